@@ -19,19 +19,36 @@ pub(crate) fn from_uri(location: &str) -> Result<PathBuf, String> {
     if scheme.is_none() {
         return Err(format!("fmuResourceLocation \"{location}\" is not a file: URI. {remedy}"));
     }
-    let rest = &location[5..];
-    let path = match rest.strip_prefix("//") {
-        None => rest,
-        Some(rest) => {
-            let (host, _) = rest.split_once('/').unwrap_or((rest, ""));
-            if !(host.is_empty() || host.eq_ignore_ascii_case("localhost")) {
-                return Err(format!("fmuResourceLocation \"{location}\" is on another host, \"{host}\". {remedy}"));
-            }
-            &rest[host.len()..]
-        }
+    let decoded = path_of(&location[5..], cfg!(windows))
+        .map_err(|problem| format!("fmuResourceLocation \"{location}\" {problem}. {remedy}"))?;
+    existing(PathBuf::from(decoded), "fmuResourceLocation", remedy)
+}
+
+/// Native path of what follows `file:`: on Windows a drive without the slash before it, and a host as
+/// `\\host\share` (RFC 8089, appendix E).
+fn path_of(rest: &str, windows: bool) -> Result<String, String> {
+    let Some(after) = rest.strip_prefix("//") else {
+        return Ok(without_slash_of_drive(&decode(rest)?, windows));
     };
-    let decoded = decode(path).map_err(|problem| format!("fmuResourceLocation \"{location}\" {problem}. {remedy}"))?;
-    existing(PathBuf::from(native(&decoded)), "fmuResourceLocation", remedy)
+    // `file://C:/fmu` and `file://C%3A%5Cfmu`, one slash short, as importers write them.
+    let whole = decode(after)?;
+    if windows && whole.as_bytes().get(1) == Some(&b':') {
+        return Ok(whole);
+    }
+    let (host, _) = after.split_once('/').unwrap_or((after, ""));
+    let path = decode(&after[host.len()..])?;
+    if host.is_empty() || host.eq_ignore_ascii_case("localhost") {
+        return Ok(without_slash_of_drive(&path, windows));
+    }
+    match windows {
+        true => Ok(format!("\\\\{host}{}", path.replace('/', "\\"))),
+        false => Err(format!("is on another host, \"{host}\"")),
+    }
+}
+
+fn without_slash_of_drive(path: &str, windows: bool) -> String {
+    let drive = windows && path.starts_with('/') && path.as_bytes().get(2) == Some(&b':');
+    path[usize::from(drive)..].to_owned()
 }
 
 /// Directory named by `resourcePath` of `fmi3InstantiateCoSimulation`: an absolute native path, with or without a
@@ -58,12 +75,6 @@ fn existing(path: PathBuf, argument: &str, remedy: &str) -> Result<PathBuf, Stri
         return Err(format!("{argument} \"{}\" is not a directory that can be read. {remedy}", path.display()));
     }
     Ok(path)
-}
-
-/// Path of a URI as the system writes it: on Windows without the slash before the drive letter.
-fn native(path: &str) -> &str {
-    let drive = cfg!(windows) && path.len() > 2 && path.as_bytes()[2] == b':';
-    if drive { path.trim_start_matches('/') } else { path }
 }
 
 /// Undo percent-encoding (RFC 3986). A percent sign without two hexadecimal digits stands for itself.
@@ -135,6 +146,24 @@ mod tests {
             let message = from_uri(uri).unwrap_err();
             assert!(message.contains(reason) && message.contains("Pass the URI"), "{uri}: {message}");
         }
+    }
+
+    #[test]
+    fn windows_has_drives_and_servers() {
+        for (rest, path) in [
+            ("///C:/fmu/resources", "C:/fmu/resources"),
+            ("/C:/fmu/resources", "C:/fmu/resources"),
+            ("//C:/fmu/resources", "C:/fmu/resources"),
+            ("//C%3A%5Cfmu%5Cresources", r"C:\fmu\resources"),
+            ("//localhost/C:/a%20b", "C:/a b"),
+            ("//server/share/a%20b/resources", r"\\server\share\a b\resources"),
+            // Four slashes: a server in the path itself, as some write it.
+            ("////server/share/resources", "//server/share/resources"),
+        ] {
+            assert_eq!(path_of(rest, true).as_deref(), Ok(path), "{rest}");
+        }
+        assert_eq!(path_of("///C:/fmu", false).as_deref(), Ok("/C:/fmu"));
+        assert!(path_of("//server/share", false).unwrap_err().contains("another host"));
     }
 
     #[test]

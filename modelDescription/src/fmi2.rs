@@ -4,13 +4,14 @@ use tiprub_core::variables::Kind;
 
 use crate::Description;
 use crate::element::Element;
-use crate::row::{Row, causality, rows, variability};
+use crate::row::{Row, causality, rows_without_time, variability};
 use crate::shared::{default_experiment, enumerations, items, log_categories, root_attributes, unit_definitions};
 use crate::text::number;
 
-/// The model description of FMI 2.0: arrays are flattened to scalars `name[i]`.
+/// The model description of FMI 2.0: arrays are flattened to scalars `name[i]`, and time is
+/// not among the variables.
 pub fn fmi2_xml(description: &Description) -> String {
-    let rows = rows(description.table, false);
+    let rows = rows_without_time(description.table);
     let root = Element::new("fmiModelDescription")
         .with("fmiVersion", "2.0")
         .with("modelName", description.model_name)
@@ -65,14 +66,16 @@ fn scalar_variable(row: &Row) -> Element {
 
 fn typed(row: &Row) -> Element {
     let variable = row.variable;
+    let [min, max] = row.bounds();
     let element = match variable.kind {
         Kind::Real => Element::new("Real")
-            .with_some("unit", variable.unit.map(|unit| unit.name))
+            .with_some("quantity", row.quantity())
+            .with_some("unit", row.unit())
             .with_some("displayUnit", row.display_unit())
-            .with_some("min", variable.min.map(number))
-            .with_some("max", variable.max.map(number))
+            .with_some("min", min)
+            .with_some("max", max)
             .with_some("nominal", variable.nominal.map(number)),
-        Kind::Integer => Element::new("Integer"),
+        Kind::Integer => Element::new("Integer").with_some("min", min).with_some("max", max),
         Kind::Boolean => Element::new("Boolean"),
         Kind::String => Element::new("String"),
         Kind::Enumeration(enumeration) => Element::new("Enumeration").with("declaredType", enumeration.name),

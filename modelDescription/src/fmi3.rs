@@ -36,6 +36,7 @@ fn co_simulation(description: &Description) -> Element {
         .with("providesDirectionalDerivatives", "false")
         .with("providesAdjointDerivatives", "false")
         .with("canHandleVariableCommunicationStepSize", "true")
+        .with_some("fixedInternalStepSize", description.fixed_internal_step.map(number))
         .with("maxOutputDerivativeOrder", "1")
         .with("providesIntermediateUpdate", "true")
         .with("mightReturnEarlyFromDoStep", "true")
@@ -57,7 +58,7 @@ fn variable(row: &Row) -> Element {
     let variable = row.variable;
     let name = match variable.kind {
         Kind::Real => "Float64",
-        Kind::Integer => "Int32",
+        Kind::Integer => "Int64",
         Kind::Boolean => "Boolean",
         Kind::String => "String",
         Kind::Enumeration(_) => "Enumeration",
@@ -71,12 +72,14 @@ fn variable(row: &Row) -> Element {
         .with_some("initial", row.initial())
         .with_some("intermediateUpdate", takes_part_in_intermediate_updates(row).then_some("true"))
         .with_some("declaredType", row.type_name());
-    if variable.kind == Kind::Real {
+    if matches!(variable.kind, Kind::Real | Kind::Integer) {
+        let [min, max] = row.bounds();
         element = element
-            .with_some("unit", variable.unit.map(|unit| unit.name))
+            .with_some("quantity", row.quantity())
+            .with_some("unit", row.unit())
             .with_some("displayUnit", row.display_unit())
-            .with_some("min", variable.min.map(number))
-            .with_some("max", variable.max.map(number))
+            .with_some("min", min)
+            .with_some("max", max)
             .with_some("nominal", variable.nominal.map(number));
     }
     let dimension = row.dimension.map(|size| Element::new("Dimension").with("start", size.to_string()));

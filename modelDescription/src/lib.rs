@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod element;
+mod extras;
 mod fmi2;
 mod fmi3;
 mod html;
@@ -15,6 +16,7 @@ mod text;
 
 use tiprub_core::{Rom, VariableTable};
 
+pub use extras::{fmi3_terminals, references_manifest};
 pub use fmi2::fmi2_xml;
 pub use fmi3::fmi3_xml;
 pub use html::html;
@@ -47,6 +49,10 @@ pub struct Description<'a> {
     pub license: &'a str,
     /// Proposal for the importer.
     pub experiment: Experiment,
+    /// Internal step (s), where it is the same for every communication step that is a multiple of it.
+    pub fixed_internal_step: Option<f64>,
+    /// Friction heat is told by the thermal patches of the ROMs, not by a grid of its own.
+    pub patches_of_roms: bool,
     /// The variables.
     pub table: &'a VariableTable,
     /// FMI 3.0: arrays as arrays, else flattened to scalars as in FMI 2.0.

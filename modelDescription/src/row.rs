@@ -5,6 +5,9 @@ use tiprub_core::variables::{Causality, Kind, Span, Start, Variability, Variable
 
 use crate::text::number;
 
+/// Unit of reals without dimension.
+pub(crate) const ONE: &str = "1";
+
 /// A variable of the description: a scalar, an element of an array, or a whole array.
 pub(crate) struct Row<'a> {
     pub name: String,
@@ -34,6 +37,17 @@ pub(crate) fn rows(table: &VariableTable, arrays: bool) -> Vec<Row<'_>> {
                 variable,
             });
         }
+    }
+    rows
+}
+
+/// The same without time, as scalars: in FMI 2.0 the independent variable is optional, and old versions of FMI
+/// Library report errors at it.
+pub(crate) fn rows_without_time(table: &VariableTable) -> Vec<Row<'_>> {
+    let mut rows = rows(table, false);
+    rows.retain(|row| row.variable.causality != Causality::Independent);
+    for (index, row) in rows.iter_mut().enumerate() {
+        row.index = index + 1;
     }
     rows
 }
@@ -74,6 +88,24 @@ impl Row<'_> {
     /// The attribute `initial`, absent for inputs and time.
     pub(crate) fn initial(&self) -> Option<&'static str> {
         self.variable.initial_is_exact().map(|exact| if exact { "exact" } else { "calculated" })
+    }
+
+    /// The name of the unit: "1" for reals without dimension (as FMI 3.0 proposes), none for other types.
+    pub(crate) fn unit(&self) -> Option<&'static str> {
+        let real = self.variable.kind == Kind::Real;
+        real.then(|| self.variable.unit.map_or(ONE, |unit| unit.name))
+    }
+
+    /// What the unit measures.
+    pub(crate) fn quantity(&self) -> Option<&'static str> {
+        self.variable.unit.map(|unit| unit.quantity)
+    }
+
+    /// Legal values as the type writes them.
+    pub(crate) fn bounds(&self) -> [Option<String>; 2] {
+        [self.variable.min, self.variable.max].map(|bound| {
+            bound.map(|bound| if self.variable.kind == Kind::Integer { format!("{bound:.0}") } else { number(bound) })
+        })
     }
 
     /// The name of the display unit, if one is better than SI.

@@ -1,9 +1,10 @@
 //! What both versions of the standard describe alike.
 
-use tiprub_core::variables::{Enumeration, Kind, Unit};
+use tiprub_core::variables::{Enumeration, Kind, Unit, Variable};
 
 use crate::Description;
 use crate::element::Element;
+use crate::row::ONE;
 use crate::text::number;
 
 /// Log categories of both versions: (name, description).
@@ -36,7 +37,10 @@ pub(crate) fn unit_definitions(description: &Description) -> Option<Element> {
             units.push(unit);
         }
     }
-    Element::new("UnitDefinitions").children(units.into_iter().map(unit_definition)).unless_empty()
+    let without = |variable: &Variable| variable.kind == Kind::Real && variable.unit.is_none();
+    let one = description.table.variables().iter().any(without);
+    let one = one.then(|| Element::new("Unit").with("name", ONE).child(Element::new("BaseUnit")));
+    Element::new("UnitDefinitions").children(units.into_iter().map(unit_definition).chain(one)).unless_empty()
 }
 
 fn unit_definition(unit: &Unit) -> Element {

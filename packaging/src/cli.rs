@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use tiprub_study::arguments::{CacheArguments, MapArguments, StabilityArguments, assignment, positive};
 
 use crate::{
+    library::PlatformChoice,
     own_arguments::{ConvergenceCommand, ErrorCommand},
     reduce_arguments::ReduceArguments,
 };
@@ -60,7 +61,8 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  tiprub package scene.toml                 both FMUs beside each other here\n  \
                             tiprub package scene.toml --fmi 3 -o rub.fmu\n  \
-                            tiprub package scene.toml --scalars       no arrays in the FMI 3 variables\n\n\
+                            tiprub package scene.toml --arrays        FMI 3 variables as arrays\n  \
+                            tiprub package scene.toml --platform x86_64-windows\n\n\
                             Same inputs, same bytes. The optional generation date is left out, unless \
                             SOURCE_DATE_EPOCH (seconds since 1970) is set."
     )]
@@ -83,15 +85,27 @@ pub enum Command {
     Study(StudyArguments),
 }
 
+/// Libraries that go into an FMU.
+#[derive(Debug, Clone, Default, Args)]
+pub struct LibraryArguments {
+    /// Library of one platform, or a directory of libraries, instead of those found beside tiprub (or built, when it runs
+    /// from its sources); may be repeated. What a file is made for is read from its content.
+    #[arg(long, value_name = "FILE|DIR")]
+    pub library: Vec<PathBuf>,
+    /// Leave out all platforms but this; may be repeated. Without it the FMU holds every library there is.
+    #[arg(long, value_enum, value_name = "PLATFORM")]
+    pub platform: Vec<PlatformChoice>,
+}
+
 /// Arguments of `tiprub demo`.
 #[derive(Debug, Args)]
 pub struct DemoArguments {
     /// Directory for everything the demo writes; made if missing.
     #[arg(long, value_name = "DIR", default_value = "demo")]
     pub out: PathBuf,
-    /// FMU library to package, instead of the one found or built.
-    #[arg(long, value_name = "FILE")]
-    pub library: Option<PathBuf>,
+    /// Libraries that go into the FMU.
+    #[command(flatten)]
+    pub libraries: LibraryArguments,
     /// Revolutions of the rotor to simulate (the scene's own stop time when absent).
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     pub revolutions: Option<f64>,
@@ -109,12 +123,15 @@ pub struct PackageArguments {
     /// The .fmu file, or a directory for it (always a directory with `--fmi both`).
     #[arg(long, short, value_name = "FILE|DIR", default_value = ".")]
     pub output: PathBuf,
-    /// Write FMI 3 variables as scalars, for importers that read no arrays.
+    /// FMI 3: keep arrays whole. Without this and --scalars an FMU has arrays where it would have more than 300 scalars.
+    #[arg(long, conflicts_with = "scalars")]
+    pub arrays: bool,
+    /// FMI 3: scalars instead of arrays however many there are, with the names of FMI 2.
     #[arg(long)]
     pub scalars: bool,
-    /// FMU library to package, instead of the one found beside tiprub.
-    #[arg(long, value_name = "FILE")]
-    pub library: Option<PathBuf>,
+    /// Libraries that go into the FMU.
+    #[command(flatten)]
+    pub libraries: LibraryArguments,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
@@ -135,7 +152,7 @@ pub struct RunArguments {
     /// Communication step H (s), instead of the scene's.
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Start value of an input or parameter; may be repeated.
+    /// Start value of an input or parameter; of an array one for all elements, or each its own: `NAME=[1,2,3]`. May be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
     /// Also estimate what steps, modes and patches along the chord leave, and rows of three across the thickness, from coarser runs of the same

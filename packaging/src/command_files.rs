@@ -11,6 +11,7 @@ use tiprub_shell::{
 use crate::{
     cli::{Command, StudyCommand},
     commands::demo,
+    library,
     shared_arguments::Written,
 };
 
@@ -30,7 +31,9 @@ pub fn check(command: &Command) -> Result<()> {
         Command::Reduce(arguments) => outputs(&arguments.model.files(), &written(arguments.model.written())),
         Command::Demo(arguments) => {
             let files: Vec<Named> = demo::FILES.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
-            apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &files)?;
+            let libraries = library::given(&arguments.libraries)?;
+            let libraries = libraries.iter().map(|path| Named::new("--library", path));
+            apart(&libraries.collect::<Vec<_>>(), &files)?;
             output_file::try_directory(&arguments.out)
         }
         Command::Study(arguments) => match &arguments.study {

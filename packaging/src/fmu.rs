@@ -1,19 +1,42 @@
-//! What goes into an .fmu, for both FMI versions: nothing is compiled, everything is data around one library.
+//! What goes into an .fmu, for both FMI versions: nothing is compiled, everything is data around the libraries.
 
 use std::{env, path::Path};
 
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{Rom, Scene, Simulation, settings::Scheme, variables::Quantity};
 use tiprub_fmi_host::archive::{self, Entry};
-use tiprub_model_description::{Description, Experiment, fmi2_xml, fmi3_xml, html};
+use tiprub_model_description::{
+    Description, Experiment, fmi2_xml, fmi3_terminals, fmi3_xml, html, references_manifest,
+};
 use tiprub_shell::{Failure, Result, native, schedule::Schedule};
 
-use crate::scene_features;
+use crate::{library::Library, scene_features};
 
 /// File name of the library inside the FMU, without extension, and `modelIdentifier` of both versions.
 pub const MODEL_IDENTIFIER: &str = "tiprub";
 
 /// Communication steps of the reference result that is packed with the documentation.
 const REFERENCE_STEPS: usize = 100;
+
+/// Most variables of an FMI 3.0 unit that are scalars by default. Several importers read no arrays, or take their first
+/// element for the whole; no person reads a list of more.
+pub const MOST_SCALARS: usize = 300;
+
+/// What FMI-LS-REF says of the files of an FMU: path, MIME type, role, description.
+const RELATED: [(&str, &str, &str, &str); 3] = [
+    (
+        "documentation/tiprub_ref.csv",
+        "text/csv",
+        "result",
+        "All outputs of the default experiment, of its first 100 communication steps if there are more",
+    ),
+    (
+        "documentation/index.html",
+        "text/html",
+        "document",
+        "The model, its variables, its limits and its reduced-order models",
+    ),
+    ("resources/scene.toml", "application/toml", "model", "The scene this FMU was made from"),
+];
 
 const ICON: &[u8] = include_bytes!("../assets/icon.png");
 const THIRD_PARTY: &str = include_str!("../assets/third-party.txt");
@@ -50,7 +73,7 @@ pub struct Package<'a> {
     /// ROMs as the FMU holds them.
     roms: Vec<Rom>,
     simulation: Simulation,
-    library: &'a [u8],
+    libraries: &'a [Library],
     reference_csv: String,
     warnings: Vec<String>,
     generated: String,
@@ -61,7 +84,7 @@ impl<'a> Package<'a> {
     ///
     /// # Errors
     /// The scene is refused, or SOURCE_DATE_EPOCH is set to nonsense.
-    pub fn new(scene: &'a Scene, library: &'a [u8]) -> Result<Self> {
+    pub fn new(scene: &'a Scene, libraries: &'a [Library]) -> Result<Self> {
         let in_scene = |error| Failure::from_core(format!("scene `{}`", scene.settings.name), error);
         let mut schedule = Schedule::new(&scene.settings.experiment, None, None)?;
         let mut simulation = Simulation::new(scene).map_err(in_scene)?;
@@ -77,7 +100,7 @@ impl<'a> Package<'a> {
             scene,
             roms: tiprub_format::packed_roms(scene),
             simulation,
-            library,
+            libraries,
             reference_csv,
             warnings,
             generated,
@@ -89,38 +112,56 @@ impl<'a> Package<'a> {
         &self.warnings
     }
 
-    /// Write the .fmu, whole or not at all. `arrays` is for FMI 3.0 only; FMI 2.0 has scalars.
+    /// Write the .fmu, whole or not at all. `arrays` is for FMI 3.0 only: whether they stay whole, by default where there would
+    /// be more than [`MOST_SCALARS`] variables. FMI 2.0 has scalars.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&self, target: &Path, version: FmiVersion, arrays: bool) -> Result<()> {
-        archive::write(target, &self.entries(version, arrays))
+    pub fn write(&self, target: &Path, version: FmiVersion, arrays: Option<bool>) -> Result<()> {
+        let many = self.simulation.table().references() > MOST_SCALARS;
+        archive::write(target, &self.entries(version, arrays.unwrap_or(many)))
     }
 
     /// Files of the .fmu in their order.
-    pub fn entries(&self, version: FmiVersion, arrays: bool) -> Vec<Entry> {
+    fn entries(&self, version: FmiVersion, arrays: bool) -> Vec<Entry> {
         let resources = tiprub_format::resource_files(self.scene, arrays);
         let token = tiprub_format::instantiation_token(&resources);
         let description = self.description(&token, arrays);
-        let (xml, platform, icon) = match version {
-            FmiVersion::Two => (fmi2_xml(&description), "linux64", "model.png"),
-            FmiVersion::Three => (fmi3_xml(&description), "x86_64-linux", "terminalsAndIcons/icon.png"),
+        let (xml, number, icon) = match version {
+            FmiVersion::Two => (fmi2_xml(&description), "2.0", "model.png"),
+            FmiVersion::Three => (fmi3_xml(&description), "3.0", "terminalsAndIcons/icon.png"),
         };
-        let mut entries = vec![
-            Entry::new("modelDescription.xml", xml),
-            Entry::new(icon, ICON),
-            Entry::new(format!("binaries/{platform}/{MODEL_IDENTIFIER}.so"), self.library),
-        ];
+        let mut entries = vec![Entry::new("modelDescription.xml", xml), Entry::new(icon, ICON)];
+        entries.extend(
+            self.libraries
+                .iter()
+                .map(|library| Entry::new(library.platform.place(number, MODEL_IDENTIFIER), library.bytes.as_slice())),
+        );
+        if let Some(terminals) = fmi3_terminals(&description).filter(|_| version == FmiVersion::Three) {
+            entries.push(Entry::new("terminalsAndIcons/terminalsAndIcons.xml", terminals));
+        }
         entries.extend(resources.into_iter().map(|(name, bytes)| Entry::new(format!("resources/{name}"), bytes)));
         entries.extend([
             Entry::new("documentation/index.html", html(&description)),
             Entry::new(format!("documentation/{MODEL_IDENTIFIER}_ref.csv"), self.reference_csv.as_str()),
+            Entry::new("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml", references_manifest(&RELATED)),
             Entry::new("documentation/licenses/license.txt", LICENSE),
             Entry::new("documentation/licenses/LICENSE-MIT.txt", LICENSE_MIT),
             Entry::new("documentation/licenses/LICENSE-APACHE.txt", LICENSE_APACHE),
             Entry::new("documentation/licenses/third-party.txt", THIRD_PARTY),
         ]);
         entries
+    }
+
+    /// The internal step (s) where every communication step that is a multiple of it is divided by it: the largest step
+    /// allowed, if the default communication step is a multiple of that. Steps of a tolerance are of any length.
+    fn fixed_internal_step(&self) -> Option<f64> {
+        let variable = self.simulation.table().with_quantity(Quantity::StepMax)?;
+        let most = self.simulation.real(variable.reference).ok()?;
+        let whole = self.scene.settings.experiment.communication_step / most;
+        let varies = self.scene.settings.time.scheme == Scheme::Galerkin;
+        let fixed = !varies && whole.round() >= 1.0 && (whole - whole.round()).abs() <= 1e-9 * whole;
+        fixed.then_some(most)
     }
 
     fn description<'b>(&'b self, token: &'b str, arrays: bool) -> Description<'b> {
@@ -142,6 +183,8 @@ impl<'a> Package<'a> {
                 stop: settings.experiment.stop,
                 step: settings.experiment.communication_step,
             },
+            fixed_internal_step: self.fixed_internal_step(),
+            patches_of_roms: settings.surfaces.iter().all(|surface| surface.patches.is_none()),
             table: self.simulation.table(),
             fmi3_arrays: arrays,
             structures: structures.zip(&self.roms).collect(),

@@ -1,11 +1,12 @@
-//! Where the shared library that goes into every FMU comes from.
+//! Where the shared libraries that go into every FMU come from.
 //!
-//! In this order: the file given with `--library`; for a tiprub that runs from a cargo target directory of the
-//! workspace, a fresh build of the fmi crate alone (profile `fmu`, so that no other crate's features leak in); else a
-//! library beside the executable, where an installation puts it.
+//! In this order: the files and directories given with `--library`; for a tiprub that runs from a cargo target directory
+//! of the workspace, a fresh build of the fmi crate alone (profile `fmu`, so that no other crate's features leak in);
+//! else the libraries beside the executable, where an installation puts them, one for each platform. What a file is made
+//! for is read from its content.
 
 use std::{
-    collections::VecDeque,
+    collections::{BTreeMap, VecDeque},
     env,
     io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
@@ -13,55 +14,166 @@ use std::{
     thread,
 };
 
+use tiprub_fmi_host::Platform;
 use tiprub_shell::{Failure, Result, console::Console};
 
-/// The workspace this program was compiled from; it need not exist where it runs.
-const WORKSPACE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+use crate::cli::LibraryArguments;
 
-/// Names under which an installation may hold the library, relative to the directory of the executable.
-const INSTALLED: [&str; 3] = ["tiprub.so", "libtiprub_fmi.so", "../lib/tiprub/tiprub.so"];
+/// The workspace this program was compiled from; it need not exist where it runs. A program that is built to be handed on
+/// (`wheels.sh`) knows none, so that its bytes do not tell where it was built.
+const WORKSPACE: Option<&str> = match option_env!("TIPRUB_HANDED_ON") {
+    Some(_) => None,
+    None => Some(concat!(env!("CARGO_MANIFEST_DIR"), "/..")),
+};
+
+/// Directories in which an installation may hold the libraries, relative to that of the executable. Each is called as
+/// its platform. The last is where `pip install --user` puts them on Windows, seen from `Python311/Scripts` and its like.
+#[cfg(not(windows))]
+const INSTALLED: [&str; 2] = [".", "../lib/tiprub"];
+#[cfg(windows)]
+const INSTALLED: [&str; 3] = [".", "../lib/tiprub", "../../lib/tiprub"];
 
 /// Largest library (bytes).
 const LARGEST: u64 = 1 << 30;
 
+/// Extensions of libraries; a directory may hold other files too.
+const EXTENSIONS: [&str; 3] = ["so", "dll", "dylib"];
+
 /// Lines of cargo's stderr kept for the error message.
 const LINES_KEPT: usize = 30;
 
-/// The library for the FMU, as bytes.
+/// The FMU's code for one platform.
+#[derive(Debug, Clone)]
+pub struct Library {
+    /// What it runs on.
+    pub platform: Platform,
+    /// The file.
+    pub bytes: Vec<u8>,
+}
+
+/// The libraries for an FMU, one for each platform, in the order of [`Platform::ALL`].
 ///
 /// # Errors
-/// No library found, the build failed, or the file is not a shared library for Linux on x86-64.
-pub fn load(explicit: Option<&Path>, console: &Console) -> Result<Vec<u8>> {
-    let path = find(explicit, console)?;
-    let bytes =
-        tiprub_format::read_file(&path, LARGEST).map_err(|error| Failure::file(&path, "cannot be read", &error))?;
-    check_format(&path, &bytes)?;
-    Ok(bytes)
+/// No library found, the build failed, a file that is no shared library for a known platform, two for one platform, or
+/// none for a platform asked for.
+pub fn load(arguments: &LibraryArguments, console: &Console) -> Result<Vec<Library>> {
+    let mut found: BTreeMap<Platform, (PathBuf, Vec<u8>)> = BTreeMap::new();
+    for path in find(arguments, console)? {
+        let bytes =
+            tiprub_format::read_file(&path, LARGEST).map_err(|error| Failure::file(&path, "cannot be read", &error))?;
+        let platform = recognised(&path, &bytes)?;
+        if let Some((other, _)) = found.get(&platform) {
+            return Err(Failure::new(
+                path.display(),
+                format!("a second library for {}, after {}", platform.tuple(), other.display()),
+                "Give one for each platform",
+            ));
+        }
+        found.insert(platform, (path, bytes));
+    }
+    wanted(&arguments.platform, found.keys().copied().collect())?;
+    Ok(found
+        .into_iter()
+        .filter(|(platform, _)| {
+            arguments.platform.is_empty() || arguments.platform.iter().any(|choice| choice.0 == *platform)
+        })
+        .map(|(platform, (_, bytes))| Library { platform, bytes })
+        .collect())
 }
 
-fn find(explicit: Option<&Path>, console: &Console) -> Result<PathBuf> {
-    if let Some(path) = explicit {
-        return Ok(path.to_path_buf());
+/// Each platform asked for is there.
+fn wanted(asked: &[PlatformChoice], found: Vec<Platform>) -> Result<()> {
+    let Some(missing) = asked.iter().find(|choice| !found.contains(&choice.0)) else { return Ok(()) };
+    let names: Vec<&str> = found.into_iter().map(Platform::tuple).collect();
+    Err(Failure::new(
+        format!("--platform {}", missing.0.tuple()),
+        format!("no library for it, only for {}", names.join(", ")),
+        "Install tiprub with the libraries of all platforms, or make them with packaging/libraries.sh and give \
+         --library DIR",
+    ))
+}
+
+/// A platform as the command line takes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PlatformChoice(pub Platform);
+
+impl clap::ValueEnum for PlatformChoice {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [PlatformChoice; Platform::ALL.len()] = {
+            let mut all = [PlatformChoice(Platform::X86_64Linux); Platform::ALL.len()];
+            let mut index = 0;
+            while index < all.len() {
+                all[index] = PlatformChoice(Platform::ALL[index]);
+                index += 1;
+            }
+            all
+        };
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
+        Some(clap::builder::PossibleValue::new(self.0.tuple()))
+    }
+}
+
+/// The files that `--library` names, those of directories among them.
+///
+/// # Errors
+/// A directory that cannot be read, or is empty.
+pub fn given(arguments: &LibraryArguments) -> Result<Vec<PathBuf>> {
+    Ok(arguments.library.iter().map(|path| files(path)).collect::<Result<Vec<_>>>()?.concat())
+}
+
+fn find(arguments: &LibraryArguments, console: &Console) -> Result<Vec<PathBuf>> {
+    if !arguments.library.is_empty() {
+        return given(arguments);
     }
     let executable = env::current_exe().unwrap_or_default();
-    let workspace = Path::new(WORKSPACE);
-    if let Some(target) = cargo_target(&executable)
+    if let Some(workspace) = WORKSPACE.map(Path::new)
+        && let Some(target) = cargo_target(&executable)
         && workspace.join("fmi/Cargo.toml").is_file()
     {
-        return build(workspace, target, console);
+        return Ok(vec![build(workspace, target, console)?]);
     }
-    installed(&executable).ok_or_else(|| {
-        Failure::new(
+    let installed = installed(&executable);
+    if installed.is_empty() {
+        return Err(Failure::new(
             "FMU library",
-            format!("none of {} is beside {}", INSTALLED.join(", "), executable.display()),
+            format!("none beside {} or in ../lib/tiprub from there", executable.display()),
             "Give it with --library FILE, or run tiprub from its source workspace with `cargo run --release`",
-        )
-    })
+        ));
+    }
+    Ok(installed)
 }
 
-fn installed(executable: &Path) -> Option<PathBuf> {
-    let directory = executable.parent()?;
-    INSTALLED.iter().map(|name| directory.join(name)).find(|path| path.is_file())
+/// A file, or the libraries of a directory by their extensions.
+fn files(path: &Path) -> Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_path_buf()]);
+    }
+    let unreadable = |error: std::io::Error| Failure::file(path, "cannot be read", &error);
+    let entries = path.read_dir().map_err(unreadable)?.collect::<std::io::Result<Vec<_>>>().map_err(unreadable)?;
+    let library = |path: &PathBuf| path.is_file() && is_library(path);
+    let mut files: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).filter(library).collect();
+    files.sort();
+    if files.is_empty() {
+        let problem = format!("holds no library (.{})", EXTENSIONS.join(", ."));
+        return Err(Failure::new(path.display(), problem, "Make them with packaging/libraries.sh"));
+    }
+    Ok(files)
+}
+
+/// By its name.
+fn is_library(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known)))
+}
+
+fn installed(executable: &Path) -> Vec<PathBuf> {
+    let directory = executable.parent().unwrap_or(Path::new("."));
+    let place = |platform: Platform| {
+        INSTALLED.iter().map(|part| directory.join(part).join(platform.file_name())).find(|path| path.is_file())
+    };
+    Platform::ALL.into_iter().filter_map(place).collect()
 }
 
 /// The cargo target directory that `executable` lies in, recognised by the file cargo keeps there.
@@ -106,9 +218,8 @@ fn build(workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> 
         let lines = Vec::from(last_lines).join("\n");
         return Err(failed(format!("cargo ended with {status}:\n{lines}\n"), "Correct what it names, then try again"));
     }
-    artifact(&messages.join().unwrap_or_default()).ok_or_else(|| {
-        failed("cargo reported no shared library".into(), "Is this Linux? Otherwise give --library FILE")
-    })
+    artifact(&messages.join().unwrap_or_default())
+        .ok_or_else(|| failed("cargo reported no shared library".into(), "Give --library FILE"))
 }
 
 /// Cargo options that keep the places of cargo's home, its registry and the workspace, and with them the builder's name
@@ -148,20 +259,31 @@ fn artifact(messages: &str) -> Option<PathBuf> {
         .filter(|message| message["reason"] == "compiler-artifact" && message["target"]["name"] == "tiprub_fmi")
         .flat_map(|message| message["filenames"].as_array().cloned().unwrap_or_default())
         .filter_map(|name| name.as_str().map(PathBuf::from))
-        .find(|path| path.extension().is_some_and(|extension| extension == "so"))
+        .find(|path| is_library(path))
 }
 
-/// 64-bit little-endian ELF, shared object, x86-64: what `binaries/linux64` and `binaries/x86_64-linux` promise.
-fn check_format(path: &Path, bytes: &[u8]) -> Result<()> {
-    let elf = bytes.len() > 64 && bytes[..6] == *b"\x7fELF\x02\x01";
-    if elf && bytes[16..18] == [3, 0] && bytes[18..20] == [62, 0] {
-        return Ok(());
+/// The platform of a library whose names are those of both versions of FMI. A file that is called as a platform must be
+/// for it.
+fn recognised(path: &Path, bytes: &[u8]) -> Result<Platform> {
+    let refused = |problem: &str| {
+        Failure::new(path.display(), problem, "Give a library built from the fmi crate with --library FILE")
+    };
+    let platform = Platform::of_library(bytes)
+        .ok_or_else(|| refused("not a whole 64-bit shared library for Linux, Windows or macOS"))?;
+    let called =
+        Platform::ALL.into_iter().find(|named| path.file_name().is_some_and(|name| name == &*named.file_name()));
+    if called.is_some_and(|called| called != platform) {
+        return Err(Failure::new(
+            path.display(),
+            format!("a library for {}, whatever its name says", platform.tuple()),
+            "Put the right library there, or call this one as what it is",
+        ));
     }
-    Err(Failure::new(
-        path.display(),
-        "not a shared library for Linux on x86-64",
-        "Give the library built from the fmi crate with --library FILE",
-    ))
+    let named = |name: &[u8]| bytes.windows(name.len()).any(|part| part == name);
+    if !(named(b"fmi2DoStep") && named(b"fmi3DoStep")) {
+        return Err(refused("a library, but of no FMU: it has no function fmi2DoStep or none fmi3DoStep"));
+    }
+    Ok(platform)
 }
 
 #[cfg(test)]
@@ -180,14 +302,115 @@ mod tests {
         assert_eq!(artifact(""), None);
     }
 
+    /// What a library of an FMU has somewhere.
+    const FUNCTIONS: &[u8] = b"fmi2DoStep\0fmi3DoStep\0";
+
+    /// Headers of an empty shared library for Linux (ELF, machine 62 is x86-64 and 183 AArch64).
+    fn elf(machine: u8) -> Vec<u8> {
+        let mut bytes = vec![0_u8; 64];
+        bytes.extend(FUNCTIONS);
+        bytes[..20].copy_from_slice(b"\x7fELF\x02\x01\x01\0\0\0\0\0\0\0\0\0\x03\0\0\0");
+        bytes[18] = machine;
+        bytes
+    }
+
+    /// Headers of an empty library for macOS (Mach-O, file type 6; the last byte of the type of processor is 7 or 12).
+    fn mach_o(processor: u8) -> Vec<u8> {
+        let mut bytes = vec![0_u8; 32];
+        bytes.extend(FUNCTIONS);
+        bytes[..8].copy_from_slice(&[0xcf, 0xfa, 0xed, 0xfe, processor, 0, 0, 1]);
+        bytes[12] = 6;
+        bytes
+    }
+
+    /// Headers of an empty library for Windows: DOS header, COFF header (x86-64, a DLL), optional header of PE32+, one empty section.
+    fn pe() -> Vec<u8> {
+        let mut bytes = vec![0_u8; 64 + 24 + 112 + 16 * 8 + 40];
+        bytes[..2].copy_from_slice(b"MZ");
+        bytes[60] = 64;
+        bytes[64..71].copy_from_slice(b"PE\0\0\x64\x86\x01");
+        bytes[84..88].copy_from_slice(&[240, 0, 0x22, 0x20]);
+        bytes[88..90].copy_from_slice(&[0x0b, 0x02]);
+        bytes[88 + 108] = 16;
+        bytes.extend(FUNCTIONS);
+        bytes
+    }
+
+    fn arguments(library: &[PathBuf], platform: &[Platform]) -> LibraryArguments {
+        let platform = platform.iter().copied().map(PlatformChoice).collect();
+        LibraryArguments { library: library.to_vec(), platform }
+    }
+
+    #[test]
+    fn libraries_of_a_directory_are_told_apart_by_content_and_chosen_by_platform() {
+        let root = tempfile::tempdir().unwrap();
+        let console = Console::new(true, false);
+        let names = ["c.so", "e.DLL", "a.so", "d.dylib", "b.dylib"];
+        for (name, bytes) in names.iter().zip([elf(62), pe(), elf(183), mach_o(7), mach_o(12)]) {
+            std::fs::write(root.path().join(name), bytes).unwrap();
+        }
+        std::fs::write(root.path().join("README.md"), "Libraries of all platforms.").unwrap();
+        let directory = [root.path().to_path_buf()];
+        let platforms = |libraries: Vec<Library>| Vec::from_iter(libraries.iter().map(|library| library.platform));
+        assert_eq!(platforms(load(&arguments(&directory, &[]), &console).unwrap()), Platform::ALL);
+        let two = [Platform::Aarch64Darwin, Platform::X86_64Windows];
+        let chosen = platforms(load(&arguments(&directory, &two), &console).unwrap());
+        assert_eq!(chosen, [Platform::X86_64Windows, Platform::Aarch64Darwin]);
+        let one = [root.path().join("e.DLL")];
+        let missing = load(&arguments(&one, &two), &console).unwrap_err();
+        assert!(missing.what.contains("aarch64-darwin") && missing.problem.contains("x86_64-windows"), "{missing}");
+        let twice = load(&arguments(&[one[0].clone(), one[0].clone()], &[]), &console).unwrap_err();
+        assert!(twice.problem.contains("a second library for x86_64-windows"), "{twice}");
+    }
+
+    #[test]
+    fn installed_libraries_are_beside_the_program_or_in_its_prefix() {
+        let root = tempfile::tempdir().unwrap();
+        let program = root.path().join("bin/tiprub");
+        for name in ["bin/x86_64-windows.dll", "lib/tiprub/x86_64-linux.so", "lib/tiprub/other.so"] {
+            let path = root.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        let found = installed(&program);
+        let names: Vec<_> = found.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(names, ["x86_64-linux.so", "x86_64-windows.dll"]);
+    }
+
     #[test]
     fn a_file_that_is_no_library_is_refused_by_name() {
         let root = tempfile::tempdir().unwrap();
-        let path = root.path().join("tiprub.so");
-        std::fs::write(&path, "hello").unwrap();
         let console = Console::new(true, false);
-        assert!(load(Some(&path), &console).unwrap_err().problem.contains("not a shared library"));
-        let missing = load(Some(&root.path().join("none.so")), &console).unwrap_err();
+        let refused = |path: PathBuf| load(&arguments(&[path], &[]), &console).unwrap_err();
+        std::fs::write(root.path().join("README.md"), "None yet.").unwrap();
+        assert!(refused(root.path().to_path_buf()).problem.contains("holds no library"));
+        let mut program = elf(62);
+        program[16] = 2;
+        let (mut big_endian, mut other) = (elf(62), elf(243));
+        big_endian[5] = 2;
+        other[16] = 3;
+        for bytes in [b"hello".to_vec(), vec![], program, big_endian, other, pe()[..80].to_vec(), mach_o(9)] {
+            let path = root.path().join("tiprub.so");
+            std::fs::write(&path, bytes).unwrap();
+            assert!(refused(path).problem.contains("64-bit shared library"));
+        }
+        let path = root.path().join("other.so");
+        std::fs::write(&path, &elf(62)[..64]).unwrap();
+        assert!(refused(path).problem.contains("of no FMU"));
+        let mut cut = pe();
+        // The one section begins behind the end.
+        cut[88 + 240 + 8..][..4].copy_from_slice(&[0, 2, 0, 0]);
+        cut[88 + 240 + 16..][..8].copy_from_slice(&[0, 2, 0, 0, 0, 2, 0, 0]);
+        let path = root.path().join("cut.dll");
+        std::fs::write(&path, cut).unwrap();
+        assert!(refused(path).problem.contains("not a whole"));
+        let path = root.path().join("x86_64-linux.so");
+        std::fs::write(&path, elf(183)).unwrap();
+        let other = refused(path.clone());
+        assert!(other.what.ends_with("x86_64-linux.so") && other.problem.contains("aarch64-linux"), "{other}");
+        std::fs::write(&path, elf(62)).unwrap();
+        assert!(load(&arguments(&[path], &[]), &console).is_ok());
+        let missing = refused(root.path().join("none.so"));
         assert!(missing.what.ends_with("none.so") && missing.problem.contains("cannot be read"), "{missing}");
     }
 
@@ -204,14 +427,11 @@ mod tests {
     }
 
     #[test]
-    fn an_installed_library_is_found_beside_the_program() {
+    fn a_program_in_a_target_directory_of_cargo_is_recognised() {
         let root = tempfile::tempdir().unwrap();
-        let executable = root.path().join("tiprub");
-        assert_eq!(installed(&executable), None);
-        std::fs::write(root.path().join("libtiprub_fmi.so"), "").unwrap();
-        assert_eq!(installed(&executable), Some(root.path().join("libtiprub_fmi.so")));
+        let executable = root.path().join("release/tiprub");
         assert_eq!(cargo_target(&executable), None);
         std::fs::write(root.path().join(".rustc_info.json"), "").unwrap();
-        assert_eq!(cargo_target(&root.path().join("release/tiprub")), Some(root.path()));
+        assert_eq!(cargo_target(&executable), Some(root.path()));
     }
 }

@@ -56,7 +56,7 @@ def fmus(tiprub, scene, work):
     library = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.environ else []
     files = SimpleNamespace(two=work / "two.fmu", three=work / "three.fmu", scalars=work / "scalars.fmu")
     tiprub("package", scene, "--fmi", "2", "-o", files.two, *library)
-    tiprub("package", scene, "--fmi", "3", "-o", files.three, *library)
+    tiprub("package", scene, "--fmi", "3", "--arrays", "-o", files.three, *library)
     tiprub("package", scene, "--fmi", "3", "--scalars", "-o", files.scalars, *library)
     return files
 
@@ -71,7 +71,7 @@ def whirling(tiprub, scene, work):
     path.write_text(text)
     files = SimpleNamespace(two=work / "whirling2.fmu", three=work / "whirling3.fmu")
     tiprub("package", path, "--fmi", "2", "-o", files.two, *library)
-    tiprub("package", path, "--fmi", "3", "-o", files.three, *library)
+    tiprub("package", path, "--fmi", "3", "--arrays", "-o", files.three, *library)
     return files
 
 
@@ -86,7 +86,7 @@ def marched(tiprub, scene, work):
     found = SimpleNamespace()
     for name, version in [("two", "2"), ("three", "3")]:
         file = work / f"marched{version}.fmu"
-        tiprub("package", path, "--fmi", version, "-o", file, *library)
+        tiprub("package", path, "--fmi", version, "--arrays", "-o", file, *library)
         directory = extract(str(file), unzipdir=str(work / file.stem))
         setattr(found, name, SimpleNamespace(directory=directory, description=read_model_description(str(file))))
     return found

@@ -123,6 +123,10 @@ class Two(Importer):
             found.update(zip(members, getters[kind](list(members.values()))))
         return [float(found[name]) for name in names]
 
+    def reached(self):
+        """The time that steps have reached: fmi2LastSuccessfulTime."""
+        return self.fmu.getRealStatus(2)
+
     def derivative(self, name, value):
         self.fmu.setRealInputDerivatives([self.variables[name][1]], [1], [value])
 
@@ -160,14 +164,13 @@ class Three(Importer):
     def set(self, **values):
         for name, value in values.items():
             kind, reference, _ = self.variables[name]
-            setters = {"Float64": self.fmu.setFloat64, "Int32": self.fmu.setInt32, "Enumeration": self.fmu.setInt64}
+            setters = {"Float64": self.fmu.setFloat64, "Int64": self.fmu.setInt64, "Enumeration": self.fmu.setInt64}
             setters[kind]([reference], [value])
 
     def read(self, names):
         """One call per variable that is needed."""
         getters = {
             "Float64": self.fmu.getFloat64,
-            "Int32": self.fmu.getInt32,
             "Int64": self.fmu.getInt64,
             "Enumeration": self.fmu.getInt64,
             "Boolean": self.fmu.getBoolean,

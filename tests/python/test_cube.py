@@ -40,7 +40,7 @@ def flight(tiprub, tmp_path_factory):
     fmus, runs = {}, {}
     for kind, importer in KINDS.items():
         path = work / f"{kind}.fmu"
-        tiprub("package", SCENE, "--fmi", "2" if kind == "two" else "3", "-o", path, *library)
+        tiprub("package", SCENE, "--fmi", "2" if kind == "two" else "3", "--arrays", "-o", path, *library)
         directory = extract(str(path), unzipdir=str(work / kind))
         fmus[kind] = SimpleNamespace(path=path, directory=directory, description=read_model_description(str(path)))
         instance = importer(fmus[kind])

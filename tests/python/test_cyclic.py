@@ -46,7 +46,7 @@ def stage(tiprub, tmp_path_factory):
     fmus = {}
     for kind, version in (("two", "2"), ("three", "3")):
         file = directory / f"{kind}.fmu"
-        tiprub("package", scene, "--fmi", version, "-o", file, *LIBRARY)
+        tiprub("package", scene, "--fmi", version, "--arrays", "-o", file, *LIBRARY)
         unpacked = extract(str(file), unzipdir=str(directory / kind))
         fmus[kind] = SimpleNamespace(path=file, directory=unpacked, description=read_model_description(str(file)))
     tiprub("run", scene, "--csv", directory / "native.csv")

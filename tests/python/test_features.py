@@ -46,7 +46,7 @@ def product(request, tiprub, scene, work):
     fmus = {}
     for kind in KINDS:
         file = work / f"{name}_{kind}.fmu"
-        options = ["--fmi", "2" if kind == "two" else "3"] + (["--scalars"] if kind == "scalars" else [])
+        options = ["--fmi", "2" if kind == "two" else "3"] + ["--scalars" if kind == "scalars" else "--arrays"]
         tiprub("package", path, *options, "-o", file, *library)
         directory = extract(str(file), unzipdir=str(work / file.stem))
         fmus[kind] = SimpleNamespace(path=file, directory=directory, description=read_model_description(str(file)))

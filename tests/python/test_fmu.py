@@ -14,6 +14,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
+from lxml import etree
 
 H = 1.17e-5
 
@@ -38,6 +39,22 @@ def points(count, size=H, start=0.0):
 @pytest.mark.parametrize("kind", ["two", "three", "scalars"])
 def test_fmpy_finds_no_problem(fmus, kind):
     assert validate_fmu(str(getattr(fmus, kind))) == []
+
+
+def test_terminals_and_related_files_are_as_their_schemas_want(unpacked):
+    schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
+    for fmu in (unpacked.three, unpacked.scalars):
+        root = Path(fmu.directory)
+        terminals = etree.parse(root / "terminalsAndIcons" / "terminalsAndIcons.xml")
+        etree.XMLSchema(etree.parse(schema)).assertValid(terminals)
+        members = {member.get("variableName") for member in terminals.iter("TerminalMemberVariable")}
+        assert members <= {variable.name for variable in fmu.description.modelVariables} and "torque" in members
+    for fmu in (unpacked.two, unpacked.three):
+        extra = Path(fmu.directory) / "extra" / "org.fmi-standard.fmi-ls-ref"
+        related = list(etree.parse(extra / "fmi-ls-manifest.xml").iter("Related"))
+        assert [file.get("role") for file in related] == ["result", "document", "model"]
+        assert all((extra / file.get("source")).is_file() for file in related)
+    assert not (Path(unpacked.two.directory) / "terminalsAndIcons").exists()
 
 
 def test_both_fmus_agree_with_the_native_run_bit_for_bit(native, two, three, unpacked):
@@ -184,7 +201,7 @@ def test_a_sixtieth_computed_three_ways(two):
         instance = two()
         instance.initialise()
         instance.step(0.0, size)
-        assert instance.get("time") == size
+        assert instance.reached() == size
         ends.append(instance.get("rotor_angle", "internal_steps"))
         instance.free()
     assert ends[0][1] == ends[1][1] == ends[2][1] == 16667

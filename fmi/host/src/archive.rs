@@ -63,7 +63,7 @@ pub(crate) fn write_into(target: impl Write + Seek, entries: &[Entry]) -> Result
 fn options(entry: &Entry) -> SimpleFileOptions {
     // Deflating a picture or an empty file only makes it longer.
     let stored = entry.bytes.is_empty() || entry.name.ends_with(".png");
-    let shared_library = entry.name.ends_with(".so");
+    let shared_library = entry.name.starts_with("binaries/");
     SimpleFileOptions::default()
         .compression_method(if stored { CompressionMethod::Stored } else { CompressionMethod::Deflated })
         .compression_level(if stored { None } else { Some(9) })

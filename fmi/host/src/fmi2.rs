@@ -25,10 +25,10 @@ extern "C" fn release(block: *mut c_void) {
 
 /// The logger, as seen by a caller that passes the format "%s" and one string.
 ///
-/// Rust cannot define variadic functions. On the two Linux ABIs for which FMUs are made here (System V x86-64 and
-/// AAPCS64) the first six pointer-sized arguments are passed in the same registers whether or not the callee is
-/// variadic, so a plain function can stand in. Any other format is shown as it is.
-#[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+/// Rust cannot define variadic functions. In the calling conventions of System V x86-64, of AAPCS64 and of Windows the
+/// six pointer-sized arguments are passed in the same places whether or not the callee is variadic, so a plain function
+/// can stand in; Apple's on Arm puts them on the stack. Any other format is shown as it is.
+#[cfg(not(all(target_vendor = "apple", target_arch = "aarch64")))]
 unsafe extern "C" fn log_message(
     environment: *mut c_void,
     _instance: *const c_char,
@@ -49,12 +49,12 @@ unsafe extern "C" fn log_message(
     }
 }
 
-#[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+#[cfg(not(all(target_vendor = "apple", target_arch = "aarch64")))]
 fn logger() -> *const c_void {
     log_message as *const c_void
 }
 
-#[cfg(not(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64"))))]
+#[cfg(all(target_vendor = "apple", target_arch = "aarch64"))]
 fn logger() -> *const c_void {
     std::ptr::null()
 }
@@ -83,7 +83,7 @@ impl Fmi2Slave {
         });
         let name = c_text(&fmu.description.model_name)?;
         let token = c_text(&fmu.description.token)?;
-        let resources = c_text(&file_uri(&fmu.resources()))?;
+        let resources = c_text(&file_uri(&fmu.resources().to_string_lossy(), cfg!(windows)))?;
         // SAFETY: all strings live through the call, the callbacks as long as the instance.
         let component = unsafe {
             (api.fmi2Instantiate)(name.as_ptr(), CO_SIMULATION, token.as_ptr(), resources.as_ptr(), &*callbacks, 0, 0)
@@ -164,12 +164,14 @@ impl Slave for Fmi2Slave {
     }
 }
 
-/// A file URI as in RFC 8089, with everything but unreserved characters percent-encoded.
-fn file_uri(path: &std::path::Path) -> String {
+/// A file URI as in RFC 8089, with everything but unreserved characters percent-encoded; on Windows of a path with a drive.
+fn file_uri(path: &str, windows: bool) -> String {
     use std::fmt::Write as _;
+    let (path, kept): (String, &[u8]) =
+        if windows { (format!("/{}", path.replace('\\', "/")), b"/-._~:") } else { (path.to_owned(), b"/-._~") };
     let mut uri = String::from("file://");
-    for byte in path.to_string_lossy().bytes() {
-        if byte.is_ascii_alphanumeric() || b"/-._~".contains(&byte) {
+    for byte in path.bytes() {
+        if byte.is_ascii_alphanumeric() || kept.contains(&byte) {
             uri.push(char::from(byte));
         } else {
             let _ = write!(uri, "%{byte:02X}");
@@ -184,7 +186,8 @@ mod tests {
 
     #[test]
     fn uris_are_encoded() {
-        assert_eq!(file_uri(std::path::Path::new("/tmp/a b/ü")), "file:///tmp/a%20b/%C3%BC");
+        assert_eq!(file_uri("/tmp/a b/ü", false), "file:///tmp/a%20b/%C3%BC");
+        assert_eq!(file_uri(r"C:\tmp\a b", true), "file:///C:/tmp/a%20b");
     }
 
     #[test]

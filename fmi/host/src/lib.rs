@@ -7,6 +7,7 @@ pub mod archive;
 mod description;
 mod fmi2;
 mod fmi3;
+mod platform;
 mod session;
 mod slave;
 
@@ -21,6 +22,7 @@ use tempfile::TempDir;
 use zip::ZipArchive;
 
 pub use description::{ImportedDescription, ImportedVariable, VariableType, parse};
+pub use platform::Platform;
 pub use session::Session;
 
 use tiprub_shell::{Failure, Result, recording::Recording, schedule::Schedule};
@@ -161,16 +163,26 @@ impl UnpackedFmu {
     /// The shared library for this machine.
     ///
     /// # Errors
-    /// The FMU has none.
+    /// The FMU has none; those it has are named.
     pub(crate) fn library(&self) -> Result<PathBuf> {
-        let platform = if self.description.fmi_version.starts_with('2') { "linux64" } else { "x86_64-linux" };
-        let name = format!("binaries/{platform}/{}.so", self.description.model_identifier);
-        let path = self.directory.path().join(&name);
-        if path.is_file() {
-            Ok(path)
-        } else {
-            Err(Failure::new("FMU", format!("has no {name}"), "It was not made for this platform"))
+        let (version, identifier) = (self.description.fmi_version.as_str(), self.description.model_identifier.as_str());
+        let place = |platform: Platform| platform.place(version, identifier);
+        let path = Platform::here().map(|here| self.directory.path().join(place(here)));
+        if let Some(path) = path.filter(|path| path.is_file()) {
+            return Ok(path);
         }
+        let held = Platform::ALL.into_iter().filter(|platform| self.directory.path().join(place(*platform)).is_file());
+        let held = held.map(Platform::tuple).collect::<Vec<_>>().join(", ");
+        Err(Failure::new(
+            "FMU",
+            format!(
+                "has no library for {}-{}, but for {}",
+                std::env::consts::ARCH,
+                std::env::consts::OS,
+                if held.is_empty() { "none" } else { &held }
+            ),
+            "Package it for this platform: `tiprub package --platform`",
+        ))
     }
 
     /// Directory of the unpacked resources.

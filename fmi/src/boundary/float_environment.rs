@@ -8,51 +8,83 @@
 /// While this lives, exceptions are masked, rounding is to nearest and denormals are kept; then the caller's control and
 /// status bits are back, so that no exception flag raised in between is seen outside.
 ///
-/// On processors other than x86-64 nothing is changed.
+/// On processors other than x86-64 and AArch64 nothing is changed.
 #[derive(Debug)]
 pub(crate) struct StandardFloats {
-    #[cfg(target_arch = "x86_64")]
-    of_caller: u32,
+    of_caller: control::Environment,
 }
 
 #[cfg(target_arch = "x86_64")]
 mod control {
-    /// Control and status register of SSE after power-up (Intel 64 manual, volume 1, section 10.2.3).
-    pub(super) const STANDARD: u32 = 0x1F80;
+    /// Control and status register of SSE.
+    pub(super) type Environment = u32;
 
-    pub(super) fn read() -> u32 {
+    /// After power-up (Intel 64 manual, volume 1, section 10.2.3).
+    pub(super) const STANDARD: Environment = 0x1F80;
+
+    pub(super) fn read() -> Environment {
         let mut value = 0_u32;
         // SAFETY: `stmxcsr` writes four bytes to the place given and changes nothing else; every x86-64 has it.
         unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut value, options(nostack, preserves_flags)) };
         value
     }
 
-    pub(super) fn write(value: u32) {
+    pub(super) fn write(value: Environment) {
         // SAFETY: `ldmxcsr` reads four bytes; the value is the standard one, which compiled code assumes, or one that
         // `read` gave for the code that goes on with it, hence no reserved bit is set.
         unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const value, options(nostack, preserves_flags)) };
     }
 }
 
+#[cfg(target_arch = "aarch64")]
+mod control {
+    /// Control register FPCR and status register FPSR.
+    pub(super) type Environment = [u64; 2];
+
+    /// No traps, to nearest, denormals kept, no flag raised: all bits zero (Arm Architecture Reference Manual for
+    /// A-profile, C5.2.8 FPCR and C5.2.10 FPSR).
+    pub(super) const STANDARD: Environment = [0, 0];
+
+    pub(super) fn read() -> Environment {
+        let (control, status): (u64, u64);
+        // SAFETY: reads of two registers that every AArch64 with floating point has; no memory, no condition flags.
+        unsafe {
+            std::arch::asm!("mrs {}, fpcr", "mrs {}, fpsr", out(reg) control, out(reg) status, options(nomem, nostack, preserves_flags));
+        }
+        [control, status]
+    }
+
+    pub(super) fn write([control, status]: Environment) {
+        // SAFETY: the values are the standard ones, which compiled code assumes, or those that `read` gave for the code
+        // that goes on with them, hence no reserved bit is set.
+        unsafe {
+            std::arch::asm!("msr fpcr, {}", "msr fpsr, {}", in(reg) control, in(reg) status, options(nomem, nostack, preserves_flags));
+        }
+    }
+}
+
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+mod control {
+    pub(super) type Environment = ();
+
+    pub(super) const STANDARD: Environment = ();
+
+    pub(super) fn read() {}
+
+    pub(super) fn write((): Environment) {}
+}
+
 impl StandardFloats {
     /// Put the caller's environment aside.
-    #[cfg(target_arch = "x86_64")]
     pub(super) fn enter() -> Self {
         let of_caller = control::read();
         control::write(control::STANDARD);
         Self { of_caller }
     }
-
-    /// Put the caller's environment aside.
-    #[cfg(not(target_arch = "x86_64"))]
-    pub fn enter() -> Self {
-        Self {}
-    }
 }
 
 impl Drop for StandardFloats {
     fn drop(&mut self) {
-        #[cfg(target_arch = "x86_64")]
         control::write(self.of_caller);
     }
 }

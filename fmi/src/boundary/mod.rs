@@ -1,6 +1,7 @@
 //! The only unsafe code of the library: C pointers to Rust values and back, callbacks, and the guard around every call.
 
 mod calls;
+mod derivatives;
 mod float_environment;
 mod instance;
 mod log;
@@ -9,6 +10,7 @@ mod pointers;
 
 pub(crate) use calls::{StateHandle, set_debug_logging, strings};
 pub(crate) use calls::{get, set, state};
+pub(crate) use derivatives::{ADJOINT, DIRECTIONAL, derivatives};
 pub(crate) use instance::{Callbacks, Instantiation, enter, instantiate, release};
 pub(crate) use instance::{Handle, guard, refuse_instantiation, unsupported};
 pub(crate) use log::{Fmi2Logger, Fmi3Logger, Sink};

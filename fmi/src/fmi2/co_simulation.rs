@@ -3,7 +3,7 @@
 use std::ffi::c_char;
 
 use super::Boolean;
-use crate::boundary::{Handle, In, Out, guard};
+use crate::boundary::{DIRECTIONAL, Handle, In, Out, derivatives, guard};
 use crate::slave::order::fmi2 as order;
 use crate::slave::{Phase, Refusal, Request, Result, Slave, Status};
 
@@ -105,4 +105,24 @@ pub(super) extern "C" fn fmi2GetBooleanStatus(c: Handle, s: i32, value: Out<Bool
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2GetStringStatus(c: Handle, s: i32, value: Out<*const c_char>) -> Status {
     guard(c, &order::GET_STRING_STATUS, |_| status(s, &value, None))
+}
+
+/// By inputs over the last communication step, where the parameter `step_derivatives` is on.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi2GetDirectionalDerivative(
+    c: Handle,
+    vUnknown_ref: In<u32>,
+    nUnknown: usize,
+    vKnown_ref: In<u32>,
+    nKnown: usize,
+    dvKnown: In<f64>,
+    dvUnknown: Out<f64>,
+) -> Status {
+    derivatives(
+        (c, "fmi2GetDirectionalDerivative", DIRECTIONAL),
+        (vUnknown_ref, nUnknown, nUnknown, "vUnknown_ref"),
+        (vKnown_ref, nKnown, nKnown, "vKnown_ref"),
+        (dvKnown, nKnown, "dvKnown"),
+        (dvUnknown, nUnknown, "dvUnknown"),
+    )
 }

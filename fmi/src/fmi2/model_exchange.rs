@@ -24,8 +24,4 @@ refused! {
     fmi2GetEventIndicators(_eventIndicators: Out<f64>, _ni: usize) CAPABILITY;
     fmi2GetContinuousStates(_x: Out<f64>, _nx: usize) CAPABILITY;
     fmi2GetNominalsOfContinuousStates(_x_nominal: Out<f64>, _nx: usize) CAPABILITY;
-    fmi2GetDirectionalDerivative(
-        _vUnknown_ref: In<u32>, _nUnknown: usize, _vKnown_ref: In<u32>, _nKnown: usize, _dvKnown: In<f64>,
-        _dvUnknown: Out<f64>
-    ) "directional derivatives";
 }

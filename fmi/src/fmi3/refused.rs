@@ -9,7 +9,6 @@ const SCHEDULED_EXECUTION: &str = "Scheduled Execution interface";
 const EVENT_MODE: &str = "Event Mode";
 const CLOCKS: &str = "clocks";
 const DEPENDENCIES: &str = "per-element dependencies";
-const DERIVATIVES: &str = "directional or adjoint derivatives";
 const CONFIGURATION: &str = "structural parameters";
 
 refused! {
@@ -30,15 +29,6 @@ refused! {
         _dependent: u32, _elementIndicesOfDependent: Out<usize>, _independents: Out<u32>,
         _elementIndicesOfIndependents: Out<usize>, _dependencyKinds: Out<i32>, _nDependencies: usize
     ) DEPENDENCIES;
-
-    fmi3GetDirectionalDerivative(
-        _unknowns: In<u32>, _nUnknowns: usize, _knowns: In<u32>, _nKnowns: usize,
-        _seed: In<f64>, _nSeed: usize, _sensitivity: Out<f64>, _nSensitivity: usize
-    ) DERIVATIVES;
-    fmi3GetAdjointDerivative(
-        _unknowns: In<u32>, _nUnknowns: usize, _knowns: In<u32>, _nKnowns: usize,
-        _seed: In<f64>, _nSeed: usize, _sensitivity: Out<f64>, _nSensitivity: usize
-    ) DERIVATIVES;
 
     fmi3GetIntervalDecimal(
         _valueReferences: In<u32>, _nValueReferences: usize, _intervals: Out<f64>, _qualifiers: Out<i32>

@@ -1,10 +1,10 @@
-//! Getting and setting variables. Reals are `Float64`, integers `Int32`, enumerations `Int64`; the functions of the other
+//! Getting and setting variables. Reals are `Float64`, integers and enumerations `Int64`; the functions of the other
 //! types exist, and refuse every reference because no variable has their type.
 
 use std::ffi::c_char;
 
 use super::Boolean;
-use crate::boundary::{self, Handle, In, Out, Text, guard};
+use crate::boundary::{self, ADJOINT, DIRECTIONAL, Handle, In, Out, Text, derivatives, guard};
 use crate::slave::order::{Rule, fmi3 as order};
 use crate::slave::{Refusal, Request, Status};
 
@@ -42,7 +42,6 @@ macro_rules! with_variables {
 
 with_variables! {
     fmi3GetFloat64 GET_FLOAT64 fmi3SetFloat64 SET_FLOAT64 "Float64" f64, f64, |value| value, |value| *value;
-    fmi3GetInt32 GET_INT32 fmi3SetInt32 SET_INT32 "Int32" i32, i32, |value| value, |value| *value;
     fmi3GetInt64 GET_INT64 fmi3SetInt64 SET_INT64 "Int64" i64, i64, |value| value, |value| *value;
     fmi3GetBoolean GET_BOOLEAN fmi3SetBoolean SET_BOOLEAN "Boolean" Boolean, bool, Boolean::from, |value| *value != 0;
 }
@@ -123,6 +122,7 @@ without_variables! {
     fmi3GetUInt8 GET_UINT8 fmi3SetUInt8 SET_UINT8 "UInt8" u8;
     fmi3GetInt16 GET_INT16 fmi3SetInt16 SET_INT16 "Int16" i16;
     fmi3GetUInt16 GET_UINT16 fmi3SetUInt16 SET_UINT16 "UInt16" u16;
+    fmi3GetInt32 GET_INT32 fmi3SetInt32 SET_INT32 "Int32" i32;
     fmi3GetUInt32 GET_UINT32 fmi3SetUInt32 SET_UINT32 "UInt32" u32;
     fmi3GetUInt64 GET_UINT64 fmi3SetUInt64 SET_UINT64 "UInt64" u64;
 }
@@ -169,4 +169,36 @@ pub(super) extern "C" fn fmi3SetClock(
     _values: In<Boolean>,
 ) -> Status {
     no_variable(instance, &order::SET_CLOCK, "Clock", (valueReferences, nValueReferences))
+}
+
+/// Derivatives by inputs over the last communication step, where the parameter `step_derivatives` is on; last, the numbers of values of unknowns
+/// and of knowns.
+macro_rules! derivative {
+    ($($name:ident $answer:ident $nSeed:ident $nSensitivity:ident $unknowns:ident $knowns:ident;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub(crate) extern "C" fn $name(
+            instance: Handle,
+            unknowns: In<u32>,
+            nUnknowns: usize,
+            knowns: In<u32>,
+            nKnowns: usize,
+            seed: In<f64>,
+            $nSeed: usize,
+            sensitivity: Out<f64>,
+            $nSensitivity: usize,
+        ) -> Status {
+            derivatives(
+                (instance, stringify!($name), $answer),
+                (unknowns, nUnknowns, $unknowns, "unknowns"),
+                (knowns, nKnowns, $knowns, "knowns"),
+                (seed, $nSeed, "seed"),
+                (sensitivity, $nSensitivity, "sensitivity"),
+            )
+        }
+    )*};
+}
+
+derivative! {
+    fmi3GetDirectionalDerivative DIRECTIONAL nSeed nSensitivity nSensitivity nSeed;
+    fmi3GetAdjointDerivative ADJOINT nSeed nSensitivity nSeed nSensitivity;
 }

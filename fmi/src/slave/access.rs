@@ -75,7 +75,7 @@ impl Value for i32 {
     }
 }
 
-/// Enumerations of FMI 3.0 travel as 64-bit integers.
+/// Integers and enumerations of FMI 3.0 travel as 64-bit integers.
 impl Value for i64 {
     fn problem(&self, variable: &Variable) -> Option<String> {
         let Kind::Enumeration(enumeration) = variable.kind else { return None };
@@ -129,8 +129,7 @@ fn type_name(dialect: Dialect, kind: Kind) -> &'static str {
         (Dialect::Fmi2, Kind::Real) => "Real",
         (Dialect::Fmi2, Kind::Integer | Kind::Enumeration(_)) => "Integer",
         (Dialect::Fmi3, Kind::Real) => "Float64",
-        (Dialect::Fmi3, Kind::Integer) => "Int32",
-        (Dialect::Fmi3, Kind::Enumeration(_)) => "Int64",
+        (Dialect::Fmi3, Kind::Integer | Kind::Enumeration(_)) => "Int64",
         (_, Kind::Boolean) => "Boolean",
         (_, Kind::String) => "String",
     }

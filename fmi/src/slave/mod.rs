@@ -6,6 +6,7 @@ pub(crate) mod order;
 mod phase;
 mod snapshot;
 mod stepping;
+mod tangent;
 
 use std::ffi::CString;
 use std::fmt;

@@ -7,11 +7,16 @@ use tiprub_core::{Rom, VariableTable};
 use tiprub_model_description::{Description, Experiment};
 use tiprub_test_models::{node, structure};
 
-pub static METRE: Unit = Unit { name: "m", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("µm", 1e6)] };
-pub static SECOND: Unit = Unit { name: "s", exponents: [0, 0, 1, 0, 0], display: &[] };
-pub static NEWTON: Unit = Unit { name: "N", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
-pub static SPEED: Unit =
-    Unit { name: "rad/s", exponents: [0, 0, -1, 1, 0], display: &[("rpm", 30.0 / std::f64::consts::PI)] };
+pub static METRE: Unit =
+    Unit { name: "m", quantity: "Length", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("µm", 1e6)] };
+pub static SECOND: Unit = Unit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[] };
+pub static NEWTON: Unit = Unit { name: "N", quantity: "Force", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
+pub static SPEED: Unit = Unit {
+    name: "rad/s",
+    quantity: "AngularVelocity",
+    exponents: [0, 0, -1, 1, 0],
+    display: &[("rpm", 30.0 / std::f64::consts::PI)],
+};
 pub static SCHEME: Enumeration = Enumeration {
     name: "Scheme",
     description: "Time-stepping scheme",
@@ -124,6 +129,8 @@ pub fn description<'a>(table: &'a VariableTable, rom: &'a Rom, fmi3_arrays: bool
         copyright: "© the tiprub developers",
         license: "MIT OR Apache-2.0",
         experiment: Experiment { start: 0.0, stop: 0.1, step: 1e-5 },
+        fixed_internal_step: Some(1e-6),
+        patches_of_roms: true,
         table,
         fmi3_arrays,
         structures: vec![("rotor", rom)],

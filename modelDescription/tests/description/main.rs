@@ -5,3 +5,4 @@ mod real_scene;
 mod scene;
 mod snapshots;
 mod structure;
+mod terminals;

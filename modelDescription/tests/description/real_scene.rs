@@ -197,6 +197,7 @@ fn range(variable: &Variable) -> String {
     match (variable.min, variable.max) {
         (Some(min), Some(max)) => format!("{} to {}", number(min), number(max)),
         (None, None) => String::new(),
+        (Some(min), None) => format!("≥ {}", number(min)),
         (min, max) => panic!("`{}` has one limit only: {min:?}, {max:?}", variable.name),
     }
 }

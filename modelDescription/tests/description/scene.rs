@@ -123,6 +123,8 @@ pub fn description<'a>(table: &'a VariableTable, roms: &'a [Rom], fmi3_arrays: b
         copyright: "-",
         license: "-",
         experiment: Experiment { start: 0.0, stop: 0.1, step: 1e-5 },
+        fixed_internal_step: None,
+        patches_of_roms: true,
         table,
         fmi3_arrays,
         structures: ["rotor", "ring"].into_iter().zip(roms).collect(),

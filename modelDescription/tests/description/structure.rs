@@ -93,7 +93,7 @@ fn capabilities_are_those_implemented() {
     let expected = flags(
         "modelIdentifier=tiprub needsExecutionTool=false canBeInstantiatedOnlyOncePerProcess=false \
          canGetAndSetFMUState=true canSerializeFMUState=true providesDirectionalDerivatives=false \
-         providesAdjointDerivatives=false canHandleVariableCommunicationStepSize=true maxOutputDerivativeOrder=1 \
+         providesAdjointDerivatives=false canHandleVariableCommunicationStepSize=true fixedInternalStepSize=1e-6 maxOutputDerivativeOrder=1 \
          providesIntermediateUpdate=true mightReturnEarlyFromDoStep=true canReturnEarlyAfterIntermediateUpdate=true \
          hasEventMode=false",
     );
@@ -107,7 +107,7 @@ fn arrays_are_flattened_with_consecutive_references() {
         |variable: &BTreeMap<String, String>| (variable["name"].clone(), variable["valueReference"].clone());
     let two: Vec<_> = at(&two, "/ModelVariables/ScalarVariable").into_iter().map(reference).collect();
     let numbers: Vec<_> = two.iter().map(|(_, number)| number.parse::<usize>().unwrap()).collect();
-    assert_eq!(numbers, (0..numbers.len()).collect::<Vec<_>>());
+    assert_eq!(numbers, (1..=numbers.len()).collect::<Vec<_>>(), "all but time, which FMI 2.0 does not list");
     let names: Vec<_> = two.iter().map(|(name, _)| name.as_str()).filter(|name| name.contains("gap")).collect();
     assert_eq!(names, ["sector_gap[1]", "sector_gap[2]", "sector_gap[3]"]);
     let in_three = |elements: &[Read]| -> Vec<_> {
@@ -115,7 +115,9 @@ fn arrays_are_flattened_with_consecutive_references() {
         let variables = elements.iter().filter(|(path, _)| path.strip_prefix(prefix).is_some_and(|p| !p.contains('/')));
         variables.map(|(_, attributes)| reference(attributes)).collect()
     };
-    assert_eq!(in_three(&scalars), two, "scalars of FMI 3.0 are those of FMI 2.0");
+    let scalars_of_three = in_three(&scalars);
+    assert_eq!(scalars_of_three[0].0, "time");
+    assert_eq!(scalars_of_three[1..], two, "scalars of FMI 3.0 are those of FMI 2.0");
     let table = common::table();
     let whole: Vec<_> = table.variables().iter().map(|v| (v.name.clone(), v.reference.to_string())).collect();
     assert_eq!(in_three(&arrays), whole);
@@ -158,10 +160,9 @@ fn the_model_structure_is_complete() {
     let numbers = |elements: &[Read], path: &str, key: &str| -> Vec<u32> {
         at(elements, path).iter().map(|unknown| unknown[key].parse().unwrap()).collect()
     };
-    // Indices of FMI 2.0 count from 1; references of this table from 0, without gaps.
-    let shifted: Vec<u32> = elements.iter().map(|reference| reference + 1).collect();
+    // Indices of FMI 2.0 count from 1; references of this table from 0 without gaps, and time, at 0, is not listed.
     for path in ["/ModelStructure/Outputs/Unknown", "/ModelStructure/InitialUnknowns/Unknown"] {
-        assert_eq!(numbers(&two, path, "index"), shifted);
+        assert_eq!(numbers(&two, path, "index"), elements);
     }
     for path in ["/ModelStructure/Output", "/ModelStructure/InitialUnknown"] {
         assert_eq!(numbers(&arrays, path, "valueReference"), whole);
@@ -189,7 +190,7 @@ fn units_and_types_used_are_defined() {
         let names =
             |path: &str| -> BTreeSet<String> { at(&elements, path).iter().map(|e| e["name"].clone()).collect() };
         let units = names("/UnitDefinitions/Unit");
-        assert_eq!(units, ["m", "s", "N", "rad/s"].map(String::from).into());
+        assert_eq!(units, ["m", "s", "N", "rad/s", "1"].map(String::from).into());
         let displayed = names("/UnitDefinitions/Unit/DisplayUnit");
         for (_, attributes) in &elements {
             assert!(attributes.get("unit").is_none_or(|unit| units.contains(unit)));

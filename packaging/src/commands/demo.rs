@@ -76,7 +76,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
     output_file::create_directory(directory)?;
     let mut watch = Stopwatch::default();
 
-    let library = watch.measure("building the FMU library", || library::load(arguments.library.as_deref(), console))?;
+    let libraries = watch.measure("building the FMU library", || library::load(&arguments.libraries, console))?;
     let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::in_rows(), console))?;
     let scene = write_inputs(directory, &reduction, &scene_text)?;
     let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
@@ -88,14 +88,14 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
     console.warn(&native.warnings);
     native.recording.write_csv(&directory.join(CSV_FILE))?;
 
-    let package = Package::new(&scene, &library)?;
+    let package = Package::new(&scene, &libraries)?;
     let mut imported = Vec::new();
     for version in [FmiVersion::Two, FmiVersion::Three] {
         let label = format!("FMI {}.0", version.digit());
         let path = fmu_path(directory, version);
         watch.measure(&format!("packaging, {label}"), || {
             console.say(format_args!("Packaging {}", path.display()));
-            package.write(&path, version, true)
+            package.write(&path, version, None)
         })?;
         let run = watch.measure(&format!("import and run, {label}"), || import(&path, &label, &schedule, console))?;
         let agreement = native.recording.compare(&run.recording)?;

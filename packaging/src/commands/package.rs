@@ -24,30 +24,37 @@ use crate::{
 pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
     // What is wrong with the command line is said before any work.
     targets(arguments, "model")?;
+    let given = library::given(&arguments.libraries)?;
+    let libraries = if given.is_empty() { None } else { Some(library::load(&arguments.libraries, console)?) };
     let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
     let targets = targets(arguments, &scene.settings.name)?;
     let files: Vec<Named> = targets.iter().map(|(_, path)| Named::new("--output", path)).collect();
-    let library_file = arguments.library.iter().map(|path| Named::new("--library", path));
+    let library_files = given.iter().map(|path| Named::new("--library", path));
     places::outputs(
-        &command_files::scene(&arguments.scene).into_iter().chain(library_file).collect::<Vec<_>>(),
+        &command_files::scene(&arguments.scene).into_iter().chain(library_files).collect::<Vec<_>>(),
         &files,
     )?;
-    let library = library::load(arguments.library.as_deref(), console)?;
-    let package = Package::new(&scene, &library).map_err(|failure| scene_source::located(&arguments.scene, failure))?;
+    let libraries = libraries.map_or_else(|| library::load(&arguments.libraries, console), Ok)?;
+    let package =
+        Package::new(&scene, &libraries).map_err(|failure| scene_source::located(&arguments.scene, failure))?;
     console.warn(package.warnings());
+    let arrays = (arguments.arrays || arguments.scalars).then_some(arguments.arrays);
     for (version, path) in &targets {
         console.say(format_args!("Writing {}", path.display()));
-        package.write(path, *version, !arguments.scalars)?;
+        package.write(path, *version, arrays)?;
     }
+    let platforms: Vec<&str> = libraries.iter().map(|library| library.platform.tuple()).collect();
     let text: Vec<String> = targets
         .iter()
         .map(|(version, path)| format!("FMI {}.0: {} ({} kB)", version.digit(), path.display(), size(path) / 1000))
+        .chain([format!("for {}", platforms.join(", "))])
         .collect();
     let files: Vec<_> = targets
         .iter()
         .map(|(version, path)| json!({"fmi": version.digit().to_string(), "file": shown_path(path), "bytes": size(path)}))
         .collect();
-    let json = json!({ "model": scene.settings.name, "fmus": files, "warnings": package.warnings() });
+    let json =
+        json!({ "model": scene.settings.name, "fmus": files, "platforms": platforms, "warnings": package.warnings() });
     Ok(Outcome { text: text.join("\n"), json })
 }
 
@@ -81,6 +88,7 @@ fn targets(arguments: &PackageArguments, name: &str) -> Result<Vec<(FmiVersion, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::LibraryArguments;
     use tiprub_study::arguments::CacheArguments;
 
     fn arguments(fmi: FmiChoice, output: &str) -> PackageArguments {
@@ -88,8 +96,9 @@ mod tests {
             scene: "s".into(),
             fmi,
             output: output.into(),
+            arrays: false,
             scalars: false,
-            library: None,
+            libraries: LibraryArguments::default(),
             cache: CacheArguments::default(),
         }
     }

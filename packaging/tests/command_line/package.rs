@@ -94,10 +94,48 @@ fn scalars_and_dates_are_packed_as_asked() {
         let mut archive = zip::ZipArchive::new(fs::File::open(project.path("x.fmu")).unwrap()).unwrap();
         std::io::read_to_string(archive.by_index(0).unwrap()).unwrap()
     };
-    let arrays = describe(&[], None);
+    let arrays = describe(&["--arrays"], None);
     assert!(arrays.contains("<Dimension") && !arrays.contains("generationDateAndTime"));
-    assert!(!describe(&["--scalars"], None).contains("<Dimension"));
+    assert_eq!(describe(&["--scalars"], None), describe(&[], None), "few variables: scalars");
+    assert!(!describe(&[], None).contains("<Dimension"));
     assert!(describe(&[], Some("951827696")).contains("generationDateAndTime=\"2000-02-29T12:34:56Z\""));
+}
+
+#[test]
+fn a_fixed_internal_step_is_told_where_it_is_true() {
+    let project = Project::new();
+    let told = |step: &str, communication_step: &str| {
+        let scene: Vec<String> = SCENE
+            .lines()
+            .map(|line| match line.split('=').next().unwrap().trim() {
+                "step" => format!("step = {step}"),
+                "communication_step" => format!("communication_step = {communication_step}"),
+                _ => line.to_owned(),
+            })
+            .collect();
+        fs::write(project.path("scene.toml"), scene.join("\n")).unwrap();
+        project.succeed(&["package", "scene.toml", "--fmi", "3", "-o", "x.fmu", "--library", "library.so", "-q"]);
+        let mut archive = zip::ZipArchive::new(fs::File::open(project.path("x.fmu")).unwrap()).unwrap();
+        let xml = std::io::read_to_string(archive.by_index(0).unwrap()).unwrap();
+        xml.split("fixedInternalStepSize=\"").nth(1).map(|rest| rest.split('"').next().unwrap().to_owned())
+    };
+    assert_eq!(told("1e-6", "1e-5").as_deref(), Some("1e-6"));
+    assert_eq!(told("1e-6", "1e-6").as_deref(), Some("1e-6"));
+    for (step, communication_step) in [("3e-7", "1e-5"), ("1e-6", "2.5e-6"), ("2e-6", "1e-6")] {
+        assert_eq!(told(step, communication_step), None, "{step} in {communication_step}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn libraries_of_a_directory_are_not_written_over() {
+    let project = Project::new();
+    fs::create_dir(project.path("libraries")).unwrap();
+    fs::rename(project.path("library.so"), project.path("libraries/x.fmu")).unwrap();
+    std::os::unix::fs::symlink("x.fmu", project.path("libraries/x.so")).unwrap();
+    let error =
+        project.fail(&["package", "scene.toml", "--fmi", "3", "--library", "libraries", "-o", "libraries/x.fmu"], 2);
+    assert!(error.contains("x.fmu"), "{error}");
 }
 
 #[test]
@@ -107,7 +145,7 @@ fn failed_packages_leave_nothing() {
     let missing = project.fail(&["package", "scene.toml", "--library", "none.so"], 1);
     assert!(missing.contains("none.so"), "{missing}");
     let text = project.fail(&["package", "scene.toml", "--library", "scene.toml"], 1);
-    assert!(text.contains("not a shared library"), "{text}");
+    assert!(text.contains("not a whole 64-bit shared library"), "{text}");
     fs::write(project.path("scene.toml"), SCENE.replace("gap = 1e-3", "gap = -1e-3")).unwrap();
     let gap = project.fail(&["package", "scene.toml", "--library", "library.so"], 1);
     assert!(gap.contains("gap"), "{gap}");

@@ -65,6 +65,7 @@ impl Project {
         fs::write(root.path().join("scene.toml"), SCENE).unwrap();
         // The header of a shared library for Linux on x86-64, which is all that packaging looks at.
         let mut library = vec![0_u8; 4096];
+        library[64..86].copy_from_slice(b"fmi2DoStep\0fmi3DoStep\0");
         library[..20].copy_from_slice(b"\x7fELF\x02\x01\x01\0\0\0\0\0\0\0\0\0\x03\0\x3e\0");
         fs::write(root.path().join("library.so"), library).unwrap();
         Self { root }

@@ -71,6 +71,8 @@ pub struct Enumeration {
 pub struct Unit {
     /// Unit name.
     pub name: &'static str,
+    /// What it measures, in the words of Modelica's SI units.
+    pub quantity: &'static str,
     /// Exponents of kg, m, s, rad, K.
     pub exponents: [i32; 5],
     /// (name, factor): display value = factor · SI value.
@@ -188,6 +190,8 @@ pub enum Quantity {
     SolverChoice,
     /// How inputs run between communication points, parameter.
     InputInterpolation,
+    /// Whether derivatives over the last step can be asked for, parameter.
+    StepDerivatives,
     /// θ_r at the start, parameter.
     InitialAngle,
     /// Ramp time of the casing shape, parameter.

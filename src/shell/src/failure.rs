@@ -15,6 +15,9 @@ pub struct Failure {
     pub usage: bool,
 }
 
+/// What cannot be done with a file that is only read.
+const READING: [&str; 2] = ["cannot be read", "cannot be opened"];
+
 /// Result of everything in this crate.
 pub type Result<T, E = Failure> = std::result::Result<T, E>;
 
@@ -49,6 +52,7 @@ impl Failure {
     pub fn file(path: &Path, doing: &str, error: &std::io::Error) -> Self {
         let remedy = match error.kind() {
             std::io::ErrorKind::NotFound => "Check the path",
+            std::io::ErrorKind::PermissionDenied if READING.contains(&doing) => "Check the permissions",
             std::io::ErrorKind::PermissionDenied => "Check the permissions, or choose another place with -o/--out",
             std::io::ErrorKind::StorageFull => "Free some space, or choose another place with -o/--out",
             std::io::ErrorKind::InvalidInput => "Give a file",
@@ -112,6 +116,14 @@ mod tests {
         let failure = Failure::new("a.toml", "no such field `gapp`", "Did you mean `gap`?");
         assert_eq!(failure.to_string(), "a.toml: no such field `gapp`. Did you mean `gap`?");
         assert_eq!(Failure::from_below("x.fmu", "truncated.").to_string(), "x.fmu: truncated.");
+    }
+
+    #[test]
+    fn another_place_is_proposed_for_what_is_written_alone() {
+        let denied = std::io::Error::from(std::io::ErrorKind::PermissionDenied);
+        let remedy = |doing| Failure::file(Path::new("a.so"), doing, &denied).remedy;
+        assert_eq!(remedy("cannot be read"), "Check the permissions");
+        assert!(remedy("cannot be written").contains("another place"));
     }
 
     #[test]

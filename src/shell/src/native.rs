@@ -111,11 +111,12 @@ impl Outputs {
     }
 }
 
-/// Set a start value by name: a scalar, one element `name[i]`, or all elements of an array at once.
+/// Set a start value by name: a scalar, one element `name[i]`, all elements of an array to one value, or each to its own
+/// of a list in brackets.
 pub fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
-    let (kind, references) = locate(simulation.table(), name)?;
-    let option = format!("--set {name}={text}");
-    for reference in references {
+    let (kind, dimension, first) = locate(simulation.table(), name)?;
+    for (reference, text) in (first..).zip(texts(name, text, dimension)?) {
+        let option = format!("--set {name}={text}");
         let outcome = match kind {
             Kind::Real => simulation.set_real(reference, number(&option, text)?),
             Kind::Integer => simulation.set_integer(reference, number(&option, text)?),
@@ -134,6 +135,21 @@ pub fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
     Ok(())
 }
 
+/// The text of each element of an array of that dimension, or of a scalar.
+fn texts<'a>(name: &str, text: &'a str, dimension: Option<usize>) -> Result<Vec<&'a str>> {
+    let refused = |problem: String, remedy: String| Err(Failure::usage(format!("--set {name}"), problem, remedy));
+    let list = text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
+    match (list.map(|list| list.split(',').map(str::trim).collect::<Vec<_>>()), dimension) {
+        (None, dimension) => Ok(vec![text; dimension.unwrap_or(1)]),
+        (Some(_), None) => refused("takes one value, not a list".into(), "Give the value without brackets".into()),
+        (Some(values), Some(count)) if values.len() == count => Ok(values),
+        (Some(values), Some(count)) => refused(
+            format!("{} values are given to an array of {count}", values.len()),
+            format!("Give {count} values, or one without brackets for all elements"),
+        ),
+    }
+}
+
 fn number<T: std::str::FromStr>(option: &str, text: &str) -> Result<T> {
     let kind = std::any::type_name::<T>();
     let wanted = match kind {
@@ -150,17 +166,16 @@ fn example(kind: &str) -> &'static str {
     if kind == "f64" { ", for example 1.5e-3" } else { "" }
 }
 
-/// Kind and value references of a variable or of one of its elements.
-fn locate(table: &VariableTable, name: &str) -> Result<(Kind, Vec<u32>)> {
+/// Kind, dimension and first value reference of a variable or of one of its elements.
+fn locate(table: &VariableTable, name: &str) -> Result<(Kind, Option<usize>, u32)> {
     if let Some(variable) = table.find(name) {
-        let count = variable.len();
-        return Ok((variable.kind, (variable.reference..).take(count).collect()));
+        return Ok((variable.kind, variable.dimension, variable.reference));
     }
     for variable in table.variables() {
         let element =
             (0..variable.len()).zip(variable.reference..).find(|(index, _)| variable.element_name(*index) == name);
         if let Some((_, reference)) = element {
-            return Ok((variable.kind, vec![reference]));
+            return Ok((variable.kind, None, reference));
         }
     }
     let settable: Vec<&str> = table
@@ -189,6 +204,18 @@ mod tests {
         let names = ["speed", "friction_coefficient"];
         assert_eq!(suggestion("sped", &names), "Did you mean `speed`?");
         assert_eq!(suggestion("xyz", &names), "Inputs and parameters are: speed, friction_coefficient");
+    }
+
+    #[test]
+    fn a_list_fills_an_array_of_its_length_alone() {
+        assert_eq!(texts("heat", "3.5", None).unwrap(), ["3.5"]);
+        assert_eq!(texts("heat", "3.5", Some(2)).unwrap(), ["3.5", "3.5"]);
+        assert_eq!(texts("heat", "[1, -2e3]", Some(2)).unwrap(), ["1", "-2e3"]);
+        assert_eq!(texts("heat", "[1]", Some(1)).unwrap(), ["1"]);
+        for (text, dimension) in [("[1]", None), ("[1]", Some(2)), ("[1,2,3]", Some(2)), ("[]", Some(2))] {
+            let failure = texts("heat", text, dimension).unwrap_err();
+            assert!(failure.what == "--set heat" && failure.usage && failure.remedy.starts_with("Give"), "{failure}");
+        }
     }
 
     #[test]

@@ -14,8 +14,8 @@ use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
-    bases, beside, conjugacy, convergence, cube, error, estimates, inputs, modes, refinement, scatter, stability,
-    stage, tolerance, witness,
+    bases, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, refinement, scatter,
+    stability, stage, tolerance, witness,
 };
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
@@ -61,6 +61,8 @@ pub enum Command {
     Conjugacy(StudyCommon),
     /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
     Inputs(StudyCommon),
+    /// A rub and a shaft in its bearings, stepped by turns: once, by iterations, by Newton's method with derivatives over the step.
+    Coupling(StudyCommon),
     /// What steps, modes, patches and the mesh are estimated to leave, against rubs refined far in each direction.
     Estimates(EstimatesArguments),
     /// What refining rubs of rotor 37 and of the stage changes: patches, mesh, modes, steps; limits, and the errors of what ships.
@@ -227,6 +229,7 @@ impl Cli {
             Command::Cube(arguments) => ("cube", &arguments.common),
             Command::Conjugacy(common) => ("conjugacy", common),
             Command::Inputs(common) => ("inputs", common),
+            Command::Coupling(common) => ("coupling", common),
             Command::Estimates(arguments) => ("estimates", &arguments.common),
             Command::Refinement(arguments) => ("refinement", &arguments.common),
             Command::Bases(common) => ("bases", common),
@@ -256,6 +259,7 @@ impl Cli {
             Command::Cube(arguments) => cube::study(arguments, console),
             Command::Conjugacy(common) => conjugacy::study(common.quick),
             Command::Inputs(common) => inputs::study(common, console),
+            Command::Coupling(common) => coupling::study(common, console),
             Command::Estimates(arguments) => estimates::study(arguments, console),
             Command::Refinement(arguments) => refinement::study(arguments, console),
             Command::Bases(common) => bases::study(common, console),

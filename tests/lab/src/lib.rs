@@ -6,7 +6,8 @@
 //! - `beside`: any scene of blades beside an independent stepper;
 //! - `witness`: reduced blades against full finite elements; `bases`: what a blade is reduced to;
 //! - `tolerance`: steps by a tolerance beside steps of one length; `scatter`: the same on random rubs and sectors;
-//! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: what the communication step does.
+//! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: what the communication step does;
+//! - `coupling`: a rub and a shaft stepped by turns, with and without derivatives over the step.
 
 #![warn(unreachable_pub)]
 mod bases;
@@ -14,6 +15,7 @@ mod beside;
 pub mod cli;
 mod conjugacy;
 mod convergence;
+mod coupling;
 mod cube;
 mod error;
 mod estimates;

@@ -189,6 +189,31 @@ fn the_quick_study_of_inputs_tells_ramps_from_hammers() {
     assert_eq!(table.lines().count(), 2 + 4 * 10, "{table}");
 }
 
+#[test]
+fn the_quick_study_of_coupling_needs_derivatives_where_the_shaft_has_no_mass() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "coupling", &[]);
+    only_no(&json, &[]);
+    let found = |shaft: &str, way: &str| -> Vec<Value> {
+        let runs = json["results"][shaft].as_array().unwrap();
+        runs.iter()
+            .filter(|run| run["way"].as_str().unwrap().starts_with(way))
+            .map(|run| run["found"].clone())
+            .collect()
+    };
+    // A fixed point is enough for a heavy shaft and none for one without mass; steps done once get better with H.
+    assert!(found("heavy", "fixed point").iter().all(|found| found["unsolved"] == 0));
+    assert!(
+        found("without mass", "fixed point")
+            .iter()
+            .all(|found| found.is_null() || found["unsolved"].as_u64() > Some(0))
+    );
+    let errors: Vec<f64> = found("heavy", "once").iter().map(|found| found["error"].as_f64().unwrap()).collect();
+    assert!(errors.windows(2).all(|pair| pair[1] < 0.75 * pair[0]), "{errors:?}");
+    let solved: Vec<f64> = found("heavy", "Newton, der").iter().map(|found| found["error"].as_f64().unwrap()).collect();
+    assert!(solved.iter().zip(&errors).all(|(solved, once)| *solved < 0.8 * once), "{solved:?} {errors:?}");
+}
+
 /// Told at once: nothing is reduced for it, and no directory stays.
 #[test]
 fn what_a_study_cannot_do_is_told_before_the_work() {
@@ -203,8 +228,19 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
         told
     };
-    for name in ["convergence", "modes", "cube", "stage", "error", "inputs", "witness", "bases", "tolerance", "scatter"]
-    {
+    for name in [
+        "convergence",
+        "modes",
+        "cube",
+        "stage",
+        "error",
+        "inputs",
+        "coupling",
+        "witness",
+        "bases",
+        "tolerance",
+        "scatter",
+    ] {
         let told = refuse(&[name, "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");
     }

@@ -544,9 +544,9 @@ fn too_many_internal_steps_end_a_step_of_fmi3_early_or_discard_it() {
         ];
         for (early, arguments) in [false, true, false, true].into_iter().zip(all) {
             let slave = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
-            let set = |most: i32| {
+            let set = |most: i64| {
                 // SAFETY: arrays of one element.
-                let status = unsafe { (api.fmi3SetInt32)(slave.handle, &raw const found.bound, 1, &raw const most, 1) };
+                let status = unsafe { (api.fmi3SetInt64)(slave.handle, &raw const found.bound, 1, &raw const most, 1) };
                 slave.expect(status);
             };
             slave.initialise();
@@ -554,7 +554,7 @@ fn too_many_internal_steps_end_a_step_of_fmi3_early_or_discard_it() {
             for step in 0..found.step {
                 assert_eq!(slave.step(f64::from(step) * LONG, LONG).status, OK);
             }
-            set(found.needed - 1);
+            set(i64::from(found.needed) - 1);
             let answer = slave.step(time, LONG);
             assert!(!answer.event && !answer.terminate);
             if !early {

@@ -64,6 +64,10 @@ fn coupled(scene: &mut Scene) {
     scene.roms[0] = disk::Disk::random(SECTORS, 3, 12, 0.1, 7).cyclic();
 }
 
+fn sticking(scene: &mut Scene) {
+    scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = Solver::Coulomb);
+}
+
 fn shape(shape: Shape) -> impl Fn(&mut Scene) {
     move |scene| scene.settings.surfaces[0].shape = shape.clone()
 }
@@ -139,6 +143,8 @@ fn rotors() -> Vec<Scene> {
         galerkin("galerkin_flexible_warm", &[warm, shaft]),
         galerkin("galerkin_coupled", &[coupled]),
         galerkin("galerkin_coupled_flexible", &[coupled, flexible, lobes]),
+        galerkin("galerkin_coulomb", &[sticking, spline, shaft]),
+        galerkin("galerkin_coulomb_coupled_flexible", &[sticking, coupled, flexible]),
         rotor("coupled_lcp", ModalExact, Lcp, coupled),
         rotor("coupled_flexible_film", CentralDifference, Film, all_of(&[coupled, flexible, shaft])),
         rotor("coupled_massless", MasslessBoundary, Lcp, coupled),
@@ -172,7 +178,10 @@ fn bodies() -> Vec<Scene> {
     let faces = lattice::scene(lattice::faces([0.0, 0.045, 0.0]), &plates, true, [0.0, -40.0, 0.0]);
     let mut marched = with(faces, Solver::Lcp, Scheme::Galerkin);
     marched.settings.time.step = 2e-5;
+    let mut stuck = marched.clone();
+    sticking(&mut stuck);
     vec![
+        named("body_galerkin_coulomb", stuck),
         named("body_galerkin", marched),
         named("body_film", with(thrown.clone(), Solver::Film, Scheme::CentralDifference)),
         named("body_coulomb", with(thrown, Solver::Coulomb, Scheme::ModalExact)),

@@ -37,6 +37,9 @@ impl Tables {
 
     /// Fill the tables for spans of length `span` (s). Does not allocate.
     pub fn set_span(&mut self, span: f64) {
+        if self.levels[0].step.to_bits() == span.to_bits() {
+            return;
+        }
         for (halvings, level) in self.levels.iter_mut().enumerate() {
             level.set_step(&self.modes, halved(span, halvings));
             level.share = halved(1.0, halvings);

@@ -94,6 +94,7 @@ impl Simulation {
             self.values[reference as usize] = before;
             outcome?;
             self.tell_of_friction(&parameters);
+            self.tangent.follow_anew();
             self.apply_friction(&parameters);
         }
         let offset = self.offset_now();
@@ -187,6 +188,7 @@ impl Simulation {
         let (stepping, at_once) = (self.phase == Phase::Stepping, self.acts_at_once(quantity));
         change(&mut input);
         if stepping {
+            self.tangent.forget();
             self.check_course(variable, element, &input, at_once, [offset, length])?;
         }
         if at_once || self.phase == Phase::Created {

@@ -18,6 +18,7 @@ mod slave_surface;
 mod state;
 mod stepping;
 mod table;
+mod tangent;
 mod units;
 mod watched;
 mod window;
@@ -31,6 +32,7 @@ use compile::Compiled;
 use drive::{Input, RotorAngle};
 pub use inputs::Courses;
 use inputs::{CarrierInputs, Inputs, PairInputs, RotorInputs};
+use tangent::Tangent;
 use watched::WatchedGaps;
 use window::Window;
 
@@ -141,12 +143,16 @@ pub struct Simulation {
     notes: Vec<String>,
     /// What was told since the start.
     told: limits::Told,
+    /// Parameters that the system was prepared for.
+    prepared: Option<limits::Parameters>,
     /// Limits found for the parameters checked last.
     limits: Option<limits::Limits>,
     /// Length of every saved state (bytes).
     state_size: usize,
     /// State to go back to where a communication step takes too many internal steps; empty where nothing bounds them.
     mark: Vec<u8>,
+    /// What derivatives of the last communication step take.
+    tangent: Tangent,
     /// Whether the communication step under way may end early.
     partial: bool,
     /// Most internal steps tried within a communication step since the start.
@@ -212,9 +218,11 @@ impl Simulation {
             warnings: Vec::new(),
             notes: Vec::new(),
             told: limits::Told::new(bodies, carriers),
+            prepared: None,
             limits: None,
             state_size: 0,
             mark: Vec::new(),
+            tangent: Tangent::default(),
             partial: false,
             most_tried: 0,
             energies,
@@ -256,6 +264,7 @@ impl Simulation {
         self.rest(&parameters);
         self.apply_methods(&parameters);
         self.make_room();
+        self.make_room_for_tangent();
         self.time = start_time;
         self.initial_time = start_time;
         self.communication = Communication { start: start_time, count: 1, done: 1, ..Communication::default() };
@@ -287,7 +296,17 @@ impl Simulation {
     fn apply_methods(&mut self, parameters: &limits::Parameters) {
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.prepare_spans(parameters.step, parameters.tolerance);
+        self.prepared = Some(parameters.clone());
         self.apply_friction(parameters);
+    }
+
+    /// Whether tables of spans are those of the parameters.
+    fn is_prepared(&self, parameters: &limits::Parameters) -> bool {
+        let deciding = |from: &limits::Parameters| {
+            let numbers = [from.step, from.tolerance].map(f64::to_bits);
+            (numbers, from.scheme, from.solver, from.damping_ratios.clone())
+        };
+        self.prepared.as_ref().is_some_and(|prepared| deciding(prepared) == deciding(parameters))
     }
 
     fn apply_friction(&mut self, parameters: &limits::Parameters) {
@@ -346,7 +365,7 @@ impl Simulation {
             // The speeds before were accepted before.
             changed.iter().for_each(|body| drop(self.compiled.set_reference_speed(*body, before[*body])));
         })?;
-        self.limits = None;
+        (self.limits, self.prepared) = (None, None);
         Ok(())
     }
 
@@ -489,6 +508,7 @@ impl Simulation {
         (self.time, self.initial_time) = (0.0, 0.0);
         self.warnings.clear();
         self.notes.clear();
+        self.tangent.renew();
         self.phase = Phase::Created;
     }
 }

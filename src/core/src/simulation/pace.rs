@@ -8,7 +8,7 @@ use crate::variables::Quantity;
 use crate::{Error, Result, shown};
 
 /// What shortest steps leave, as a share of the clearance per length (1/s): where errors stop to follow the tolerance. A blade with 18
-/// modes that rubs (`core/tests/galerkin.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
+/// modes that rubs (`core/tests/galerkin/main.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
 const LEFT: f64 = 4.0;
 
 impl Simulation {

@@ -318,12 +318,17 @@ impl Simulation {
         // What the step takes from parameters follows from the restored values.
         let parameters = self.parameters();
         self.rest(&parameters);
-        self.apply_methods(&parameters);
+        if self.is_prepared(&parameters) {
+            self.apply_friction(&parameters);
+        } else {
+            self.apply_methods(&parameters);
+        }
         self.system.restore(reader);
         if self.phase != Phase::Created {
             self.renew_limits();
         }
         self.make_room();
+        self.make_room_for_tangent();
         if self.phase == Phase::Stepping {
             self.set_mark();
         }
@@ -341,12 +346,18 @@ impl Simulation {
     /// Back to the mark, with the same parameters. Does not allocate.
     pub(super) fn withdraw(&mut self) {
         let mark = std::mem::take(&mut self.mark);
-        let reader = &mut Reader::new(&mark);
+        self.go_back_to(&mark);
+        self.mark = mark;
+        self.tangent.forget();
+    }
+
+    /// Back to a state of this simulation, with the same parameters. Does not allocate.
+    pub(super) fn go_back_to(&mut self, mark: &[u8]) {
+        let reader = &mut Reader::new(mark);
         // Magic, version, scene.
         [0_u64; 3].restore(reader);
         self.read_values(reader);
         self.system.restore(reader);
-        self.mark = mark;
     }
 
     /// All of a state but that of the system.

@@ -68,6 +68,7 @@ impl Simulation {
             self.set_mark();
         }
         // Nothing is refused from here on.
+        self.set_out_tangent();
         if !keeps {
             self.system.set_step(step);
             if self.system.steps() == 0 {
@@ -408,6 +409,7 @@ impl Simulation {
         if self.phase != Phase::Stepping || self.communication.done == 0 {
             return Err(Error::invalid("early return", "no internal step is done", "Return after an internal step"));
         }
+        self.tangent.forget();
         let done = self.communication.done;
         let (offset, time) = (self.communication.offset(done), self.communication.time(done));
         self.communication = Communication { length: offset, count: done, ..self.communication };

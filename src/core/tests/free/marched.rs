@@ -148,6 +148,14 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
     (square(&mut a.iter().zip(b).map(|(a, b)| a - b)) / square(&mut b.iter().copied())).sqrt()
 }
 
+/// Errors (root mean square) over the tolerances, which are a share of a thousandth of the extent, against a far smaller one.
+fn over_tolerance(of: impl Fn(f64) -> Scene, steps: usize, tolerances: &[f64], smallest: f64) -> Vec<f64> {
+    let exact = flown(&of(smallest), steps);
+    let size = (exact.iter().map(|value| value * value).sum::<f64>() / exact.len() as f64).sqrt();
+    let error = |tolerance: &f64| apart(&flown(&of(*tolerance), steps), &exact) * size / (tolerance * 1e-3 * SIDE);
+    tolerances.iter().map(error).collect()
+}
+
 const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 
 /// What remains goes down with the tolerance, on plates that give way, with friction.
@@ -155,12 +163,8 @@ const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 fn the_error_follows_the_tolerance() {
     for (name, scene, steps) in events().drain(..2) {
         for friction in [0.0, 0.2] {
-            let run = |tolerance: f64| flown(&marched(scene.clone(), tolerance, friction), steps);
-            let exact = run(1e-7);
-            let mean_square = exact.iter().map(|value| value * value).sum::<f64>() / exact.len() as f64;
-            // A thousandth of the extent is what the tolerance is a share of.
-            let errors = TOLERANCES
-                .map(|tolerance| apart(&run(tolerance), &exact) * mean_square.sqrt() / (tolerance * 1e-3 * SIDE));
+            let of = |tolerance: f64| marched(scene.clone(), tolerance, friction);
+            let errors = over_tolerance(of, steps, &TOLERANCES, 1e-7);
             told!("{name}, µ {friction}: error over tolerance {errors:?}");
             assert!(errors.iter().all(|error| *error < 1.0), "{name}, µ {friction}: {errors:?}");
         }
@@ -188,11 +192,17 @@ fn light_contact_nodes_fly_as_massless_ones() {
 #[test]
 fn a_saved_flight_goes_on_with_the_same_bits_and_allocates_nothing() {
     let (_, scene, steps) = events().swap_remove(1);
-    let scene = marched(scene, 1e-3, 0.2);
-    let mut simulation = started(&scene);
+    let sliding = marched(scene, 1e-3, 0.2);
+    let mut sticking = sliding.clone();
+    sticking.settings.contacts.iter_mut().for_each(|contact| contact.solver = Solver::Coulomb);
+    [sliding, sticking].iter().for_each(|scene| goes_on(scene, steps));
+}
+
+fn goes_on(scene: &Scene, steps: usize) {
+    let mut simulation = started(scene);
     (0..steps / 3).for_each(|_| go(&mut simulation, H));
     let state = saved(&simulation);
-    let mut other = Simulation::new(&scene).unwrap();
+    let mut other = Simulation::new(scene).unwrap();
     other.restore_state(&state).unwrap();
     let count = allocations_of(|| {
         (0..steps / 2).for_each(|_| simulation.do_step(simulation.time(), H).unwrap());
@@ -279,14 +289,13 @@ fn with_sticking_friction_takes_energy_alone() {
             let heat = simulation.system().ledger().friction_loss.value();
             assert!(heat > 1e-3 * start, "{heat} J");
         }
-        let exact = flown(&of(1e-5), 60);
-        let mean_square = exact.iter().map(|value| value * value).sum::<f64>() / exact.len() as f64;
-        let errors = [1e-1, 1e-2, 1e-3].map(|tolerance| {
-            apart(&flown(&of(tolerance), 60), &exact) * mean_square.sqrt() / (tolerance * 1e-3 * SIDE)
-        });
+        let tolerances = [1e-1, 1e-2, 1e-3];
+        let errors = over_tolerance(of, 60, &tolerances, 1e-5);
+        told!("tolerances {tolerances:?}");
         told!("sticking, rigid {rigid}: error over tolerance {errors:.1?}");
         assert!(errors.iter().all(|error| *error < 6.0), "{errors:?}");
     }
+    guide::hold("cargo test -p tiprub-core --test free sticking");
 }
 
 /// Slower along the wall than friction stops: by other equations, with the mass of its contact nodes, it sticks as well.

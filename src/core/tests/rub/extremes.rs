@@ -344,7 +344,7 @@ fn units_are_what_their_names_say() {
             }
         }
     }
-    let all = ["deg", "kN", "kN/m", "kW", "mJ", "mm", "mm3", "ms", "rev", "rpm", "um", "us"];
+    let all = ["deg", "kN", "kN.m", "kN/m", "kW", "mJ", "mN.s", "mm", "mm3", "ms", "rev", "rpm", "um", "us"];
     assert!(seen.iter().eq(&all), "{seen:?}");
 }
 

@@ -1,5 +1,8 @@
 //! Rubs of bladed disks through the whole simulation: books, states, time, inputs; what is refused.
 
+#[path = "../../../../tests/guide.rs"]
+mod guide;
+
 mod blades;
 mod extremes;
 mod inputs;
@@ -9,4 +12,5 @@ mod robustness;
 mod rub;
 mod spin;
 mod states;
+mod tangent;
 mod values;

@@ -1,6 +1,7 @@
 //! `lab stability`: stiff and extreme cases, each in a process of its own, judged.
 
 use tiprub_packaging::{
+    cli::LibraryArguments,
     fmu::{FmiVersion, Package},
     library,
 };
@@ -76,15 +77,17 @@ fn verdict(table: &Table, directory: &std::path::Path) -> Option<Failure> {
 
 /// The scenes whose variables are walked, as FMUs of both versions in a temporary directory.
 fn package(arguments: &StabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
-    let library = library::load(arguments.library.as_deref(), console)?;
+    let chosen =
+        LibraryArguments { library: arguments.library.iter().cloned().collect(), ..LibraryArguments::default() };
+    let libraries = library::load(&chosen, console)?;
     let directory = tempfile::tempdir()
         .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
     for name in values::SCENES {
         let scene = values::scene(name);
-        let package = Package::new(&scene, &library)?;
+        let package = Package::new(&scene, &libraries)?;
         for version in [FmiVersion::Two, FmiVersion::Three] {
             let path = directory.path().join(format!("{name}-{}.fmu", version.digit()));
-            package.write(&path, version, false)?;
+            package.write(&path, version, Some(false))?;
         }
     }
     Ok(directory)

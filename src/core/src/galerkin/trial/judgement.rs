@@ -11,7 +11,7 @@ use crate::galerkin::rows::Rows;
 /// a hundred errors are beyond 1.9, 1.9 and 1.8 times the tolerance, and in 1, 2 and 6 % more trials than without.
 const KINK: f64 = 0.2;
 /// The same of forces that are linear in time, where contacts may stick. Measured on a block that swings under friction (`core/tests/belt.rs`):
-/// 14 turns leave up to 2.5 times the tolerance, and on the rub of `core/tests/galerkin.rs`: 0.2 to 0.5 of it.
+/// 14 stops leave up to 2.5 times the tolerance. And on a rub where all slides (`core/tests/galerkin/sticking.rs`): 0.2 to 0.8 of it.
 const BEND: f64 = 0.5;
 /// Gap of a node between points may be so many times what the polynomial leaves out, or the step is shortened.
 const NEAR: f64 = 4.0;

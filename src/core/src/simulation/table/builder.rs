@@ -5,7 +5,7 @@ use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP};
 use crate::schemes::SCHEMES;
 use crate::settings::{ContactSettings, SceneSettings, TOLERANCE};
 use crate::simulation::outputs::Reader;
-use crate::simulation::units::{ANGLE, INPUT_INTERPOLATIONS, TIME};
+use crate::simulation::units::{ANGLE, INPUT_INTERPOLATIONS, STEP_DERIVATIVES, TIME};
 use crate::variables::{
     Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
 };
@@ -197,6 +197,13 @@ impl Builder {
         let text =
             "Inputs that move or load something, and gap_offset, between communication points; speed is always held";
         self.choice(Quantity::InputInterpolation, "input_interpolation", &INPUT_INTERPOLATIONS, start, text);
+    }
+
+    /// Whether derivatives over communication steps can be asked for.
+    pub fn step_derivatives(&mut self) {
+        let text = "Whether directional derivatives are those of outputs at the end of the last communication step by inputs over it; \
+                    when on, the state at the start of each step is kept";
+        self.choice(Quantity::StepDerivatives, "step_derivatives", &STEP_DERIVATIVES, 1, text);
     }
 
     /// Name of the scene.

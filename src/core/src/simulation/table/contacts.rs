@@ -47,6 +47,7 @@ pub fn totals(table: &mut Builder, friction: bool) {
         scalar(|view| view.contacts()),
     );
     (count.kind, count.variability, count.quantity) = (Kind::Integer, Variability::Discrete, Quantity::ContactCount);
+    count.min = Some(0.0);
     let touching = table.output(
         "in_contact",
         Span::Point,

@@ -102,7 +102,7 @@ pub fn parameters(table: &mut Builder, parts: &Parts) {
             table.belongs(carrier.index, parts.of_carrier(carrier));
             let text = "Number of nodal diameters of the radial line load on the casing";
             let row = table.parameter(Quantity::LoadOrder, "casing_load_order", None, 0.0, text);
-            row.kind = Kind::Integer;
+            (row.kind, row.min) = (Kind::Integer, Some(0.0));
             row.start = Some(Start::Integer(i32::try_from(load.order).unwrap_or(i32::MAX)));
         }
     }

@@ -107,6 +107,7 @@ fn parameters(table: &mut Builder, parts: &Parts) {
     table.methods(settings);
     if features::has_moving_inputs(parts) || settings.time.input_interpolation == InputInterpolation::Hold {
         table.input_interpolation(settings);
+        table.step_derivatives();
     }
     for body in bodies.iter().filter(|body| !body.free) {
         table.belongs(body.index, parts.of_body(body));

@@ -1,14 +1,15 @@
 //! Continuous Galerkin in time on whole scenes: against massless-boundary with ever shorter steps, within its tolerance, with books that
 //! close, with all it may be combined with.
 
-#[path = "common/counting.rs"]
+#[path = "../common/counting.rs"]
 mod counting;
-#[path = "../../../tests/guide.rs"]
+#[path = "../../../../tests/guide.rs"]
 mod guide;
+mod sticking;
 
 use counting::allocations_of;
 use guide::told;
-use tiprub_core::settings::{LoadSettings, OutputSettings, Scheme, Shape, Solver, SplineSettings, TimeSettings};
+use tiprub_core::settings::{LoadSettings, OutputSettings, Scheme, Shape, SplineSettings, TimeSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::disk::Disk;
 use tiprub_test_models::{
@@ -196,24 +197,7 @@ fn a_disk_of_coupled_sectors_is_what_it_is_as_one_structure() {
         let of = |rom: Rom, tolerance: f64| {
             let mut scene = bumps(rom);
             scene.settings.contacts[0].friction = friction;
-            scene.settings.time = TimeSettings { tolerance: Some(tolerance), ..scene_time() };
-            scene.settings.outputs.energies = true;
-            let mut simulation = started(&scene);
-            let mut displacements = Vec::new();
-            for _ in 0..60 {
-                go(&mut simulation, H);
-                let bank = simulation.system().bank();
-                for row in 0..3 * sectors * nodes {
-                    // Nodes of all sectors in a row where the disk is one structure.
-                    let place = if bank.sectors() == 1 { (row, 0) } else { (row % (3 * nodes), row / (3 * nodes)) };
-                    displacements.push(bank.row(place.0, place.1));
-                }
-            }
-            let ledger = simulation.system().ledger();
-            let (kinetic, strain) = simulation.system().energies();
-            let residual = ledger.residual(kinetic + strain).abs() / ledger.scale();
-            assert!(residual < 1e-12 && ledger.turnover.value() > 0.0, "{residual:e}");
-            displacements
+            disk_displacements(scene, tolerance)
         };
         let exact = of(disk.whole(), 1e-7);
         for tolerance in [1e-3, 1e-5, 1e-7] {
@@ -222,6 +206,27 @@ fn a_disk_of_coupled_sectors_is_what_it_is_as_one_structure() {
             assert!(together < 6.0 * tolerance.max(1e-6), "{sectors} sectors, {tolerance:e}: {together:e}");
         }
     }
+}
+
+/// Displacements of all contact rows of a disk, sector by sector, at communication points (m).
+fn disk_displacements(mut scene: Scene, tolerance: f64) -> Vec<f64> {
+    scene.settings.time = TimeSettings { tolerance: Some(tolerance), ..scene_time() };
+    scene.settings.outputs.energies = true;
+    let mut simulation = started(&scene);
+    let mut displacements = Vec::new();
+    for _ in 0..60 {
+        go(&mut simulation, H);
+        let bank = simulation.system().bank();
+        // Of sectors, or of one structure with the nodes of all in a row.
+        for sector in 0..bank.sectors() {
+            displacements.extend((0..bank.rows()).map(|row| bank.row(row, sector)));
+        }
+    }
+    let ledger = simulation.system().ledger();
+    let (kinetic, strain) = simulation.system().energies();
+    let residual = ledger.residual(kinetic + strain).abs() / ledger.scale();
+    assert!(residual < 1e-12 && ledger.turnover.value() > 0.0, "{residual:e}");
+    displacements
 }
 
 /// A tolerance that asks for nothing: books close all the same, and nothing is above what was put in.
@@ -672,32 +677,4 @@ fn a_wide_clearance_does_not_loosen_the_tolerance() {
     let (near, far) = (run(1e-3), run(1e-2));
     assert!(near.1 > STEPS.into(), "{} trials", near.1);
     assert_eq!(near, far);
-}
-
-/// The solver that knows sticking, on a rub where all slides: it tends to what massless-boundary tends to with it, and errors are those
-/// asked for.
-#[test]
-fn friction_that_may_stick_goes_by_the_tolerance() {
-    for (name, change) in [("rigid", (|_: &mut Scene| {}) as Change), ("flexible", flexible)] {
-        let of = |scheme: Scheme, step: f64, tolerance: f64| {
-            let mut scene = scene(scheme, step, tolerance);
-            change(&mut scene);
-            scene.settings.contacts[0].solver = Solver::Coulomb;
-            run(&scene, still)
-        };
-        let exact = of(Scheme::Galerkin, 0.25 * H, 1e-6);
-        if name == "rigid" {
-            let far = |step: f64| apart(&of(Scheme::MasslessBoundary, step, 1e-3).displacements, &exact.displacements);
-            let (coarse, fine) = (far(2e-7), far(5e-8));
-            told!("coulomb, massless-boundary, h = 0.05 us: {fine:.1e}");
-            assert!(fine < 1e-5 && coarse > 2.0 * fine, "{coarse:e} {fine:e}");
-        }
-        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
-            let found = of(Scheme::Galerkin, H, tolerance);
-            let error = apart(&found.displacements, &exact.displacements);
-            told!("coulomb, {name}, tolerance {tolerance:.0e}: {error:.1e}, steps per blade {}", found.steps);
-            assert!(error < 1.5 * tolerance && found.residual < 1e-13, "{error:e} {:e}", found.residual);
-        }
-    }
-    guide::hold("cargo test -p tiprub-core --test galerkin stick");
 }

@@ -1,0 +1,39 @@
+//! Directional and adjoint derivatives, of which both versions of the standard have functions.
+
+use super::{Handle, In, Out, guard};
+use crate::slave::order::unsupported;
+use crate::slave::{Dialect, Request, Result, Slave, Status};
+
+/// Value references with the number of their values, and the names of both arguments.
+pub(crate) type Side = (In<u32>, usize, usize, &'static str);
+
+/// What a function asks for.
+type Answer = fn(&mut Slave, &[u32], &[u32], &[f64]) -> Result<Vec<f64>>;
+
+/// Forward: outputs move as inputs do.
+pub(crate) const DIRECTIONAL: Answer = Slave::directional;
+/// Backward: inputs weigh as outputs do.
+pub(crate) const ADJOINT: Answer = Slave::adjoint;
+
+/// Answer with derivatives of `unknowns` by `knowns`; `seed` and `sensitivity` with the names of their arguments.
+pub(crate) fn derivatives(
+    (handle, name, answer): (Handle, &'static str, Answer),
+    unknowns: Side,
+    knowns: Side,
+    (seed, seeds, seed_name): (In<f64>, usize, &'static str),
+    (sensitivity, sensitivities, sensitivity_name): (Out<f64>, usize, &'static str),
+) -> Status {
+    guard(handle, &unsupported(name), |slave| {
+        slave.check_derivatives()?;
+        let type_name = if slave.dialect() == Dialect::Fmi2 { "Real" } else { "Float64" };
+        let elements = |slave: &Slave, (references, count, values, name): Side| {
+            let references = references.array(count, slave.reference_limit(), name)?;
+            slave.elements(&Request { type_name, references, values })
+        };
+        let (outputs, inputs) = (elements(slave, unknowns)?, elements(slave, knowns)?);
+        let seed = seed.array(seeds, usize::MAX, seed_name)?;
+        let window = sensitivity.window(sensitivities, sensitivity_name)?;
+        window.fill(&answer(slave, &outputs, &inputs, seed)?);
+        Ok(Status::Ok)
+    })
+}

@@ -1,0 +1,123 @@
+//! What stands beside `modelDescription.xml`: terminals of FMI 3.0, and the list of related files of FMI-LS-REF.
+
+use crate::Description;
+use crate::element::Element;
+use crate::row::{Row, rows};
+
+/// Member of a terminal: its name there, the variable's name without prefix and index, kind (FMI 3.0, section 2.4.9.2.2).
+type Member = (&'static str, &'static str, &'static str);
+
+/// Terminal, its text, its members. Forces, torques and heat go out of the unit: they act on what is connected.
+type Terminal = (&'static str, &'static str, &'static [Member]);
+
+/// Of each rotor.
+const TERMINALS: [Terminal; 2] = [
+    (
+        "shaft",
+        "Rotating flange of the rotor",
+        &[("angle", "rotor_angle", SIGNAL), ("speed", "speed", SIGNAL), ("torque", "torque", OUTFLOW)],
+    ),
+    (
+        "centre",
+        "Where whirl and axial shift move the shaft, and what the contacts do there",
+        &[
+            ("x", "whirl_x", SIGNAL),
+            ("y", "whirl_y", SIGNAL),
+            ("z", "axial_shift", SIGNAL),
+            ("force_x", "force_x", OUTFLOW),
+            ("force_y", "force_y", OUTFLOW),
+            ("force_z", "force_z", OUTFLOW),
+            ("moment_x", "moment_x", OUTFLOW),
+            ("moment_y", "moment_y", OUTFLOW),
+        ],
+    ),
+];
+
+/// Thermal port of each casing patch, or of all where arrays are whole. Of several pairs none: heat is of a pair, temperature
+/// of a structure.
+const PATCH: Terminal = (
+    "casing_patch",
+    "Thermal port of the casing",
+    &[("temperature", "casing_temperature", SIGNAL), ("heat", "casing_friction_power", OUTFLOW)],
+);
+
+const SIGNAL: &str = "signal";
+const OUTFLOW: &str = "outflow";
+
+/// `terminalsAndIcons.xml` of FMI 3.0; none where the scene has nothing to connect.
+pub fn fmi3_terminals(description: &Description) -> Option<String> {
+    let rows = rows(description.table, description.fmi3_arrays);
+    let mut prefixes: Vec<&str> = Vec::new();
+    for row in &rows {
+        let (prefix, _, _) = parts(&row.name);
+        if !prefixes.contains(&prefix) {
+            prefixes.push(prefix);
+        }
+    }
+    let of_prefix = |prefix: &&str| {
+        let port = |terminal: &Terminal| terminal_of(&rows, terminal, prefix, None);
+        let patches = rows.iter().filter_map(|row| {
+            let (of, base, index) = parts(&row.name);
+            (description.patches_of_roms && of == *prefix && base == PATCH.2[0].1).then_some(index)
+        });
+        let patches = patches.filter_map(|index| terminal_of(&rows, &PATCH, prefix, index));
+        let turns = rows.iter().any(|row| row.name == format!("{prefix}speed"));
+        TERMINALS.iter().filter(|_| turns).filter_map(port).chain(patches).collect::<Vec<_>>()
+    };
+    let terminals = Element::new("Terminals").children(prefixes.iter().flat_map(of_prefix)).unless_empty()?;
+    Some(Element::new("fmiTerminalsAndIcons").with("fmiVersion", "3.0").child(terminals).document())
+}
+
+/// A terminal with those members that the scene has; a single one connects nothing.
+fn terminal_of(rows: &[Row], (name, text, members): &Terminal, prefix: &str, index: Option<&str>) -> Option<Element> {
+    let suffix = index.map_or(String::new(), |index| format!("[{index}]"));
+    let member = |(name, base, kind): &Member| {
+        let variable = format!("{prefix}{base}{suffix}");
+        rows.iter().any(|row| row.name == variable).then(|| {
+            Element::new("TerminalMemberVariable")
+                .with("variableName", variable)
+                .with("memberName", name)
+                .with("variableKind", kind)
+        })
+    };
+    let members: Vec<Element> = members.iter().filter_map(member).collect();
+    (members.len() > 1).then(|| {
+        Element::new("Terminal")
+            .with("name", format!("{prefix}{name}{suffix}"))
+            .with("matchingRule", "bus")
+            .with("description", text)
+            .children(members)
+    })
+}
+
+/// `rotor.speed[3]` as prefix with its point, base name and index.
+fn parts(name: &str) -> (&str, &str, Option<&str>) {
+    let (name, index) = match name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
+        Some((name, index)) => (name, Some(index)),
+        None => (name, None),
+    };
+    let at = name.rfind('.').map_or(0, |point| point + 1);
+    (&name[..at], &name[at..], index)
+}
+
+/// `fmi-ls-manifest.xml` of FMI-LS-REF 1.0.0-alpha.1, in `extra/org.fmi-standard.fmi-ls-ref`: which of the files of the FMU
+/// (`related`: path from its root, MIME type, role, description) is what.
+pub fn references_manifest(related: &[(&str, &str, &str, &str)]) -> String {
+    let file = |(path, kind, role, text): &(&str, &str, &str, &str)| {
+        Element::new("Related")
+            .with("type", kind)
+            .with("source", format!("../../{path}"))
+            .with("role", role)
+            .with("description", text)
+    };
+    Element::new("fmiReferences")
+        .with("xmlns:fmi-ls", "http://fmi-standard.org/fmi-ls-manifest")
+        .with("fmi-ls:fmi-ls-name", "org.fmi-standard.fmi-ls-ref")
+        .with("fmi-ls:fmi-ls-version", "1.0.0-alpha.1")
+        .with(
+            "fmi-ls:fmi-ls-description",
+            "Layered Standard providing information on related files included in an FMU.",
+        )
+        .children(related.iter().map(file))
+        .document()
+}

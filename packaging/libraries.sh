@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# Build the FMU library for every platform, or for those named, into target/libraries, and show what each needs:
+#
+#     packaging/libraries.sh [x86_64-linux|x86_64-windows|aarch64-linux|x86_64-darwin|aarch64-darwin]...
+#
+# Linux libraries run with glibc 2.17 and later. The Zig linker crosses (both packages come from PyPI, pinned); nothing
+# of Microsoft's or Apple's is needed. The same sources and the same Rust give the same bytes, wherever they are built.
+# `tiprub package --library target/libraries` takes what is here.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+target_dir=${CARGO_TARGET_DIR:-target}
+out=$target_dir/libraries
+venv=$target_dir/cross-venv
+if [ ! -x "$venv/bin/cargo-zigbuild" ]; then
+    python3 -m venv "$venv"
+    "$venv/bin/pip" install --quiet --disable-pip-version-check ziglang==0.17.1 cargo-zigbuild==0.24.0
+fi
+bin=$(cd "$venv/bin" && pwd)
+all="x86_64-linux x86_64-windows aarch64-linux x86_64-darwin aarch64-darwin"
+[ $# -gt 0 ] || set -- $all
+cargo fetch --locked --quiet
+. packaging/remap.sh
+# The linker for Windows writes a time into the library.
+export SOURCE_DATE_EPOCH=315532800
+export MACOSX_DEPLOYMENT_TARGET=11.0
+mkdir -p "$out"
+for platform in "$@"; do
+    flags=$library_flags
+    case $platform in
+    *-linux) triple=${platform%-linux}-unknown-linux-gnu glibc=.2.17 built=libtiprub_fmi.so extension=so ;;
+    *-windows) triple=${platform%-windows}-pc-windows-gnu glibc= built=tiprub_fmi.dll extension=dll ;;
+    *-darwin) triple=${platform%-darwin}-apple-darwin glibc= built=libtiprub_fmi.dylib extension=dylib
+        # A name that does not tell where it was built.
+        flags=$library_flags$separator-Clink-arg=-Wl,-install_name,@rpath/tiprub.dylib ;;
+    *) echo "libraries.sh: $platform is none of $all" >&2; exit 2 ;;
+    esac
+    rustup target add --toolchain "$(rustc -V | cut -d' ' -f2)" "$triple" >/dev/null 2>&1 || rustup target add "$triple"
+    CARGO_ENCODED_RUSTFLAGS=$flags PATH=$bin:$PATH \
+        cargo zigbuild --quiet -p tiprub-fmi --profile fmu --target "$triple$glibc"
+    library=$out/$platform.$extension
+    cp "$target_dir/$triple/fmu/$built" "$library"
+    echo "$library: $(stat -c %s "$library") bytes, $(gzip -9 -c "$library" | wc -c) packed"
+    if [ $extension = so ]; then
+        readelf -d "$library" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/  needs \1/p'
+        echo "  newest glibc symbol: $(readelf -V --wide "$library" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -1)"
+    fi
+done

@@ -1,0 +1,245 @@
+"""Running the program `tiprub`, and what it answers."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Iterable, Iterator, Mapping, Optional
+
+import numpy
+
+
+class Error(Exception):
+    """What tiprub refused or could not do, in the words of the command line.
+
+    Attributes
+    ----------
+    what : str
+        What the trouble is about: a file, an option, a scene field.
+    problem : str
+        What is wrong with it.
+    remedy : str
+        What to do about it; empty where the problem already says so.
+    exit_code : int
+        1: the work failed; 2: what was asked for is wrong.
+    """
+
+    def __init__(self, what: str, problem: str, remedy: str = "", exit_code: int = 1) -> None:
+        super().__init__(what, problem, remedy, exit_code)
+        self.what, self.problem, self.remedy, self.exit_code = what, problem, remedy, exit_code
+
+    def __str__(self) -> str:
+        sentences = [f"{self.what}: {self.problem}", self.remedy]
+        return " ".join(text.rstrip().rstrip(".") + "." for text in sentences if text)
+
+
+class Report(dict):
+    """What a command answers: a dict, with the keys of `tiprub COMMAND --json`.
+
+    It stands for the file or directory that was written or looked at wherever Python takes a path, and in a scene's `rom`.
+
+    Attributes
+    ----------
+    path : pathlib.Path or None
+        That file or directory; None for what ships.
+    """
+
+    def __init__(self, values: Mapping[str, Any], path: Optional[Path] = None) -> None:
+        super().__init__(values)
+        self.path = path
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings of the command."""
+        return self.get("warnings") or (self.get("scene") or {}).get("warnings") or []
+
+    def __fspath__(self) -> str:
+        if self.path is None:
+            raise TypeError("this report stands for no file")
+        return str(self.path)
+
+    def _repr_html_(self) -> str:
+        title = "" if self.path is None else f"<b>{html.escape(str(self.path))}</b>"
+        return title + as_html(self)
+
+
+#: Longer lists are cut in notebooks.
+MOST_SHOWN = 12
+
+
+def as_html(value: Any) -> str:
+    """Nested tables of what JSON holds."""
+    if isinstance(value, dict):
+        rows = (f"<tr><th style='text-align:left'>{html.escape(str(key))}</th>"
+                f"<td style='text-align:left'>{as_html(item)}</td></tr>" for key, item in value.items())
+        return f"<table>{''.join(rows)}</table>"
+    if isinstance(value, list):
+        between = "<br>" if any(isinstance(item, (dict, list, str)) for item in value) else ", "
+        more = [f"… {len(value)} in all"] if len(value) > MOST_SHOWN else []
+        return between.join([as_html(item) for item in value[:MOST_SHOWN]] + more)
+    return html.escape(f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value))
+
+
+def program() -> str:
+    """The program: what TIPRUB names, else the one installed with this module, else the one on PATH."""
+    named = os.environ.get("TIPRUB")
+    if named:
+        return named
+    name = "tiprub.exe" if os.name == "nt" else "tiprub"
+    user = sysconfig.get_path("scripts", f"{os.name}_user")
+    # The last is where `pip install --target` puts it.
+    for directory in [sysconfig.get_path("scripts"), user, Path(__file__).resolve().parents[1] / "bin"]:
+        if (Path(directory) / name).is_file():
+            return str(Path(directory) / name)
+    found = shutil.which("tiprub")
+    if found is None:
+        raise Error("tiprub", "the program is not installed", "Install the wheel, or name the program in the environment variable TIPRUB")
+    return found
+
+
+#: Options that are no keywords: what to do instead.
+INSTEAD = {
+    "csv": "The result is a pandas.DataFrame: write it with its `to_csv`",
+    "help": "Call Python's help, such as help(tiprub.run), or `tiprub COMMAND --help`",
+    "json": "Leave it out: the answer is a Python object",
+    "out": "`study` and `demo` take `out`, `package` and `reduce` take `output`",
+    "output": "`package` and `reduce` take `output`, `study` and `demo` take `out`; a result of `run` has `to_csv`",
+    "set": "`run` and `study` take `set`; elsewhere write start values into the scene",
+    "version": "Use tiprub.__version__",
+}
+
+
+def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({})) -> list[str]:
+    """Keywords as options: `contact_nodes=3` is `--contact-nodes=3`, True an option alone, several values the option repeated.
+
+    Raises
+    ------
+    Error
+        A keyword of `more` that is also among the function's `own` options or is in `INSTEAD`, or a value of a wrong type.
+    """
+    for key in more:
+        if key in own or key in INSTEAD:
+            remedy = INSTEAD.get(key, "See the function's help for the keyword that does the same")
+            raise Error(f"keyword `{key}`", "is none of this function", remedy, 2)
+    words = []
+    for key, value in {**own, **more}.items():
+        option = "--" + key.replace("_", "-")
+        value = value.tolist() if hasattr(value, "tolist") else value
+        several = isinstance(value, Iterable) and not isinstance(value, (str, bytes, Mapping, os.PathLike))
+        for one in value if several else [value]:
+            if one is True:
+                words.append(option)
+            elif several or (one is not None and one is not False):
+                words.append(f"{option}={text(option, one)}")
+    return words
+
+
+def kind_of(kind: Any) -> str:
+    """The kind of a reduction or study, which is no option."""
+    if not isinstance(kind, str) or not kind or kind.startswith("-"):
+        raise Error("kind", f"{kind!r} is none", "See `tiprub reduce --help` or `tiprub study --help`", 2)
+    return kind
+
+
+def assignments(values: Optional[Mapping[str, Any]]) -> list[str]:
+    """Start values as options; an array as a list in brackets, whose length the program checks."""
+    if not isinstance(values, (Mapping, type(None))):
+        raise Error("keyword `set`", f"is of type {type(values).__name__}", 'Give a dict of names and values, such as {"speed": 1700.0}', 2)
+    return [f"--set={name}={start_value(f'keyword `set`, `{name}`', value)}" for name, value in (values or {}).items()]
+
+
+def start_value(what: str, value: Any) -> str:
+    """A number or word, or the numbers of an array of one dimension."""
+    try:
+        # Not asarray, which forgets masks.
+        array = numpy.asanyarray(value)
+    except ValueError:
+        # Rows of several lengths.
+        array = numpy.empty((0, 0))
+    if array.ndim == 0:
+        return text(what, array.item())
+    if array.ndim > 1 or array.size == 0 or array.dtype.kind not in "biuf":
+        raise Error(what, "is no row of numbers", "Give a number, or a number for each element of an array", 2)
+    return "[" + ",".join(text(what, one) for one in array.tolist()) + "]"
+
+
+def text(what: str, value: Any) -> str:
+    """A value as the command line and TOML take it; numbers keep their bits. `what` is named where it is none."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, (str, os.PathLike)):
+        return place(what, value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return repr(int(value) if isinstance(value, int) else float(value))
+    raise Error(what, f"is of type {type(value).__name__}", "Give a number, a text or a truth value", 2)
+
+
+def place(what: str, value: Any) -> str:
+    """A path as text. `what` is named where it is none."""
+    if isinstance(value, (str, os.PathLike)):
+        # A report may stand for no file.
+        with contextlib.suppress(TypeError):
+            return os.fsdecode(value)
+    raise Error(what, f"is no path (type {type(value).__name__})", "Give the path of a file or directory", 2)
+
+
+@contextlib.contextmanager
+def called(name: str, file: "os.PathLike[str]") -> Iterator[None]:
+    """Errors call the temporary file by the name that the user knows."""
+    try:
+        yield
+    except Error as error:
+        words = (part.replace(str(file), name) for part in (error.what, error.problem, error.remedy))
+        raise Error(*words, error.exit_code) from None
+
+
+def call(words: Iterable[str], files: Iterable[str] = (), quiet: bool = False) -> dict[str, Any]:
+    """Run a command; its JSON object.
+
+    Progress and warnings go to stderr, that of a notebook too; with `quiet` they go nowhere.
+
+    Raises
+    ------
+    Error
+        What the command says it could not do.
+    """
+    command = [program(), "--json", *(["--quiet"] if quiet else []), *words, *(["--", *files] if files else [])]
+    # A terminal gets progress bars; a stream of Python's own, as in a notebook, gets lines.
+    inherited = sys.stderr is sys.__stderr__ and sys.stderr is not None
+    stderr = subprocess.DEVNULL if quiet else None if inherited else subprocess.PIPE
+    with tempfile.TemporaryFile() as answer:
+        try:
+            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=answer, stderr=stderr)
+        except ValueError as error:
+            raise Error("tiprub", f"cannot be asked: {error}", "Names and values hold no zero bytes", 2) from None
+        except OSError as error:
+            raise Error(command[0], f"cannot be started: {error}", "Name the program in the environment variable TIPRUB") from error
+        with process:
+            try:
+                for line in process.stderr or ():
+                    if sys.stderr is not None:
+                        sys.stderr.write(line.decode("utf-8", "replace"))
+                process.wait()
+            except BaseException:
+                process.kill()
+                raise
+        answer.seek(0)
+        content = answer.read()
+    try:
+        result = json.loads(content)
+    except ValueError:
+        raise Error("tiprub", f"ended with {process.returncode} and without an answer", "See what it says on stderr") from None
+    if "error" in result and process.returncode != 0:
+        error = result["error"]
+        raise Error(error["what"], error["problem"], error["remedy"], error["exit_code"])
+    return result

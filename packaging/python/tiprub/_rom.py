@@ -1,0 +1,132 @@
+"""ROM files from NumPy arrays, without another package."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import struct
+import tempfile
+from pathlib import Path
+from typing import Any, Union
+
+import numpy
+
+from ._program import Error, call, called, place, text
+
+#: Entries of the file that are text; all else is an array.
+ENTRIES = {"origin", "contact_names", "largest_speed", "contact_grid", "watched_names", "basis", "contact_rows", "rub_errors", "rub_errors_found_on", "units"}
+#: Needs format 2.
+SECOND = {"contact_areas", "contact_lengths", "flexibility_deviation", "response_frequencies", "response_deviation", "watched_map",
+          "watched_positions", "watched_names", "basis", "contact_rows", "rub_errors", "rub_errors_found_on"}
+
+
+def rom(
+    path: Union[str, "os.PathLike[str]"],
+    mass: Any,
+    stiffness: Any,
+    contact_map: Any,
+    contact_positions: Any,
+    *,
+    name: str,
+    sectors: int = 1,
+    frame: str = "cylindrical",
+    damping_ratio: float = 0.0,
+    check: bool = True,
+    **more: Any,
+) -> Path:
+    """Write the reduced-order model of a structure, from whatever program its matrices come.
+
+    With `n` reduced coordinates q of one sector: M q'' + D q' + K q = Cᵀ f and u = C q.
+
+    Parameters
+    ----------
+    path : path
+        The file, by custom NAME.rom.safetensors. One that is there is replaced, unless the new one is refused.
+    mass : array_like, shape (n, n), kg
+        M: symmetric, positive definite.
+    stiffness : array_like, shape (n, n), N/m
+        K: symmetric, positive semidefinite.
+    contact_map : array_like, shape (nodes, 3, n), m per unit coordinate
+        C: displacement components of each contact node caused by each coordinate.
+    contact_positions : array_like, shape (nodes, 3), m, rad, m or m
+        (r, theta, z) with `frame="cylindrical"`, (x, y, z) with `frame="cartesian"`.
+    name : str
+        Name of the structure.
+    sectors : int
+        Number of identical sectors around the axis.
+    frame : {"cylindrical", "cartesian"}
+        Directions of positions and displacements.
+    damping_ratio : float
+        Modal damping ratio, from 0 to below 1.
+    check : bool
+        Have the program read the file, so that what is wrong with it is said here, before anything is replaced.
+    **more
+        Any other array or entry of the format, by its name: `contact_names=["le", "te"]`, `contact_grid=(24, 3)`,
+        `stiffness_speed2=K1`, ... Of coupled sectors, `mass_3`, `stiffness_3`, `contact_map_3` and so on are complex
+        arrays of shapes (m, m), (m, m) and (nodes, 3, m).
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    Error
+        What the program refuses in it, what is no number or text, or a file that cannot be written.
+    """
+    arrays = {"mass": mass, "stiffness": stiffness, "contact_map": contact_map, "contact_positions": contact_positions}
+    arrays.update((key, item) for key, item in more.items() if key not in ENTRIES)
+    path = place("path", path)
+    entries = {"format": "tiprub-rom", "format_version": "2" if SECOND & more.keys() else "1", "name": name, "sectors": sectors,
+               "frame": frame, "damping_ratio": damping_ratio}
+    entries.update((key, item) for key, item in more.items() if key in ENTRIES)
+    header: dict[str, Any] = {"__metadata__": {key: entry(f"{path}: `{key}`", item) for key, item in entries.items()}}
+    data = []
+    end = 0
+    for key, item in arrays.items():
+        try:
+            content = array(key, item)
+        except (TypeError, ValueError) as error:
+            raise Error(f"{path}: array `{key}`", f"is none of numbers: {error}", "Give numbers, or see docs/rom-file.md for its name") from None
+        header[key] = {"dtype": "F64", "shape": list(content.shape), "data_offsets": [end, end + content.nbytes]}
+        end += content.nbytes
+        data.append(content.tobytes())
+    head = json.dumps(header).encode()
+    head += b" " * (-len(head) % 8)
+    # Beside it, under the same name: what is there stays as it is until the new one is right. Through a link to its file.
+    try:
+        file = Path(os.path.realpath(path))
+        with tempfile.TemporaryDirectory(prefix=".tiprub-", dir=file.parent) as own:
+            new = Path(own) / file.name
+            new.write_bytes(b"".join([struct.pack("<Q", len(head)), head, *data]))
+            if check:
+                with called(path, new):
+                    call(["inspect"], [str(new)], quiet=True)
+            os.replace(new, file)
+    except (OSError, ValueError) as error:
+        problem = getattr(error, "strerror", None) or error
+        raise Error(path, f"cannot be written: {problem}", "Give a file in a directory that is there and may be written to") from None
+    return Path(path)
+
+
+def array(key: str, item: Any) -> numpy.ndarray:
+    """An array as the file holds it; complex ones have real and imaginary parts last."""
+    found = numpy.asarray(item)
+    if found.dtype.kind not in "biufc":
+        raise TypeError(f"dtype {found.dtype}")
+    coupled = re.fullmatch(r"(mass|stiffness|contact_map)_[0-9]+", key)
+    if numpy.iscomplexobj(found) or (coupled and found.ndim == (3 if coupled[1] == "contact_map" else 2)):
+        found = numpy.stack([found.real, found.imag], axis=-1)
+    # Not ascontiguousarray, which makes a vector of a number.
+    return numpy.array(found, dtype="<f8", order="C")
+
+
+def entry(what: str, item: Any) -> str:
+    """Text of an entry; several words or numbers have commas between them."""
+    item = item.tolist() if hasattr(item, "tolist") else item
+    found = ",".join(text(what, one) for one in item) if isinstance(item, (list, tuple)) else text(what, item)
+    if not found:
+        raise Error(what, "is empty", "Give a text, or leave it out", 2)
+    return found

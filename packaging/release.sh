@@ -1,0 +1,57 @@
+#!/usr/bin/env bash
+# Make everything that a release holds, into target/release-VERSION:
+#
+#     wheels, the libraries of all platforms, the guide as a book, the sources, licences, a bill of materials (CycloneDX),
+#     what the studies of the guide wrote (docs), and SHA-256 checksums of all of it.
+#
+# Offline but for the registries of Rust and Python, and the database of advisories. `--no-check` leaves cargo deny out,
+# `--no-wheels` the wheels.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+check=yes wheels=yes
+for option in "$@"; do
+    case $option in
+    --no-check) check=no ;;
+    --no-wheels) wheels=no ;;
+    *) sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
+    esac
+done
+[ -z "$(git status --porcelain)" ] || { echo "release.sh: the tree has changes; commit them first" >&2; exit 1; }
+version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)
+target_dir=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+out=$target_dir/release-$version
+tools=$target_dir/release-tools
+SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
+export SOURCE_DATE_EPOCH
+rm -rf "$out"
+mkdir -p "$out"
+
+if [ $check = yes ]; then
+    [ -x "$tools/bin/cargo-deny" ] || cargo install --quiet --locked --root "$tools" cargo-deny@0.20.2
+    "$tools/bin/cargo-deny" --log-level error check
+fi
+[ -x "$tools/bin/cargo-cyclonedx" ] || cargo install --quiet --locked --root "$tools" cargo-cyclonedx@0.5.9
+"$tools/bin/cargo-cyclonedx" cyclonedx --quiet --format json --describe crate --override-filename bill-of-materials
+mv packaging/bill-of-materials.json "$out/tiprub-$version.cdx.json"
+mv fmi/bill-of-materials.json "$out/tiprub-fmi-$version.cdx.json"
+find . -name bill-of-materials.json -not -path './target/*' -delete
+
+packaging/libraries.sh
+tarred() {
+    tar --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" -C "$1" -c "$2" | gzip -9n > "$out/$3.tar.gz"
+}
+tarred "$target_dir" libraries "tiprub-libraries-$version"
+if command -v mdbook > /dev/null; then
+    packaging/book.sh
+    tarred "$target_dir" book "tiprub-guide-$version"
+else
+    tarred . docs "tiprub-guide-$version"
+fi
+git archive --format=tar --prefix="tiprub-$version/" HEAD | gzip -9n > "$out/tiprub-$version.tar.gz"
+cp packaging/assets/third-party.txt LICENSE-MIT LICENSE-APACHE CHANGELOG.md "$out"
+if [ $wheels = yes ]; then
+    packaging/wheels.sh
+    cp "$target_dir"/wheels/*.whl "$out"
+fi
+(cd "$out" && sha256sum -- * > SHA256SUMS)
+cat "$out/SHA256SUMS"

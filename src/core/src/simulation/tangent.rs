@@ -1,0 +1,257 @@
+//! ∂y(t+H)/∂u: what outputs at the end of the last communication step owe to inputs over it, for importers that iterate.
+//!
+//! Outputs of a step are piecewise smooth in its inputs: pieces differ in which contacts are closed and, with galerkin, in which steps
+//! every sector takes. Inputs are moved by so little (gaps by a millionth of the clearance) that the step stays on its piece, and the step is
+//! marched again in a copy. The steps that the copy took tell whether it stayed there. The quotient is then the derivative with
+//! contacts and steps as they were in the accepted step, exact up to rounding.
+
+use super::{Phase, Simulation};
+use crate::variables::{Causality, Kind, Quantity, Variability};
+use crate::{Error, Result, shown};
+
+/// By how much inputs are moved, as a share of what moves gaps by a clearance: 2⁻²⁰, so that sums with usual values are exact. Rounding in
+/// gaps is some 1e-7 of it, more on splines.
+const SMALL: f64 = 1.0 / 1_048_576.0;
+/// How much less, in turn, where the step does not stay on its piece.
+const LESS: f64 = 0.125;
+/// Marches at most, in both directions together.
+const TRIES: usize = 6;
+/// Inputs that move gaps by less than this share of what was meant are moved by more, by a factor up to [`MOST`].
+const WEAK: f64 = 0.0625;
+const MOST: f64 = 4096.0;
+/// Part of a turn (rad) over which shapes and loads change by a clearance, by order of magnitude.
+const TURN: f64 = 0.1;
+/// Change of a temperature (K) that moves a casing by a clearance, by order of magnitude.
+const HEATING: f64 = 100.0;
+
+/// What marching the last communication step again takes.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tangent {
+    /// State at its start; empty where nobody asks for derivatives.
+    start: Vec<u8>,
+    /// Whether `start` and the inputs in it are all that the step came from.
+    stands: bool,
+    /// What marches it again, made when first needed.
+    twin: Option<Box<Simulation>>,
+    /// Whether parameters of the twin are those of now.
+    follows: bool,
+}
+
+impl Tangent {
+    /// The step marched last cannot be marched again from its start.
+    pub(super) fn forget(&mut self) {
+        self.stands = false;
+    }
+
+    /// The twin must take its parameters from the state it starts from.
+    pub(super) fn follow_anew(&mut self) {
+        self.follows = false;
+    }
+
+    /// Another run, or another state: nothing of before holds.
+    pub(super) fn renew(&mut self) {
+        (self.stands, self.follows) = (false, false);
+    }
+}
+
+impl Simulation {
+    /// Whether derivatives over steps can be asked for: the parameter `step_derivatives`.
+    pub fn is_differentiated(&self) -> bool {
+        self.value_of(Quantity::StepDerivatives, 0) > 1.5
+    }
+
+    /// Room for the state at the start of steps, where derivatives will be asked for.
+    pub(super) fn make_room_for_tangent(&mut self) {
+        let size = if self.is_differentiated() { self.state_size } else { 0 };
+        self.tangent.start.resize(size, 0);
+        self.tangent.renew();
+    }
+
+    /// A communication step begins. Does not allocate.
+    pub(super) fn set_out_tangent(&mut self) {
+        let mut start = std::mem::take(&mut self.tangent.start);
+        self.tangent.stands = !start.is_empty() && self.save_state(&mut start).is_ok();
+        self.tangent.start = start;
+    }
+
+    /// Derivatives of `outputs` at the end of the last communication step by `inputs` over it, times `seed`: Σ_j ∂y_i(t+H)/∂u_j s_j, written to
+    /// `sensitivity`. An input here is the value that was asked for before the step; contacts and internal steps stay as they were in it.
+    ///
+    /// It marches the step again, once as a rule, in a copy of the simulation; the simulation itself stays as it is.
+    ///
+    /// # Errors
+    /// Derivatives not asked for before initialisation; no communication step done, or one that inputs were set in, ended early, or a state
+    /// restored since; references of other variables than continuous real outputs and real inputs; a seed that is not finite.
+    ///
+    /// # Panics
+    /// Slices of different lengths.
+    pub fn step_derivative(
+        &mut self,
+        outputs: &[u32],
+        inputs: &[u32],
+        seed: &[f64],
+        sensitivity: &mut [f64],
+    ) -> Result<()> {
+        assert!(outputs.len() == sensitivity.len() && inputs.len() == seed.len(), "one value per reference");
+        self.check_tangent(outputs, inputs, seed)?;
+        let most = inputs.iter().zip(seed).filter(|(_, seed)| **seed != 0.0);
+        let most = most.map(|(input, seed)| self.nudge(*input) / seed.abs()).fold(f64::INFINITY, f64::min);
+        if !most.is_finite() {
+            sensitivity.fill(0.0);
+            return Ok(());
+        }
+        let mut twin = match self.tangent.twin.take() {
+            Some(twin) => twin,
+            None => {
+                self.tangent.follows = false;
+                Box::new(Self::new(&self.compiled.scene)?)
+            }
+        };
+        let outcome = self.differentiate(&mut twin, (outputs, sensitivity), (inputs, seed), most);
+        self.tangent.twin = Some(twin);
+        outcome
+    }
+
+    fn differentiate(
+        &mut self,
+        twin: &mut Self,
+        (outputs, sensitivity): (&[u32], &mut [f64]),
+        (inputs, seed): (&[u32], &[f64]),
+        most: f64,
+    ) -> Result<()> {
+        let (mut moved, mut grown) = (most, inputs.iter().any(|input| self.is_speed(*input)));
+        for _ in 0..TRIES {
+            self.march_again(twin, inputs, seed, moved)?;
+            let share = self.gaps_moved(twin) / (SMALL * self.clearance());
+            if !grown && share < WEAK {
+                let more = (1.0 / share.max(1.0 / MOST)).log2().floor().exp2();
+                (moved, grown) = (more * moved, true);
+                continue;
+            }
+            grown = true;
+            for (value, output) in sensitivity.iter_mut().zip(outputs) {
+                let output = *output as usize;
+                *value = (twin.values[output] - self.values[output]) / moved;
+            }
+            // The same steps: on the same piece. The last try stands in any case, it is on the piece beside.
+            if twin.system.effort() == self.system.effort() {
+                break;
+            }
+            moved = if moved > 0.0 { -moved } else { -LESS * moved };
+        }
+        Ok(())
+    }
+
+    fn is_speed(&self, reference: u32) -> bool {
+        self.table.locate(reference).is_ok_and(|(variable, _)| variable.quantity == Quantity::Speed)
+    }
+
+    /// Smallest clearance of all pairs (m).
+    fn clearance(&self) -> f64 {
+        self.system.pairs().iter().map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Largest difference between gaps of now and those of a twin (m).
+    fn gaps_moved(&self, twin: &Self) -> f64 {
+        let both = self.system.structures().iter().zip(twin.system.structures());
+        let gaps = both.flat_map(|(own, other)| own.gaps().iter().zip(other.gaps()));
+        gaps.map(|(own, other)| (own - other).abs()).filter(|moved| moved.is_finite()).fold(0.0, f64::max)
+    }
+
+    /// March the last communication step in `twin`, with inputs moved by `moved` times `seed`.
+    fn march_again(&mut self, twin: &mut Self, inputs: &[u32], seed: &[f64], moved: f64) -> Result<()> {
+        let lost = |error: Error| Error::Unstable {
+            problem: format!("the communication step to t = {} s cannot be marched again: {error}", shown(self.time)),
+            remedy: "Do without derivatives over this step".to_owned(),
+        };
+        if self.tangent.follows {
+            twin.go_back_to(&self.tangent.start);
+        } else {
+            twin.restore_state(&self.tangent.start).map_err(lost)?;
+            twin.tangent = Tangent::default();
+        }
+        self.tangent.follows = true;
+        // What was done once may be done again.
+        if let Some(bound) = twin.table.with_quantity_of(Quantity::StepsAtMost, 0) {
+            twin.values[bound.reference as usize] = 0.0;
+        }
+        for (input, seed) in inputs.iter().zip(seed) {
+            twin.move_input(*input, moved * seed);
+        }
+        twin.notes.clear();
+        twin.do_step(self.communication.start, self.communication.length).map_err(lost)
+    }
+
+    /// Move the course that is asked for, its slope as it is.
+    fn move_input(&mut self, reference: u32, by: f64) {
+        let (hold, inputs) = (self.holds(), &mut self.inputs);
+        let Ok((variable, element)) = self.table.locate(reference) else { return };
+        let Some(input) = inputs.get_mut(variable.quantity, variable.of, element) else { return };
+        input.value += by;
+        if variable.quantity == Quantity::Speed || hold {
+            input.take();
+        }
+        if variable.quantity == Quantity::Speed {
+            self.rotors[variable.of].rebase(&inputs.rotors[variable.of].speed, 0.0);
+        }
+    }
+
+    /// How far an input is moved: a small share of what closes the clearance.
+    fn nudge(&self, reference: u32) -> f64 {
+        let Ok((variable, _)) = self.table.locate(reference) else { return f64::INFINITY };
+        let value = self.values[reference as usize].abs();
+        let size = match variable.quantity {
+            Quantity::Speed => {
+                (TURN / self.communication.length).min(if value > 0.0 { 10.0 * value } else { f64::INFINITY })
+            }
+            Quantity::ShapeRotation | Quantity::LoadPhase => TURN,
+            Quantity::ShapeFactor => 1.0,
+            Quantity::LoadAmplitude => value.max(1.0),
+            Quantity::CasingTemperature => HEATING,
+            _ => self.clearance(),
+        };
+        SMALL * size
+    }
+
+    fn check_tangent(&self, outputs: &[u32], inputs: &[u32], seed: &[f64]) -> Result<()> {
+        let what = "derivative over the last step";
+        if !self.is_differentiated() {
+            let remedy = "Set the parameter step_derivatives to on before initialisation";
+            return Err(Error::invalid(what, "derivatives are off", remedy));
+        }
+        if self.phase != Phase::Ready || !self.tangent.stands {
+            return Err(Error::invalid(
+                what,
+                "there is no communication step that could be marched again: none is done, a state was restored after it, it ended early, or \
+                 inputs were set within it",
+                "Ask after a whole communication step, before a state is restored",
+            ));
+        }
+        for output in outputs {
+            self.check_differentiable(*output)?;
+        }
+        for (input, seed) in inputs.iter().zip(seed) {
+            let (variable, element) = self.table.locate(*input)?;
+            let what = || format!("derivative by `{}`", variable.element_name(element));
+            if variable.causality != Causality::Input || variable.kind != Kind::Real {
+                let remedy = "Ask for derivatives by real inputs only";
+                return Err(Error::invalid(what(), "the variable is not a real input", remedy));
+            }
+            if !seed.is_finite() {
+                return Err(Error::invalid(what(), format!("seed {}", shown(*seed)), "Give finite seeds"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_differentiable(&self, output: u32) -> Result<()> {
+        let (variable, element) = self.table.locate(output)?;
+        let continuous = variable.causality == Causality::Output && variable.variability == Variability::Continuous;
+        if continuous && variable.kind == Kind::Real {
+            return Ok(());
+        }
+        let remedy = "Ask for derivatives of continuous real outputs only";
+        let what = format!("derivative of `{}`", variable.element_name(element));
+        Err(Error::invalid(what, "the variable is not a continuous real output", remedy))
+    }
+}
