@@ -72,15 +72,16 @@ def test_derivatives_are_those_of_steps_repeated_from_a_saved_state(make):
         expected.append((numpy.array(ends[0]) - numpy.array(ends[1])) / (2.0 * moved[known]))
     expected = numpy.array(expected).T
     assert abs(expected[0, 0]) > 1e4, "N/m: there is a contact"
-    scale = abs(expected).max(axis=0)
-    assert (abs(found - expected) < 1e-3 * scale).all(), (found, expected)
+    # The least clearance is that of a closed contact: it stays 0.
+    scale = abs(expected).max(axis=1, keepdims=True)
+    assert (abs(found - expected) <= 1e-3 * scale).all(), (found, expected)
     # All at once, which FMI 3.0 can do backwards too.
     instance.restore(state)
     instance.step(time, H)
     seed = [1e-6, -2e-6, 0.5]
     together = numpy.array(directional(instance, UNKNOWNS, KNOWNS, seed))
     sums = found @ numpy.array(seed)
-    assert (abs(together - sums) < 1e-3 * (abs(found) @ abs(numpy.array(seed)))).all()
+    assert (abs(together - sums) <= 1e-3 * (abs(found) @ abs(numpy.array(seed)))).all()
     if isinstance(instance, Three):
         weights = [1.0, 2.0, -0.5, 1e5]
         backwards = instance.fmu.getAdjointDerivative(
