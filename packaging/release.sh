@@ -31,9 +31,11 @@ if [ $check = yes ]; then
     "$tools/bin/cargo-deny" --log-level error check
 fi
 [ -x "$tools/bin/cargo-cyclonedx" ] || cargo install --quiet --locked --root "$tools" cargo-cyclonedx@0.5.9
-"$tools/bin/cargo-cyclonedx" cyclonedx --quiet --format json --describe crate --override-filename bill-of-materials
-mv packaging/bill-of-materials.json "$out/tiprub-$version.cdx.json"
-mv fmi/bill-of-materials.json "$out/tiprub-fmi-$version.cdx.json"
+"$tools/bin/cargo-cyclonedx" cyclonedx --quiet --format json --override-filename bill-of-materials
+# Without the directory of these sources.
+for part in packaging:tiprub fmi:tiprub-fmi; do
+    sed "s|path+file://$PWD/|path+file:///tiprub/|g" "${part%:*}/bill-of-materials.json" > "$out/${part#*:}-$version.cdx.json"
+done
 find . -name bill-of-materials.json -not -path './target/*' -delete
 
 packaging/libraries.sh
