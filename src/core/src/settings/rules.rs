@@ -135,6 +135,15 @@ static VARIABLES: &[Rule] = &[
         "Add a `coating` to the contact, or remove the line",
     ),
     needs(
+        &[STRESS],
+        ("a rotor whose ROM recovers stress, and a watched sector", |at| {
+            let mut roms = at.contacts().filter(|at| !at.is_free());
+            !at.outputs().watched_sectors.is_empty() && roms.any(|at| at.rom().extras.stress.is_some())
+        }),
+        "stress comes from the finite elements that the ROM was reduced from",
+        "Reduce the blade with --stress-modes or --stress-set, watch a sector, or remove the line",
+    ),
+    needs(
         &[DISPLACEMENT],
         ("`surface.structure` of a surface around an axis", |at| {
             at.contacts().any(|at| at.carrier().is_some() && !at.is_free())

@@ -423,6 +423,13 @@ pub const FIELDS: [SceneField; 73] = [
         "",
         "Values at the communication point, beside the averages over the step.",
     ),
+    field(
+        "outputs.stress",
+        "true or false",
+        Some("false"),
+        "",
+        "Stress of watched sectors at the places that the ROM recovers it at.",
+    ),
     field("outputs.wear", "true or false", Some("false"), "", "Wear depth of every coating cell."),
     field(
         "outputs.slave_displacement",

@@ -11,6 +11,7 @@ use tiprub_model::eigen::lowest_modes;
 use tiprub_model::element::ElementKind;
 use tiprub_model::progress::{Progress, Stage, silent};
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, full_modes, reduce};
+use tiprub_model::stress::StressPlaces;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::{Error, Mesh};
 
@@ -171,6 +172,7 @@ fn options(modes: usize, frame: Frame) -> ReductionOptions {
         sectors: 1,
         frame,
         watched: Vec::new(),
+        stress: StressPlaces::default(),
         damping_ratio: 0.01,
     }
 }

@@ -9,6 +9,7 @@ use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::ElementKind;
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions, full_modes};
+use tiprub_model::stress::StressPlaces;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::spin::{
     Rotating, SpinningState, frequencies_at, gyroscopic_frequencies, turned_about_axis, without_axial,
@@ -231,6 +232,7 @@ fn options(frame: Frame) -> ReductionOptions {
         sectors: 1,
         frame,
         watched: Vec::new(),
+        stress: StressPlaces::default(),
         damping_ratio: 0.01,
     }
 }
