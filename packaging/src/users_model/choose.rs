@@ -166,7 +166,14 @@ pub fn grid(imported: &Imported, asked: &CasingMeshArguments) -> Result<Chosen> 
     let Some((mesh, _)) = &imported.model.mesh else { return Err(super::no_mesh()) };
     let [around, along] = asked.contact_grid;
     let grid = GridNodes::chosen(mesh, &free, around, along, asked.contact_axial).map_err(failure)?;
-    Ok(Chosen { stress: StressPlaces::default(), clamped, contact: grid.contact_points(), faces: None, grid: Some(grid), tip: None })
+    Ok(Chosen {
+        stress: StressPlaces::default(),
+        clamped,
+        contact: grid.contact_points(),
+        faces: None,
+        grid: Some(grid),
+        tip: None,
+    })
 }
 
 /// Contact nodes that are not among the `fixed` ones, and whether they were given by number.

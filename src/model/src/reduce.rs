@@ -26,8 +26,8 @@ use crate::{Error, Result};
 
 pub use crate::contact_point::ContactPoint;
 pub(crate) use held::Held;
-use outcome::{build_rom, contact_node};
 pub(crate) use outcome::direction;
+use outcome::{build_rom, contact_node};
 pub(crate) use outcome::{description, element_names, interface, responses};
 use response::{Seen, with_responses};
 
@@ -388,8 +388,8 @@ fn stress(
     let nodes: Vec<usize> = places.iter().map(|(_, node)| *node).collect();
     let rows = stress_rows((mesh, material), free, &nodes, options.frame)?;
     let map = tall_product(rows.as_ref(), transformation.as_ref());
-    let points = places.into_iter().map(|(name, node)| {
-        contact_node(&model.nodes, &ContactPoint::at(name, node, 0.0), options.frame)
-    });
+    let points = places
+        .into_iter()
+        .map(|(name, node)| contact_node(&model.nodes, &ContactPoint::at(name, node, 0.0), options.frame));
     Ok(Some(Watched { map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]), points: points.collect() }))
 }

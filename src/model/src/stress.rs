@@ -49,7 +49,8 @@ fn rows(mesh: &Mesh, material: &Material, nodes: &[usize]) -> Result<Vec<Rows>> 
         }
     }
     let mean = |(rows, around): (Rows, f64)| {
-        let share = |(node, axis, values): (usize, usize, [f64; STRESSES])| (node, axis, values.map(|one| one / around));
+        let share =
+            |(node, axis, values): (usize, usize, [f64; STRESSES])| (node, axis, values.map(|one| one / around));
         rows.into_iter().map(share).collect()
     };
     Ok(all.into_iter().map(mean).collect())

@@ -189,10 +189,7 @@ pub(super) fn arrays(extras: &RomExtras) -> Vec<(&'static str, Array)> {
         let (count, [map, positions]) = (watched.points.len(), names);
         let shape = vec![count, watched.map.nrows() / count, watched.map.ncols()];
         let places = watched.points.iter().flat_map(|point| point.position).collect();
-        arrays.extend([
-            (map, Array { shape, ..matrix(&watched.map) }),
-            (positions, list(places, vec![count, 3])),
-        ]);
+        arrays.extend([(map, Array { shape, ..matrix(&watched.map) }), (positions, list(places, vec![count, 3]))]);
     }
     arrays
 }

@@ -9,8 +9,8 @@ use tiprub_model::cyclic::{
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
 use tiprub_model::progress::{Progress, silent};
-use tiprub_model::stress::StressPlaces;
 use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions, reduce};
+use tiprub_model::stress::StressPlaces;
 
 fn reduced(mesh: &Mesh, sectors: usize, clamped: bool, options: &CyclicOptions) -> CyclicReduction {
     let clamped = if clamped { mesh.set("BORE").unwrap() } else { &[] };

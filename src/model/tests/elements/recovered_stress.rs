@@ -11,7 +11,8 @@ type Field = fn([f64; 3]) -> ([f64; 3], [f64; 6]);
 /// Stress at every node of every element, against that of the strain there: largest deviation beside the largest stress.
 fn deviation(kind: ElementKind, distorted: bool, field: Field) -> f64 {
     let (counts, size) = ([2, 2, 2], [0.3, 0.2, 0.1]);
-    let mesh = if distorted { distorted_box(kind, counts, size, wobble(0.15)) } else { straight_box(kind, counts, size) };
+    let mesh =
+        if distorted { distorted_box(kind, counts, size, wobble(0.15)) } else { straight_box(kind, counts, size) };
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
     for (number, element) in mesh.elements.iter().enumerate() {
         let coordinates = mesh.coordinates(element);
@@ -48,11 +49,7 @@ fn stress_of_bending_is_exact_in_quadratic_elements() {
     let field: Field = |[x, y, z]| {
         // εxx = κ y with free cross contraction (Poisson's ratio of steel, 0.3).
         let (kappa, nu) = (1e-3, 0.3);
-        let u = [
-            kappa * x * y,
-            -0.5 * kappa * (x * x + nu * (y * y - z * z)),
-            -kappa * nu * y * z,
-        ];
+        let u = [kappa * x * y, -0.5 * kappa * (x * x + nu * (y * y - z * z)), -kappa * nu * y * z];
         (u, [kappa * y, -nu * kappa * y, -nu * kappa * y, 0.0, 0.0, 0.0])
     };
     for kind in [ElementKind::Hex20, ElementKind::Penta15, ElementKind::Tet10] {

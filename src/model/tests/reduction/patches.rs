@@ -12,8 +12,8 @@ use tiprub_model::patches::{contact_patches, tip_patches};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
 use tiprub_model::rotor37::{MeshCounts, Tip, blade_mesh};
-use tiprub_model::stress::StressPlaces;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
+use tiprub_model::stress::StressPlaces;
 use tiprub_model::{Mesh, Rotor37Options, reduce_rotor37};
 
 const SIZE: [f64; 3] = [0.3, 0.02, 0.06];

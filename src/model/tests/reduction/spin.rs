@@ -9,11 +9,11 @@ use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::ElementKind;
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions, full_modes};
-use tiprub_model::stress::StressPlaces;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::spin::{
     Rotating, SpinningState, frequencies_at, gyroscopic_frequencies, turned_about_axis, without_axial,
 };
+use tiprub_model::stress::StressPlaces;
 use tiprub_model::{FeModel, Material, Mesh, Reduction, Result, reduce, reduce_model};
 
 fn column(rows: usize, entry: impl Fn(usize) -> f64) -> Mat<f64> {

@@ -4,6 +4,7 @@ use crate::common::{distorted_box, nodes_at, steel, straight_box, wobble};
 use crate::guide::{self, told};
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::rom::{Frame, STRESSES};
+use tiprub_model::Mesh;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::{ElementKind, nodal_stress};
@@ -12,7 +13,6 @@ use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::stress::{StressPlaces, von_mises};
-use tiprub_model::Mesh;
 
 const SIZE: [f64; 3] = [0.3, 0.02, 0.06];
 
@@ -131,9 +131,8 @@ fn places_of_modes_are_where_their_stress_is_largest() {
     let element = SIZE[0] / 12.0;
     assert!((at(1)[0] - element).abs() < 1e-12, "{:?}", at(1));
     assert!(at(1)[1].abs() < 1e-12 || (at(1)[1] - SIZE[1]).abs() < 1e-12, "{:?}", at(1));
-    let refused = |places: StressPlaces| {
-        reduced(&mesh, &tip, (ReductionKind::FreeInterface, 6), places).unwrap_err().to_string()
-    };
+    let refused =
+        |places: StressPlaces| reduced(&mesh, &tip, (ReductionKind::FreeInterface, 6), places).unwrap_err().to_string();
     let told = refused(StressPlaces { nodes: Vec::new(), modes: 7 });
     assert!(told.starts_with("places of largest stress: 7 asked"), "{told}");
     let told = refused(StressPlaces { nodes: vec![("a".into(), 100_000)], modes: 0 });

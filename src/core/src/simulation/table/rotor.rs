@@ -136,7 +136,11 @@ fn stresses(table: &mut Builder, body: &Body, sector: usize) {
     add("von_mises_stress".to_owned(), format!("Equivalent stress of von Mises ({list})"), read);
     for (component, name) in STRESS_COMPONENTS[usize::from(body.rom.frame == Frame::Cartesian)].into_iter().enumerate()
     {
-        let text = format!("{} stress, {} ({list})", if component < 3 { "Normal" } else { "Shear" }, name.replace('_', " and "));
+        let text = format!(
+            "{} stress, {} ({list})",
+            if component < 3 { "Normal" } else { "Shear" },
+            name.replace('_', " and ")
+        );
         let read = each(move |view, place| view.stress(index, sector - 1, place, component));
         add(format!("{name}_stress"), text, read);
     }
