@@ -44,6 +44,13 @@ pub struct BladeOptions {
     /// Which modes are kept [default: craig-bampton; free-interface with patches].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
+    /// Stress is recovered where each of so many of the lowest modes has its largest, away from held nodes; from a mesh of one material only
+    /// [default: 0].
+    #[arg(long, value_name = "N", conflicts_with = "stiffness")]
+    pub stress_modes: Option<usize>,
+    /// Stress is recovered at the nodes of this set, or at those of these numbers in the file, such as 12,57,103.
+    #[arg(long, value_name = "SET", conflicts_with = "stiffness")]
+    pub stress_set: Option<String>,
     /// What is read.
     #[command(flatten)]
     pub model: ModelOptions,

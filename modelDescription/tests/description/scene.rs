@@ -1,5 +1,6 @@
 //! A scene with every option on, small blades in a small flexible casing, and what each option is.
 
+use nalgebra::DMatrix;
 use tiprub_core::rom::Watched;
 use tiprub_core::settings::*;
 use tiprub_core::{Rom, Scene, VariableTable};
@@ -36,7 +37,10 @@ pub fn rigid() -> Scene {
     let mut rom = models::blade(36);
     rom.extras.spin = Some(models::spin(rom.order()));
     let points = ["edge_1", "edge_2"].map(|name| models::node(name, rom.contact_nodes[0].position, 0.0)).to_vec();
-    rom.extras.watched = Some(Watched { map: rom.contact_map.rows(0, 3 * points.len()).into_owned(), points });
+    let two = |rows: usize| DMatrix::from_fn(rows * points.len(), rom.order(), |i, j| rom.contact_map[(i % 6, j)]);
+    let (moved, stress) = (two(3), two(6));
+    rom.extras.watched = Some(Watched { map: moved, points: points.clone() });
+    rom.extras.stress = Some(Watched { map: stress, points });
     let mut scene = models::bumps(rom);
     let settings = &mut scene.settings;
     settings.structures[0].speed = 1800.0;
@@ -48,6 +52,7 @@ pub fn rigid() -> Scene {
         nodal_diameters: Some(18),
         energies: true,
         instantaneous_forces: true,
+        stress: true,
         ..OutputSettings::default()
     };
     settings.experiment.communication_step = 1e-5;
@@ -58,7 +63,7 @@ pub fn rigid() -> Scene {
 pub type Switch = (&'static str, fn(&mut Scene));
 
 /// Every option that adds variables, in a scene with a flexible casing.
-pub const OPTIONS: [Switch; 20] = [
+pub const OPTIONS: [Switch; 21] = [
     ("`tolerance`, or the scheme `galerkin`", |scene| scene.settings.time.tolerance = None),
     ("`motion = \"rotating\"`", |scene| {
         let rotor = &mut scene.settings.structures[0];
@@ -86,7 +91,11 @@ pub const OPTIONS: [Switch; 20] = [
         scene.settings.contacts[0].coating = None;
         scene.settings.outputs.wear = false;
     }),
-    ("`watched_sectors`", |scene| scene.settings.outputs.watched_sectors.clear()),
+    ("`watched_sectors`", |scene| {
+        scene.settings.outputs.watched_sectors.clear();
+        scene.settings.outputs.stress = false;
+    }),
+    ("`stress = true`", |scene| scene.settings.outputs.stress = false),
     ("watched points of the ROM", |scene| scene.roms[0].extras.watched = None),
     ("`all_sectors = true`", |scene| scene.settings.outputs.all_sectors = false),
     ("`nodal_diameters`", |scene| scene.settings.outputs.nodal_diameters = None),

@@ -7,17 +7,20 @@ use tiprub_model::{
     patches::{FoundTip, find_tip, row_name, tip_patches},
     read::{ContactChoice, Imported, choose_contact_nodes, set_counts},
     reduce::ContactPoint,
+    stress::StressPlaces,
 };
 use tiprub_shell::{Failure, Result};
 
 use super::failure;
-use crate::own_arguments::{CasingMeshArguments, ModelOptions, SectorArguments, TipOptions};
+use crate::own_arguments::{BladeOptions, CasingMeshArguments, ModelOptions, SectorArguments, TipOptions};
 
 /// Share of the largest radius by which nodes of the two faces of a sector may miss each other.
 const FACE_TOLERANCE: f64 = 1e-5;
 
 /// What is reduced, chosen from what was read.
 pub struct Chosen {
+    /// Places whose stress the ROM recovers.
+    pub stress: StressPlaces,
     /// Nodes that are held, ascending.
     pub clamped: Vec<usize>,
     /// Contact nodes.
@@ -69,7 +72,7 @@ pub fn tips(
         let choice = ContactChoice { count, names: tips.contact_names.clone() };
         choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?
     };
-    Ok(Chosen { clamped, contact, faces, grid: None, tip })
+    Ok(Chosen { stress: StressPlaces::default(), clamped, contact, faces, grid: None, tip })
 }
 
 /// Nodes that may touch, whether they were given by number, and the tip with whether they are its.
@@ -131,6 +134,27 @@ pub fn watched(model: &FeModel, contact: &[ContactPoint]) -> Result<Vec<ContactP
     choose_contact_nodes(&model.nodes, &set, &choice).map_err(failure)
 }
 
+/// Most places of a set: each has seven outputs per watched sector.
+const MOST_PLACES: usize = 1000;
+
+/// Places whose stress the ROM of blades recovers.
+///
+/// # Errors
+/// Sets that are missing or large.
+pub fn stress(imported: &Imported, asked: &BladeOptions) -> Result<StressPlaces> {
+    let mut places = StressPlaces { nodes: Vec::new(), modes: asked.stress_modes.unwrap_or(0) };
+    if let Some(name) = &asked.stress_set {
+        let (nodes, _) = nodes_of(imported, name, "--stress-set")?;
+        if nodes.len() > MOST_PLACES {
+            let problem = format!("{} nodes, {MOST_PLACES} at most", nodes.len());
+            return Err(Failure::usage("--stress-set", problem, "Name a set of the places that matter"));
+        }
+        let named = |node: usize| (format!("node_{}", imported.node_numbers[node]), node);
+        places.nodes = nodes.into_iter().map(named).collect();
+    }
+    Ok(places)
+}
+
 /// For a casing.
 ///
 /// # Errors
@@ -142,7 +166,14 @@ pub fn grid(imported: &Imported, asked: &CasingMeshArguments) -> Result<Chosen> 
     let Some((mesh, _)) = &imported.model.mesh else { return Err(super::no_mesh()) };
     let [around, along] = asked.contact_grid;
     let grid = GridNodes::chosen(mesh, &free, around, along, asked.contact_axial).map_err(failure)?;
-    Ok(Chosen { clamped, contact: grid.contact_points(), faces: None, grid: Some(grid), tip: None })
+    Ok(Chosen {
+        stress: StressPlaces::default(),
+        clamped,
+        contact: grid.contact_points(),
+        faces: None,
+        grid: Some(grid),
+        tip: None,
+    })
 }
 
 /// Contact nodes that are not among the `fixed` ones, and whether they were given by number.

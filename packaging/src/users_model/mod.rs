@@ -59,7 +59,9 @@ pub fn blade(
 ) -> Result<Reduced> {
     let source = asked.source(file, kept);
     let imported = import(&source, console)?;
-    let choose = |imported: &Imported| choose::tips(imported, source.model, tips, None);
+    let choose = |imported: &Imported| {
+        Ok(Chosen { stress: choose::stress(imported, asked)?, ..choose::tips(imported, source.model, tips, None)? })
+    };
     told(&source, imported, choose, |model, chosen, clamped| {
         Ok(Reduced::general(general(&source, asked, model, chosen, console)?, clamped))
     })
@@ -180,6 +182,7 @@ fn general(
         sectors: asked.sectors.unwrap_or(1) as usize,
         frame: Frame::Cylindrical,
         watched: choose::watched(&model, &chosen.contact)?,
+        stress: chosen.stress.clone(),
         damping_ratio: source.kept.damping.unwrap_or(DAMPING),
     };
     let model = RefCell::new(Some(model));

@@ -17,6 +17,8 @@ pub const SLOPE: f64 = 1e3;
 pub const MATRIX: f64 = 1e30;
 /// Largest entry of a contact map, in any unit of the coordinates: 1/√m of a mass of 1e-30 kg.
 pub const MAP: f64 = 1e15;
+/// Largest stress of a unit coordinate (Pa): what the largest strain of a contact map is worth in diamond.
+pub const STRESS_MAP: f64 = 1e27;
 /// Largest thermal load of a patch (N/K), in any unit of the coordinates.
 pub const THERMAL_LOAD: f64 = 1e15;
 /// Largest angular velocity (rad/s): eight times the fastest turbines, of dentists.

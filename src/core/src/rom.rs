@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 use crate::{Error, Result, ranges, shown};
 pub use cyclic::Harmonic;
 pub(crate) use cyclic::cholesky;
-pub use watched::Watched;
+pub use watched::{STRESSES, Watched};
 
 /// Most sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or hostile file must not ask for all memory,
 /// which ends the process of the importer.
@@ -170,6 +170,8 @@ pub struct RomExtras {
     pub harmonics: Vec<Harmonic>,
     /// Points beside the contact nodes.
     pub watched: Option<Watched>,
+    /// Places whose stress is recovered.
+    pub stress: Option<Watched>,
     /// What the coordinates stand for.
     pub basis: Basis,
     /// The contact patches are in so many rows across the thickness of the tip, one row after the other, each as the others along the chord;

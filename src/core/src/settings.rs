@@ -406,6 +406,9 @@ pub struct OutputSettings {
     pub energies: bool,
     /// Values at the communication point in addition to averages over the step.
     pub instantaneous_forces: bool,
+    /// Stress at the places that the ROMs recover it at, of watched sectors.
+    #[serde(skip_serializing_if = "is_default")]
+    pub stress: bool,
     /// Wear depth of every coating cell.
     #[serde(skip_serializing_if = "is_default")]
     pub wear: bool,
@@ -422,6 +425,7 @@ impl Default for OutputSettings {
             nodal_diameters: None,
             energies: true,
             instantaneous_forces: false,
+            stress: false,
             wear: false,
             slave_displacement: false,
         }

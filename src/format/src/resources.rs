@@ -75,6 +75,7 @@ fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) ->
         harmonics: rom.extras.harmonics.clone(),
         // Its displacements are outputs of watched sectors.
         watched: rom.extras.watched.clone().filter(|_| !settings.outputs.watched_sectors.is_empty()),
+        stress: rom.extras.stress.clone().filter(|_| settings.outputs.stress),
         basis: rom.extras.basis,
         rows: rom.extras.rows,
     }

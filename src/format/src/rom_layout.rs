@@ -6,7 +6,7 @@ pub(crate) const ROM_FORMAT: &str = "tiprub-rom";
 /// written in the first form that holds it, for older readers.
 pub(crate) const ROM_FORMAT_VERSIONS: [&str; 2] = ["1", "2"];
 /// Arrays and metadata of format 2.
-pub(crate) const SECOND_RELEASE: [&str; 12] = [
+pub(crate) const SECOND_RELEASE: [&str; 15] = [
     "contact_areas",
     "contact_lengths",
     "flexibility_deviation",
@@ -15,6 +15,9 @@ pub(crate) const SECOND_RELEASE: [&str; 12] = [
     "watched_map",
     "watched_positions",
     "watched_names",
+    "stress_map",
+    "stress_positions",
+    "stress_names",
     "basis",
     "contact_rows",
     "rub_errors",
@@ -62,7 +65,7 @@ const fn array(
 const GENERAL_ARRAYS: usize = 9;
 
 /// Every array.
-pub const ARRAYS: [ArrayLayout; 27] = [
+pub const ARRAYS: [ArrayLayout; 29] = [
     array("mass", "[n, n]", "kg", true, "Reduced mass matrix of one sector: symmetric, positive definite."),
     array("stiffness", "[n, n]", "N/m", true, "Reduced stiffness matrix: symmetric, positive semidefinite."),
     array(
@@ -205,6 +208,21 @@ pub const ARRAYS: [ArrayLayout; 27] = [
         false,
         "Undeformed positions of these points, as for contact nodes.",
     ),
+    array(
+        "stress_map",
+        "[places, 6, n]",
+        "Pa per unit coordinate",
+        false,
+        "Stresses at chosen places, in the directions of a contact node there: 11, 22, 33, 12, 23, 31. With `stress_positions` and \
+         `stress_names`, not with coupled sectors.",
+    ),
+    array(
+        "stress_positions",
+        "[places, 3]",
+        "m, rad, m (cylindrical) or m (cartesian)",
+        false,
+        "Undeformed positions of these places, as for contact nodes.",
+    ),
 ];
 
 /// The arrays of a structure that spins: all or none.
@@ -212,6 +230,8 @@ pub(crate) const SPIN_ARRAYS: [&str; 5] =
     ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load", "centrifugal_load_speed4"];
 /// The arrays of watched points: both or none.
 pub(crate) const WATCHED_ARRAYS: [&str; 2] = ["watched_map", "watched_positions"];
+/// The arrays of places with stress: both or none.
+pub(crate) const STRESS_ARRAYS: [&str; 2] = ["stress_map", "stress_positions"];
 /// The arrays of a structure that heats up: both or none.
 pub(crate) const THERMAL_ARRAYS: [&str; 2] = ["thermal_loads", "thermal_patches"];
 
@@ -220,7 +240,7 @@ const fn entry(name: &'static str, default: Option<&'static str>, description: &
 }
 
 /// Every metadata entry.
-pub const METADATA: [MetadataLayout; 17] = [
+pub const METADATA: [MetadataLayout; 18] = [
     entry("format", None, "Always `tiprub-rom`."),
     entry("format_version", None, "`1`, or `2` with anything that format 2 added, below."),
     entry("name", None, "Name of the structure."),
@@ -248,6 +268,7 @@ pub const METADATA: [MetadataLayout; 17] = [
          of its row.",
     ),
     entry("watched_names", Some(""), "Names of the watched points, separated by commas; format 2."),
+    entry("stress_names", Some(""), "Names of the places with stress, separated by commas; format 2."),
     entry(
         "basis",
         Some("craig-bampton"),

@@ -36,6 +36,7 @@ pub mod rotor37;
 pub mod sparse;
 pub mod spin;
 pub mod stage;
+pub mod stress;
 pub mod thermal;
 pub mod vtk;
 

@@ -21,11 +21,13 @@ use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report, silent};
 use crate::sparse::{Factor, SparseMatrix, principal_pair, tall_product};
 use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
+use crate::stress::{StressPlaces, all_places, stress_rows};
 use crate::{Error, Result};
 
 pub use crate::contact_point::ContactPoint;
 pub(crate) use held::Held;
-use outcome::{build_rom, contact_node, direction};
+pub(crate) use outcome::direction;
+use outcome::{build_rom, contact_node};
 pub(crate) use outcome::{description, element_names, interface, responses};
 use response::{Seen, with_responses};
 
@@ -66,6 +68,8 @@ pub struct ReductionOptions {
     pub frame: Frame,
     /// Points whose displacements the ROM tells beside those of the contact nodes.
     pub watched: Vec<ContactPoint>,
+    /// Places whose stress the ROM recovers; from a mesh of one material.
+    pub stress: StressPlaces,
     /// Modal damping ratio proposed with the model.
     pub damping_ratio: f64,
 }
@@ -191,6 +195,7 @@ pub fn reduce_model(
     let mut rom = build_rom(&model, clamped.len(), contact, options, &craig_bampton, checks);
     rom.extras.spin = spin;
     rom.extras.watched = watched(&model, &free, &craig_bampton.transformation, options)?;
+    rom.extras.stress = stress(&model, &free, &craig_bampton.transformation, &full.modes.shapes, options)?;
     let fixed_interface_frequencies = craig_bampton.fixed_interface_frequencies;
     let reduction = Reduction::new(rom, &full.modes, &free, &squares, (model.nodes.len(), model.mesh))?;
     Ok(Reduction { spin_checks, fixed_interface_frequencies, ..reduction })
@@ -361,5 +366,30 @@ fn watched(
     let rows = contact_loads(free, &model.nodes, &options.watched, options.frame)?;
     let map = tall_product(rows.as_ref(), transformation.as_ref());
     let points = options.watched.iter().map(|point| contact_node(&model.nodes, point, options.frame));
+    Ok(Some(Watched { map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]), points: points.collect() }))
+}
+
+/// Stress at chosen places per reduced coordinate, in the directions of the contact nodes.
+fn stress(
+    model: &FeModel,
+    free: &[usize],
+    transformation: &Mat<f64>,
+    modes: &Mat<f64>,
+    options: &ReductionOptions,
+) -> Result<Option<Watched>> {
+    if options.stress.is_empty() {
+        return Ok(None);
+    }
+    let Some((mesh, material)) = &model.mesh else {
+        let problem = "the model has no mesh of one material, whose elements know it";
+        return Err(Error::invalid("stress", problem, "Leave it out, or give a mesh file of one material"));
+    };
+    let places = all_places((mesh, material), free, modes, &options.stress)?;
+    let nodes: Vec<usize> = places.iter().map(|(_, node)| *node).collect();
+    let rows = stress_rows((mesh, material), free, &nodes, options.frame)?;
+    let map = tall_product(rows.as_ref(), transformation.as_ref());
+    let points = places
+        .into_iter()
+        .map(|(name, node)| contact_node(&model.nodes, &ContactPoint::at(name, node, 0.0), options.frame));
     Ok(Some(Watched { map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]), points: points.collect() }))
 }

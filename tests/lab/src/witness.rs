@@ -17,6 +17,7 @@ use tiprub_model::{
     progress::silent,
     reduce::{ContactPoint, ReductionKind, ReductionOptions, reduce_model},
     rotor37::{BladeMesh, MeshCounts, blade_mesh},
+    stress::StressPlaces,
 };
 use tiprub_reference::{
     blade::{Blade, Part, Steps},
@@ -220,6 +221,7 @@ impl Setting {
             sectors: 1,
             frame: Frame::Cylindrical,
             watched: self.blade.contact_points(3).map_err(told)?,
+            stress: StressPlaces::default(),
             damping_ratio: 0.0,
         };
         let (mesh, contact) = (self.blade.mesh.clone(), self.contact(reduced.touching)?);

@@ -1,33 +1,50 @@
-//! Points of a structure whose motion is looked at, and that touch nothing.
+//! Points of a structure that are looked at, and that touch nothing: how they move, what stress is there.
 
 use nalgebra::DMatrix;
 
 use super::{ContactNode, Rom, entries};
 use crate::{Error, Result, ranges};
 
-/// Points whose motion is looked at, and that touch nothing.
+/// Points that are looked at, and that touch nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Watched {
-    /// Displacement of the points, 3·points × n; rows (point, component), directions as for contact nodes.
+    /// What is there per unit of each coordinate, rows (point, component) × n, directions as for contact nodes: three displacements, or
+    /// six stresses σ₁₁, σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁ (Pa).
     pub map: DMatrix<f64>,
     /// Names and places.
     pub points: Vec<ContactNode>,
 }
 
+/// Components of stress at a point.
+pub const STRESSES: usize = 6;
+
 impl Rom {
     pub(super) fn validate_watched(&self, remedy: &str) -> Result<()> {
-        let Some(watched) = &self.extras.watched else { return Ok(()) };
-        let expected = (3 * watched.points.len(), self.order());
+        self.validate_points("watched", self.extras.watched.as_ref(), (3, ranges::MAP), remedy)?;
+        self.validate_points("stress", self.extras.stress.as_ref(), (STRESSES, ranges::STRESS_MAP), remedy)
+    }
+
+    /// Points whose arrays are named `of`, with so many components each, up to the largest.
+    fn validate_points(
+        &self,
+        of: &str,
+        watched: Option<&Watched>,
+        (components, largest): (usize, f64),
+        remedy: &str,
+    ) -> Result<()> {
+        let Some(watched) = watched else { return Ok(()) };
+        let name = format!("{of}_map");
+        let expected = (components * watched.points.len(), self.order());
         if watched.points.is_empty() || watched.map.shape() != expected {
             let problem = format!("shape {:?}, {expected:?} and at least one point expected", watched.map.shape());
-            return Err(Error::invalid("ROM array `watched_map`", problem, remedy));
+            return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
         }
         if self.is_cyclic() {
             let problem = "given with coupled sectors, whose nodal diameters above 0 it says nothing of";
-            return Err(Error::invalid("ROM array `watched_map`", problem, "Leave watched points out"));
+            return Err(Error::invalid(format!("ROM array `{name}`"), problem, "Leave these points out"));
         }
-        entries("watched_map", &watched.map, ranges::MAP, remedy)?;
-        let what = |index: usize| format!("ROM array `watched_positions`, point {}", index + 1);
+        entries(&name, &watched.map, largest, remedy)?;
+        let what = |index: usize| format!("ROM array `{of}_positions`, point {}", index + 1);
         let mut places = watched.points.iter().enumerate();
         places.try_for_each(|(index, point)| self.validate_place(&what(index), point, remedy))
     }

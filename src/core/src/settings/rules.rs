@@ -135,6 +135,12 @@ static VARIABLES: &[Rule] = &[
         "Add a `coating` to the contact, or remove the line",
     ),
     needs(
+        &[STRESS],
+        ("`outputs.watched_sectors`", |at| !at.outputs().watched_sectors.is_empty()),
+        "it is told of watched sectors",
+        "Watch a sector, or remove the line",
+    ),
+    needs(
         &[DISPLACEMENT],
         ("`surface.structure` of a surface around an axis", |at| {
             at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
@@ -275,6 +281,14 @@ static ROMS: &[Rule] = &[
         }),
         "a row of cells is worn by what it sees between two patches along the axis, and patches of several rows would take turns",
         "Reduce it with one row of patches (without --contact-rows), or remove the coating",
+    ),
+    needs(
+        &[STRESS],
+        ("places of stress in the ROM of a rotor", |at| {
+            at.contacts().any(|at| !at.is_free() && at.master_rom().is_some_and(|rom| rom.extras.stress.is_some()))
+        }),
+        "stress comes from the finite elements that the ROM was reduced from",
+        "Reduce the blade with --stress-modes or --stress-set, or remove the line",
     ),
     needs(
         &[LOAD],

@@ -52,6 +52,8 @@ pub struct Body {
     pub centrifugal: Vec<[f64; 2]>,
     /// Displacement of watched points per unit of each mode, 3·points × modes; empty without.
     pub watched: DMatrix<f64>,
+    /// Stress at places per unit of each mode, 6·places × modes (Pa); empty where the scene does not ask for it.
+    pub stress: DMatrix<f64>,
 }
 
 /// A structure that carries surfaces.
@@ -94,8 +96,8 @@ impl Body {
         };
         let disk = rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()?;
         let (reference_speed, stiffness_range, centrifugal) = (0.0, None, Vec::new());
-        let watched = DMatrix::zeros(0, 0);
-        Ok(Self { model, disk, translations, reference_speed, stiffness_range, centrifugal, watched })
+        let (watched, stress) = (DMatrix::zeros(0, 0), DMatrix::zeros(0, 0));
+        Ok(Self { model, disk, translations, reference_speed, stiffness_range, centrifugal, watched, stress })
     }
 
     /// Largest angular frequency (rad/s), of all nodal diameters where sectors are coupled.
@@ -240,11 +242,15 @@ impl Compiled {
             let ranges = spin.map(|spin| [range(&spin.stiffness_speed2), range(&spin.stiffness_speed4)]);
             (self.bodies[body].stiffness_range, self.bodies[body].model) = (ranges, model);
         }
+        let asked = self.scene.settings.outputs.stress;
         let body = &mut self.bodies[body];
         body.reference_speed = speed;
         body.centrifugal = centrifugal(structure, rom, &body.model);
         if let Some(watched) = &rom.extras.watched {
             body.watched = &watched.map * &body.model.shapes;
+        }
+        if let Some(stress) = rom.extras.stress.as_ref().filter(|_| asked) {
+            body.stress = &stress.map * &body.model.shapes;
         }
         Ok(())
     }

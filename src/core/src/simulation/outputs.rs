@@ -3,6 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
+
 use super::units::LENGTH;
 use super::window::Window;
 use super::{Phase, Simulation};
@@ -10,6 +12,7 @@ use crate::dynamics::sectors::Sectors;
 use crate::gaps::sector_angle;
 use crate::laws::coating::Coating;
 use crate::ledger::Ledger;
+use crate::rom::STRESSES;
 use crate::system::System;
 use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
@@ -255,6 +258,19 @@ impl View<'_> {
         self.simulation.watched_row(body, 3 * point + axis, sector)
     }
 
+    /// Component of the stress at a place of a sector (Pa).
+    pub fn stress(&self, body: usize, sector: usize, place: usize, component: usize) -> f64 {
+        let shapes = &self.simulation.compiled.bodies[body].stress;
+        self.simulation.observed(body, shapes, STRESSES * place + component, sector)
+    }
+
+    /// Equivalent stress of von Mises at a place of a sector (Pa).
+    pub fn von_mises(&self, body: usize, sector: usize, place: usize) -> f64 {
+        let [xx, yy, zz, xy, yz, zx] = [0, 1, 2, 3, 4, 5].map(|row| self.stress(body, sector, place, row));
+        let normal = [xx - yy, yy - zz, zz - xx].iter().map(|one| 0.5 * one * one).sum::<f64>();
+        libm::sqrt(normal + 3.0 * (xy * xy + yz * yz + zx * zx))
+    }
+
     /// Clearance of a watched point of a sector (m).
     pub fn watched_clearance(&self, body: usize, sector: usize, point: usize) -> f64 {
         self.simulation.watched_gaps.clearance(body, point, sector)
@@ -291,8 +307,13 @@ impl Simulation {
     }
 
     pub(super) fn watched_row(&self, body: usize, row: usize, sector: usize) -> f64 {
-        let (modes, shapes) = (self.system.structures()[body].modes(), self.compiled.bodies[body].watched.row(row));
-        shapes.iter().enumerate().map(|(mode, shape)| shape * modes.modal_state(mode, sector).0).sum()
+        self.observed(body, &self.compiled.bodies[body].watched, row, sector)
+    }
+
+    /// A row of what is seen per unit of each mode, at the displacements of a sector.
+    fn observed(&self, body: usize, shapes: &DMatrix<f64>, row: usize, sector: usize) -> f64 {
+        let modes = self.system.structures()[body].modes();
+        shapes.row(row).iter().enumerate().map(|(mode, shape)| shape * modes.modal_state(mode, sector).0).sum()
     }
 
     pub(super) fn derivative_of(&self, variable: &Variable, element: usize, reference: u32) -> f64 {

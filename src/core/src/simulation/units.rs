@@ -27,6 +27,9 @@ pub static TIME: Unit =
 /// Pa.
 pub static PRESSURE: Unit =
     Unit { name: "Pa", quantity: "Pressure", exponents: [1, -1, -2, 0, 0], display: &[("MPa", 1e-6)] };
+/// Pa, of stresses.
+pub static STRESS: Unit =
+    Unit { name: "Pa", quantity: "Stress", exponents: [1, -1, -2, 0, 0], display: &[("MPa", 1e-6)] };
 /// N.
 pub static FORCE: Unit = Unit { name: "N", quantity: "Force", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
 /// N.m.

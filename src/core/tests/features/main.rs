@@ -10,3 +10,4 @@ mod coating;
 mod cyclic;
 mod cyclic_features;
 mod pairs;
+mod stress;

@@ -2,10 +2,10 @@
 //! are those of the first release.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Patch, RomExtras, Spin, Thermal, Watched};
+use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Patch, RomExtras, STRESSES, Spin, Thermal, Watched};
 
 use super::{Array, Arrays, Metadata, Reader, WRITE_AGAIN, list, matrix, names};
-use crate::rom_layout::{SPIN_ARRAYS, THERMAL_ARRAYS, WATCHED_ARRAYS};
+use crate::rom_layout::{SPIN_ARRAYS, STRESS_ARRAYS, THERMAL_ARRAYS, WATCHED_ARRAYS};
 use crate::{Result, suggestion};
 
 /// Third word of a contact grid with free edges all around.
@@ -17,6 +17,11 @@ const ROWS: &str = "contact_rows";
 /// Values of the metadata entry `basis`.
 const BASES: [(&str, Basis); 2] = [("craig-bampton", Basis::FixedInterface), ("free-interface", Basis::FreeInterface)];
 
+/// Metadata entry of the names of points with this array of positions.
+fn names_of(positions: &str) -> String {
+    positions.replace("positions", "names")
+}
+
 impl Reader<'_> {
     pub(super) fn extras(&self, arrays: &Arrays, metadata: &Metadata, order: usize) -> Result<RomExtras> {
         Ok(RomExtras {
@@ -24,7 +29,8 @@ impl Reader<'_> {
             thermal: self.thermal(arrays, order)?,
             grid: self.grid(metadata)?,
             harmonics: Vec::new(),
-            watched: self.watched(arrays, metadata, order)?,
+            watched: self.watched((arrays, metadata), (&WATCHED_ARRAYS, 3), order)?,
+            stress: self.watched((arrays, metadata), (&STRESS_ARRAYS, STRESSES), order)?,
             basis: self.basis(metadata)?,
             rows: self.rows(metadata)?,
         })
@@ -51,25 +57,34 @@ impl Reader<'_> {
         }
     }
 
-    fn watched(&self, arrays: &Arrays, metadata: &Metadata, order: usize) -> Result<Option<Watched>> {
-        if !self.group(arrays, &WATCHED_ARRAYS)? {
-            if metadata.contains_key("watched_names") {
-                let problem = format!("given without the array `{}`", WATCHED_ARRAYS[0]);
-                return Err(self.error("metadata `watched_names`", problem, "Remove the entry, or add the arrays"));
+    /// Points that are looked at: an array of so many components each, one of positions, and an entry of names.
+    fn watched(
+        &self,
+        (arrays, metadata): (&Arrays, &Metadata),
+        (names, components): (&[&str; 2], usize),
+        order: usize,
+    ) -> Result<Option<Watched>> {
+        let [map_name, positions_name] = *names;
+        let entry = names_of(positions_name);
+        if !self.group(arrays, names)? {
+            if metadata.contains_key(&entry) {
+                let problem = format!("given without the array `{map_name}`");
+                return Err(self.error(format!("metadata `{entry}`"), problem, "Remove the entry, or add the arrays"));
             }
             return Ok(None);
         }
-        let positions = self.required(arrays, "watched_positions", 2)?;
+        let positions = self.required(arrays, positions_name, 2)?;
         let count = positions.shape[0];
-        self.shape("watched_positions", positions, &[count, 3], "three coordinates per point")?;
-        let map = self.required(arrays, "watched_map", 3)?;
-        let reason = "points as in `watched_positions`, 3 components, coordinates as in `mass`";
-        self.shape("watched_map", map, &[count, 3, order], reason)?;
-        let names = self.point_names("watched_names", self.entry(metadata, "watched_names")?, count)?;
+        self.shape(positions_name, positions, &[count, 3], "three coordinates per point")?;
+        let map = self.required(arrays, map_name, 3)?;
+        let reason = format!("points as in `{positions_name}`, {components} components, coordinates as in `mass`");
+        self.shape(map_name, map, &[count, components, order], &reason)?;
+        let names = self.point_names(&entry, self.entry(metadata, &entry)?, count)?;
         let (triples, _) = positions.values.as_chunks::<3>();
         let points = names.into_iter().zip(triples);
         let points = points.map(|(name, position)| ContactNode { name, position: *position, ..ContactNode::default() });
-        Ok(Some(Watched { map: DMatrix::from_row_slice(3 * count, order, &map.values), points: points.collect() }))
+        let map = DMatrix::from_row_slice(components * count, order, &map.values);
+        Ok(Some(Watched { map, points: points.collect() }))
     }
 
     /// Whether the arrays of a group are there: all or none.
@@ -169,13 +184,12 @@ pub(super) fn arrays(extras: &RomExtras) -> Vec<(&'static str, Array)> {
             ("thermal_patches", list(places, vec![thermal.patches.len(), 4])),
         ]);
     }
-    if let Some(watched) = &extras.watched {
-        let count = watched.points.len();
-        let positions = watched.points.iter().flat_map(|point| point.position).collect();
-        arrays.extend([
-            ("watched_map", Array { shape: vec![count, 3, watched.map.ncols()], ..matrix(&watched.map) }),
-            ("watched_positions", list(positions, vec![count, 3])),
-        ]);
+    for (watched, names) in [(&extras.watched, WATCHED_ARRAYS), (&extras.stress, STRESS_ARRAYS)] {
+        let Some(watched) = watched else { continue };
+        let (count, [map, positions]) = (watched.points.len(), names);
+        let shape = vec![count, watched.map.nrows() / count, watched.map.ncols()];
+        let places = watched.points.iter().flat_map(|point| point.position).collect();
+        arrays.extend([(map, Array { shape, ..matrix(&watched.map) }), (positions, list(places, vec![count, 3]))]);
     }
     arrays
 }
@@ -190,5 +204,6 @@ pub(super) fn metadata(extras: &RomExtras) -> Vec<(&'static str, String)> {
     let told = BASES.iter().find(|(_, basis)| *basis == extras.basis && extras.basis != Basis::default());
     let basis = told.map(|(name, _)| ("basis", (*name).to_owned()));
     let rows = extras.rows.map(|rows| (ROWS, rows.to_string()));
-    speed.into_iter().chain(grid).chain(watched).chain(basis).chain(rows).collect()
+    let stress = extras.stress.as_ref().map(|stress| ("stress_names", names(&stress.points)));
+    speed.into_iter().chain(grid).chain(watched).chain(stress).chain(basis).chain(rows).collect()
 }

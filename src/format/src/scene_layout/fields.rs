@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 73] = [
+pub const FIELDS: [SceneField; 74] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
     field(
@@ -422,6 +422,13 @@ pub const FIELDS: [SceneField; 73] = [
         Some("false"),
         "",
         "Values at the communication point, beside the averages over the step.",
+    ),
+    field(
+        "outputs.stress",
+        "true or false",
+        Some("false"),
+        "",
+        "Stress of watched sectors at the places that the ROM recovers it at.",
     ),
     field("outputs.wear", "true or false", Some("false"), "", "Wear depth of every coating cell."),
     field(

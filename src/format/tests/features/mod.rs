@@ -26,6 +26,7 @@ pub fn scene_with_every_feature() -> SceneSettings {
     scene.contacts[0].coating = Some(coating());
     scene.contacts[0].heat_to_slave = Some(0.4);
     (scene.outputs.wear, scene.outputs.slave_displacement) = (true, true);
+    scene.outputs.stress = true;
     scene.time.input_interpolation = InputInterpolation::Hold;
     scene.time.tolerance = Some(2e-3);
     scene.time.steps_at_most = Some(5000);

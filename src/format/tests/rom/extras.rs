@@ -63,7 +63,8 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
         ..ContactNode::default()
     };
     let points: Vec<ContactNode> = ["leading_edge", "mid_chord"].into_iter().enumerate().map(point).collect();
-    rom.extras.watched = Some(Watched { map: DMatrix::from_fn(6, order, |_, _| value()), points });
+    rom.extras.watched = Some(Watched { map: DMatrix::from_fn(6, order, |_, _| value()), points: points.clone() });
+    rom.extras.stress = Some(Watched { map: DMatrix::from_fn(12, order, |_, _| value()), points });
     rom.extras.basis = Basis::FreeInterface;
     (rom.checks.response_frequencies, rom.checks.response_deviation) = (vec![100.0, 2e3], vec![0.1, value()]);
     rom.checks.flexibility_deviation = vec![1e-9; rom.contact_nodes.len()];
@@ -76,7 +77,7 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
 /// What format 1 has no place for, left out.
 fn of_the_first_format(rom: &Rom) -> Rom {
     let mut rom = rom.clone();
-    (rom.extras.watched, rom.extras.basis) = (None, Basis::default());
+    (rom.extras.watched, rom.extras.stress, rom.extras.basis) = (None, None, Basis::default());
     rom.checks.response_frequencies.clear();
     rom.checks.response_deviation.clear();
     rom.checks.flexibility_deviation.clear();
@@ -124,7 +125,8 @@ fn a_file_is_of_the_first_format_that_holds_it() {
     let plain = of_the_first_format(&full);
     let version = |rom: &Rom| Loose::of(rom).entries["format_version"].clone();
     assert_eq!(version(&plain), "1");
-    let with: [fn(&mut Rom, &Rom); 8] = [
+    let with: [fn(&mut Rom, &Rom); 9] = [
+        |rom, full| rom.extras.stress.clone_from(&full.extras.stress),
         |rom, full| rom.extras.watched.clone_from(&full.extras.watched),
         |rom, full| rom.extras.basis = full.extras.basis,
         |rom, full| rom.checks.response_frequencies.clone_from(&full.checks.response_frequencies),
@@ -156,6 +158,15 @@ fn watched_points_come_whole_and_only_where_they_can() {
     assert!(told.contains("`watched_positions`") && told.contains("`watched_map`"), "{told}");
     let told = refused(&|file| drop(file.entries.insert("watched_names".into(), "a,a".into())));
     assert!(told.contains("`watched_names`") && told.contains("twice"), "{told}");
+    let told = refused(&|file| drop(file.arrays.remove("stress_map")));
+    assert!(told.contains("`stress_map`") && told.contains("`stress_positions`"), "{told}");
+    let told = refused(&|file| drop(file.entries.insert("stress_names".into(), "a".into())));
+    assert!(told.contains("`stress_names`") && told.contains("`stress_positions`"), "{told}");
+    let told = refused(&|file| {
+        let map = file.arrays["watched_map"].clone();
+        file.arrays.insert("stress_map".into(), map);
+    });
+    assert!(told.contains("`stress_map`") && told.contains("6 components"), "{told}");
     let told = refused(&|file| drop(file.entries.insert("basis".into(), "free_interface".into())));
     assert!(told.contains("`basis`") && told.contains("free-interface"), "{told}");
     let mut negative = rom.clone();
@@ -169,10 +180,10 @@ pub fn with_extras() -> impl Strategy<Value = Rom> {
     (0..u64::MAX / 2, 1..7usize, 1..5usize, prop::array::uniform5(any::<bool>())).prop_map(
         |(seed, order, patches, has)| {
             let mut rom = complete(seed, order, patches);
-            let RomExtras { spin, thermal, grid, harmonics, watched, basis, rows } = rom.extras;
+            let RomExtras { spin, thermal, grid, harmonics, watched, stress, basis, rows } = rom.extras;
             let (spin, thermal) = (spin.filter(|_| has[0]), thermal.filter(|_| has[1]));
             let (grid, watched) = (grid.filter(|_| has[2]), watched.filter(|_| has[3]));
-            rom.extras = RomExtras { spin, thermal, grid, harmonics, watched, basis, rows };
+            rom.extras = RomExtras { spin, thermal, grid, harmonics, watched, stress, basis, rows };
             if has[4] { of_the_first_format(&rom) } else { rom }
         },
     )

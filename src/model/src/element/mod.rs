@@ -16,6 +16,7 @@ mod incompatible;
 mod matrices;
 mod nonlinear;
 mod quadrature;
+mod recovery;
 mod shape;
 
 pub use incompatible::{Formulation, incompatible_stiffness};
@@ -24,6 +25,7 @@ pub use matrices::thermal_load;
 pub use matrices::{consistent_mass, stiffness, strain, stress};
 pub use nonlinear::{Tangent, geometric_stiffness, second_stresses, tangent};
 pub use quadrature::QuadraturePoint;
+pub use recovery::nodal_stress;
 pub use shape::Shape;
 
 /// Largest number of nodes of any element.

@@ -14,7 +14,7 @@ use crate::material::Material;
 use crate::mesh::Mesh;
 
 /// (cos θ, sin θ) of a point about the z axis.
-pub(super) fn direction([x, y, _]: [f64; 3]) -> (f64, f64) {
+pub(crate) fn direction([x, y, _]: [f64; 3]) -> (f64, f64) {
     let radius = x.hypot(y);
     (x / radius, y / radius)
 }

@@ -27,6 +27,7 @@ use tiprub_core::rom::Frame;
 use crate::material::Material;
 use crate::progress::{Listener, Stage, report};
 use crate::reduce::{Reduction, ReductionKind, ReductionOptions, reduce_model};
+use crate::stress::StressPlaces;
 use crate::{FeModel, Result};
 
 /// Number of blades.
@@ -48,6 +49,8 @@ pub fn sections() -> &'static [Section] {
 
 /// Watched points of a tip of patches: its edges and the middle.
 const WATCHED: usize = 3;
+/// Modes of a blade with patches whose places of largest stress are recovered.
+const STRESSED: usize = 6;
 
 /// What of the tip touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,6 +145,7 @@ impl Rotor37Options {
 pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Result<Reduction> {
     report(listener, Stage::Mesh, 0, 1);
     let blade = blade_mesh(options.mesh)?;
+    let stressed = if let Tip::Nodes(_) = options.tip { 0 } else { STRESSED };
     let (contact, watched) = match options.tip {
         Tip::Nodes(count) => (blade.contact_points(count)?, Vec::new()),
         Tip::Patches(count) => (blade.contact_patches(count)?, blade.contact_points(WATCHED)?),
@@ -157,6 +161,7 @@ pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Resul
         sectors: BLADES,
         frame: Frame::Cylindrical,
         watched,
+        stress: StressPlaces { nodes: Vec::new(), modes: stressed },
         damping_ratio: options.damping_ratio,
     };
     let model = FeModel::assembled(blade.mesh, &options.material, String::new(), listener)?;

@@ -10,6 +10,7 @@ use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
 use tiprub_model::progress::{Progress, silent};
 use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions, reduce};
+use tiprub_model::stress::StressPlaces;
 
 fn reduced(mesh: &Mesh, sectors: usize, clamped: bool, options: &CyclicOptions) -> CyclicReduction {
     let clamped = if clamped { mesh.set("BORE").unwrap() } else { &[] };
@@ -46,6 +47,7 @@ fn reduced_whole(mesh: &Mesh, sectors: usize, modes: usize, checked_modes: usize
         sectors: 1,
         frame: Frame::Cylindrical,
         watched: Vec::new(),
+        stress: StressPlaces::default(),
         damping_ratio: 0.005,
     };
     let clamped = disk.mesh.set("BORE").unwrap().to_vec();

@@ -8,3 +8,4 @@ mod every;
 mod incompatible;
 mod large_displacements;
 mod ordering;
+mod recovered_stress;

@@ -11,6 +11,7 @@ use tiprub_model::read::{
     Axis, ContactChoice, Imported, MatrixFiles, MeshOptions, Units, choose_contact_nodes, read_matrices, read_mesh,
 };
 use tiprub_model::reduce::{ReductionKind, ReductionOptions};
+use tiprub_model::stress::StressPlaces;
 use tiprub_model::{Material, reduce_model};
 
 fn data(name: &str) -> PathBuf {
@@ -36,6 +37,7 @@ fn rom(imported: &Imported) -> Rom {
         sectors: 1,
         frame: Frame::Cylindrical,
         watched: Vec::new(),
+        stress: StressPlaces::default(),
         damping_ratio: 0.005,
     };
     let clamped = model.set("ROOT").unwrap().to_vec();

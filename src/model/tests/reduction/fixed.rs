@@ -12,6 +12,7 @@ use tiprub_model::element::ElementKind;
 use tiprub_model::progress::{Progress, Stage, silent};
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, full_modes, reduce};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
+use tiprub_model::stress::StressPlaces;
 use tiprub_model::{Error, Mesh};
 
 const SIZE: [f64; 3] = [0.3, 0.04, 0.05];
@@ -171,6 +172,7 @@ fn options(modes: usize, frame: Frame) -> ReductionOptions {
         sectors: 1,
         frame,
         watched: Vec::new(),
+        stress: StressPlaces::default(),
         damping_ratio: 0.01,
     }
 }

@@ -10,3 +10,4 @@ mod fixed;
 mod hertz;
 mod patches;
 mod spin;
+mod stress;

@@ -13,6 +13,7 @@ use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
 use tiprub_model::rotor37::{MeshCounts, Tip, blade_mesh};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
+use tiprub_model::stress::StressPlaces;
 use tiprub_model::{Mesh, Rotor37Options, reduce_rotor37};
 
 const SIZE: [f64; 3] = [0.3, 0.02, 0.06];
@@ -35,6 +36,7 @@ fn reduced(mesh: Mesh, contact: &[ContactPoint], kind: ReductionKind, modes: usi
         sectors: 1,
         frame: Frame::Cylindrical,
         watched: Vec::new(),
+        stress: StressPlaces::default(),
         damping_ratio: 0.01,
     };
     let clamped = nodes_at(&mesh, 0, 0.0);
@@ -196,6 +198,7 @@ fn a_free_structure_keeps_its_modes_beside_patches() {
         sectors: 1,
         frame: Frame::Cylindrical,
         watched: Vec::new(),
+        stress: StressPlaces::default(),
         damping_ratio: 0.01,
     };
     let rom = reduce(mesh, &steel(), &[], &contact, &options, &silent).unwrap().rom;

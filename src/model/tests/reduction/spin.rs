@@ -13,6 +13,7 @@ use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::spin::{
     Rotating, SpinningState, frequencies_at, gyroscopic_frequencies, turned_about_axis, without_axial,
 };
+use tiprub_model::stress::StressPlaces;
 use tiprub_model::{FeModel, Material, Mesh, Reduction, Result, reduce, reduce_model};
 
 fn column(rows: usize, entry: impl Fn(usize) -> f64) -> Mat<f64> {
@@ -231,6 +232,7 @@ fn options(frame: Frame) -> ReductionOptions {
         sectors: 1,
         frame,
         watched: Vec::new(),
+        stress: StressPlaces::default(),
         damping_ratio: 0.01,
     }
 }

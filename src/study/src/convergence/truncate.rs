@@ -60,8 +60,8 @@ pub fn truncated(rom: &Rom, modes: usize) -> Result<Rom, String> {
         .thermal
         .as_ref()
         .map(|thermal| Thermal { loads: basis.transpose() * &thermal.loads, patches: thermal.patches.clone() });
-    if let Some(watched) = &mut found.extras.watched {
-        watched.map = &watched.map * &basis;
+    for seen in [&mut found.extras.watched, &mut found.extras.stress].into_iter().flatten() {
+        seen.map = &seen.map * &basis;
     }
     let harmonics = rom.extras.harmonics.iter().map(|harmonic| of_harmonic(form, harmonic, less));
     found.extras.harmonics = harmonics.collect::<Result<_, _>>()?;

@@ -82,5 +82,6 @@ pub(super) const OTHER_SECTORS: Fact =
     fact("outputs.watched_sectors", "beyond 1", |at| at.outputs().watched_sectors.iter().any(|sector| *sector != 1));
 pub(super) const ALL_SECTORS: Fact = fact("outputs.all_sectors", "", |at| at.outputs().all_sectors);
 pub(super) const DIAMETERS: Fact = fact("outputs.nodal_diameters", "", |at| at.outputs().nodal_diameters.is_some());
+pub(super) const STRESS: Fact = fact("outputs.stress", "", |at| at.outputs().stress);
 pub(super) const WEAR: Fact = fact("outputs.wear", "", |at| at.outputs().wear);
 pub(super) const DISPLACEMENT: Fact = fact("outputs.slave_displacement", "", |at| at.outputs().slave_displacement);

@@ -119,6 +119,13 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.contacts[1].solver = Solver::Film;
     }),
     ("outputs.wear: needs `contact.coating`", |scene| scene.settings.outputs.wear = true),
+    ("outputs.stress: needs `outputs.watched_sectors`", |scene| {
+        scene.settings.outputs.stress = true;
+        scene.settings.outputs.watched_sectors.clear();
+    }),
+    ("outputs.stress: needs places of stress in the ROM of a rotor", |scene| {
+        scene.settings.outputs.stress = true;
+    }),
     ("outputs.slave_displacement: needs `surface.structure`", |scene| {
         scene.settings.surfaces[0].structure = None;
         scene.settings.outputs.slave_displacement = true;

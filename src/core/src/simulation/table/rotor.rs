@@ -3,9 +3,9 @@
 use super::builder::Builder;
 use super::parts::{Body, Parts, refuse};
 use crate::Result;
-use crate::rom::{ContactNode, Frame};
+use crate::rom::{ContactNode, Frame, STRESSES};
 use crate::simulation::outputs::{Reader, each, scalar, whole};
-use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINE_LOAD, PRESSURE};
+use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINE_LOAD, PRESSURE, STRESS};
 use crate::variables::{Quantity, Span, Unit};
 
 pub fn angle(table: &mut Builder, parts: &Parts, body: &Body) {
@@ -72,6 +72,9 @@ pub fn watched(table: &mut Builder, parts: &Parts) -> Result<()> {
 
 fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
     watched_points(table, parts, body, sector);
+    if parts.settings.outputs.stress {
+        stresses(table, body, sector);
+    }
     patches(table, body, sector);
     let list = node_list(body);
     for row in watched_rows(body.index, sector - 1, [nominal(parts, body), Some((&FORCE, 100.0))]) {
@@ -111,6 +114,36 @@ fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize
     let name = format!("blade[{sector}].watched_clearance");
     let row = table.output(name, Span::Point, nominal(parts, body), text, read);
     (row.dimension, row.display) = (Some(names.len()), Some(1));
+}
+
+/// Components of stress in both frames.
+const STRESS_COMPONENTS: [[&str; STRESSES]; 2] = [
+    ["radial", "tangential", "axial", "radial_tangential", "tangential_axial", "axial_radial"],
+    ["x", "y", "z", "xy", "yz", "zx"],
+];
+
+/// Stress at the places that a ROM recovers it at.
+fn stresses(table: &mut Builder, body: &Body, sector: usize) {
+    let Some(stress) = &body.rom.extras.stress else { return };
+    let (index, places) = (body.index, stress.points.len());
+    let names: Vec<&str> = stress.points.iter().map(|point| point.name.as_str()).collect();
+    let list = names.join(", ");
+    let mut add = |name: String, text: String, read: Reader| {
+        let row = table.output(format!("blade[{sector}].{name}"), Span::Point, Some((&STRESS, 1e8)), text, read);
+        (row.dimension, row.display) = (Some(places), Some(0));
+    };
+    let read = each(move |view, place| view.von_mises(index, sector - 1, place));
+    add("von_mises_stress".to_owned(), format!("Equivalent stress of von Mises ({list})"), read);
+    for (component, name) in STRESS_COMPONENTS[usize::from(body.rom.frame == Frame::Cartesian)].into_iter().enumerate()
+    {
+        let text = format!(
+            "{} stress, {} ({list})",
+            if component < 3 { "Normal" } else { "Shear" },
+            name.replace('_', " and ")
+        );
+        let read = each(move |view, place| view.stress(index, sector - 1, place, component));
+        add(format!("{name}_stress"), text, read);
+    }
 }
 
 /// A force over what a patch stands for: name, words, unit, nominal value, and the extent of a contact node.

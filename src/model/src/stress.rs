@@ -1,0 +1,161 @@
+//! Stress at chosen nodes of a mesh: rows that give it from displacements, and where it is largest.
+//!
+//! The stress at a node is the mean of what the elements around it have there, see [`crate::element::nodal_stress`].
+
+use faer::Mat;
+use nalgebra::Matrix3;
+use tiprub_core::rom::{Frame, STRESSES};
+
+use crate::element::nodal_stress;
+use crate::material::Material;
+use crate::mesh::Mesh;
+use crate::reduce::direction;
+use crate::{Error, Result};
+
+/// Where stress is recovered.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StressPlaces {
+    /// Nodes by name.
+    pub nodes: Vec<(String, usize)>,
+    /// Besides, where each of so many of the lowest modes has its largest stress, clamped elements left out.
+    pub modes: usize,
+}
+
+impl StressPlaces {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty() && self.modes == 0
+    }
+}
+
+/// Stress at a node per displacement of the nodes around it: (node, component, of each of the six stresses).
+type Rows = Vec<(usize, usize, [f64; STRESSES])>;
+
+/// Means of the elements around each of these nodes.
+fn rows(mesh: &Mesh, material: &Material, nodes: &[usize]) -> Result<Vec<Rows>> {
+    let mut all = vec![(Rows::new(), 0.0); nodes.len()];
+    for (number, element) in mesh.elements.iter().enumerate() {
+        for (local, node) in element.nodes.iter().enumerate() {
+            for (place, _) in nodes.iter().enumerate().filter(|(_, own)| *own == node) {
+                let coordinates = mesh.coordinates(element);
+                let stress = nodal_stress(element.kind, &coordinates, material, local, number)?;
+                let (rows, around) = &mut all[place];
+                *around += 1.0;
+                for (index, column) in stress.column_iter().enumerate() {
+                    let values = std::array::from_fn(|component| column[component]);
+                    rows.push((element.nodes[index / 3], index % 3, values));
+                }
+            }
+        }
+    }
+    let mean = |(rows, around): (Rows, f64)| {
+        let share =
+            |(node, axis, values): (usize, usize, [f64; STRESSES])| (node, axis, values.map(|one| one / around));
+        rows.into_iter().map(share).collect()
+    };
+    Ok(all.into_iter().map(mean).collect())
+}
+
+/// Stress components of these nodes per free degree of freedom, free dofs × 6·nodes, in the directions of the frame at each node.
+///
+/// # Errors
+/// Those of [`nodal_stress`].
+pub(crate) fn stress_rows(
+    (mesh, material): (&Mesh, &Material),
+    free: &[usize],
+    nodes: &[usize],
+    frame: Frame,
+) -> Result<Mat<f64>> {
+    let mut loads = Mat::zeros(free.len(), STRESSES * nodes.len());
+    for (place, rows) in rows(mesh, material, nodes)?.into_iter().enumerate() {
+        let (cos, sin) = if frame == Frame::Cylindrical { direction(mesh.nodes[nodes[place]]) } else { (1.0, 0.0) };
+        for (node, axis, values) in rows {
+            // What is clamped does not move.
+            let Ok(row) = free.binary_search(&(3 * node + axis)) else { continue };
+            for (component, value) in turned(values, cos, sin).into_iter().enumerate() {
+                loads[(row, STRESSES * place + component)] += value;
+            }
+        }
+    }
+    Ok(loads)
+}
+
+/// The same stress in axes turned about z.
+fn turned([xx, yy, zz, xy, yz, zx]: [f64; STRESSES], cos: f64, sin: f64) -> [f64; STRESSES] {
+    let tensor = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz);
+    let axes = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
+    let own = axes.transpose() * tensor * axes;
+    [own[(0, 0)], own[(1, 1)], own[(2, 2)], own[(0, 1)], own[(1, 2)], own[(2, 0)]]
+}
+
+/// Equivalent stress of von Mises (Pa) of σ₁₁, σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁.
+pub fn von_mises([xx, yy, zz, xy, yz, zx]: [f64; STRESSES]) -> f64 {
+    let normal = 0.5 * ((xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2));
+    (normal + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
+}
+
+/// All places by name and node: those named, then where each mode (free dofs × modes) has its largest stress of von Mises. Elements that
+/// hold a clamped node are left out there: a clamped corner has no finite stress.
+///
+/// # Errors
+/// A node that does not exist, a name that is there twice, more modes than are known.
+pub(crate) fn all_places(
+    (mesh, material): (&Mesh, &Material),
+    free: &[usize],
+    modes: &Mat<f64>,
+    asked: &StressPlaces,
+) -> Result<Vec<(String, usize)>> {
+    if asked.modes > modes.ncols() {
+        let problem = format!("{} asked, and {} modes of the full model are known", asked.modes, modes.ncols());
+        return Err(Error::invalid("places of largest stress", problem, "Ask for fewer"));
+    }
+    let mut places = asked.nodes.clone();
+    for (name, node) in &places {
+        if *node >= mesh.nodes.len() {
+            let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
+            return Err(Error::invalid(format!("place of stress `{name}`"), problem, "Name nodes of the mesh"));
+        }
+    }
+    for mode in 0..asked.modes {
+        let Some(node) = largest((mesh, material), free, modes, mode)? else { continue };
+        if places.iter().all(|(_, own)| *own != node) {
+            places.push((format!("mode_{}", mode + 1), node));
+        }
+    }
+    let mut names: Vec<&str> = places.iter().map(|(name, _)| name.as_str()).collect();
+    names.sort_unstable();
+    if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Error::invalid(format!("place of stress `{}`", pair[0]), "it is there twice", "Name each once"));
+    }
+    Ok(places)
+}
+
+/// The node where a mode has its largest stress.
+fn largest(
+    (mesh, material): (&Mesh, &Material),
+    free: &[usize],
+    modes: &Mat<f64>,
+    mode: usize,
+) -> Result<Option<usize>> {
+    let moved = |node: usize, axis: usize| free.binary_search(&(3 * node + axis)).ok().map(|row| modes[(row, mode)]);
+    let clamped = |node: usize| (0..3).all(|axis| free.binary_search(&(3 * node + axis)).is_err());
+    let mut sums = vec![([0.0; STRESSES], 0.0_f64); mesh.nodes.len()];
+    for (number, element) in mesh.elements.iter().enumerate() {
+        if element.nodes.iter().any(|node| clamped(*node)) {
+            continue;
+        }
+        let coordinates = mesh.coordinates(element);
+        for (local, node) in element.nodes.iter().enumerate() {
+            let stress = nodal_stress(element.kind, &coordinates, material, local, number)?;
+            let (sum, around) = &mut sums[*node];
+            *around += 1.0;
+            for (index, column) in stress.column_iter().enumerate() {
+                let displacement = moved(element.nodes[index / 3], index % 3).unwrap_or(0.0);
+                sum.iter_mut().zip(column.iter()).for_each(|(sum, value)| *sum += value * displacement);
+            }
+        }
+    }
+    let seen = sums.iter().enumerate().filter(|(_, (_, around))| *around > 0.0);
+    let stress = seen.map(|(node, (sum, around))| (node, von_mises(sum.map(|one| one / around))));
+    Ok(stress.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(node, _)| node))
+}

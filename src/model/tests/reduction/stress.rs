@@ -1,0 +1,254 @@
+//! Stress that a reduced model recovers, against that of the full one and closed forms.
+
+use crate::common::{distorted_box, nodes_at, steel, straight_box, wobble};
+use crate::guide::{self, told};
+use nalgebra::{DMatrix, DVector};
+use tiprub_core::rom::{Frame, STRESSES};
+use tiprub_model::Mesh;
+use tiprub_model::assembly::{assemble, free_dofs};
+use tiprub_model::craig_bampton::dense_modes;
+use tiprub_model::element::{ElementKind, nodal_stress};
+use tiprub_model::patches::contact_patches;
+use tiprub_model::progress::silent;
+use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
+use tiprub_model::sparse::{SparseMatrix, principal_pair};
+use tiprub_model::stress::{StressPlaces, von_mises};
+
+const SIZE: [f64; 3] = [0.3, 0.02, 0.06];
+
+fn reduced(
+    mesh: &Mesh,
+    contact: &[ContactPoint],
+    (kind, modes): (ReductionKind, usize),
+    stress: StressPlaces,
+) -> tiprub_model::Result<Reduction> {
+    let options = ReductionOptions {
+        name: "beam".into(),
+        kind,
+        modes,
+        checked_modes: 6,
+        sectors: 1,
+        frame: Frame::Cartesian,
+        watched: Vec::new(),
+        stress,
+        damping_ratio: 0.0,
+    };
+    let clamped = nodes_at(mesh, 0, 0.0);
+    reduce(mesh.clone(), &steel(), &clamped, contact, &options, &silent)
+}
+
+/// The node nearest to a point.
+fn nearest(mesh: &Mesh, point: [f64; 3]) -> usize {
+    let off = |node: &[f64; 3]| (0..3).map(|i| (node[i] - point[i]).powi(2)).sum::<f64>();
+    (0..mesh.nodes.len()).min_by(|a, b| off(&mesh.nodes[*a]).total_cmp(&off(&mesh.nodes[*b]))).unwrap()
+}
+
+/// A cantilever pushed at its end: σxx = M y / I at half its length, whatever the number of modes.
+#[test]
+fn a_cantilever_has_the_bending_stress_of_beam_theory() {
+    let mesh = straight_box(ElementKind::Hex20, [12, 2, 3], SIZE);
+    let tip = contact_patches(&mesh, &nodes_at(&mesh, 0, SIZE[0]), 1, |_| "end".into()).unwrap();
+    let middle = [0.5 * SIZE[0], 0.0, 0.5 * SIZE[2]];
+    let above = [middle[0], SIZE[1], middle[2]];
+    let nodes = vec![("below".to_owned(), nearest(&mesh, middle)), ("above".to_owned(), nearest(&mesh, above))];
+    for modes in [0, 5] {
+        let places = StressPlaces { nodes: nodes.clone(), modes: 0 };
+        let rom = reduced(&mesh, &tip, (ReductionKind::FreeInterface, modes), places).unwrap().rom;
+        let force = rom.contact_map.transpose() * DVector::from_vec(vec![0.0, 1000.0, 0.0]);
+        let moved = rom.stiffness.clone().lu().solve(&force).unwrap();
+        let stress = &rom.extras.stress.as_ref().unwrap().map * moved;
+        let inertia = SIZE[2] * SIZE[1].powi(3) / 12.0;
+        let expected = 1000.0 * 0.5 * SIZE[0] * 0.5 * SIZE[1] / inertia;
+        for (place, sign) in [(0, 1.0), (1, -1.0)] {
+            let found = stress[STRESSES * place];
+            assert!((found - sign * expected).abs() < 2e-3 * expected, "{modes} modes: {found:e}, {expected:e}");
+            let all = std::array::from_fn(|component| stress[STRESSES * place + component]);
+            assert!((von_mises(all) - expected).abs() < 2e-2 * expected, "{modes} modes: {all:?}");
+        }
+    }
+}
+
+/// Directions turn with the place: a cylindrical frame has the same invariants, and its normal stresses along its own axes.
+#[test]
+fn directions_follow_the_frame() {
+    let mut mesh = distorted_box(ElementKind::Hex20, [4, 1, 3], SIZE, wobble(0.1));
+    // Off the x axis, so that the directions differ.
+    mesh.nodes.iter_mut().for_each(|node| node[1] += 0.2);
+    let tip = contact_patches(&mesh, &nodes_at(&mesh, 0, SIZE[0]), 2, |index| format!("patch_{index}")).unwrap();
+    let place = nearest(&mesh, [0.15, 0.22, 0.03]);
+    let of = |frame| {
+        let options = ReductionOptions {
+            name: "beam".into(),
+            kind: ReductionKind::FreeInterface,
+            modes: 8,
+            checked_modes: 6,
+            sectors: 1,
+            frame,
+            watched: Vec::new(),
+            stress: StressPlaces { nodes: vec![("place".into(), place)], modes: 0 },
+            damping_ratio: 0.0,
+        };
+        let rom = reduce(mesh.clone(), &steel(), &nodes_at(&mesh, 0, 0.0), &tip, &options, &silent).unwrap().rom;
+        // The same force along x on the first patch, in the directions of either frame at its middle.
+        let [r, angle, _] = rom.contact_nodes[0].position;
+        let direction = match frame {
+            Frame::Cartesian => [1.0, 0.0, 0.0],
+            Frame::Cylindrical => [angle.cos(), -angle.sin(), 0.0],
+        };
+        assert!(r > 0.0);
+        let mut force = DVector::zeros(6);
+        force.rows_mut(0, 3).copy_from_slice(&direction);
+        let moved = rom.stiffness.clone().lu().solve(&(rom.contact_map.transpose() * force)).unwrap();
+        let stress = rom.extras.stress.unwrap();
+        let values: [f64; STRESSES] = std::array::from_fn(|i| (stress.map.row(i) * &moved)[0]);
+        (values, stress.points[0].position)
+    };
+    let (cartesian, position) = of(Frame::Cartesian);
+    let (cylindrical, place) = of(Frame::Cylindrical);
+    assert!((place[0] - position[0].hypot(position[1])).abs() < 1e-15);
+    // A patch spreads a cylindrical force along each node's own directions: nearly that force.
+    let close = |a: f64, b: f64| assert!((a - b).abs() < 2e-2 * von_mises(cartesian), "{cartesian:?} {cylindrical:?}");
+    close(von_mises(cartesian), von_mises(cylindrical));
+    let (cos, sin) = (place[1].cos(), place[1].sin());
+    let [xx, yy, zz, xy, ..] = cartesian;
+    close(cylindrical[0], xx * cos * cos + yy * sin * sin + 2.0 * xy * sin * cos);
+    close(cylindrical[1], xx * sin * sin + yy * cos * cos - 2.0 * xy * sin * cos);
+    close(cylindrical[2], zz);
+    close(cylindrical[3], (yy - xx) * sin * cos + xy * (cos * cos - sin * sin));
+}
+
+/// Where a mode has its largest stress: bending of a cantilever at its root, away from the clamped elements.
+#[test]
+fn places_of_modes_are_where_their_stress_is_largest() {
+    let mesh = straight_box(ElementKind::Hex20, [12, 1, 3], SIZE);
+    let tip = contact_patches(&mesh, &nodes_at(&mesh, 0, SIZE[0]), 2, |index| format!("patch_{index}")).unwrap();
+    let places = StressPlaces { nodes: vec![("mine".into(), nearest(&mesh, [0.15, 0.02, 0.03]))], modes: 2 };
+    let rom = reduced(&mesh, &tip, (ReductionKind::FreeInterface, 6), places).unwrap().rom;
+    let names: Vec<&str> = rom.extras.stress.as_ref().unwrap().points.iter().map(|point| point.name.as_str()).collect();
+    assert_eq!(names, ["mine", "mode_1", "mode_2"]);
+    let at = |place: usize| rom.extras.stress.as_ref().unwrap().points[place].position;
+    // First bending: the outer fibre of the first element that is not clamped.
+    let element = SIZE[0] / 12.0;
+    assert!((at(1)[0] - element).abs() < 1e-12, "{:?}", at(1));
+    assert!(at(1)[1].abs() < 1e-12 || (at(1)[1] - SIZE[1]).abs() < 1e-12, "{:?}", at(1));
+    let refused =
+        |places: StressPlaces| reduced(&mesh, &tip, (ReductionKind::FreeInterface, 6), places).unwrap_err().to_string();
+    let told = refused(StressPlaces { nodes: Vec::new(), modes: 7 });
+    assert!(told.starts_with("places of largest stress: 7 asked"), "{told}");
+    let told = refused(StressPlaces { nodes: vec![("a".into(), 100_000)], modes: 0 });
+    assert!(told.contains("`a`") && told.contains("node 100001 does not exist"), "{told}");
+    let told = refused(StressPlaces { nodes: vec![("a".into(), 0), ("a".into(), 1)], modes: 0 });
+    assert!(told.contains("`a`: it is there twice"), "{told}");
+}
+
+/// Pulses of force on three patches, one after the other (N).
+fn pushed(time: f64, pulse: f64) -> DVector<f64> {
+    let mut force = DVector::zeros(9);
+    for patch in 0..3 {
+        let since = time - 0.5 * pulse * patch as f64;
+        if (0.0..pulse).contains(&since) {
+            let push = -3e3 * (std::f64::consts::PI * since / pulse).sin();
+            force[3 * patch] = push;
+            force[3 * patch + 1] = 0.15 * push;
+        }
+    }
+    force
+}
+
+/// Coordinates of modes (angular frequencies squared, shapes M-orthonormal) under forces of `loads` per unit, sample by sample: each mode
+/// exactly under forces that run linearly between samples.
+fn driven(squares: &[f64], loads: &DMatrix<f64>, step: f64, samples: usize, pulse: f64) -> Vec<DVector<f64>> {
+    let forces: Vec<DVector<f64>> = (0..=samples).map(|sample| loads * pushed(step * sample as f64, pulse)).collect();
+    let mut all = vec![DVector::zeros(squares.len()); samples + 1];
+    for (mode, square) in squares.iter().enumerate() {
+        let omega = square.sqrt();
+        let (sin, cos) = (omega * step).sin_cos();
+        let (mut position, mut velocity) = (0.0, 0.0);
+        for sample in 0..samples {
+            let (from, to) = (forces[sample][mode] / square, forces[sample + 1][mode] / square);
+            // The response at rest runs linearly; the rest is free.
+            let slope = (to - from) / step;
+            let (off, speed) = (position - from, velocity - slope);
+            position = to + off * cos + speed / omega * sin;
+            velocity = slope - off * omega * sin + speed * cos;
+            all[sample + 1][mode] = position;
+        }
+    }
+    all
+}
+
+fn dense(matrix: &SparseMatrix) -> DMatrix<f64> {
+    let all: Vec<usize> = (0..matrix.order()).collect();
+    let block = matrix.block(&all, &all);
+    DMatrix::from_fn(all.len(), all.len(), |i, j| block[(i, j)])
+}
+
+/// Stress under the same contact forces: a reduced model against all modes of the full one, by the number of its modes.
+#[test]
+fn stress_under_the_same_forces_converges_to_that_of_the_full_model() {
+    let mesh = distorted_box(ElementKind::Hex20, [6, 1, 4], SIZE, wobble(0.1));
+    let tip = contact_patches(&mesh, &nodes_at(&mesh, 0, SIZE[0]), 3, |index| format!("patch_{index}")).unwrap();
+    let clamped = nodes_at(&mesh, 0, 0.0);
+    let free = free_dofs(mesh.nodes.len(), &clamped);
+    let places = StressPlaces { nodes: Vec::new(), modes: 6 };
+    let reference = reduced(&mesh, &tip, (ReductionKind::FreeInterface, 5), places.clone()).unwrap().rom;
+    let points = &reference.extras.stress.as_ref().unwrap().points;
+    let nodes: Vec<usize> = points.iter().map(|point| nearest(&mesh, point.position)).collect();
+    // The full model, its stress by the elements around each node.
+    let assembled = assemble(&mesh, &steel(), &silent).unwrap();
+    let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+    let (squares, shapes) = dense_modes(&dense(&stiffness), &dense(&mass)).unwrap();
+    let mut rows = DMatrix::zeros(STRESSES * nodes.len(), free.len());
+    for (place, node) in nodes.iter().enumerate() {
+        let around: Vec<usize> = (0..mesh.elements.len()).filter(|e| mesh.elements[*e].nodes.contains(node)).collect();
+        for number in &around {
+            let element = &mesh.elements[*number];
+            let local = element.nodes.iter().position(|own| own == node).unwrap();
+            let one = nodal_stress(element.kind, &mesh.coordinates(element), &steel(), local, *number).unwrap();
+            for (index, column) in one.column_iter().enumerate() {
+                if let Ok(dof) = free.binary_search(&(3 * element.nodes[index / 3] + index % 3)) {
+                    (0..STRESSES).for_each(|i| rows[(STRESSES * place + i, dof)] += column[i] / around.len() as f64);
+                }
+            }
+        }
+    }
+    let mut push = DMatrix::zeros(free.len(), 9);
+    for (index, point) in tip.iter().enumerate() {
+        for (node, weight) in point.weights() {
+            (0..3).for_each(|axis| push[(free.binary_search(&(3 * node + axis)).unwrap(), 3 * index + axis)] = weight);
+        }
+    }
+    let (step, samples) = (1e-6, 4000);
+    let counts = [5, 10, 20, 40, 80];
+    let kinds = [ReductionKind::FixedInterface, ReductionKind::FreeInterface];
+    let mut errors = vec![[0.0; 4]; counts.len()];
+    for (column, pulse) in [(0, 5e-4), (2, 5e-5)] {
+        let histories = |squares: &[f64], shapes: &DMatrix<f64>, push: &DMatrix<f64>, rows: &DMatrix<f64>| {
+            let seen = rows * shapes;
+            let moved = driven(squares, &(shapes.transpose() * push), step, samples, pulse);
+            moved.into_iter().map(|modes| &seen * modes).collect::<Vec<_>>()
+        };
+        let full = histories(&squares, &shapes, &push, &rows);
+        let largest = full.iter().fold(0.0, |most: f64, one| most.max(one.amax()));
+        for (row, modes) in counts.into_iter().enumerate() {
+            for (which, kind) in kinds.into_iter().enumerate() {
+                let rom = reduced(&mesh, &tip, (kind, modes), places.clone()).unwrap().rom;
+                let stress = rom.extras.stress.as_ref().unwrap();
+                assert_eq!(&stress.points, points);
+                let (own, shapes) = dense_modes(&rom.stiffness, &rom.mass).unwrap();
+                let found = histories(&own, &shapes, &rom.contact_map.transpose(), &stress.map);
+                let off = found.iter().zip(&full).fold(0.0, |most: f64, (a, b)| most.max((a - b).amax()));
+                errors[row][column + which] = off / largest;
+            }
+        }
+    }
+    for (modes, row) in counts.iter().zip(&errors) {
+        let values: Vec<String> = row.iter().map(|error| format!("{error:.0e}")).collect();
+        told!("| {modes} | {} |", values.join(" | "));
+    }
+    for column in 0..4 {
+        assert!(errors[4][column] < 0.1 * errors[0][column], "{errors:?}");
+    }
+    assert!(errors[4][1] < 1e-3, "{errors:?}");
+    guide::hold("cargo test -p tiprub-model --test reduction");
+}
