@@ -183,12 +183,14 @@ impl Simulation {
     fn change_input(&mut self, reference: u32, change: impl FnOnce(&mut Input)) -> Result<()> {
         let (variable, element) = self.table.locate(reference)?;
         let (quantity, of) = (variable.quantity, variable.of);
-        let Some(mut input) = self.inputs.get(quantity, of, element).copied() else { return Ok(()) };
-        let (offset, length) = (self.offset_now(), self.communication.length);
         let (stepping, at_once) = (self.phase == Phase::Stepping, self.acts_at_once(quantity));
-        change(&mut input);
         if stepping {
             self.tangent.forget();
+        }
+        let Some(mut input) = self.inputs.get(quantity, of, element).copied() else { return Ok(()) };
+        let (offset, length) = (self.offset_now(), self.communication.length);
+        change(&mut input);
+        if stepping {
             self.check_course(variable, element, &input, at_once, [offset, length])?;
         }
         if at_once || self.phase == Phase::Created {

@@ -2,10 +2,12 @@
 //!
 //! Outputs of a step are piecewise smooth in its inputs: pieces differ in which contacts are closed and, with galerkin, in which steps
 //! every sector takes. Inputs are moved by so little (gaps by a millionth of the clearance) that the step stays on its piece, and the step is
-//! marched again in a copy. The steps that the copy took tell whether it stayed there. The quotient is then the derivative with
-//! contacts and steps as they were in the accepted step, exact up to rounding.
+//! marched again in a copy. With galerkin the steps that the copy took tell whether it stayed there. The other schemes count nothing that
+//! would: there the step is marched in both directions, and impulses and gaps that do not change alike tell of a kink between. Inputs are then moved
+//! less. The quotient is the derivative with contacts and steps as they were in the accepted step, up to rounding.
 
 use super::{Phase, Simulation};
+use crate::settings::Scheme;
 use crate::variables::{Causality, Kind, Quantity, Variability};
 use crate::{Error, Result, shown};
 
@@ -14,8 +16,10 @@ use crate::{Error, Result, shown};
 const SMALL: f64 = 1.0 / 1_048_576.0;
 /// How much less, in turn, where the step does not stay on its piece.
 const LESS: f64 = 0.125;
-/// Marches at most, in both directions together.
+/// Marches at most with galerkin, and pairs of marches with other schemes.
 const TRIES: usize = 6;
+/// Most that impulses and gaps may change otherwise in one direction than in the other, as a share of what they change by.
+const BENT: f64 = 1e-3;
 /// Inputs that move gaps by less than this share of what was meant are moved by more, by a factor up to [`MOST`].
 const WEAK: f64 = 0.0625;
 const MOST: f64 = 4096.0;
@@ -77,7 +81,8 @@ impl Simulation {
     /// Derivatives of `outputs` at the end of the last communication step by `inputs` over it, times `seed`: Σ_j ∂y_i(t+H)/∂u_j s_j, written to
     /// `sensitivity`. An input here is the value that was asked for before the step; contacts and internal steps stay as they were in it.
     ///
-    /// It marches the step again, once as a rule, in a copy of the simulation; the simulation itself stays as it is.
+    /// It marches the step again in a copy of the simulation, as a rule once with galerkin and twice with other schemes; the simulation itself
+    /// stays as it is.
     ///
     /// # Errors
     /// Derivatives not asked for before initialisation; no communication step done, or one that inputs were set in, ended early, or a state
@@ -120,6 +125,7 @@ impl Simulation {
         most: f64,
     ) -> Result<()> {
         let (mut moved, mut grown) = (most, inputs.iter().any(|input| self.is_speed(*input)));
+        let mut least = f64::INFINITY;
         for _ in 0..TRIES {
             self.march_again(twin, inputs, seed, moved)?;
             let share = self.gaps_moved(twin) / (SMALL * self.clearance());
@@ -129,6 +135,24 @@ impl Simulation {
                 continue;
             }
             grown = true;
+            if self.system.settings().scheme != Scheme::Galerkin {
+                let of_twin =
+                    |twin: &Self| outputs.iter().map(|output| twin.values[*output as usize]).collect::<Vec<_>>();
+                let (ahead, touched) = (of_twin(twin), twin.touched());
+                self.march_again(twin, inputs, seed, -moved)?;
+                let bent = bend(&twin.touched(), &self.touched(), &touched);
+                if bent < least {
+                    least = bent;
+                    for (value, (ahead, behind)) in sensitivity.iter_mut().zip(ahead.iter().zip(of_twin(twin))) {
+                        *value = (ahead - behind) / (2.0 * moved);
+                    }
+                }
+                if bent <= BENT {
+                    break;
+                }
+                moved *= LESS;
+                continue;
+            }
             for (value, output) in sensitivity.iter_mut().zip(outputs) {
                 let output = *output as usize;
                 *value = (twin.values[output] - self.values[output]) / moved;
@@ -149,6 +173,13 @@ impl Simulation {
     /// Smallest clearance of all pairs (m).
     fn clearance(&self) -> f64 {
         self.system.pairs().iter().map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Normal impulses over the communication step (N·s) and gaps at its end (m) of all structures.
+    fn touched(&self) -> [Vec<f64>; 2] {
+        let impulses = self.window.bodies.iter().flat_map(|body| &body.normal_impulse).copied();
+        let gaps = self.system.structures().iter().flat_map(|structure| structure.gaps()).copied();
+        [impulses.collect(), gaps.collect()]
     }
 
     /// Largest difference between gaps of now and those of a twin (m).
@@ -222,8 +253,8 @@ impl Simulation {
         if self.phase != Phase::Ready || !self.tangent.stands {
             return Err(Error::invalid(
                 what,
-                "there is no communication step that could be marched again: none is done, a state was restored after it, it ended early, or \
-                 inputs were set within it",
+                "there is no communication step that could be marched again: none is done, it was discarded, a state was restored after it, it \
+                 ended early, or something was set within it",
                 "Ask after a whole communication step, before a state is restored",
             ));
         }
@@ -254,4 +285,21 @@ impl Simulation {
         let what = format!("derivative of `{}`", variable.element_name(element));
         Err(Error::invalid(what, "the variable is not a continuous real output", remedy))
     }
+}
+
+/// How far impulses and gaps at three places in a row are from a line, as a share of their change; the larger of both.
+fn bend(behind: &[Vec<f64>; 2], now: &[Vec<f64>; 2], ahead: &[Vec<f64>; 2]) -> f64 {
+    let one = |which: usize| {
+        let (mut off, mut change) = (0.0, 0.0);
+        for ((behind, now), ahead) in behind[which].iter().zip(&now[which]).zip(&ahead[which]) {
+            let (before, after) = (now - behind, ahead - now);
+            // Nothing to touch, before or after, has no rate.
+            if before.is_finite() && after.is_finite() {
+                off += (after - before).abs();
+                change += before.abs() + after.abs();
+            }
+        }
+        if change > 0.0 { off / change } else { 0.0 }
+    };
+    f64::max(one(0), one(1))
 }
