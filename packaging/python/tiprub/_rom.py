@@ -15,10 +15,11 @@ import numpy
 from ._program import Error, call, called, place, text
 
 #: Entries of the file that are text; all else is an array.
-ENTRIES = {"origin", "contact_names", "largest_speed", "contact_grid", "watched_names", "basis", "contact_rows", "rub_errors", "rub_errors_found_on", "units"}
+ENTRIES = {"origin", "contact_names", "largest_speed", "contact_grid", "watched_names", "stress_names", "basis", "contact_rows",
+           "rub_errors", "rub_errors_found_on", "units"}
 #: Needs format 2.
 SECOND = {"contact_areas", "contact_lengths", "flexibility_deviation", "response_frequencies", "response_deviation", "watched_map",
-          "watched_positions", "watched_names", "basis", "contact_rows", "rub_errors", "rub_errors_found_on"}
+          "watched_positions", "watched_names", "stress_map", "stress_positions", "stress_names", "basis", "contact_rows", "rub_errors", "rub_errors_found_on"}
 
 
 def rom(

@@ -116,9 +116,8 @@ pub(crate) fn all_places(
             return Err(Error::invalid(format!("place of stress `{name}`"), problem, "Name nodes of the mesh"));
         }
     }
-    for mode in 0..asked.modes {
-        let Some(node) = largest((mesh, material), free, modes, mode)? else { continue };
-        if places.iter().all(|(_, own)| *own != node) {
+    for (mode, node) in largest((mesh, material), free, modes, asked.modes)?.into_iter().enumerate() {
+        if let Some(node) = node.filter(|node| places.iter().all(|(_, own)| own != node)) {
             places.push((format!("mode_{}", mode + 1), node));
         }
     }
@@ -130,32 +129,40 @@ pub(crate) fn all_places(
     Ok(places)
 }
 
-/// The node where a mode has its largest stress.
+/// The node where each of so many modes has its largest stress.
 fn largest(
     (mesh, material): (&Mesh, &Material),
     free: &[usize],
     modes: &Mat<f64>,
-    mode: usize,
-) -> Result<Option<usize>> {
-    let moved = |node: usize, axis: usize| free.binary_search(&(3 * node + axis)).ok().map(|row| modes[(row, mode)]);
-    let clamped = |node: usize| (0..3).all(|axis| free.binary_search(&(3 * node + axis)).is_err());
-    let mut sums = vec![([0.0; STRESSES], 0.0_f64); mesh.nodes.len()];
-    for (number, element) in mesh.elements.iter().enumerate() {
+    count: usize,
+) -> Result<Vec<Option<usize>>> {
+    let row = |node: usize, axis: usize| free.binary_search(&(3 * node + axis)).ok();
+    let clamped = |node: usize| (0..3).all(|axis| row(node, axis).is_none());
+    let nodes = mesh.nodes.len();
+    let (mut sums, mut around) = (vec![[0.0; STRESSES]; count * nodes], vec![0.0_f64; nodes]);
+    let counted = if count == 0 { &[][..] } else { &mesh.elements[..] };
+    for (number, element) in counted.iter().enumerate() {
         if element.nodes.iter().any(|node| clamped(*node)) {
             continue;
         }
         let coordinates = mesh.coordinates(element);
+        let rows: Vec<_> = element.nodes.iter().flat_map(|node| (0..3).map(|axis| row(*node, axis))).collect();
         for (local, node) in element.nodes.iter().enumerate() {
             let stress = nodal_stress(element.kind, &coordinates, material, local, number)?;
-            let (sum, around) = &mut sums[*node];
-            *around += 1.0;
-            for (index, column) in stress.column_iter().enumerate() {
-                let displacement = moved(element.nodes[index / 3], index % 3).unwrap_or(0.0);
-                sum.iter_mut().zip(column.iter()).for_each(|(sum, value)| *sum += value * displacement);
+            around[*node] += 1.0;
+            for (column, row) in stress.column_iter().zip(&rows) {
+                let Some(row) = *row else { continue };
+                for mode in 0..count {
+                    let sum = sums[mode * nodes + node].iter_mut();
+                    sum.zip(column.iter()).for_each(|(sum, value)| *sum += value * modes[(row, mode)]);
+                }
             }
         }
     }
-    let seen = sums.iter().enumerate().filter(|(_, (_, around))| *around > 0.0);
-    let stress = seen.map(|(node, (sum, around))| (node, von_mises(sum.map(|one| one / around))));
-    Ok(stress.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(node, _)| node))
+    let place = |mode: usize| {
+        let seen = (0..nodes).filter(|node| around[*node] > 0.0);
+        let stress = seen.map(|node| (node, von_mises(sums[mode * nodes + node].map(|one| one / around[node]))));
+        stress.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(node, _)| node)
+    };
+    Ok((0..count).map(place).collect())
 }

@@ -12,7 +12,8 @@ fn scene() -> Scene {
     let (order, nodes) = (rom.order(), rom.contact_nodes.len());
     // As many watched points as contact nodes, so that their displacements are told beside.
     rom.extras.watched = Some(Watched { map: rom.contact_map.clone(), points: rom.contact_nodes.clone() });
-    let factor = |row: usize, column: usize| 1e11 * (1.0 + row as f64) * if column.is_multiple_of(2) { 1.0 } else { -0.3 };
+    let factor =
+        |row: usize, column: usize| 1e11 * (1.0 + row as f64) * if column.is_multiple_of(2) { 1.0 } else { -0.3 };
     let of_moved = DMatrix::from_fn(2 * STRESSES, 3 * nodes, factor);
     let map = of_moved * &rom.contact_map;
     assert_eq!(map.shape(), (2 * STRESSES, order));
