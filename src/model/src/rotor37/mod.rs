@@ -145,7 +145,7 @@ impl Rotor37Options {
 pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Result<Reduction> {
     report(listener, Stage::Mesh, 0, 1);
     let blade = blade_mesh(options.mesh)?;
-    let stressed = if let Tip::Nodes(_) = options.tip { 0 } else { STRESSED };
+    let stressed = if let Tip::Nodes(_) = options.tip { 0 } else { STRESSED.min(options.checked_modes) };
     let (contact, watched) = match options.tip {
         Tip::Nodes(count) => (blade.contact_points(count)?, Vec::new()),
         Tip::Patches(count) => (blade.contact_patches(count)?, blade.contact_points(WATCHED)?),
