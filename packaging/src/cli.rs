@@ -155,6 +155,10 @@ pub struct RunArguments {
     /// Start value of an input or parameter; of an array one for all elements, or each its own: `NAME=[1,2,3]`. May be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
+    /// Inputs over time from a CSV file with the columns `time,NAME,NAME,...`: linear between its lines, followed without delay; also
+    /// tunable parameters.
+    #[arg(long, value_name = "FILE", conflicts_with = "estimate")]
+    pub inputs: Option<PathBuf>,
     /// Also estimate what steps, modes and patches along the chord leave, and rows of three across the thickness, from coarser runs of the same
     /// scene: some ten runs more. What the mesh leaves is told where the ROM has it (`tiprub study convergence --into`).
     #[arg(long)]

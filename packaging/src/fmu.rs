@@ -7,7 +7,11 @@ use tiprub_fmi_host::archive::{self, Entry};
 use tiprub_model_description::{
     Description, Experiment, fmi2_xml, fmi3_terminals, fmi3_xml, html, references_manifest,
 };
-use tiprub_shell::{Failure, Result, native, schedule::Schedule};
+use tiprub_shell::{
+    Failure, Result,
+    native::{self, Given},
+    schedule::Schedule,
+};
 
 use crate::{library::Library, scene_features};
 
@@ -94,7 +98,7 @@ impl<'a> Package<'a> {
             schedule.count = REFERENCE_STEPS;
             schedule.stop = schedule.start + REFERENCE_STEPS as f64 * schedule.step;
         }
-        let reference_csv = native::run(scene, &schedule, &[], &|_| {})?.recording.to_csv();
+        let reference_csv = native::run(scene, &schedule, Given::default(), &|_| {})?.recording.to_csv();
         let generated = generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())?;
         Ok(Self {
             scene,

@@ -66,6 +66,18 @@ def test_a_run_takes_times_and_start_values(blade, tmp_path):
     assert type(usual[["torque"]]) is pandas.DataFrame, "parts are plain"
 
 
+def test_inputs_over_time_are_tables_or_files(blade, tmp_path):
+    table = pandas.DataFrame({"time": [0.0, 1e-3], "speed": [500.0, 600.0]})
+    (tmp_path / "inputs.csv").write_text("time,speed\n0,500\n0.001,600\n")
+    forms = [table, table.set_index("time"), {"time": [0.0, 1e-3], "speed": [500.0, 600.0]}, tmp_path / "inputs.csv"]
+    results = [module.run(SCENE, directory=tmp_path, quiet=True, inputs=form) for form in forms]
+    assert all(result.equals(results[0]) for result in results[1:])
+    # Half the change over the first millisecond, all of it after.
+    assert results[0]["rotor_angle"].iloc[-1] == pytest.approx(0.55 + 0.6, rel=1e-12)
+    with pytest.raises(module.Error, match="no such variable"):
+        module.run(SCENE, directory=tmp_path, quiet=True, inputs={"time": [0.0], "spee": [1.0]})
+
+
 def test_notebooks_get_tables(blade, tmp_path):
     result = module.run(SCENE, directory=tmp_path, quiet=True)
     page = result._repr_html_()

@@ -57,6 +57,7 @@ def run(
     stop: Optional[float] = None,
     step: Optional[float] = None,
     set: Optional[Mapping[str, Any]] = None,
+    inputs: Union[None, Place, pandas.DataFrame, Mapping[str, Any]] = None,
     *,
     directory: Place = ".",
     quiet: bool = False,
@@ -75,6 +76,9 @@ def run(
     set : dict
         Start values of inputs and parameters by name, such as `{"speed": 1700.0}`. An array takes a number for all of its
         elements, or an array_like of shape (elements,).
+    inputs : pandas.DataFrame, dict or path
+        Inputs and tunable parameters over time: columns by name, with `time` (s) as a column or as the index; or a CSV file. Linear between
+        the rows, and followed without delay.
     directory : path
         Where ROM files are that a dict or text names without a place.
     quiet : bool
@@ -94,7 +98,8 @@ def run(
     """
     with scene_file(scene, directory) as file, tempfile.TemporaryDirectory(prefix="tiprub-") as own:
         csv = Path(own) / "result.csv"
-        words = ["run", *options({"csv": csv, "stop": stop, "step": step}, more), *assignments(set)]
+        given = _history(inputs, Path(own) / "inputs.csv")
+        words = ["run", *options({"csv": csv, "stop": stop, "step": step, "inputs": given}, more), *assignments(set)]
         answer = call(words, [file], quiet)
         with csv.open(encoding="utf-8", newline="") as table:
             names = next(_csv.reader(table))
@@ -102,6 +107,16 @@ def run(
     result = Result(values[:, 1:], index=pandas.Index(values[:, 0], name=names[0]), columns=names[1:])
     result.attrs.update((key, item) for key, item in answer.items() if key not in ("csv", "last"))
     return result
+
+
+def _history(inputs: Union[None, Place, pandas.DataFrame, Mapping[str, Any]], file: Path) -> Optional[Place]:
+    """The CSV file of inputs over time, written where they are a table."""
+    if inputs is None or isinstance(inputs, (str, os.PathLike)):
+        return inputs
+    table = pandas.DataFrame(inputs)
+    table = table.set_index("time") if "time" in table.columns else table
+    table.to_csv(file, index_label="time")
+    return file
 
 
 def package(

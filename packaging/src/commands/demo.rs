@@ -17,7 +17,7 @@ use tiprub_model::{Reduction, Rotor37Options};
 use tiprub_shell::{
     Failure, Result,
     console::{Console, Outcome, shown_path},
-    native::{self, NativeRun},
+    native::{self, Given, NativeRun},
     output_file,
     schedule::Schedule,
 };
@@ -83,7 +83,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
 
     let native = watch.measure("native run", || {
         let task = console.task("Native run", Some(schedule.count as u64));
-        native::run(&scene, &schedule, &[], &|done| task.at(done as u64))
+        native::run(&scene, &schedule, Given::default(), &|done| task.at(done as u64))
     })?;
     console.warn(&native.warnings);
     native.recording.write_csv(&directory.join(CSV_FILE))?;
@@ -195,7 +195,7 @@ impl Paper {
     fn run(schedule: &Schedule, console: &Console) -> Result<Self> {
         let scene = scene_source::load("builtin:rotor37-paper", &RomCache::off(), console)?;
         let task = console.task("Native run of the paper's model and method", Some(schedule.count as u64));
-        let run = native::run(&scene, schedule, &[], &|done| task.at(done as u64))?;
+        let run = native::run(&scene, schedule, Given::default(), &|done| task.at(done as u64))?;
         Ok(Self { scene, run })
     }
 }

@@ -9,7 +9,8 @@ use tiprub_shell::{
     Failure, Result,
     console::{Console, Outcome, shown_path},
     extremes::{Extreme, extremes},
-    native,
+    history::History,
+    native::{self, Given},
     recording::shortest,
     schedule::Schedule,
 };
@@ -32,10 +33,12 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     }
     let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
+    let history = arguments.inputs.as_deref().map(History::read).transpose()?;
     let clock = Instant::now();
     let run = {
         let task = console.task(&format!("Running {}", scene.settings.name), Some(schedule.count as u64));
-        let run = native::run(&scene, &schedule, &arguments.set, &|done| task.at(done as u64));
+        let given = Given { settings: &arguments.set, history: history.as_ref() };
+        let run = native::run(&scene, &schedule, given, &|done| task.at(done as u64));
         // The step of the file, unless the command line has another.
         let is_set = arguments.step.is_some() || arguments.set.iter().any(|(name, _)| name == "internal_step_max");
         run.map_err(|failure| if is_set { failure } else { scene_source::located(&arguments.scene, failure) })?

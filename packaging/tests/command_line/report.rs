@@ -13,7 +13,11 @@ use tiprub_packaging::{
     },
     rom_facts::RomFacts,
 };
-use tiprub_shell::{console::Console, native, schedule::Schedule};
+use tiprub_shell::{
+    console::Console,
+    native::{self, Given},
+    schedule::Schedule,
+};
 use tiprub_study::{
     error_study::{self, ErrorStudy, METHODS, by_tolerance},
     estimate::Estimate,
@@ -46,7 +50,7 @@ fn a_report_is_complete_offline_and_small() {
     let reduction = reduction::rotor37(&options, &Console::new(true, false)).unwrap();
     let scene = rotor37_scene_with(reduction.rom.clone()).unwrap();
     let schedule = Schedule::new(&scene.settings.experiment, Some(0.004), Some(2e-6)).unwrap();
-    let run = native::run(&scene, &schedule, &[], &|_| {}).unwrap();
+    let run = native::run(&scene, &schedule, Given::default(), &|_| {}).unwrap();
     let agreement = run.recording.compare(&run.recording).unwrap();
     let quiet = Console::new(true, false);
     let study = error_study::study(&scene, 1.5e-3, &quiet.task("study", None)).unwrap();

@@ -68,6 +68,42 @@ fn settings_and_times_can_be_replaced() {
     assert_eq!(csv(&["--set", "speed=100"]), csv(&[]));
 }
 
+/// Inputs of a file: a speed that grows is integrated exactly, what rests changes nothing, what cannot be followed is told.
+#[test]
+fn inputs_over_time_are_followed_without_delay() {
+    let project = Project::new();
+    let csv = |inputs: &str| {
+        fs::write(project.path("inputs.csv"), inputs).unwrap();
+        columns(&project.succeed(&["run", "scene.toml", "--csv", "-", "--quiet", "--inputs", "inputs.csv"]))
+    };
+    let plain = columns(&project.succeed(&["run", "scene.toml", "--csv", "-", "--quiet"]));
+    assert_eq!(csv("time,speed,gap_offset\n0,100,0\n"), plain);
+    let (names, rows) = csv("time,speed\n0,100\n0.02,150\n");
+    let angle = names.iter().position(|name| name == "rotor_angle").unwrap();
+    for row in &rows {
+        let (time, ramp) = (row[0], row[0].min(0.02));
+        let expected = 100.0 * ramp + 0.5 * 2500.0 * ramp * ramp + 150.0 * (time - ramp);
+        assert!((row[angle] - expected).abs() < 1e-12 * expected.max(1.0), "{row:?}: {expected}");
+    }
+    let least = |rows: &[Vec<f64>]| {
+        let at = names.iter().position(|name| name == "clearance_minimum").unwrap();
+        rows[40..].iter().map(|row| row[at]).fold(f64::MAX, f64::min)
+    };
+    let away = csv("time,gap_offset\n0,0\n0.01,2e-3\n").1;
+    assert!(least(&away) > least(&plain.1) + 1e-3, "{} {}", least(&away), least(&plain.1));
+    for (inputs, more, told) in [
+        ("time,sped\n0,1\n", &[][..], "inputs.csv, `sped`: no such variable. Did you mean `speed`?"),
+        ("time,torque\n0,1\n", &[], "inputs.csv, `torque`: it cannot change in a run"),
+        ("time,speed\n0,100\n0.01,1e9\n", &[], "variable `speed`: its derivative"),
+        ("time,speed\n0,100\n", &["--set", "speed=50"], "--set speed: the file of inputs has a column of it"),
+    ] {
+        fs::write(project.path("inputs.csv"), inputs).unwrap();
+        let output = project.run(&[&["run", "scene.toml", "--quiet", "--inputs", "inputs.csv"], more].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success() && stderr.contains(told), "{inputs}: {stderr}");
+    }
+}
+
 #[test]
 fn a_communication_step_longer_than_the_run_is_warned_of() {
     let project = Project::new();

@@ -2,12 +2,14 @@
 //!
 //! - [`failure`], [`console`]: what went wrong, for people and programs; the terminal and progress;
 //! - [`output_file`], [`places`]: files that appear whole or not at all, and no output that is an input;
-//! - [`schedule`], [`native`], [`recording`], [`extremes`]: communication points, the run without FMI, its table of results;
+//! - [`schedule`], [`history`], [`native`], [`recording`], [`extremes`]: communication points, inputs, the run without FMI, its table of
+//!   results;
 //! - [`sweep`]: runs that do not depend on each other.
 
 pub mod console;
 pub mod extremes;
 pub mod failure;
+pub mod history;
 pub mod native;
 pub mod output_file;
 pub mod places;

@@ -9,7 +9,7 @@ use tiprub_core::{
     variables::{Causality, Kind, Variable},
 };
 
-use crate::{Failure, Result, recording::Recording, schedule::Schedule};
+use crate::{Failure, Result, history::History, recording::Recording, schedule::Schedule};
 
 /// Results of a native run.
 #[derive(Debug, Clone)]
@@ -28,14 +28,23 @@ pub struct NativeRun {
     pub warnings: Vec<String>,
 }
 
-/// Run `scene` over the schedule with start values replaced by `settings` (name, value as text).
+/// What a run is given beside its scene.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Given<'a> {
+    /// Start values (name, value as text).
+    pub settings: &'a [(String, String)],
+    /// Inputs over time.
+    pub history: Option<&'a History>,
+}
+
+/// Run `scene` over the schedule with other start values and inputs over time.
 ///
 /// # Errors
 /// Unknown or wrong settings, refused scenes, a state that became non-finite.
 pub fn run(
     scene: &Scene,
     schedule: &Schedule,
-    settings: &[(String, String)],
+    given: Given<'_>,
     progress: &dyn Fn(usize),
 ) -> Result<NativeRun> {
     let name = scene.settings.name.clone();
@@ -44,12 +53,21 @@ pub fn run(
     let mut scene = scene.clone();
     scene.settings.experiment.communication_step = schedule.time(1) - schedule.time(0);
     let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
-    for (variable, value) in settings {
+    for (variable, value) in given.settings {
+        if given.history.is_some_and(|history| history.holds(variable)) {
+            let problem = "the file of inputs has a column of it";
+            return Err(Failure::usage(format!("--set {variable}"), problem, "Give one of the two"));
+        }
         set(&mut simulation, variable, value)?;
+    }
+    let driver = given.history.map(|history| history.drive(&simulation)).transpose()?;
+    if let Some(driver) = &driver {
+        driver.start(&mut simulation, schedule.start)?;
     }
     simulation.initialise(schedule.start).map_err(in_scene)?;
     // Those of the start: what comes up in the run is told by its notes.
     let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
+    warnings.extend(given.history.map(|history| history.warnings(schedule.step)).unwrap_or_default());
     let outputs = Outputs::of(simulation.table());
     let mut recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
     let (mut stepping, mut slowest) = (Duration::ZERO, Duration::ZERO);
@@ -59,8 +77,12 @@ pub fn run(
         outputs.read(&simulation, &mut recording.values).map_err(in_scene)?;
         progress(index);
         if index < schedule.count {
+            let next = schedule.time(index + 1);
+            if let Some(driver) = &driver {
+                driver.step(&mut simulation, [time, next])?;
+            }
             let clock = Instant::now();
-            simulation.do_step(time, schedule.time(index + 1) - time).map_err(in_scene)?;
+            simulation.do_step(time, next - time).map_err(in_scene)?;
             let taken = clock.elapsed();
             (stepping, slowest) = (stepping + taken, slowest.max(taken));
         }
@@ -187,7 +209,7 @@ fn locate(table: &VariableTable, name: &str) -> Result<(Kind, Option<usize>, u32
     Err(Failure::usage(format!("--set {name}"), "no such variable", suggestion(name, &settable)))
 }
 
-fn suggestion(name: &str, candidates: &[&str]) -> String {
+pub(crate) fn suggestion(name: &str, candidates: &[&str]) -> String {
     let scored = candidates.iter().map(|candidate| (strsim::jaro_winkler(name, candidate), *candidate));
     match scored.max_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((score, candidate)) if score > 0.8 => format!("Did you mean `{candidate}`?"),

@@ -1,0 +1,258 @@
+//! Inputs over time from a CSV file, which a run follows without delay.
+
+use std::path::Path;
+
+use tiprub_core::{
+    Simulation,
+    variables::{Causality, Kind, Quantity, Variability, Variable},
+};
+
+use crate::{Failure, Result, native};
+
+/// Inputs over time: a column each, linear between the rows, and as in the first and the last row before and after them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct History {
+    /// Where it is from, for messages.
+    name: String,
+    /// Names of the columns after the time.
+    names: Vec<String>,
+    /// Times of the rows (s), growing.
+    times: Vec<f64>,
+    /// Values, row after row.
+    values: Vec<f64>,
+}
+
+impl History {
+    /// Read a CSV file whose first column is `time` (s), the others inputs and tunable parameters by their names of FMI 2.0.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a header without `time`, names that are there twice, rows that are not numbers, times that do not grow.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|error| Failure::file(path, "cannot be read", &error))?;
+        Self::parse(&bytes, &path.display().to_string())
+    }
+
+    fn parse(bytes: &[u8], name: &str) -> Result<Self> {
+        let refused =
+            |place: String, problem: String, remedy: &str| Failure::new(format!("{name}{place}"), problem, remedy);
+        let whole = |problem: String, remedy: &str| refused(String::new(), problem, remedy);
+        let header = "Its first line holds the names: time,NAME,NAME,...";
+        // Spreadsheets write a mark before the first name.
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
+        let names = reader.headers().map_err(|error| whole(error.to_string(), header))?;
+        let names: Vec<String> = names.iter().map(str::to_owned).collect();
+        if names.first().map(String::as_str) != Some("time") || names.len() < 2 {
+            return Err(whole(format!("its first line is {:?}", names.join(",")), header));
+        }
+        if let Some((_, twice)) = names.iter().enumerate().find(|(index, own)| names[..*index].contains(own)) {
+            return Err(whole(format!("`{twice}` is there twice"), "Give each variable one column"));
+        }
+        let (mut times, mut values) = (Vec::<f64>::new(), Vec::new());
+        for record in reader.records() {
+            let uneven = "Give every line as many values as there are names";
+            let record = record.map_err(|error| whole(error.to_string(), uneven))?;
+            let line = record.position().map_or(0, csv::Position::line);
+            for (column, text) in record.iter().enumerate() {
+                let value = text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
+                    let place = format!(", line {line}, `{}`", names[column]);
+                    refused(place, format!("{text:?} is no finite number"), "Give numbers with a decimal point")
+                })?;
+                if column > 0 {
+                    values.push(value);
+                    continue;
+                }
+                if let Some(last) = times.last().filter(|last| **last >= value) {
+                    let problem = format!("the time {value} s is not after {last} s");
+                    return Err(refused(format!(", line {line}"), problem, "Sort the lines by time, each time once"));
+                }
+                times.push(value);
+            }
+        }
+        if times.is_empty() {
+            return Err(whole("it has no values".to_owned(), "Give at least one line of values"));
+        }
+        Ok(Self { name: name.to_owned(), names: names[1..].to_vec(), times, values })
+    }
+
+    /// Value of a column at a time (s).
+    fn at(&self, column: usize, time: f64) -> f64 {
+        let value = |row: usize| self.values[row * self.names.len() + column];
+        match self.times.partition_point(|own| *own <= time) {
+            0 => value(0),
+            after if after == self.times.len() => value(after - 1),
+            after => {
+                let (from, to) = (self.times[after - 1], self.times[after]);
+                value(after - 1) + (time - from) / (to - from) * (value(after) - value(after - 1))
+            }
+        }
+    }
+
+    /// The columns as variables of a simulation.
+    ///
+    /// # Errors
+    /// Names that are no input and no tunable parameter of it.
+    pub fn drive(&self, simulation: &Simulation) -> Result<Driver<'_>> {
+        let rows = simulation.table().variables();
+        let mut elements = Vec::with_capacity(self.names.len());
+        for name in &self.names {
+            let found = rows.iter().find_map(|row| {
+                let element = (0..row.len()).zip(row.reference..).find(|(index, _)| row.element_name(*index) == *name);
+                element.map(|(_, reference)| (row, reference))
+            });
+            let Some((row, reference)) = found.filter(|(row, _)| is_drivable(row)) else {
+                let problem = if found.is_some() { "it cannot change in a run" } else { "no such variable" };
+                let all = rows.iter().filter(|row| is_drivable(row));
+                let names: Vec<&str> = all.map(|row| row.name.as_str()).collect();
+                let remedy = native::suggestion(name, &names);
+                return Err(Failure::new(format!("{}, `{name}`", self.name), problem, remedy));
+            };
+            elements.push(match (row.causality, row.quantity) {
+                (Causality::Input, _) => Element::Line(reference),
+                (_, Quantity::GapOffset) => Element::Reached(reference),
+                _ => Element::Held(reference),
+            });
+        }
+        Ok(Driver { history: self, elements })
+    }
+
+    /// Whether this variable, or an element of it, has a column.
+    pub fn holds(&self, name: &str) -> bool {
+        self.names.iter().any(|own| own == name || own.strip_prefix(name).is_some_and(|rest| rest.starts_with('[')))
+    }
+
+    /// What the communication step leaves out of it, if anything.
+    pub fn warnings(&self, step: f64) -> Vec<String> {
+        let shortest = self.times.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+        if shortest >= 0.999 * step {
+            return Vec::new();
+        }
+        vec![format!(
+            "{}: lines are {shortest:.3e} s apart, and only what they say at communication points counts, every {step:.3e} s: a shorter \
+             communication step (--step) sees more",
+            self.name
+        )]
+    }
+}
+
+/// Real inputs and tunable parameters.
+fn is_drivable(row: &Variable) -> bool {
+    let tunable = row.causality == Causality::Parameter && row.variability == Variability::Tunable;
+    row.kind == Kind::Real && (row.causality == Causality::Input || tunable)
+}
+
+/// How a variable follows its column.
+#[derive(Debug, Clone, Copy)]
+enum Element {
+    /// Value at the start of a communication step and its derivative over it.
+    Line(u32),
+    /// Ramped, without derivative: the value of the end, which is reached there.
+    Reached(u32),
+    /// Jumps to the value at the start of a step.
+    Held(u32),
+}
+
+/// Columns of a history with the variables that follow them.
+#[derive(Debug)]
+pub struct Driver<'a> {
+    history: &'a History,
+    elements: Vec<Element>,
+}
+
+impl Driver<'_> {
+    /// Start values.
+    ///
+    /// # Errors
+    /// Values that the variables do not take.
+    pub fn start(&self, simulation: &mut Simulation, time: f64) -> Result<()> {
+        for (column, element) in self.elements.iter().enumerate() {
+            let (Element::Line(reference) | Element::Reached(reference) | Element::Held(reference)) = *element;
+            self.set(simulation, (column, reference), time)?;
+        }
+        Ok(())
+    }
+
+    /// What a communication step from a time to another (s) needs.
+    ///
+    /// # Errors
+    /// Values that the variables do not take.
+    pub fn step(&self, simulation: &mut Simulation, [from, to]: [f64; 2]) -> Result<()> {
+        for (column, element) in self.elements.iter().enumerate() {
+            match *element {
+                Element::Line(reference) => {
+                    self.set(simulation, (column, reference), from)?;
+                    let slope = (self.history.at(column, to) - self.history.at(column, from)) / (to - from);
+                    let set = simulation.set_input_derivative(reference, 1, slope);
+                    set.map_err(|error| self.refused(column, from, error))?;
+                }
+                Element::Reached(reference) => self.set(simulation, (column, reference), to)?,
+                // What rests is not judged anew.
+                Element::Held(reference) if self.rests(simulation, (column, reference), from) => {}
+                Element::Held(reference) => self.set(simulation, (column, reference), from)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn rests(&self, simulation: &Simulation, (column, reference): (usize, u32), time: f64) -> bool {
+        simulation.real(reference).is_ok_and(|value| value.to_bits() == self.history.at(column, time).to_bits())
+    }
+
+    /// Set a variable to what its column has at a time.
+    fn set(&self, simulation: &mut Simulation, (column, reference): (usize, u32), time: f64) -> Result<()> {
+        let set = simulation.set_real(reference, self.history.at(column, time));
+        set.map_err(|error| self.refused(column, time, error))
+    }
+
+    fn refused(&self, column: usize, time: f64, error: tiprub_core::Error) -> Failure {
+        let History { name, names, .. } = self.history;
+        Failure::from_core(format!("{name}, `{}` at {time} s", names[column]), error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::History;
+
+    fn parsed(text: &str) -> crate::Result<History> {
+        History::parse(text.as_bytes(), "inputs.csv")
+    }
+
+    #[test]
+    fn columns_are_linear_between_rows_and_rest_outside() {
+        let history = parsed("\u{feff}time, a,b\r\n0.5,1,-1\r\n1.5,3,-1\r\n2,0,1e3\r\n").unwrap();
+        let at = |time: f64| [history.at(0, time), history.at(1, time)];
+        for (time, expected) in [
+            (0.0, [1.0, -1.0]),
+            (0.5, [1.0, -1.0]),
+            (1.0, [2.0, -1.0]),
+            (1.5, [3.0, -1.0]),
+            (1.75, [1.5, 499.5]),
+            (2.0, [0.0, 1e3]),
+            (9.0, [0.0, 1e3]),
+        ] {
+            assert_eq!(at(time).map(f64::to_bits), expected.map(f64::to_bits), "{time}");
+        }
+        assert!(history.holds("a") && !history.holds("c"));
+        assert_eq!(history.warnings(0.5).len(), 0);
+        assert!(history.warnings(0.6)[0].contains("5.000e-1 s apart"));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line() {
+        for (text, told) in [
+            ("", "its first line is \"\""),
+            ("t,a\n0,1\n", "its first line is \"t,a\""),
+            ("time\n0\n", "its first line is \"time\""),
+            ("time,a,a\n0,1,2\n", "`a` is there twice"),
+            ("time,a\n", "it has no values"),
+            ("time,a\n0,1\n1,x\n", "inputs.csv, line 3, `a`: \"x\" is no finite number"),
+            ("time,a\n0,1\n1,NaN\n", "line 3, `a`: \"NaN\" is no finite number"),
+            ("time,a\n0,1\n0,2\n", "line 3: the time 0 s is not after 0 s"),
+            ("time,a\n0,1\n1\n", "1 fields"),
+        ] {
+            let failure = parsed(text).unwrap_err().to_string();
+            assert!(failure.contains(told), "{text:?}: {failure}");
+        }
+    }
+}
