@@ -41,12 +41,7 @@ pub struct Given<'a> {
 ///
 /// # Errors
 /// Unknown or wrong settings, refused scenes, a state that became non-finite.
-pub fn run(
-    scene: &Scene,
-    schedule: &Schedule,
-    given: Given<'_>,
-    progress: &dyn Fn(usize),
-) -> Result<NativeRun> {
+pub fn run(scene: &Scene, schedule: &Schedule, given: Given<'_>, progress: &dyn Fn(usize)) -> Result<NativeRun> {
     let name = scene.settings.name.clone();
     let in_scene = |error: tiprub_core::Error| Failure::from_core(format!("scene `{name}`"), error);
     // Checks and warnings are for the step that is taken.
