@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 use crate::{Error, Result, ranges, shown};
 pub use cyclic::Harmonic;
 pub(crate) use cyclic::cholesky;
-pub use watched::{STRESSES, Watched};
+pub use watched::{STRESSES, Watched, von_mises};
 
 /// Most sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or hostile file must not ask for all memory,
 /// which ends the process of the importer.

@@ -4,7 +4,7 @@
 
 use faer::Mat;
 use nalgebra::Matrix3;
-use tiprub_core::rom::{Frame, STRESSES};
+use tiprub_core::rom::{Frame, STRESSES, von_mises};
 
 use crate::element::nodal_stress;
 use crate::material::Material;
@@ -86,12 +86,6 @@ fn turned([xx, yy, zz, xy, yz, zx]: [f64; STRESSES], cos: f64, sin: f64) -> [f64
     let axes = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
     let own = axes.transpose() * tensor * axes;
     [own[(0, 0)], own[(1, 1)], own[(2, 2)], own[(0, 1)], own[(1, 2)], own[(2, 0)]]
-}
-
-/// Equivalent stress of von Mises (Pa) of σ₁₁, σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁.
-pub fn von_mises([xx, yy, zz, xy, yz, zx]: [f64; STRESSES]) -> f64 {
-    let normal = 0.5 * ((xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2));
-    (normal + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
 }
 
 /// All places by name and node: those named, then where each mode (free dofs × modes) has its largest stress of von Mises. Elements that

@@ -18,6 +18,12 @@ pub struct Watched {
 /// Components of stress at a point.
 pub const STRESSES: usize = 6;
 
+/// Equivalent stress of von Mises (Pa) of σ₁₁, σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁.
+pub fn von_mises([xx, yy, zz, xy, yz, zx]: [f64; STRESSES]) -> f64 {
+    let normal = [xx - yy, yy - zz, zz - xx].iter().map(|one| 0.5 * one * one).sum::<f64>();
+    libm::sqrt(normal + 3.0 * (xy * xy + yz * yz + zx * zx))
+}
+
 impl Rom {
     pub(super) fn validate_watched(&self, remedy: &str) -> Result<()> {
         self.validate_points("watched", self.extras.watched.as_ref(), (3, ranges::MAP), remedy)?;

@@ -12,7 +12,7 @@ use crate::dynamics::sectors::Sectors;
 use crate::gaps::sector_angle;
 use crate::laws::coating::Coating;
 use crate::ledger::Ledger;
-use crate::rom::STRESSES;
+use crate::rom::{STRESSES, von_mises};
 use crate::system::System;
 use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
@@ -266,9 +266,7 @@ impl View<'_> {
 
     /// Equivalent stress of von Mises at a place of a sector (Pa).
     pub fn von_mises(&self, body: usize, sector: usize, place: usize) -> f64 {
-        let [xx, yy, zz, xy, yz, zx] = [0, 1, 2, 3, 4, 5].map(|row| self.stress(body, sector, place, row));
-        let normal = [xx - yy, yy - zz, zz - xx].iter().map(|one| 0.5 * one * one).sum::<f64>();
-        libm::sqrt(normal + 3.0 * (xy * xy + yz * yz + zx * zx))
+        von_mises([0, 1, 2, 3, 4, 5].map(|component| self.stress(body, sector, place, component)))
     }
 
     /// Clearance of a watched point of a sector (m).

@@ -89,17 +89,22 @@ fn small(name: &str) -> f64 {
 }
 
 /// Central differences by states saved before the step.
-fn central(simulation: &Simulation, state: &[u8], input: u32, outputs: &[u32]) -> (Vec<f64>, f64, Vec<f64>) {
-    let by = small(&simulation.table().locate(input).unwrap().0.name);
+fn central(
+    simulation: &Simulation,
+    state: &[u8],
+    (input, by): (u32, f64),
+    outputs: &[u32],
+    length: f64,
+) -> (Vec<f64>, Vec<f64>) {
     let [up, down] = [by, -by].map(|by| {
         let mut other = simulation.clone();
         other.restore_state(state).unwrap();
         let value = other.real(input).unwrap();
         other.set_real(input, value + by).unwrap();
-        go(&mut other, H);
+        go(&mut other, length);
         outputs.iter().map(|output| other.real(*output).unwrap()).collect::<Vec<_>>()
     });
-    (up.iter().zip(&down).map(|(up, down)| (up - down) / (2.0 * by)).collect(), by, up)
+    (up.iter().zip(&down).map(|(up, down)| (up - down) / (2.0 * by)).collect(), up)
 }
 
 /// What the blades did over a step, beside the step before.
@@ -116,7 +121,8 @@ fn errors(simulation: &mut Simulation, state: &[u8], [inputs, outputs]: [&[u32];
     for &input in inputs {
         let mut own = vec![0.0; outputs.len()];
         simulation.step_derivative(outputs, &[input], &[1.0], &mut own).unwrap();
-        let (central, by, values) = central(simulation, state, input, outputs);
+        let by = small(&simulation.table().locate(input).unwrap().0.name);
+        let (central, values) = central(simulation, state, (input, by), outputs, H);
         let unit = |output: u32| simulation.table().locate(output).unwrap().0.unit.map_or("1", |unit| unit.name);
         let mut scales = BTreeMap::<&str, [f64; 2]>::new();
         for (i, output) in outputs.iter().enumerate() {
@@ -307,4 +313,41 @@ fn what_has_no_derivative_is_refused() {
     assert!(ask(on, torque, speed, 1.0).contains("something was set within it"));
     go(on, H);
     on.step_derivative(&[torque], &[speed], &[1.0], &mut [0.0]).unwrap();
+}
+
+/// Steps far shorter than those before: ramps act in part, inputs are moved by more, and contacts open or close beside.
+#[test]
+fn a_kink_beside_the_step_is_not_stepped_over() {
+    for solver in [Solver::Lcp, Solver::Film] {
+        let (_, mut scene) = scenes().swap_remove(2);
+        scene.settings.contacts[0].solver = solver;
+        let mut simulation = switched_on(&scene);
+        for (name, value) in OFF {
+            set(&mut simulation, name, value);
+        }
+        let outputs = ["force_x", "force_y", "torque"].map(|name| reference(&simulation, name));
+        let inputs = ["whirl_x", "whirl_y", "casing_radius_change"].map(|name| reference(&simulation, name));
+        let (mut compared, mut touching) = (0, 0);
+        for step in 0..200 {
+            let length = [H, 1e-6, 1e-7, 1e-8][step % 4];
+            let state = saved(&simulation);
+            go(&mut simulation, length);
+            touching += usize::from(real(&simulation, "normal_force_peak") > 0.0);
+            for input in inputs {
+                let mut own = [0.0; 3];
+                simulation.step_derivative(&outputs, &[input], &[1.0], &mut own).unwrap();
+                let at = |by: f64| central(&simulation, &state, (input, by), &outputs, length).0;
+                let (coarse, fine) = (at(1e-10), at(1e-11));
+                let largest = |all: &[f64]| all.iter().fold(0.0, |most: f64, one| most.max(one.abs()));
+                let apart = |one: &[f64]| largest(&one.iter().zip(&fine).map(|(a, b)| a - b).collect::<Vec<_>>());
+                // Where differences disagree there is a kink between them, or nothing but rounding.
+                if largest(&fine) < 1.0 || apart(&coarse) > 1e-4 * largest(&fine) {
+                    continue;
+                }
+                compared += 1;
+                assert!(apart(&own) < 1e-3 * largest(&fine), "{solver:?}, step {step}, {own:?}, {fine:?}");
+            }
+        }
+        assert!(compared > 50 && touching > 20, "{compared} compared, {touching} steps touched");
+    }
 }

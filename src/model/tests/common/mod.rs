@@ -4,9 +4,11 @@
 pub mod casing;
 pub mod disk;
 
+use nalgebra::DMatrix;
 use tiprub_model::Material;
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::{Element, Mesh};
+use tiprub_model::sparse::SparseMatrix;
 
 /// How a brick of eight corners is divided into elements of a linear kind.
 pub fn division(kind: ElementKind) -> Vec<Vec<usize>> {
@@ -104,4 +106,11 @@ pub fn distorted_nodes(kind: ElementKind) -> Vec<[f64; 3]> {
         ]
     };
     kind.natural_nodes().iter().map(|&node| map(node)).collect()
+}
+
+/// The whole matrix.
+pub fn dense(matrix: &SparseMatrix) -> DMatrix<f64> {
+    let all: Vec<usize> = (0..matrix.order()).collect();
+    let block = matrix.block(&all, &all);
+    DMatrix::from_fn(all.len(), all.len(), |i, j| block[(i, j)])
 }

@@ -1,6 +1,6 @@
 //! Lanczos against dense eigenvalues; Craig-Bampton against the full model.
 
-use crate::common::{distorted_box, nodes_at, steel, straight_box, wobble};
+use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
 use faer::Mat;
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -25,12 +25,6 @@ fn clamped_pencil(mesh: &Mesh) -> (SparseMatrix, SparseMatrix) {
     let assembled = assemble(mesh, &steel(), &silent).unwrap();
     let free = free_dofs(mesh.nodes.len(), &nodes_at(mesh, 0, 0.0));
     principal_pair(&assembled.stiffness, &assembled.mass, &free)
-}
-
-fn dense(matrix: &SparseMatrix) -> DMatrix<f64> {
-    let all: Vec<usize> = (0..matrix.order()).collect();
-    let block = matrix.block(&all, &all);
-    DMatrix::from_fn(all.len(), all.len(), |i, j| block[(i, j)])
 }
 
 #[test]

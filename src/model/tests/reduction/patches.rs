@@ -2,7 +2,7 @@
 
 use crate::guide::told;
 
-use crate::common::{distorted_box, nodes_at, steel, straight_box, wobble};
+use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
 use nalgebra::DMatrix;
 use tiprub_core::rom::Frame;
 use tiprub_model::assembly::{assemble, free_dofs};
@@ -12,7 +12,7 @@ use tiprub_model::patches::{contact_patches, tip_patches};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
 use tiprub_model::rotor37::{MeshCounts, Tip, blade_mesh};
-use tiprub_model::sparse::{SparseMatrix, principal_pair};
+use tiprub_model::sparse::principal_pair;
 use tiprub_model::stress::StressPlaces;
 use tiprub_model::{Mesh, Rotor37Options, reduce_rotor37};
 
@@ -41,12 +41,6 @@ fn reduced(mesh: Mesh, contact: &[ContactPoint], kind: ReductionKind, modes: usi
     };
     let clamped = nodes_at(&mesh, 0, 0.0);
     reduce(mesh, &steel(), &clamped, contact, &options, &silent)
-}
-
-fn dense(matrix: &SparseMatrix) -> DMatrix<f64> {
-    let all: Vec<usize> = (0..matrix.order()).collect();
-    let block = matrix.block(&all, &all);
-    DMatrix::from_fn(all.len(), all.len(), |i, j| block[(i, j)])
 }
 
 /// Hat functions over the length 1 have their middles at 1/6, 1/2 and 5/6, whatever the elements.

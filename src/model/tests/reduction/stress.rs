@@ -1,9 +1,9 @@
 //! Stress that a reduced model recovers, against that of the full one and closed forms.
 
-use crate::common::{distorted_box, nodes_at, steel, straight_box, wobble};
+use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
 use crate::guide::{self, told};
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::rom::{Frame, STRESSES};
+use tiprub_core::rom::{Frame, STRESSES, von_mises};
 use tiprub_model::Mesh;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
@@ -11,8 +11,8 @@ use tiprub_model::element::{ElementKind, nodal_stress};
 use tiprub_model::patches::contact_patches;
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
-use tiprub_model::sparse::{SparseMatrix, principal_pair};
-use tiprub_model::stress::{StressPlaces, von_mises};
+use tiprub_model::sparse::principal_pair;
+use tiprub_model::stress::StressPlaces;
 
 const SIZE: [f64; 3] = [0.3, 0.02, 0.06];
 
@@ -175,12 +175,6 @@ fn driven(squares: &[f64], loads: &DMatrix<f64>, step: f64, samples: usize, puls
         }
     }
     all
-}
-
-fn dense(matrix: &SparseMatrix) -> DMatrix<f64> {
-    let all: Vec<usize> = (0..matrix.order()).collect();
-    let block = matrix.block(&all, &all);
-    DMatrix::from_fn(all.len(), all.len(), |i, j| block[(i, j)])
 }
 
 /// Stress under the same contact forces: a reduced model against all modes of the full one, by the number of its modes.
