@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Run an example of a system around the FMU, from nothing: makes a Python environment of its own from pinned
+# packages, builds tiprub where none is given, runs the example, and leaves figures and tables in target/examples/NAME.
+#
+#     examples/run.sh NAME [options of the example]     examples/run.sh NAME --help
+#
+# TIPRUB names a tiprub program to take instead of building one; TIPRUB_LIBRARY an FMU library.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+known=$(cd "$root/examples" && for main in */*.py; do [ "${main%/*}" = "$(basename "$main" .py)" ] && echo -n " ${main%/*}"; done; true)
+name=${1:-}
+if [ -z "$name" ] || [ ! -f "$root/examples/$name/$name.py" ]; then
+    sed -n '2,7s/^# \{0,1\}//p' "$0" >&2
+    echo "Examples:$known" >&2
+    exit 2
+fi
+shift
+out=$root/target/examples/$name
+venv=$root/target/examples/$name-venv
+requirements=$root/examples/$name/requirements.txt
+if ! cmp -s "$requirements" "$venv/requirements.txt"; then
+    rm -rf "$venv"
+    python3 -m venv "$venv"
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$requirements"
+    cp "$requirements" "$venv/requirements.txt"
+fi
+if [ -z "${TIPRUB:-}" ]; then
+    cargo build --manifest-path "$root/Cargo.toml" --release --quiet -p tiprub
+    export TIPRUB=$root/target/release/tiprub
+fi
+mkdir -p "$out"
+exec "$venv/bin/python" "$root/examples/$name/$name.py" --into "$out" "$@"
