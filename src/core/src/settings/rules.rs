@@ -118,6 +118,12 @@ static PARTS: &[Rule] = &[
         "pairs of one structure, or of surfaces on one flexible structure, push each other",
         "Leave out the coating, or give the pair a structure and a surface of its own",
     ),
+    excludes(
+        &[MODULUS, YIELD, HARDENING],
+        ("`contact.coating.cutting`", |at| at.is_cut()),
+        "what is cut off does not yield",
+        "Remove the line, or `cutting` for the plastic law",
+    ),
     needs(
         &[SOLVER],
         ("that of contact[1]", |at| at.contact().solver == at.settings.contacts[0].solver),
@@ -196,6 +202,12 @@ static METHODS: &[Rule] = &[
         ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
         "it seeks forces for gaps that close, and a coating takes force while they do",
         "Use \"modal-exact\", or remove the coating",
+    ),
+    excludes(
+        &[MASSLESS],
+        ("`contact.coating.cutting`", |at| at.contacts().any(|at| at.is_cut())),
+        "the way that is cut is that of the step in which the force acts, and its forces act a step later",
+        "Use \"modal-exact\" or \"central-difference\", or the plastic law",
     ),
     excludes(
         &[GALERKIN],

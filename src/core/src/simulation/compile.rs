@@ -333,7 +333,9 @@ impl Compiled {
                 rows[carrier] += 3 * gap.spline().map_or(0, |surface| surface.control_points().len());
                 Carrier { structure: self.bodies.len() + carrier, first_row }
             });
-            pairs.push(PairParts { structure: plan.body, gap, carrier, friction: self.contact(index).friction });
+            let contact = self.contact(index);
+            let cutting = contact.coating.and_then(|coating| coating.cutting).map_or(0.0, |cut| 1.0 / cut.normal_ratio);
+            pairs.push(PairParts { structure: plan.body, gap, carrier, friction: contact.friction, cutting });
         }
         let coating = |pair| self.coating(pair).map_err(|error| self.of_pair(pair, error));
         let coatings = (0..pairs.len()).filter_map(|pair| Some((pair, coating(pair).transpose()?)));

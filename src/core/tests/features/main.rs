@@ -7,6 +7,7 @@ mod apart;
 mod casing;
 mod checks;
 mod coating;
+mod cutting;
 mod cyclic;
 mod cyclic_features;
 mod pairs;

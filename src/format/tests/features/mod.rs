@@ -41,7 +41,7 @@ fn coating() -> CoatingSettings {
         yield_stress: 1e7,
         hardening: 1e8,
         cells_around: 1000,
-        cells_along: 20,
+        cells_along: 20, cutting: None
     }
 }
 

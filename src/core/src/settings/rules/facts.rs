@@ -62,6 +62,9 @@ pub(super) const GAP: Fact = fact("contact.gap", "", |at| at.contact().gap != 0.
 pub(super) const SECTOR_GAPS: Fact = fact("contact.sector_gaps", "", |at| !at.contact().sector_gaps.is_empty());
 pub(super) const MERIDIAN: Fact = fact("contact.meridian", "", |at| at.contact().meridian != Meridian::default());
 pub(super) const COATING: Fact = fact("contact.coating", "", |at| at.is_coated());
+pub(super) const MODULUS: Fact = fact("contact.coating.modulus", "", |at| at.plastic(|coating| coating.modulus));
+pub(super) const YIELD: Fact = fact("contact.coating.yield_stress", "", |at| at.plastic(|coating| coating.yield_stress));
+pub(super) const HARDENING: Fact = fact("contact.coating.hardening", "", |at| at.plastic(|coating| coating.hardening));
 pub(super) const HEAT: Fact = fact("contact.heat_to_slave", "", |at| at.contact().heat_to_slave.is_some());
 pub(super) const SOLVER: Fact = fact("contact.solver", "", |_| true);
 pub(super) const FILM: Fact = fact("contact.solver", "`film`", |at| at.solver == Solver::Film);

@@ -59,7 +59,7 @@ fn flight() -> Scene {
 
 fn coating() -> Option<CoatingSettings> {
     let (thickness, modulus, yield_stress, hardening) = (1e-4, 2e8, 1e6, 2e7);
-    Some(CoatingSettings { thickness, modulus, yield_stress, hardening, cells_around: 500, cells_along: 3 })
+    Some(CoatingSettings { thickness, modulus, yield_stress, hardening, cells_around: 500, cells_along: 3 , cutting: None})
 }
 
 /// A second contact of the same master, on a surface of the same structure.

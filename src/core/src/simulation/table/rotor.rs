@@ -78,7 +78,7 @@ fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
     patches(table, body, sector);
     let list = node_list(body);
     for row in watched_rows(body.index, sector - 1, [nominal(parts, body), Some((&FORCE, 100.0))]) {
-        if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_friction()) {
+        if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_tangential_forces()) {
             let untouched = if row.is_length() { untouched(parts, body) } else { "" };
             let text = format!("{} ({list}){untouched}", row.text);
             row.add(table, format!("blade[{sector}].{}", row.name), text, body.rom.contact_nodes.len());
