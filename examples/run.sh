@@ -7,7 +7,7 @@
 # TIPRUB names a tiprub program to take instead of building one; TIPRUB_LIBRARY an FMU library.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
-known=$(cd "$root/examples" && for main in */*.py; do [ "${main%/*}" = "$(basename "$main" .py)" ] && echo -n " ${main%/*}"; done; true)
+known=$(shopt -s nullglob; cd "$root/examples" && for main in */*.py; do [ "${main%/*}" = "$(basename "$main" .py)" ] && echo -n " ${main%/*}"; done; true)
 name=${1:-}
 if [ -z "$name" ] || [ ! -f "$root/examples/$name/$name.py" ]; then
     sed -n '2,7s/^# \{0,1\}//p' "$0" >&2
