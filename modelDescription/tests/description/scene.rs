@@ -26,7 +26,8 @@ pub fn complete() -> Scene {
         yield_stress: 1e7,
         hardening: 1e8,
         cells_around: 360,
-        cells_along: 5, cutting: None
+        cells_along: 5,
+        cutting: None,
     });
     (scene.settings.outputs.wear, scene.settings.outputs.slave_displacement) = (true, true);
     scene

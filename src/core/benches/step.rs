@@ -51,7 +51,8 @@ fn coated(scene: &mut Scene) {
         yield_stress: 5e6,
         hardening: 2e8,
         cells_around: 1000,
-        cells_along: 20, cutting: None
+        cells_along: 20,
+        cutting: None,
     });
 }
 

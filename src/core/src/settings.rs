@@ -450,9 +450,24 @@ pub struct OutputSettings {
     /// Stress at the places that the ROMs recover it at, of watched sectors.
     #[serde(skip_serializing_if = "is_default")]
     pub stress: bool,
+    /// Amplitudes of so many modes of watched sectors, from the lowest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modal_amplitudes: Option<usize>,
+    /// Displacements of the contact nodes of watched sectors.
+    #[serde(skip_serializing_if = "is_default")]
+    pub tip_displacements: bool,
+    /// Force and moment on every surface around an axis.
+    #[serde(skip_serializing_if = "is_default")]
+    pub casing_forces: bool,
+    /// Force and moment of the support on the casing.
+    #[serde(skip_serializing_if = "is_default")]
+    pub support_reaction: bool,
     /// Wear depth of every coating cell.
     #[serde(skip_serializing_if = "is_default")]
     pub wear: bool,
+    /// Mean wear depth around the circumference and along the axis.
+    #[serde(skip_serializing_if = "is_default")]
+    pub wear_profile: bool,
     /// Radial displacement of every contact-grid node of the flexible slave.
     #[serde(skip_serializing_if = "is_default")]
     pub slave_displacement: bool,
@@ -467,7 +482,12 @@ impl Default for OutputSettings {
             energies: true,
             instantaneous_forces: false,
             stress: false,
+            modal_amplitudes: None,
+            tip_displacements: false,
+            casing_forces: false,
+            support_reaction: false,
             wear: false,
+            wear_profile: false,
             slave_displacement: false,
         }
     }

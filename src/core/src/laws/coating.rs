@@ -16,6 +16,7 @@ use std::f64::consts::TAU;
 
 use cutting::Cutting;
 pub use cutting::Way;
+use nalgebra::DMatrix;
 pub use problem::CoatedProblem;
 pub use rod::{Branch, Rod};
 
@@ -202,6 +203,37 @@ impl Coating {
     /// Wear depth of a cell (m).
     pub fn wear_depth(&self, cell: usize) -> f64 {
         self.plastic[cell] * self.thickness
+    }
+
+    /// Normal forces of contact nodes per depth of cut of all of them (N/m), nodes²; `None` where the coating is pressed in.
+    pub fn cut_stiffness(&self) -> Option<DMatrix<f64>> {
+        self.cutting.as_ref()?;
+        let mut stiffness = DMatrix::zeros(self.nodes, self.nodes);
+        let (_, modulus) = self.rod.line(Branch::Elastic, 0.0);
+        for row in &self.rows {
+            for (a, from) in row.nodes.into_iter().zip(row.weights) {
+                for (b, to) in row.nodes.into_iter().zip(row.weights) {
+                    stiffness[(a, b)] += modulus * row.width * from * to;
+                }
+            }
+        }
+        Some(stiffness)
+    }
+
+    /// Mean wear depth (m) of every place around, over the area of the rows there, or of every row.
+    pub fn wear_profile(&self, around: bool, out: &mut [f64]) {
+        let area: f64 = self.rows.iter().map(|row| row.area).sum();
+        if around {
+            out.fill(0.0);
+            for (row, plastic) in self.rows.iter().zip(self.plastic.chunks(self.around)) {
+                let share = self.thickness * row.area / area;
+                out.iter_mut().zip(plastic).for_each(|(mean, plastic)| *mean += share * plastic);
+            }
+            return;
+        }
+        for (mean, plastic) in out.iter_mut().zip(self.plastic.chunks(self.around)) {
+            *mean = self.thickness * plastic.iter().sum::<f64>() / number(self.around);
+        }
     }
 
     /// Largest wear depth (m).

@@ -292,10 +292,7 @@ impl System {
     /// `drives`, one per pair.
     pub fn start(&mut self, drives: &[Drive]) {
         self.structures.iter_mut().for_each(Structure::start);
-        self.groups
-            .iter_mut()
-            .filter_map(|group| group.law_mut().coating_mut())
-            .for_each(Coating::reset);
+        self.groups.iter_mut().filter_map(|group| group.law_mut().coating_mut()).for_each(Coating::reset);
         self.events.now.clear();
         self.events.before.clear();
         self.pairs.iter_mut().zip(drives).for_each(|(pair, drive)| pair.start(drive));

@@ -21,7 +21,8 @@ fn settings() -> CoatingSettings {
         yield_stress: YIELD,
         hardening: HARDENING,
         cells_around: 360,
-        cells_along: 20, cutting: None
+        cells_along: 20,
+        cutting: None,
     }
 }
 

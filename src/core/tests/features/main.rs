@@ -12,3 +12,4 @@ mod cyclic;
 mod cyclic_features;
 mod pairs;
 mod stress;
+mod support;

@@ -354,7 +354,8 @@ fn what_does_not_go_together_is_refused_by_name() {
         yield_stress: 1e6,
         hardening: 2e7,
         cells_around: 500,
-        cells_along: 3, cutting: None
+        cells_along: 3,
+        cutting: None,
     });
     refused(&scene, "contact[2].coating: excludes contacts solved together");
     let mut scene = both.clone();
