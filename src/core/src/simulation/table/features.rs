@@ -4,7 +4,7 @@ use super::builder::Builder;
 use super::parts::{AXES, Body, Carrier, Pair, Parts, largest_length};
 use crate::laws::coating::Coating;
 use crate::ranges;
-use crate::settings::{CoatingSettings, ContactSettings, StructureSettings};
+use crate::settings::{CoatingSettings, StructureSettings};
 use crate::simulation::outputs::{each, scalar, whole};
 use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
 use crate::variables::{Kind, Quantity, Span, Start, Variability};
@@ -205,10 +205,6 @@ fn heat(table: &mut Builder, pair: &Pair) {
     }
 }
 
-fn is_not_pressed_in(contact: &ContactSettings) -> bool {
-    contact.coating.is_none_or(|coating| coating.cutting.is_some())
-}
-
 fn wear(table: &mut Builder, parts: &Parts, pair: &Pair, coating: &CoatingSettings) {
     let (index, depth) = (pair.index, Some((&LENGTH, coating.thickness)));
     let read = scalar(move |view| view.coating(index, Coating::largest_wear_depth));
@@ -219,15 +215,8 @@ fn wear(table: &mut Builder, parts: &Parts, pair: &Pair, coating: &CoatingSettin
     // Of all coatings together.
     if parts.settings.contacts[..index].iter().all(|contact| contact.coating.is_none()) {
         table.belongs_to_all();
-        let text = match (parts.is_cut(), parts.settings.contacts.iter().all(is_not_pressed_in)) {
-            (false, _) => {
-                "Energy that wearing the coating takes since the start; no cutting force or torque carries it"
-            }
-            (true, true) => "Energy that cutting the coating takes since the start, cell by cell; the shaft pays it",
-            (true, false) => {
-                "Energy that wearing coatings takes since the start; of those that are cut the shaft pays it, of others no force"
-            }
-        };
+        let text = "Energy that wearing the coating takes since the start; the shaft pays it where it is cut, no force where it is \
+                    pressed in";
         let read = scalar(|view| view.ledger().wear_energy.value());
         table.output("wear_energy", Span::Total, Some((&ENERGY, 1.0)), text, read);
         table.belongs(index, parts.of_pair(pair));
