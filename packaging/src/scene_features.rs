@@ -3,8 +3,8 @@
 use tiprub_core::{
     Rom, Scene,
     settings::{
-        CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver, StructureSettings,
-        SurfaceSettings, TOLERANCE,
+        CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver,
+        StructureSettings, SurfaceSettings, TOLERANCE,
     },
 };
 

@@ -30,7 +30,8 @@ pub fn complete() -> Scene {
         cutting: Some(CuttingSettings { specific_energy: 1e8, normal_ratio: 1.0 }),
     });
     let outputs = &mut scene.settings.outputs;
-    (outputs.wear, outputs.wear_profile, outputs.slave_displacement, outputs.support_reaction) = (true, true, true, true);
+    (outputs.wear, outputs.wear_profile, outputs.slave_displacement, outputs.support_reaction) =
+        (true, true, true, true);
     let rom = &mut scene.roms[1];
     let zeros = |columns: usize| DMatrix::zeros(SUPPORT_ROWS, columns);
     let patches = rom.extras.thermal.as_ref().map_or(0, |thermal| thermal.patches.len());
