@@ -1,4 +1,4 @@
-//! Energy ledger: kinetic + strain = initial + external work + curvature work + load work + step changes − damping −
+//! Energy ledger: kinetic + strain = initial + external work + curvature work + load work + excitation work + step changes − damping −
 //! friction − impact losses − wear work.
 //!
 //! All terms are those of the discrete equations (see [`crate::schemes`]), so the closure residual measures
@@ -47,6 +47,8 @@ pub struct Ledger {
     pub wear_energy: Sum,
     /// Work of centrifugal, thermal and nodal-diameter loads.
     pub load_work: Sum,
+    /// Work of the excitation of blades.
+    pub excitation_work: Sum,
     /// Work of the shaft through the contacts, −∫ torque dθ_r; of what slides along fixed obstacles.
     pub shaft_work: Sum,
     /// Work of the shaft on rotors whose modes depend on the speed: strain energy by stiffening.
@@ -80,13 +82,14 @@ macro_rules! sums_of_ledger {
     };
 }
 
-sums_of_ledger! { 14:
+sums_of_ledger! { 15:
     damping_loss,
     friction_loss,
     impact_loss,
     wear_work,
     wear_energy,
     load_work,
+    excitation_work,
     shaft_work,
     stiffening_work,
     whirl_work,
@@ -129,6 +132,7 @@ impl Ledger {
         balance.add(-self.impact_loss.value());
         balance.add(-self.wear_work.value());
         balance.add(self.load_work.value());
+        balance.add(self.excitation_work.value());
         balance.add(-mechanical);
         balance.value()
     }
@@ -143,6 +147,7 @@ impl Ledger {
     /// heat of friction and damping and work on the coating. Impacts, which only take, are left out.
     pub fn supplied(&self) -> f64 {
         let put_in = self.external_work() + self.load_work.value() + self.step_change.value();
+        let put_in = put_in + self.excitation_work.value();
         put_in - self.friction_loss.value() - self.damping_loss.value() - self.wear_work.value()
     }
 

@@ -9,5 +9,8 @@ mod checks;
 mod coating;
 mod cyclic;
 mod cyclic_features;
+mod excitation;
+mod heat;
+mod initial;
 mod pairs;
 mod stress;
