@@ -20,7 +20,9 @@ pub struct Excitation {
 
 /// The first of the rows that are moved most, with equal ones up to rounding.
 pub fn most_moved(sizes: impl Iterator<Item = f64>) -> usize {
-    let most = sizes.enumerate().fold((0, 0.0), |most, (row, size)| if size > most.1 * (1.0 + 1e-6) { (row, size) } else { most });
+    let most = sizes
+        .enumerate()
+        .fold((0, 0.0), |most, (row, size)| if size > most.1 * (1.0 + 1e-6) { (row, size) } else { most });
     most.0
 }
 

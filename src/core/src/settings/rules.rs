@@ -6,9 +6,7 @@ mod place;
 #[cfg(test)]
 mod tests;
 
-use super::{
-    ContactSettings, Motion, Preset, Scene, SceneSettings, Scheme, Solver, SpinSettings, StructureSettings,
-};
+use super::{ContactSettings, Motion, Preset, Scene, SceneSettings, Scheme, Solver, SpinSettings, StructureSettings};
 use crate::rom::Frame;
 use crate::{Error, Result, Rom};
 use facts::*;
@@ -291,12 +289,7 @@ static ROMS: &[Rule] = &[
         "nodal diameters are modes of equal sectors, and the same at every speed and temperature",
         "Leave it out, or use a ROM of uncoupled sectors (without harmonics)",
     ),
-    excludes(
-        &[INITIAL_SECTOR],
-        COUPLED,
-        "a blade of such a disk has no mode of its own",
-        "Give a `nodal_diameter`",
-    ),
+    excludes(&[INITIAL_SECTOR], COUPLED, "a blade of such a disk has no mode of its own", "Give a `nodal_diameter`"),
     needs(
         &[THERMAL],
         ("thermal loads in the ROM", |at| at.rom().extras.thermal.is_some()),

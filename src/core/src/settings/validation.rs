@@ -3,8 +3,8 @@
 mod pairs;
 
 use super::{
-    CoatingSettings, ContactSettings, ExcitationSettings, InitialSettings, Motion, SceneSettings, Shape, SplineSettings,
-    StructureSettings, SurfaceSettings,
+    CoatingSettings, ContactSettings, ExcitationSettings, InitialSettings, Motion, SceneSettings, Shape,
+    SplineSettings, StructureSettings, SurfaceSettings,
 };
 use crate::ranges::{self, at_most, within};
 use crate::{Error, Result, shown};

@@ -2,7 +2,9 @@
 
 use super::compile::Compiled;
 use super::{Quantity, Simulation};
+use crate::dynamics::bank::BankOptions;
 use crate::dynamics::excitation::{Excitation, most_moved};
+use crate::dynamics::modal::{ModalModel, ModalSpin};
 use crate::dynamics::sectors::Sectors;
 use crate::ranges::SOFTENED;
 use crate::settings::{InitialSettings, Scheme, StructureSettings};
@@ -10,7 +12,7 @@ use crate::{Error, Result, Rom, shown};
 
 /// Modal load by the temperature of the blades, per kelvin; of coupled sectors on nodal diameter 0. Empty where a scene does not
 /// ask for it.
-pub fn heat(structure: &StructureSettings, rom: &Rom, model: &crate::dynamics::modal::ModalModel) -> Vec<f64> {
+pub fn heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
     let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) else { return Vec::new() };
     let whole: Vec<f64> = thermal.loads.row_iter().map(|row| row.iter().sum()).collect();
     #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
@@ -112,7 +114,8 @@ impl Compiled {
                     return Err(Error::invalid(format!("{at}.sector"), problem, remedy));
                 }
                 if let Some(n) = one.nodal_diameter.filter(|n| *n > rom.largest_nodal_diameter()) {
-                    let problem = format!("{n}, where {} sectors have up to {}", rom.sectors, rom.largest_nodal_diameter());
+                    let problem =
+                        format!("{n}, where {} sectors have up to {}", rom.sectors, rom.largest_nodal_diameter());
                     return Err(Error::invalid(format!("{at}.nodal_diameter"), problem, remedy));
                 }
                 Ok(())
@@ -143,6 +146,29 @@ impl Compiled {
             ),
             "Use a lower temperature or less softening",
         ))
+    }
+
+    /// What the modes of a structure that touches need beside contact.
+    pub fn bank_options(&self, body: usize, excitation: Option<Excitation>) -> BankOptions {
+        let ((structure, rom), parts) = (self.body(body), &self.bodies[body]);
+        let coupled = structure.spin.stiffening || structure.spin.coriolis;
+        let spin = rom.extras.spin.as_ref().filter(|_| coupled);
+        let modal = spin.map(|spin| ModalSpin::new(spin, &parts.model, parts.reference_speed));
+        let modal = if structure.softening == 0.0 {
+            modal
+        } else {
+            let modal = modal.unwrap_or_else(|| ModalSpin::without_spin(&parts.model));
+            let (share, temperature) = (structure.softening, parts.reference_temperature);
+            Some(modal.softened(&rom.stiffness, &parts.model, share, temperature))
+        };
+        let coupling = modal.map(|modal| (modal, structure.spin.stiffening, structure.spin.coriolis));
+        BankOptions {
+            frequency_factors: structure.frequency_factors.clone(),
+            loads: self.loads_blades(body),
+            coupling,
+            excitation,
+            ..BankOptions::default()
+        }
     }
 
     /// Speed (rad/s) and temperature (K) whose stiffness each structure that touches has.
@@ -176,7 +202,8 @@ impl super::RotorInputs {
 impl Simulation {
     /// Speed (rad/s) and temperature (K) of each structure that touches, as set.
     pub(super) fn references(&self) -> Vec<[f64; 2]> {
-        let of = |rotor: &super::RotorInputs| [rotor.speed.value, rotor.temperature.first().map_or(0.0, |one| one.value)];
+        let of =
+            |rotor: &super::RotorInputs| [rotor.speed.value, rotor.temperature.first().map_or(0.0, |one| one.value)];
         self.inputs.rotors.iter().map(of).collect()
     }
 
@@ -198,7 +225,11 @@ impl Simulation {
         for body in 0..self.compiled.bodies.len() {
             if let Some(reference) = self.compiled.references.engine_orders[body] {
                 let order = self.values[reference];
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "of an integer from 0 to 1e6")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "of an integer from 0 to 1e6"
+                )]
                 self.system.structures_mut()[body].modes_mut().set_excitation_order(order as u32);
             }
         }
@@ -301,10 +332,7 @@ fn launch(modes: &mut Sectors, one: &InitialSettings, displacement: f64, velocit
             let square = most.re * most.re + most.im * most.im;
             let (sine, cosine) = libm::sincos(one.phase);
             // e^(−i phase)/Ψ.
-            let share = [
-                (cosine * most.re - sine * most.im) / square,
-                -(sine * most.re + cosine * most.im) / square,
-            ];
+            let share = [(cosine * most.re - sine * most.im) / square, -(sine * most.re + cosine * most.im) / square];
             let times = |value: f64| share.map(|part| part * value);
             bank.add_modal_state(n, mode, times(displacement), times(velocity));
         }

@@ -1,6 +1,5 @@
 //! From settings to kernels: what is decided once, before anything moves.
 
-use crate::dynamics::bank::BankOptions;
 use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::{ModalModel, ModalSpin};
 use crate::dynamics::rigid::{Translations, free_modes};
@@ -349,7 +348,7 @@ impl Compiled {
             let uncoupled = SectorModel::Uncoupled(&self.bodies[body].model, self.body(body).1.sectors);
             let model = self.bodies[body].disk.as_ref().map_or(uncoupled, SectorModel::Coupled);
             let excitation = excitations[body];
-            StructureParts::Touching(model, BankOptions { excitation, ..self.bank_options(body) })
+            StructureParts::Touching(model, self.bank_options(body, excitation))
         });
         let carrying = self.carriers.iter().zip(&control);
         let carrying = carrying.map(|(carrier, model)| StructureParts::Carrying(model, carrier.loads.are_there()));
@@ -472,27 +471,6 @@ impl Compiled {
         let first = if let GapLaw::Spline(gap) = gap { gap.first_node } else { 0 };
         let modes = CarrierModes { rom: self.carrier(carrier).1, model: &self.carriers[carrier].model };
         Some(modes.at_control_points(gap.spline()?, first))
-    }
-
-    fn bank_options(&self, body: usize) -> BankOptions {
-        let ((structure, rom), parts) = (self.body(body), &self.bodies[body]);
-        let coupled = structure.spin.stiffening || structure.spin.coriolis;
-        let spin = rom.extras.spin.as_ref().filter(|_| coupled);
-        let modal = spin.map(|spin| ModalSpin::new(spin, &parts.model, parts.reference_speed));
-        let modal = if structure.softening == 0.0 {
-            modal
-        } else {
-            let modal = modal.unwrap_or_else(|| ModalSpin::without_spin(&parts.model));
-            let (share, temperature) = (structure.softening, parts.reference_temperature);
-            Some(modal.softened(&rom.stiffness, &parts.model, share, temperature))
-        };
-        let coupling = modal.map(|modal| (modal, structure.spin.stiffening, structure.spin.coriolis));
-        BankOptions {
-            frequency_factors: structure.frequency_factors.clone(),
-            loads: self.loads_blades(body),
-            coupling,
-            ..BankOptions::default()
-        }
     }
 
     fn coating(&self, pair: usize) -> Result<Option<Coating>> {

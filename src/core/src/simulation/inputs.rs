@@ -276,10 +276,8 @@ impl Simulation {
             return Err(Error::invalid(what(), problem, remedy));
         }
         let rate = (end - reached) / (until - start);
-        let angle = matches!(
-            variable.quantity,
-            Quantity::ShapeRotation | Quantity::LoadPhase | Quantity::Excitation(1)
-        );
+        let angle =
+            matches!(variable.quantity, Quantity::ShapeRotation | Quantity::LoadPhase | Quantity::Excitation(1));
         let turned = if angle { (input.asked(start) - reached).abs() } else { 0.0 };
         if at_once || (rate.is_finite() && turned <= std::f64::consts::PI) {
             return Ok(());

@@ -91,7 +91,8 @@ fn softened_blades_ring_lower_by_the_root_of_the_stiffness_left() {
         let structure = &mut given.settings.structures[0];
         (structure.softening, structure.damping_ratio) = (SOFTENING, Some(0.0));
         let (mode, displacement) = (1, 1e-5);
-        structure.initial = vec![InitialSettings { mode, sector: None, nodal_diameter: None, phase: 0.0, displacement, velocity: 0.0 }];
+        structure.initial =
+            vec![InitialSettings { mode, sector: None, nodal_diameter: None, phase: 0.0, displacement, velocity: 0.0 }];
         (given.settings.time.scheme, given.settings.time.step) = (scheme, 5e-7);
         if hold {
             given.settings.time.input_interpolation = InputInterpolation::Hold;
@@ -106,7 +107,12 @@ fn softened_blades_ring_lower_by_the_root_of_the_stiffness_left() {
         // From the phase between two instants of one mode alone.
         let q = |run: &Simulation| run.system().bank().modal_state(0, 0).0;
         let third = TAU / first / 3.0;
-        let samples: Vec<f64> = (0..30).map(|_| { go(&mut run, third); q(&run) }).collect();
+        let samples: Vec<f64> = (0..30)
+            .map(|_| {
+                go(&mut run, third);
+                q(&run)
+            })
+            .collect();
         let (above, below) = samples.windows(3).fold((0.0, 0.0), |(above, below), three| {
             (above + 0.5 * (three[0] + three[2]) * three[1], below + three[1] * three[1])
         });
@@ -139,7 +145,9 @@ fn speed_and_temperature_act_together() {
     let rom = &given.roms[0];
     let (spin, speed) = (rom.extras.spin.as_ref().unwrap(), 1300.0_f64);
     let square = speed * speed;
-    let stiffness = &rom.stiffness * (1.0 - SOFTENING * 200.0) + &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square);
+    let stiffness = &rom.stiffness * (1.0 - SOFTENING * 200.0)
+        + &spin.stiffness_speed2 * square
+        + &spin.stiffness_speed4 * (square * square);
     let softer = Rom { stiffness, ..rom.clone() };
     let expected = ModalModel::from_rom(&softer, 0.0).unwrap().frequencies;
     let found = &run.system().bank().uncoupled().unwrap().model().frequencies;

@@ -105,7 +105,14 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.structures[0].excitation = Some(excitation());
     }),
     ("structure[1].initial.sector: excludes a ROM whose sectors", |scene| {
-        let one = InitialSettings { mode: 1, sector: Some(1), nodal_diameter: None, phase: 0.0, displacement: 1e-6, velocity: 0.0 };
+        let one = InitialSettings {
+            mode: 1,
+            sector: Some(1),
+            nodal_diameter: None,
+            phase: 0.0,
+            displacement: 1e-6,
+            velocity: 0.0,
+        };
         scene.settings.structures[0].initial = vec![one];
         couple(&mut scene.roms[0]);
     }),

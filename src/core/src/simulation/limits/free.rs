@@ -9,8 +9,8 @@
 use nalgebra::DMatrix;
 
 use super::{BodyLimits, Closing, Parameters, Sense};
-use crate::dynamics::modal::fill_ratios;
 use crate::dynamics::modal::ModalModel;
+use crate::dynamics::modal::fill_ratios;
 use crate::gaps::open::{OpenGap, tangent};
 use crate::gaps::{GapLaw, Geometry, dot};
 use crate::settings::{Scheme, Solver};

@@ -16,7 +16,8 @@ pub fn inputs(table: &mut Builder, parts: &Parts, body: &Body) {
         let row = table.moving_input(quantity, name, Some(&FORCE), excitation.amplitude, text);
         row.nominal = Some(1.0);
         (row.min, row.max) = (Some(-ranges::EXCITATION), Some(ranges::EXCITATION));
-        let text = "Phase of the excitation: blade j of N feels amplitude cos(order (rotor angle + 2 pi (j - 1)/N) - phase)";
+        let text =
+            "Phase of the excitation: blade j of N feels amplitude cos(order (rotor angle + 2 pi (j - 1)/N) - phase)";
         let (name, quantity) = ("excitation_phase", Quantity::Excitation(1));
         table.moving_input(quantity, name, Some(&ANGLE), excitation.phase, text).display = Some(0);
     }

@@ -178,7 +178,8 @@ pub fn energies(table: &mut Builder, parts: &Parts) {
 }
 
 /// Stiffening where heat softens too.
-const SOFTENED: &str = "Strain energy that changes of speed and temperature add by stiffening and softening since the start";
+const SOFTENED: &str =
+    "Strain energy that changes of speed and temperature add by stiffening and softening since the start";
 
 fn softens(parts: &Parts) -> bool {
     parts.bodies().iter().any(|body| body.structure.softening != 0.0)
