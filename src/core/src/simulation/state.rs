@@ -11,7 +11,7 @@ use crate::variables::{Causality, Kind, Variable};
 use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 11;
+const VERSION: u64 = 12;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done, tried, most });
@@ -53,8 +53,8 @@ struct Lead {
     inputs: Inputs,
     rotors: Vec<RotorAngle>,
     values: Vec<f64>,
-    /// Of each structure that touches (rad/s).
-    reference_speeds: Vec<f64>,
+    /// Speed (rad/s) and temperature (K) of each structure that touches.
+    references: Vec<[f64; 2]>,
     /// Internal step (s).
     step: f64,
 }
@@ -141,7 +141,7 @@ impl Simulation {
         self.window.save(writer);
         self.values.save(writer);
         self.previous.save(writer);
-        self.compiled.bodies.iter().for_each(|body| body.reference_speed.save(writer));
+        self.compiled.references().iter().for_each(|reference| reference.save(writer));
         self.system.save(writer);
     }
 
@@ -156,7 +156,7 @@ impl Simulation {
             inputs: self.inputs.clone(),
             rotors: self.rotors.clone(),
             values: self.values.clone(),
-            reference_speeds: vec![0.0; self.rotors.len()],
+            references: vec![[0.0; 2]; self.rotors.len()],
             step: 0.0,
         };
         lead.phase.restore(reader);
@@ -180,7 +180,7 @@ impl Simulation {
         reader.up_to(f64::MAX);
         take(&mut lead.values, reader);
         self.previous.check(reader);
-        take(&mut lead.reference_speeds, reader);
+        take(&mut lead.references, reader);
         reader.up_to(largest);
         let endless;
         (lead.step, endless) = self.system.check(reader, runs);
@@ -273,8 +273,8 @@ impl Simulation {
             // Looked at when a step begins and when a speed is given, not at every internal step.
             Phase::Stepping => self
                 .check_turning_of_all(lead.step, lead.communication.length)
-                .and_then(|()| self.adopt(&lead.reference_speeds)),
-            Phase::Ready | Phase::Failed => self.adopt(&lead.reference_speeds),
+                .and_then(|()| self.adopt(&lead.references)),
+            Phase::Ready | Phase::Failed => self.adopt(&lead.references),
         };
         if outcome.is_err() {
             (self.values, self.inputs) = before;
@@ -300,12 +300,12 @@ impl Simulation {
         })
     }
 
-    fn adopt(&mut self, reference_speeds: &[f64]) -> Result<()> {
+    fn adopt(&mut self, references: &[[f64; 2]]) -> Result<()> {
         let parameters = self.parameters();
         self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
         let orders: Vec<u32> = self.compiled.carriers.iter().map(|carrier| carrier.load_order).collect();
         // The orders before were accepted before.
-        self.follow_load_orders().and_then(|()| self.follow_reference_speeds(reference_speeds)).inspect_err(|_| {
+        self.follow_load_orders().and_then(|()| self.follow_reference_speeds(references)).inspect_err(|_| {
             for (carrier, order) in orders.into_iter().enumerate() {
                 drop(self.compiled.set_load_order(carrier, f64::from(order)));
             }
@@ -375,7 +375,7 @@ impl Simulation {
         self.values.restore(reader);
         self.previous.restore(reader);
         // Followed already.
-        self.rotors.iter().for_each(|_| 0.0_f64.restore(reader));
+        self.rotors.iter().for_each(|_| [0.0_f64; 2].restore(reader));
     }
 }
 
