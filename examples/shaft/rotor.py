@@ -20,7 +20,7 @@ class Rotor:
 
     def __init__(self, matrices, node, *, speed, clearance, inertia=numpy.inf, drive=0.0, origin="a rotor"):
         """`matrices` are M, C, G, K, each (n, n), with M and K symmetric and positive definite. `node` are the places in q of the rub's
-        displacements along x and y and of its turns about x and y. Speed (rad/s); clearance (m), by which whirl is measured; moment of
+        displacements along x and y and, where it tilts, of its turns about x and y. Speed (rad/s); clearance (m), by which whirl is measured; moment of
         inertia about the axis (kg m²), without which the speed stays; driving torque (N m)."""
         mass, damping, gyroscopic, stiffness = (numpy.asarray(matrix, dtype=float) for matrix in matrices)
         for name, matrix in (("mass", mass), ("stiffness", stiffness)):
@@ -32,7 +32,8 @@ class Rotor:
         # Modes of the shaft at rest, without damping: p = ω η and w = η' have all entries of one size, and energies are their squares.
         self.frequencies, self.size = numpy.sqrt(squares), len(squares)
         self.damping, self.gyroscopic = shapes.T @ damping @ shapes, shapes.T @ gyroscopic @ shapes
-        self.shape = shapes[list(node)]
+        self.shape = numpy.zeros((4, self.size))
+        self.shape[: len(node)] = shapes[list(node)]
         self.inertia, self.drive, self.origin = inertia, drive, origin
         self.scale = numpy.array([clearance, clearance, abs(speed) or 1.0])
         self.unbalance, self.load = 0j, numpy.zeros(4)
@@ -177,14 +178,14 @@ class Rotor:
         self.state[-len(ENERGIES) :] += works
 
 
-def jeffcott(mass, damping, stiffness, *, diametral=0.0, polar=0.0, tilting=1.0, **keywords):
-    """A rigid disk on isotropic springs (kg, N s/m, N/m). With a diametral moment of inertia it tilts too, on springs (N m/rad), with
-    gyroscopic coupling by the polar one (kg m²): both have closed forms."""
-    gyroscopic = numpy.zeros((4, 4))
-    gyroscopic[2, 3], gyroscopic[3, 2] = polar, -polar
-    inertia = diametral or 1.0
-    matrices = numpy.diag([mass, mass, inertia, inertia]), numpy.diag([damping, damping, 0.0, 0.0]), gyroscopic, numpy.diag([stiffness, stiffness, tilting, tilting])
-    return Rotor(matrices, range(4), origin=f"the disk of {mass:g} kg", **keywords)
+def jeffcott(mass, damping, stiffness, *, diametral=0.0, polar=0.0, tilting=0.0, tilt_damping=0.0, **keywords):
+    """A rigid disk on isotropic springs (kg, N s/m, N/m). With a diametral moment of inertia it tilts too (N m/rad, N m s/rad), and the polar
+    one (kg m²) makes that gyroscopic: both motions have closed forms."""
+    diagonals = [[mass] * 2 + [diametral] * 2, [damping] * 2 + [tilt_damping] * 2, [0.0] * 4, [stiffness] * 2 + [tilting] * 2]
+    matrices = [numpy.diag(diagonal) for diagonal in diagonals]
+    matrices[2][2, 3], matrices[2][3, 2] = polar, -polar
+    free = 4 if diametral else 2
+    return Rotor([matrix[:free, :free] for matrix in matrices], range(free), origin=f"the disk of {mass:g} kg", **keywords)
 
 
 def of_ross(rotor, node, **keywords):

@@ -53,7 +53,7 @@ class Shafts:
         """The shaft of the studies: of ROSS, or a disk of about the same first frequency and tilt."""
         keywords = {"speed": SPEED, "clearance": CLEARANCE, "inertia": INERTIA, **keywords}
         if self.kind == "disk":
-            return jeffcott(20.0, 2.6e3, 1.1e7, diametral=0.08, polar=0.15, tilting=8e5, **keywords)
+            return jeffcott(20.0, 2.6e3, 1.1e7, diametral=0.08, polar=0.15, tilting=8e5, tilt_damping=20.0, **keywords)
         if self._first is None:
             self._first = ross_rotor()
         return of_ross(self._first, 3, **keywords)
