@@ -20,15 +20,15 @@ class Rotor:
 
     def __init__(self, matrices, node, *, speed, clearance, inertia=numpy.inf, drive=0.0, origin="a rotor"):
         """`matrices` are M, C, G, K, each (n, n), with M and K symmetric and positive definite. `node` are the places in q of the rub's
-        displacements along x and y and, where it tilts, of its turns about x and y. Speed (rad/s); clearance (m), by which whirl is measured; moment of
-        inertia about the axis (kg m²), without which the speed stays; driving torque (N m)."""
+        displacements along x and y and, where it tilts, of its turns about x and y. Speed (rad/s); clearance (m), by which whirl is
+        measured; moment of inertia about the axis (kg m²), without which the speed stays; driving torque (N m)."""
         mass, damping, gyroscopic, stiffness = (numpy.asarray(matrix, dtype=float) for matrix in matrices)
         for name, matrix in (("mass", mass), ("stiffness", stiffness)):
             if not numpy.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9 * numpy.abs(matrix).max()):
                 raise ValueError(f"the {name} of {origin} is not symmetric: bearings with cross-coupled stiffness have no place here")
         squares, shapes = eigh(stiffness, mass)
         if squares[0] <= 0.0:
-            raise ValueError(f"{origin} can move without force (ω² = {squares[0]:.3g} 1/s²): hold it in bearings, and leave out turns about its axis")
+            raise ValueError(f"{origin} can move without force (ω² = {squares[0]:.3g} 1/s²): hold it in bearings, without turns about its axis")
         # Modes of the shaft at rest, without damping: p = ω η and w = η' have all entries of one size, and energies are their squares.
         self.frequencies, self.size = numpy.sqrt(squares), len(squares)
         self.damping, self.gyroscopic = shapes.T @ damping @ shapes, shapes.T @ gyroscopic @ shapes
@@ -188,11 +188,16 @@ def jeffcott(mass, damping, stiffness, *, diametral=0.0, polar=0.0, tilting=0.0,
     return Rotor([matrix[:free, :free] for matrix in matrices], range(free), origin=f"the disk of {mass:g} kg", **keywords)
 
 
+# Degrees of freedom of a node of ROSS: x, y, z, turns about x, y, z. These are x, y and the turns about them.
+LATERAL = (0, 1, 3, 4)
+
+
 def of_ross(rotor, node, **keywords):
     """The lateral motion of a rotor of ROSS with a rub at one of its nodes. Axial motion and turning about the axis are left out."""
-    per_node = rotor.number_dof
-    lateral = [place for place in range(rotor.ndof) if place % per_node in ((0, 1, 3, 4) if per_node == 6 else (0, 1, 2, 3))]
-    where = [lateral.index(node * per_node + turn) for turn in ((0, 1, 3, 4) if per_node == 6 else (0, 1, 2, 3))]
+    if rotor.number_dof != 6:
+        raise ValueError(f"a rotor of ROSS with {rotor.number_dof} degrees of freedom per node has no place here: 6 are known")
+    lateral = [place for place in range(rotor.ndof) if place % 6 in LATERAL]
+    where = [lateral.index(6 * node + turn) for turn in LATERAL]
     cut = numpy.ix_(lateral, lateral)
     matrices = [numpy.asarray(matrix)[cut] for matrix in (rotor.M(0.0), rotor.C(0.0), rotor.G(), rotor.K(0.0))]
     return Rotor(matrices, where, origin="the rotor of ROSS", **keywords)

@@ -1,14 +1,17 @@
 """What is coupled: the scenes beside this file as FMUs, and the shafts that lean on them."""
 
+import contextlib
+import io
 import os
 import shutil
 import subprocess
+import warnings
 from pathlib import Path
 
 import numpy
 
 from coupling import CouplingError
-from rotor import Rotor, jeffcott, of_ross
+from rotor import LATERAL, Rotor, jeffcott, of_ross
 
 HERE = Path(__file__).resolve().parent
 # Those of rub.toml: clearance (m), speed (rad/s).
@@ -30,33 +33,50 @@ def package(scene, into):
     return file
 
 
+# The node of the beam that carries the disk.
+DISK = 3
+
+
 def ross_rotor():
-    """A steel shaft of 0.8 m in two bearings with a disk of 12 kg: the first whirl at 750 rad/s, far below the speed, the third above it."""
+    """A steel shaft of 0.8 m in two bearings with a disk of 12 kg: it whirls first at 750 rad/s, below the speed, then near 1800 rad/s."""
     try:
-        import ross
+        # It tells at length, and as an error, that it lacks a library for fluids which nothing here needs.
+        with contextlib.redirect_stdout(None), contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings(action="ignore"):
+            import ross
     except ImportError as error:
         raise CouplingError(f"ROSS cannot be imported ({error}): run examples/run.sh shaft, or take --shaft disk") from error
     steel = ross.Material("steel", rho=7810, E=211e9, G_s=81.2e9)
     beam = [ross.ShaftElement(0.1, 0.0, 0.07, material=steel) for _ in range(8)]
-    disk = ross.DiskElement(n=3, m=12.0, Id=0.08, Ip=0.15)
+    disk = ross.DiskElement(n=DISK, m=12.0, Id=0.08, Ip=0.15)
     bearings = [ross.BearingElement(n=end, kxx=2e7, cxx=1e4) for end in (0, 8)]
     return ross.Rotor(beam, [disk], bearings)
+
+
+def response_of(rotor, speed):
+    """What ROSS says of displacements and turns about x and y at the disk under 1e-3 kg m: amplitudes of exp(iΩt), (4,)."""
+    found = rotor.run_unbalance_response(DISK, 1e-3, 0.0, frequency=numpy.array([speed])).forced_resp[:, 0]
+    return found[[rotor.number_dof * DISK + turn for turn in LATERAL]]
 
 
 class Shafts:
     """Maker of fresh shafts; matrices of ROSS are asked for once."""
 
     def __init__(self, kind):
-        self.kind, self._first = kind, None
+        self.kind, self._ross = kind, None
+
+    @property
+    def ross(self):
+        """The rotor of ROSS."""
+        if self._ross is None:
+            self._ross = ross_rotor()
+        return self._ross
 
     def whirling(self, **keywords):
-        """The shaft of the studies: of ROSS, or a disk of about the same first frequency and tilt."""
+        """The shaft of the studies: of ROSS, or a disk on springs of about the same first frequency, mass and damping."""
         keywords = {"speed": SPEED, "clearance": CLEARANCE, "inertia": INERTIA, **keywords}
         if self.kind == "disk":
             return jeffcott(20.0, 2.6e3, 1.1e7, diametral=0.08, polar=0.15, tilting=8e5, tilt_damping=20.0, **keywords)
-        if self._first is None:
-            self._first = ross_rotor()
-        return of_ross(self._first, 3, **keywords)
+        return of_ross(self.ross, DISK, **keywords)
 
 
 def pressed(mass, stiffness=2e7, damping_ratio=0.1):
@@ -79,11 +99,6 @@ def blade_off(at):
     return before
 
 
-def whirl_of(run):
-    """Displacement of the shaft's centre at the ends of steps, as shares of the clearance, (steps, 2)."""
-    return run.values[:, :2] / CLEARANCE
-
-
 def place_of(run, rotor: Rotor):
-    """The same of the shaft itself, which is where the rub was told it is only when both agree."""
+    """Displacement of the shaft's centre at the ends of steps, as shares of the clearance, (steps, 2)."""
     return (run.states[:, : rotor.size] / rotor.frequencies) @ rotor.shape[:2].T / CLEARANCE

@@ -1,7 +1,13 @@
 """A rub on a shaft: the FMU of tiprub coupled to a beam shaft of ROSS that whirls, and to two spools that it brakes.
 
-Studies: errors (orbit against H and way of coupling), stability (longest communication step), books (energy and impulse across the coupling),
-rollback (bits after going back), blade-off (a blade is lost), run-up (two spools). Without names all are done.
+Studies; without names all are done:
+  response   the shaft without rub against ROSS
+  errors     the orbit after a lost blade over H and way of coupling
+  stability  the longest communication step
+  books      energy and impulse across the coupling
+  rollback   bits after going back, here and in another process
+  blade-off  a blade is lost at speed
+  run-up     two spools and who brakes them
 """
 
 import os
@@ -20,7 +26,8 @@ import studies
 from coupling import CouplingError
 from scenario import CLEARANCE, HERE, Shafts, package
 
-STUDIES = ["errors", "stability", "books", "rollback", "blade-off", "run-up"]
+STUDIES = ["response", "errors", "stability", "books", "rollback", "blade-off", "run-up"]
+SCENES = {**dict.fromkeys(["errors", "stability", "books", "rollback", "blade-off"], "rub"), "run-up": "two_spools"}
 
 
 def arguments():
@@ -34,6 +41,8 @@ def arguments():
     unknown = [name for name in found.studies if name not in STUDIES]
     if unknown:
         parser.error(f"no study {', '.join(unknown)}: there are {', '.join(STUDIES)}")
+    if found.shaft == "disk" and "response" in found.studies:
+        parser.error("response compares with ROSS: leave out --shaft disk")
     return found
 
 
@@ -49,7 +58,9 @@ class Progress:
 
 def study(name, asked, shafts, files, say):
     """Tables of one study."""
-    rub, quick = files["rub"], asked.quick
+    rub, quick = files.get("rub"), asked.quick
+    if name == "response":
+        return studies.response(shafts, say)
     if name == "errors":
         return studies.errors(rub, shafts, quick, say)
     if name == "stability":
@@ -79,10 +90,11 @@ def main():
         return
     asked.into.mkdir(parents=True, exist_ok=True)
     say, shafts = Progress(), Shafts(asked.shaft)
-    chosen = asked.studies or STUDIES
-    scenes = [scene for scene in ("rub", "two_spools") if any((name == "run-up") == (scene == "two_spools") for name in chosen)]
-    say("packaging the FMUs (models that ship are reduced once)")
-    files = {scene: package(HERE / f"{scene}.toml", asked.into) for scene in scenes}
+    chosen = asked.studies or [name for name in STUDIES if asked.shaft == "ross" or name != "response"]
+    scenes = {SCENES[name] for name in chosen if name in SCENES}
+    if scenes:
+        say("packaging the FMUs (models that ship are reduced once)")
+    files = {scene: package(HERE / f"{scene}.toml", asked.into) for scene in sorted(scenes)}
     for name in chosen:
         begun = time.perf_counter()
         tables = study(name, asked, shafts, files, say)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy
 
 from coupling import CouplingError, Rub, Run, Way, march
-from scenario import CLEARANCE, blade_off, place_of, pressed
+from scenario import CLEARANCE, blade_off, place_of, pressed, response_of
 from spools import Spools
 from stability import contraction, growth
 
@@ -39,11 +39,29 @@ def coupled(file, rotor, way, step, length, *, before=None, parameters=None, wat
         return march(rub, rotor, way, step, round(length / step), before=hook, watch=watch, progress=progress, slopes=slopes)
 
 
+def response(shafts, say):
+    """Whirl under unbalance without rub, marched, against what ROSS says itself: displacement and tilt of the disk."""
+    header = ["speed (rad/s)", "whirl of ROSS for 1e-3 kg m (m)", "marched, largest difference / whirl", "tilt of ROSS (rad)", "difference / tilt"]
+    table = Table("response", header)
+    for speed in (400.0, 750.0, 1200.0, 1800.0, 2600.0):
+        say(f"response: {speed:g} rad/s")
+        shaft = shafts.whirling(speed=speed, inertia=numpy.inf)
+        shaft.unbalance = 1e-3
+        shaft.turn_steadily()
+        whirl = response_of(shafts.ross, speed)
+        size, worst = numpy.abs(whirl), numpy.zeros(4)
+        for _ in range(200):
+            shaft.commit(numpy.zeros(5), None, 5e-5)
+            worst = numpy.maximum(worst, numpy.abs(shaft.place - (whirl * numpy.exp(1j * shaft.angle)).real))
+        table.rows.append([speed, size[0], worst[:2].max() / size[0], size[2], worst[2:].max() / size[2]])
+    return [table]
+
+
 def errors(file, shafts, quick, say):
     """Orbit after a lost blade against that of a fine run, over H and way."""
-    length, at = (2.4e-3, 0.2e-3) if quick else (8e-3, 0.5e-3)
-    steps = [1e-4, 5e-5] if quick else [2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5]
-    fine = 2.5e-5 if quick else 6.25e-6
+    length, at = (2.4e-3 if quick else 4e-3), 0.2e-3
+    steps = [1e-4, 5e-5] if quick else [2e-4, 1e-4, 5e-5, 2.5e-5]
+    fine = 2.5e-5 if quick else 1.25e-5
 
     def orbit(way, step, tolerance):
         rotor = shafts.whirling()
@@ -54,18 +72,20 @@ def errors(file, shafts, quick, say):
     def distance(one, other):
         return float(numpy.hypot(*(one - other).T).max())
 
-    table = Table("errors", ["way", "H (s)", "error / clearance", "steps of the rub per H", "derivatives per H", "not solved", "time (s)"])
+    table = Table("errors", ["way", "H (s)", "error / clearance", "steps of the rub per H", "derivatives per H", "not solved", "processor time (s)"])
     say(f"errors: the fine run, H = {fine:g} s")
     reference, _ = orbit(Way.NEWTON, fine, 1e-4)
-    for what, changed in [("H twice as long", orbit(Way.NEWTON, 2.0 * fine, 1e-4)), ("tolerance ten times as large", orbit(Way.NEWTON, fine, 1e-3))]:
-        table.rows.append([f"reference, {what}", 2.0 * fine if "H" in what else fine, distance(changed[0], reference), changed[1].tried, changed[1].derivatives, changed[1].unsolved, None])
+    for what, step, tolerance in [("H twice as long", 2.0 * fine, 1e-4), ("tolerance ten times as large", fine, 1e-3)]:
+        say(f"errors: reference, {what}")
+        found, run = orbit(Way.NEWTON, step, tolerance)
+        table.rows.append([f"reference, {what}", step, distance(found, reference), run.tried, run.derivatives, run.unsolved, None])
     for way in Way:
         for step in steps:
             say(f"errors: {way.value}, H = {step:g} s")
-            begun = time.perf_counter()
+            begun = time.process_time()
             try:
                 found, run = orbit(way, step, 1e-4)
-                row = [distance(found, reference), run.tried, run.derivatives, run.unsolved, time.perf_counter() - begun]
+                row = [distance(found, reference), run.tried, run.derivatives, run.unsolved, time.process_time() - begun]
                 table.series.setdefault(way.value, []).append((step, row[0]))
             except CouplingError:
                 row = ["run failed", None, None, None, None]
@@ -80,9 +100,9 @@ def steadiness(run, clearance=CLEARANCE):
     return mean, float(numpy.hypot(*(last - mean).T).max())
 
 
-def stability(file, quick, say):
+def stability(file, quick, say, masses=None):
     """Longest communication step with which a disk that is pressed against the casing comes to rest there, by mass and way."""
-    masses = [1.0] if quick else [12.0, 1.0, 0.1]
+    masses = masses or ([1.0] if quick else [12.0, 1.0, 0.1])
     steps = [2e-4, 1e-4, 5e-5] if quick else [8e-4, 4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5]
     length, fine = 1.2e-2, 5e-5
     table = Table("stability", ["mass (kg)", "way", "longest stable H (s)", "linear theory (s)", "next longer H"])
@@ -143,7 +163,8 @@ def books(file, shafts, quick, say):
         run = coupled(file, rotor, way, step, length, before=blade_off(0.5e-3), watch=TOLD)
         columns.append(balance(rotor, run, start))
     table.rows = [[name, *[column[name] for column in columns]] for name in columns[0]]
-    impulse = Table("impulse", ["internal step (s)", "impulse handed over (N s)", "less the sum over internal steps", "forces × whirl (J)", "less whirl work of the ledger"])
+    header = ["internal step (s)", "impulse handed over (N s)", "less the sum over internal steps", "forces × whirl (J)", "less whirl work of the ledger"]
+    impulse = Table("impulse", header)
     for inner in (1e-6, 5e-7):
         say(f"impulse: internal step {inner:g} s")
         rotor, fixed = shafts.whirling(), {"scheme": 2, "internal_step_max": inner}
@@ -274,7 +295,8 @@ def lost_blade(file, shafts, quick, say):
     begun = time.perf_counter()
     run = coupled(file, rotor, Way.NEWTON, step, length, before=blade_off(at), watch=TOLD)
     seconds = time.perf_counter() - begun
-    history = Table("blade_off", ["time (s)", "whirl_x (m)", "whirl_y (m)", "speed (rad/s)", *[f"{name} ({'N' if 'force' in name else 'N m'})" for name in rotor.outputs]])
+    units = [f"{name} ({'N' if 'force' in name else 'N m'})" for name in rotor.outputs]
+    history = Table("blade_off", ["time (s)", "whirl_x (m)", "whirl_y (m)", "speed (rad/s)", *units])
     for time_, values, outputs in zip(run.times, run.values, run.outputs):
         history.rows.append([time_, *values, *outputs])
     bare = shafts.whirling()
@@ -316,7 +338,8 @@ def spools():
 def run_up(file, quick, say):
     """Two spools run up through the speeds at which their blades ring: who brakes, and torque against shaft work by way and H."""
     length = 1e-2 if quick else 1.2e-1
-    table = Table("run_up", ["way", "H (s)", "shaft work (J)", "torque × speed taken, less that (J)", "turning energy, less all works (J)", "speeds against the fine run (rad/s)"])
+    header = ["way", "H (s)", "shaft work (J)", "torque × speed taken, less that (J)", "turning energy, less all works (J)", "speeds, error (rad/s)"]
+    table = Table("run_up", header)
 
     def one(way, step, length):
         pair = spools()
@@ -338,6 +361,7 @@ def run_up(file, quick, say):
             table.rows.append([way.value, step, run.watched[-1][0], told, closed, error])
     say(f"run-up: {length:g} s")
     run, *_ = one(Way.RUB_FIRST, 5e-5, length)
-    history = Table("run_up_history", ["time (s)", "low.speed (rad/s)", "high.speed (rad/s)", "low.torque (N m)", "high.torque (N m)", "shaft work (J)"])
+    header = ["time (s)", "low.speed (rad/s)", "high.speed (rad/s)", "low.torque (N m)", "high.torque (N m)", "shaft work (J)"]
+    history = Table("run_up_history", header)
     history.rows = [[time_, *state[:2], *outputs, work[0]] for time_, state, outputs, work in zip(run.times, run.states, run.outputs, run.watched)]
     return [table, history]
