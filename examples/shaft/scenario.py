@@ -1,11 +1,10 @@
 """What is coupled: the scenes beside this file as FMUs, and the shafts that lean on them."""
 
 import contextlib
-import io
 import os
 import shutil
 import subprocess
-import warnings
+import sys
 from pathlib import Path
 
 import numpy
@@ -33,6 +32,22 @@ def package(scene, into):
     return file
 
 
+@contextlib.contextmanager
+def silence():
+    """Keep what is said, by libraries in C too, from both outputs."""
+    sys.stdout.flush()
+    kept = [os.dup(output) for output in (1, 2)]
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        for output, saved in zip((1, 2), kept):
+            os.dup2(saved, output)
+            os.close(saved)
+
+
 # The node of the beam that carries the disk.
 DISK = 3
 
@@ -41,7 +56,7 @@ def ross_rotor():
     """A steel shaft of 0.8 m in two bearings with a disk of 12 kg: it whirls first at 750 rad/s, below the speed, then near 1800 rad/s."""
     try:
         # It tells at length, and as an error, that it lacks a library for fluids which nothing here needs.
-        with contextlib.redirect_stdout(None), contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings(action="ignore"):
+        with silence():
             import ross
     except ImportError as error:
         raise CouplingError(f"ROSS cannot be imported ({error}): run examples/run.sh shaft, or take --shaft disk") from error
