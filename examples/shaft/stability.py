@@ -32,13 +32,3 @@ def contraction(shaft, stiffness, step):
     """Factor by which a fixed point comes nearer per iteration: from 1 on it does not."""
     _, gain, reading = shaft.linear(step)
     return float(numpy.abs(numpy.linalg.eigvals(reading @ gain @ (0.5 * stiffness))).max())
-
-
-def longest(test, steps):
-    """Longest of rising steps up to which every one passes `test`; 0.0 where the first one fails."""
-    found = 0.0
-    for step in steps:
-        if not test(step):
-            break
-        found = step
-    return found
