@@ -129,7 +129,7 @@ def resolved(fast, slow, plan, stop, tell=lambda time: None):
 
 
 def cycle_jump(fast, slow, plan, stop, tell=lambda time: None):
-    """Windows and jumps, until `stop` (s) is passed by less than a window. The slow unit starts at time 0."""
+    """Windows and jumps, to `stop` (s) or the step next to it. The slow unit starts at time 0."""
     journey, length = Journey(), plan.first
     window = _together(fast, slow, plan, 0.0, plan.begin * plan.cycle, plan.window * plan.cycle, journey)
     _keep(journey, window, plan, slow)
@@ -138,9 +138,10 @@ def cycle_jump(fast, slow, plan, stop, tell=lambda time: None):
         length = min(length, plan.longest, max(stop - time - plan.window_time, 0.0))
         if length < plan.window_time:
             # Jumps as short as a window save nothing.
-            before, window = window, _together(fast, slow, plan, time, plan.window * plan.cycle, plan.window * plan.cycle, journey)
+            steps = min(plan.window * plan.cycle, max(1, round((stop - time) / plan.step)))
+            before, window = window, _together(fast, slow, plan, time, steps, steps, journey)
             _keep(journey, window, plan, slow)
-            time, length = time + plan.window_time, max(length, plan.window_time) * 1.5
+            time, length = time + steps * plan.step, 1.5 * plan.window_time
         else:
             arrived = _try(fast, slow, plan, journey, window, before, time, length)
             error = journey.jumps[-1].error

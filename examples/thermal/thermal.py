@@ -33,7 +33,7 @@ REVOLUTION = 2.0 * math.pi / SPEED
 STEP, CYCLE = REVOLUTION / 10, 10
 ROTOR = ["--contact-patches", "5", "--modes", "12", "--mesh", "16x2x20"]
 # Revolutions of `couplings`, of `step`; seconds of `jump`, of `long`; tolerances (K).
-FULL = {"couplings": 20, "step": 40, "jump": 2.0, "long": 10.0, "tolerances": (2.0, 0.5, 0.2, 0.1, 0.05), "tolerance": 0.25}
+FULL = {"couplings": 20, "step": 40, "jump": 1.0, "long": 10.0, "tolerances": (2.0, 0.5, 0.2, 0.1), "tolerance": 0.25}
 QUICK = {"couplings": 3, "step": 4, "jump": 0.12, "long": 0.3, "tolerances": (0.5, 0.1), "tolerance": 0.5}
 
 
