@@ -2,7 +2,7 @@
 
 import contextlib
 import csv
-import ctypes
+import ctypes.util
 import io
 import subprocess
 import sys
@@ -49,7 +49,7 @@ def write(file, rub, casing, patches, stop):
 
 
 def validate(file):
-    """Against the schema of SSP 1.0 that FMPy brings; lxml reads no zip members by name, so FMPy opens the archive."""
+    """Its system, once it is valid by the schema of SSP 1.0, which FMPy brings."""
     from fmpy.ssp.ssd import read_ssd
 
     return read_ssd(str(file))
@@ -88,11 +88,16 @@ with EcosSimulation(ssp_path=file, step_size=float(step)) as simulation:
 """
 
 
+def tbb():
+    """The library libtbb that Ecos wants, of the package tbb in this environment or of the system; None without."""
+    own = next(iter(sorted(Path(sys.prefix).glob("lib/libtbb.so.12"))), None)
+    return str(own) if own else ctypes.util.find_library("tbb")
+
+
 def run_ecos(file, step, count, patches):
     """By Ecos (ecospy)."""
     names = [f"casing.{TEMPERATURE}[{k}]" for k in range(1, patches + 1)] + [f"rub.{HEAT}[{k}]" for k in range(1, patches + 1)]
-    library = next(iter(sorted(Path(sys.prefix).glob("lib/libtbb.so.12"))), "")
-    command = [sys.executable, "-c", ECOS, str(library), str(file), repr(step), str(count), *names]
+    command = [sys.executable, "-c", ECOS, tbb() or "", str(file), repr(step), str(count), *names]
     run = subprocess.run(command, capture_output=True, text=True)
     lines = [line for line in run.stdout.splitlines() if line[:1] in "-0123456789" or line.startswith("casing.")]
     if run.returncode != 0 or len(lines) != count + 1:

@@ -3,6 +3,7 @@
 
 Makes both units and an SSP package of the two, and shows
   couplings  the pair stepped by a script (FMI 2.0 and 3.0), as SSP package by FMPy and by Ecos, and with a casing written in Python
+  choice     friction heat of finer models of the blades and of a step by tolerance, and what a revolution costs
   step       what the communication step does, for units stepped together and in turn
   jump       cycle jump against the fully resolved run: error against speed-up, by the tolerance of a jump
   long       ten seconds by cycle jump, and the same with a finer model of the blades
@@ -12,6 +13,7 @@ Figures (SVG) and tables (CSV) go into a directory.
 import argparse
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -27,14 +29,14 @@ from pair import Casing, Rub, script
 from units import Unit, UnitError
 
 HERE = Path(__file__).resolve().parent
-PARTS = ("couplings", "step", "jump", "long")
+PARTS = ("couplings", "choice", "step", "jump", "long")
 SPEED, SHARE, PATCHES = 1800.0, 0.5, 12
 REVOLUTION = 2.0 * math.pi / SPEED
 STEP, CYCLE = REVOLUTION / 10, 10
 ROTOR = ["--contact-patches", "5", "--modes", "12", "--mesh", "16x2x20"]
-# Revolutions of `couplings`, of `step`; seconds of `jump`, of `long`; tolerances (K).
-FULL = {"couplings": 20, "step": 40, "jump": 1.0, "long": 10.0, "tolerances": (2.0, 0.5, 0.2, 0.1), "tolerance": 0.25}
-QUICK = {"couplings": 3, "step": 4, "jump": 0.12, "long": 0.3, "tolerances": (0.5, 0.1), "tolerance": 0.5}
+# Revolutions of `couplings`, `choice` and `step`; seconds of `jump`, of `long`; tolerances (K).
+FULL = {"couplings": 10, "choice": 16, "step": 24, "jump": 1.0, "long": 10.0, "tolerances": (2.0, 0.5, 0.2, 0.1), "tolerance": 0.25}
+QUICK = {"couplings": 3, "choice": 2, "step": 4, "jump": 0.12, "long": 0.3, "tolerances": (0.5, 0.1), "tolerance": 0.5}
 
 
 class ExampleError(Exception):
@@ -78,12 +80,14 @@ class Files:
     def _library(variable):
         return ["--library", os.environ[variable]] if os.environ.get(variable) else []
 
-    def rub(self, name, rotor):
-        """FMUs of the scene with this model of the rotor: {2: file, 3: file}."""
+    def rub(self, name, rotor, time=None):
+        """FMUs of the scene with this model of the rotor, and `[time]` in other words: {2: file, 3: file}."""
         place = self.into / name
         place.mkdir(exist_ok=True)
         say(f"models of the rub, {name}")
         text = (HERE / "rub.toml").read_text(encoding="utf-8")
+        if time:
+            text = re.sub(r"\[time\][^\[]*", f"[time]\n{time}\n\n", text)
         if rotor:
             self.tiprub("reduce", "rotor37", *rotor, "--force", "-o", place / "rotor.rom.safetensors")
         else:
@@ -170,6 +174,30 @@ def couplings(files, rub, casing, python, size):
     for name, reason in failed.items():
         say(f"{name} did not run: {reason}")
     figures.couplings(files.into / "couplings.svg", ways)
+
+
+def choice(files, rub, size):
+    """Friction heat of a cold casing, over the second half of some revolutions."""
+    half, rows = size["choice"] // 2, []
+    finest = 'scheme = "galerkin"\nstep = 8.0e-5\ntolerance = 1.0e-3'
+    cases = {
+        "as here": rub,
+        "24 modes": files.rub("more-modes", ["--contact-patches", "5", "--modes", "24", "--mesh", "16x2x20"], "step = 1.66e-6"),
+        "tolerance 1e-3 for the step": files.rub("tolerance", ROTOR, finest),
+        "9 patches, 80 modes": files.rub("finer", None),
+        "9 patches, 80 modes, half the step": files.rub("finer-halved", None, "step = 1.039e-6"),
+    }
+    for name, units in cases.items():
+        with Unit(units[2], name="rub") as unit:
+            side, cold = Rub(unit, SHARE), numpy.zeros(PATCHES)
+            tell, started, before = progress(name, 2 * half * REVOLUTION), time.process_time(), 0.0
+            for index in range(2 * half):
+                before = side.total() if index == half else before
+                side.step(REVOLUTION, cold)
+                tell((index + 1) * REVOLUTION)
+            power = (side.total() - before) / (half * REVOLUTION)
+            rows.append([name, power, power / rows[0][1] - 1.0 if rows else 0.0, (time.process_time() - started) / (2 * half)])
+    files.table("choice", ["model", "heat into a cold casing (W)", "against the first", "processor time of a revolution (s)"], rows)
 
 
 def step(files, rub, casing, size):
@@ -271,6 +299,8 @@ def main():
         casing = files.casing() if arguments.casing == "unit" else {2: python, 3: python}
         if "couplings" in parts:
             couplings(files, rub, casing, python, size)
+        if "choice" in parts:
+            choice(files, rub, size)
         if "step" in parts:
             step(files, rub, casing, size)
         if "jump" in parts:
