@@ -3,7 +3,7 @@
 use tiprub_core::{
     Rom, Scene,
     settings::{
-        CoatingSettings, ContactSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver, StructureSettings,
+        CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver, StructureSettings,
         SurfaceSettings, TOLERANCE,
     },
 };
@@ -93,9 +93,13 @@ fn of_contact(contact: &ContactSettings, found: &mut Vec<String>) {
     if contact.solver == Solver::Coulomb {
         found.push("friction sticks and slides (coulomb)".into());
     }
-    if let Some(CoatingSettings { thickness, cells_around, cells_along, .. }) = contact.coating {
+    if let Some(CoatingSettings { thickness, cells_around, cells_along, cutting, .. }) = contact.coating {
+        let cut = cutting.map_or(String::new(), |cut| {
+            let CuttingSettings { specific_energy, normal_ratio } = cut;
+            format!(", cut at {specific_energy:e} J/m3, normal force {normal_ratio} times the tangential one")
+        });
         found.push(format!(
-            "abradable coating on `{}`: {thickness} m, {cells_around} x {cells_along} cells",
+            "abradable coating on `{}`: {thickness} m, {cells_around} x {cells_along} cells{cut}",
             contact.slave
         ));
     }

@@ -1,7 +1,7 @@
 //! A scene with every option on, small blades in a small flexible casing, and what each option is.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::Watched;
+use tiprub_core::rom::{SUPPORT_ROWS, Support, Watched};
 use tiprub_core::settings::*;
 use tiprub_core::{Rom, Scene, VariableTable};
 use tiprub_model_description::{Description, Experiment};
@@ -22,13 +22,20 @@ pub fn complete() -> Scene {
     contact.heat_to_slave = Some(0.4);
     contact.coating = Some(CoatingSettings {
         thickness: 1e-3,
-        modulus: 1e9,
-        yield_stress: 1e7,
-        hardening: 1e8,
+        modulus: 0.0,
+        yield_stress: 0.0,
+        hardening: 0.0,
         cells_around: 360,
         cells_along: 5,
+        cutting: Some(CuttingSettings { specific_energy: 1e8, normal_ratio: 1.0 }),
     });
-    (scene.settings.outputs.wear, scene.settings.outputs.slave_displacement) = (true, true);
+    let outputs = &mut scene.settings.outputs;
+    (outputs.wear, outputs.wear_profile, outputs.slave_displacement, outputs.support_reaction) = (true, true, true, true);
+    let rom = &mut scene.roms[1];
+    let zeros = |columns: usize| DMatrix::zeros(SUPPORT_ROWS, columns);
+    let patches = rom.extras.thermal.as_ref().map_or(0, |thermal| thermal.patches.len());
+    let (stiffness, mass) = (zeros(rom.order()), zeros(rom.order()));
+    rom.extras.support = Some(Support { stiffness, mass, thermal: zeros(patches) });
     scene
 }
 
@@ -53,6 +60,9 @@ pub fn rigid() -> Scene {
         energies: true,
         instantaneous_forces: true,
         stress: true,
+        modal_amplitudes: Some(3),
+        tip_displacements: true,
+        casing_forces: true,
         ..OutputSettings::default()
     };
     settings.experiment.communication_step = 1e-5;
@@ -63,7 +73,7 @@ pub fn rigid() -> Scene {
 pub type Switch = (&'static str, fn(&mut Scene));
 
 /// Every option that adds variables, in a scene with a flexible casing.
-pub const OPTIONS: [Switch; 21] = [
+pub const OPTIONS: [Switch; 27] = [
     ("`tolerance`, or the scheme `galerkin`", |scene| scene.settings.time.tolerance = None),
     ("`motion = \"rotating\"`", |scene| {
         let rotor = &mut scene.settings.structures[0];
@@ -76,7 +86,7 @@ pub const OPTIONS: [Switch; 21] = [
         scene.settings.structures.truncate(1);
         scene.roms.truncate(1);
         scene.settings.surfaces[0].structure = None;
-        scene.settings.outputs.slave_displacement = false;
+        (scene.settings.outputs.slave_displacement, scene.settings.outputs.support_reaction) = (false, false);
     }),
     ("`thermal = true`", |scene| scene.settings.structures[1].thermal = false),
     ("`load` of the casing", |scene| scene.settings.structures[1].load = None),
@@ -89,11 +99,16 @@ pub const OPTIONS: [Switch; 21] = [
     ("`heat_to_slave`", |scene| scene.settings.contacts[0].heat_to_slave = None),
     ("`coating`", |scene| {
         scene.settings.contacts[0].coating = None;
-        scene.settings.outputs.wear = false;
+        (scene.settings.outputs.wear, scene.settings.outputs.wear_profile) = (false, false);
+    }),
+    ("`cutting` of the coating", |scene| {
+        let coating = scene.settings.contacts[0].coating.as_mut();
+        coating.into_iter().for_each(|own| (own.cutting, own.modulus) = (None, 1e9));
     }),
     ("`watched_sectors`", |scene| {
         scene.settings.outputs.watched_sectors.clear();
-        scene.settings.outputs.stress = false;
+        let outputs = &mut scene.settings.outputs;
+        (outputs.stress, outputs.tip_displacements, outputs.modal_amplitudes) = (false, false, None);
     }),
     ("`stress = true`", |scene| scene.settings.outputs.stress = false),
     ("watched points of the ROM", |scene| scene.roms[0].extras.watched = None),
@@ -101,6 +116,11 @@ pub const OPTIONS: [Switch; 21] = [
     ("`nodal_diameters`", |scene| scene.settings.outputs.nodal_diameters = None),
     ("`energies = true`", |scene| scene.settings.outputs.energies = false),
     ("`instantaneous_forces = true`", |scene| scene.settings.outputs.instantaneous_forces = false),
+    ("`modal_amplitudes`", |scene| scene.settings.outputs.modal_amplitudes = None),
+    ("`tip_displacements = true`", |scene| scene.settings.outputs.tip_displacements = false),
+    ("`casing_forces = true`", |scene| scene.settings.outputs.casing_forces = false),
+    ("`support_reaction = true`", |scene| scene.settings.outputs.support_reaction = false),
+    ("`wear_profile = true`", |scene| scene.settings.outputs.wear_profile = false),
     ("`wear = true`", |scene| scene.settings.outputs.wear = false),
     ("`slave_displacement = true`", |scene| scene.settings.outputs.slave_displacement = false),
 ];

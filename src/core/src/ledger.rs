@@ -43,7 +43,10 @@ pub struct Ledger {
     pub impact_loss: Sum,
     /// Work of the coating's normal force on the approaching blades.
     pub wear_work: Sum,
-    /// Energy that wearing cells takes, ∫(Y + Kε_p) dε_p: not part of the balance, see the coating's limits.
+    /// Work along the way against what is cut off the coating: specific cutting energy times volume.
+    pub cutting_work: Sum,
+    /// Energy that wearing cells takes: ∫(Y + Kε_p) dε_p of those pressed in, not part of the balance; of those cut the same as
+    /// `cutting_work`, cell by cell.
     pub wear_energy: Sum,
     /// Work of centrifugal, thermal and nodal-diameter loads.
     pub load_work: Sum,
@@ -80,11 +83,12 @@ macro_rules! sums_of_ledger {
     };
 }
 
-sums_of_ledger! { 14:
+sums_of_ledger! { 15:
     damping_loss,
     friction_loss,
     impact_loss,
     wear_work,
+    cutting_work,
     wear_energy,
     load_work,
     shaft_work,
@@ -128,6 +132,7 @@ impl Ledger {
         balance.add(-self.friction_loss.value());
         balance.add(-self.impact_loss.value());
         balance.add(-self.wear_work.value());
+        balance.add(-self.cutting_work.value());
         balance.add(self.load_work.value());
         balance.add(-mechanical);
         balance.value()
@@ -135,7 +140,7 @@ impl Ledger {
 
     /// All energy that came in or was lost (J).
     pub fn exchanged(&self) -> f64 {
-        let losses = [self.damping_loss, self.friction_loss, self.impact_loss, self.wear_work];
+        let losses = [self.damping_loss, self.friction_loss, self.impact_loss, self.wear_work, self.cutting_work];
         self.scale() + losses.iter().map(|loss| loss.value().abs()).sum::<f64>()
     }
 
@@ -143,7 +148,8 @@ impl Ledger {
     /// heat of friction and damping and work on the coating. Impacts, which only take, are left out.
     pub fn supplied(&self) -> f64 {
         let put_in = self.external_work() + self.load_work.value() + self.step_change.value();
-        put_in - self.friction_loss.value() - self.damping_loss.value() - self.wear_work.value()
+        let left = put_in - self.friction_loss.value() - self.damping_loss.value();
+        left - self.wear_work.value() - self.cutting_work.value()
     }
 
     /// What the residual is compared with (J): initial energy plus all work exchanged.

@@ -64,6 +64,10 @@ pub const THICKNESS: [f64; 2] = [1e-9, 0.1];
 pub const MODULUS: [f64; 2] = [5e-324, 1e13];
 /// Largest yield stress and hardening of a coating (Pa), beyond any solid.
 pub const STRESS: f64 = 1e13;
+/// Specific cutting energy of a coating (J/m³): from what is softer than any foam to what is harder to cut than any alloy.
+pub const CUTTING_ENERGY: [f64; 2] = [1e3, 1e12];
+/// Normal force per tangential force of a cut: from tools that draw themselves in to tips that hardly cut.
+pub const NORMAL_RATIO: [f64; 2] = [0.05, 20.0];
 /// Most cells of a coating: 80 megabytes of state.
 pub const CELLS: usize = 10_000_000;
 

@@ -7,6 +7,7 @@
 
 mod cyclic;
 mod grid;
+mod support;
 mod watched;
 
 use nalgebra::DMatrix;
@@ -14,6 +15,7 @@ use nalgebra::DMatrix;
 use crate::{Error, Result, ranges, shown};
 pub use cyclic::Harmonic;
 pub(crate) use cyclic::cholesky;
+pub use support::{SUPPORT_ROWS, Support};
 pub use watched::{STRESSES, Watched, von_mises};
 
 /// Most sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or hostile file must not ask for all memory,
@@ -172,6 +174,8 @@ pub struct RomExtras {
     pub watched: Option<Watched>,
     /// Places whose stress is recovered.
     pub stress: Option<Watched>,
+    /// What its held nodes feel.
+    pub support: Option<Support>,
     /// What the coordinates stand for.
     pub basis: Basis,
     /// The contact patches are in so many rows across the thickness of the tip, one row after the other, each as the others along the chord;
@@ -240,6 +244,7 @@ impl Rom {
         self.validate_grid()?;
         self.validate_rows(remedy)?;
         self.validate_watched(remedy)?;
+        self.validate_support(remedy)?;
         self.validate_harmonics(remedy)
     }
 

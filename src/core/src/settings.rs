@@ -1,5 +1,6 @@
 //! The scene: every setting with its unit, default and range. `tiprub-format` reads it from TOML.
 
+mod coating;
 pub mod rules;
 mod validation;
 
@@ -8,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::Rom;
 pub use crate::laws::Solver;
 pub use crate::schemes::Scheme;
+pub use coating::{CoatingSettings, CuttingSettings};
 
 /// Shape of a rigid surface of revolution: radial clearance change around the circumference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -283,25 +285,6 @@ pub struct SurfaceSettings {
     pub patches: Option<PatchSettings>,
 }
 
-/// Abradable coating on a surface: cells of rods that yield and harden (Legrand, Batailly, Pierre, J. Comput.
-/// Nonlinear Dyn. 2012). Its unworn surface is where `gap` ends; the hard surface lies `thickness` behind it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CoatingSettings {
-    /// Thickness h₀ (m), 1e-9 to 0.1.
-    pub thickness: f64,
-    /// Modulus E (Pa), > 0.
-    pub modulus: f64,
-    /// Yield stress Y (Pa), ≥ 0.
-    pub yield_stress: f64,
-    /// Linear hardening modulus K (Pa), ≥ 0.
-    pub hardening: f64,
-    /// Cells around the circumference.
-    pub cells_around: usize,
-    /// Cells along the axis, over the axial extent of the contact nodes.
-    pub cells_along: usize,
-}
-
 /// Whether the contact normal follows the meridional slope of the tip contour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -409,9 +392,24 @@ pub struct OutputSettings {
     /// Stress at the places that the ROMs recover it at, of watched sectors.
     #[serde(skip_serializing_if = "is_default")]
     pub stress: bool,
+    /// Amplitudes of so many modes of watched sectors, from the lowest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modal_amplitudes: Option<usize>,
+    /// Displacements of the contact nodes of watched sectors.
+    #[serde(skip_serializing_if = "is_default")]
+    pub tip_displacements: bool,
+    /// Force and moment on every surface around an axis.
+    #[serde(skip_serializing_if = "is_default")]
+    pub casing_forces: bool,
+    /// Force and moment of the support on the casing.
+    #[serde(skip_serializing_if = "is_default")]
+    pub support_reaction: bool,
     /// Wear depth of every coating cell.
     #[serde(skip_serializing_if = "is_default")]
     pub wear: bool,
+    /// Mean wear depth around the circumference and along the axis.
+    #[serde(skip_serializing_if = "is_default")]
+    pub wear_profile: bool,
     /// Radial displacement of every contact-grid node of the flexible slave.
     #[serde(skip_serializing_if = "is_default")]
     pub slave_displacement: bool,
@@ -426,7 +424,12 @@ impl Default for OutputSettings {
             energies: true,
             instantaneous_forces: false,
             stress: false,
+            modal_amplitudes: None,
+            tip_displacements: false,
+            casing_forces: false,
+            support_reaction: false,
             wear: false,
+            wear_profile: false,
             slave_displacement: false,
         }
     }

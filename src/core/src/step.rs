@@ -37,6 +37,7 @@ impl System {
             group.solve(&mut bodies, &mut Found { events, factorisations, wear_energy: &mut ledger.wear_energy })?;
         }
         self.enter_work()?;
+        self.remove_cut();
         self.count_pulling();
         self.counted.steps += 1;
         if self.counted.steps.is_multiple_of(FLUSH_EVERY) {

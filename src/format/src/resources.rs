@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use tiprub_core::rom::RomExtras;
+use tiprub_core::rom::{RomExtras, SUPPORT_ROWS, Support};
 use tiprub_core::settings::{SceneSettings, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
@@ -76,6 +77,13 @@ fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) ->
         // Its displacements are outputs of watched sectors.
         watched: rom.extras.watched.clone().filter(|_| !settings.outputs.watched_sectors.is_empty()),
         stress: rom.extras.stress.clone().filter(|_| settings.outputs.stress),
+        support: rom.extras.support.clone().filter(|_| carries && settings.outputs.support_reaction).map(|support| {
+            Support {
+                // Its columns are the patches.
+                thermal: if structure.thermal { support.thermal } else { DMatrix::zeros(SUPPORT_ROWS, 0) },
+                ..support
+            }
+        }),
         basis: rom.extras.basis,
         rows: rom.extras.rows,
     }

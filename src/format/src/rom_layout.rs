@@ -6,7 +6,10 @@ pub(crate) const ROM_FORMAT: &str = "tiprub-rom";
 /// written in the first form that holds it, for older readers.
 pub(crate) const ROM_FORMAT_VERSIONS: [&str; 2] = ["1", "2"];
 /// Arrays and metadata of format 2.
-pub(crate) const SECOND_RELEASE: [&str; 15] = [
+pub(crate) const SECOND_RELEASE: [&str; 18] = [
+    "support_stiffness",
+    "support_mass",
+    "support_thermal",
     "contact_areas",
     "contact_lengths",
     "flexibility_deviation",
@@ -65,7 +68,7 @@ const fn array(
 const GENERAL_ARRAYS: usize = 9;
 
 /// Every array.
-pub const ARRAYS: [ArrayLayout; 29] = [
+pub const ARRAYS: [ArrayLayout; 32] = [
     array("mass", "[n, n]", "kg", true, "Reduced mass matrix of one sector: symmetric, positive definite."),
     array("stiffness", "[n, n]", "N/m", true, "Reduced stiffness matrix: symmetric, positive semidefinite."),
     array(
@@ -223,6 +226,28 @@ pub const ARRAYS: [ArrayLayout; 29] = [
         false,
         "Undeformed positions of these places, as for contact nodes.",
     ),
+    array(
+        "support_stiffness",
+        "[6, n]",
+        "N or N m per unit coordinate",
+        false,
+        "Force of the support on the structure along fixed x, y, z and its moment about x, y, z through the origin, caused by each \
+         reduced coordinate: the rows of the full stiffness at the held nodes. With `support_mass`; sectors = 1.",
+    ),
+    array(
+        "support_mass",
+        "[6, n]",
+        "kg or kg m",
+        false,
+        "The same caused by the acceleration of each reduced coordinate: the rows of the full mass at the held nodes.",
+    ),
+    array(
+        "support_thermal",
+        "[6, patches]",
+        "N/K or N m/K",
+        false,
+        "Thermal load of each patch on the held nodes, which the support takes up; zero where left out.",
+    ),
 ];
 
 /// The arrays of a structure that spins: all or none.
@@ -232,6 +257,9 @@ pub(crate) const SPIN_ARRAYS: [&str; 5] =
 pub(crate) const WATCHED_ARRAYS: [&str; 2] = ["watched_map", "watched_positions"];
 /// The arrays of places with stress: both or none.
 pub(crate) const STRESS_ARRAYS: [&str; 2] = ["stress_map", "stress_positions"];
+/// The arrays of a support: both or none; the third comes with thermal loads.
+pub(crate) const SUPPORT_ARRAYS: [&str; 2] = ["support_stiffness", "support_mass"];
+pub(crate) const SUPPORT_THERMAL: &str = "support_thermal";
 /// The arrays of a structure that heats up: both or none.
 pub(crate) const THERMAL_ARRAYS: [&str; 2] = ["thermal_loads", "thermal_patches"];
 

@@ -37,13 +37,14 @@ pub(crate) const REPEATED_TABLES: [&str; 3] = ["structure", "surface", "contact"
 pub(crate) const SINGLE_TABLES: [&str; 3] = ["time", "outputs", "experiment"];
 
 /// Tables inside the repeated ones, each with an example: written inline, or below as `[structure.spin]`.
-pub(crate) const INNER_TABLES: [(&str, &str); 6] = [
+pub(crate) const INNER_TABLES: [(&str, &str); 7] = [
     ("structure.spin", "{ stiffening = true }"),
     ("structure.load", "{ order = 2, amplitude = 100.0 }"),
     ("surface.shape", "{ kind = \"circular\" } or with the keys of another kind"),
     ("surface.spline", "{ around = 72, along = 5 }"),
     ("surface.patches", "{ around = 8 }"),
     ("contact.coating", "{ thickness = 5e-3, modulus = 1e9, ... }"),
+    ("contact.coating.cutting", "{ specific_energy = 5e8, normal_ratio = 1.0 }"),
 ];
 
 /// How a table is written in the file.

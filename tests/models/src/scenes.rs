@@ -89,5 +89,13 @@ pub fn coating(scene: &mut Scene) {
 
 /// A soft coating of this thickness (m), with so many cells around and along.
 pub fn coating_of(thickness: f64, [cells_around, cells_along]: [usize; 2]) -> CoatingSettings {
-    CoatingSettings { thickness, modulus: 2e8, yield_stress: 1e6, hardening: 2e7, cells_around, cells_along }
+    CoatingSettings {
+        thickness,
+        modulus: 2e8,
+        yield_stress: 1e6,
+        hardening: 2e7,
+        cells_around,
+        cells_along,
+        cutting: None,
+    }
 }

@@ -213,6 +213,6 @@ fn around(frame: Frame, drive: &Drive, arm: [f64; 3], force: [f64; 3]) -> Wrench
 }
 
 /// Vector product.
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

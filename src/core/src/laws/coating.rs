@@ -6,6 +6,7 @@
 //! behind it, g ≥ −h₀. [`CoatedProblem`] finds gaps, rod forces and hard contact forces of one step together; wear
 //! grows only in [`Coating::commit`].
 
+mod cutting;
 mod problem;
 mod rod;
 #[cfg(test)]
@@ -13,6 +14,9 @@ mod tests;
 
 use std::f64::consts::TAU;
 
+use cutting::Cutting;
+pub use cutting::Way;
+use nalgebra::DMatrix;
 pub use problem::CoatedProblem;
 pub use rod::{Branch, Rod};
 
@@ -34,6 +38,19 @@ struct Row {
     area: f64,
     /// Centre (m).
     axial: f64,
+    /// Radius, and width along the axis (m).
+    radius: f64,
+    width: f64,
+}
+
+impl Row {
+    /// Where a blade with contact nodes at `angles` (rad) is.
+    fn angle(&self, angles: &[f64]) -> f64 {
+        let [a, b] = self.nodes;
+        let apart = angles[b] - angles[a];
+        // Neighbouring nodes are less than half a turn apart, whichever turn their angles are given in.
+        angles[a] + self.weights[1] * (apart - TAU * (apart / TAU).round())
+    }
 }
 
 /// A cell in front of a blade.
@@ -44,9 +61,14 @@ struct CellContact {
     nodes: [usize; 2],
     weights: [f64; 2],
     area: f64,
-    /// Plastic strain before the step.
+    /// Plastic strain before the step; where it is cut, ahead of the blade.
     plastic: f64,
     branch: Branch,
+    /// Whose it is.
+    blade: usize,
+    row: usize,
+    /// It is the one that the blade faces, not one that it has left in this step.
+    faced: bool,
 }
 
 /// The coating of one slave: material, cells, wear.
@@ -58,8 +80,10 @@ pub struct Coating {
     /// Contact nodes per blade.
     nodes: usize,
     rows: Vec<Row>,
-    /// Plastic strain, `[row · around + place around]`.
+    /// Plastic strain, `[row · around + place around]`: wear depth as a share of the thickness.
     plastic: Vec<f64>,
+    /// Where it is cut instead of pressed in.
+    cutting: Option<Cutting>,
 }
 
 impl Coating {
@@ -102,21 +126,23 @@ impl Coating {
             let centre = extent[0] + (number(index) + 0.5) * width;
             let (nodes, weights) = neighbours(axial, &order, centre);
             let radius = weights[0] * radii[nodes[0]] + weights[1] * radii[nodes[1]];
-            Row { nodes, weights, area: radius * TAU / number(around) * width, axial: centre }
+            Row { nodes, weights, area: radius * TAU / number(around) * width, axial: centre, radius, width }
         };
         Ok(Self {
-            rod: Rod::new(settings),
+            rod: settings.cutting.map_or_else(|| Rod::new(settings), Cutting::rod),
             thickness: settings.thickness,
             around,
             nodes: axial.len(),
             rows: (0..along).map(row).collect(),
             plastic: vec![0.0; around * along],
+            cutting: settings.cutting.map(|cutting| Cutting::new(cutting, blades, along, axial.len())),
         })
     }
 
     /// Scratch for groups of at most `blades` coupled blades.
     pub fn problem(&self, blades: usize) -> CoatedProblem {
-        CoatedProblem::new(self.rod, self.thickness, blades * self.nodes, blades * self.rows.len())
+        let cells = if self.cutting.is_some() { 2 } else { 1 };
+        CoatedProblem::new(self.rod, self.thickness, blades * self.nodes, blades * self.rows.len() * cells)
     }
 
     /// Append a blade to a group: its nodes follow those already there, one cell of each row faces it. `angles` are
@@ -125,10 +151,7 @@ impl Coating {
         let first = problem.append_nodes(self.nodes);
         for (index, row) in self.rows.iter().enumerate() {
             let [a, b] = row.nodes;
-            let apart = angles[b] - angles[a];
-            // Neighbouring nodes are less than half a turn apart, whichever turn their angles are given in.
-            let angle = angles[a] + row.weights[1] * (apart - TAU * (apart / TAU).round());
-            let cell = index * self.around + place(angle, self.around);
+            let cell = index * self.around + place(row.angle(angles), self.around);
             problem.append_contact(CellContact {
                 cell,
                 nodes: [first + a, first + b],
@@ -136,6 +159,9 @@ impl Coating {
                 area: row.area,
                 plastic: self.plastic[cell],
                 branch: Branch::Free,
+                blade: 0,
+                row: index,
+                faced: true,
             });
         }
     }
@@ -179,6 +205,37 @@ impl Coating {
         self.plastic[cell] * self.thickness
     }
 
+    /// Normal forces of contact nodes per depth of cut of all of them (N/m), nodes²; `None` where the coating is pressed in.
+    pub fn cut_stiffness(&self) -> Option<DMatrix<f64>> {
+        self.cutting.as_ref()?;
+        let mut stiffness = DMatrix::zeros(self.nodes, self.nodes);
+        let (_, modulus) = self.rod.line(Branch::Elastic, 0.0);
+        for row in &self.rows {
+            for (a, from) in row.nodes.into_iter().zip(row.weights) {
+                for (b, to) in row.nodes.into_iter().zip(row.weights) {
+                    stiffness[(a, b)] += modulus * row.width * from * to;
+                }
+            }
+        }
+        Some(stiffness)
+    }
+
+    /// Mean wear depth (m) of every place around, over the area of the rows there, or of every row.
+    pub fn wear_profile(&self, around: bool, out: &mut [f64]) {
+        let area: f64 = self.rows.iter().map(|row| row.area).sum();
+        if around {
+            out.fill(0.0);
+            for (row, plastic) in self.rows.iter().zip(self.plastic.chunks(self.around)) {
+                let share = self.thickness * row.area / area;
+                out.iter_mut().zip(plastic).for_each(|(mean, plastic)| *mean += share * plastic);
+            }
+            return;
+        }
+        for (mean, plastic) in out.iter_mut().zip(self.plastic.chunks(self.around)) {
+            *mean = self.thickness * plastic.iter().sum::<f64>() / number(self.around);
+        }
+    }
+
     /// Largest wear depth (m).
     pub fn largest_wear_depth(&self) -> f64 {
         self.plastic.iter().copied().fold(0.0, f64::max) * self.thickness
@@ -198,6 +255,7 @@ impl Coating {
     /// Unworn again.
     pub fn reset(&mut self) {
         self.plastic.fill(0.0);
+        self.cutting.iter_mut().for_each(Cutting::reset);
     }
 }
 
@@ -205,9 +263,11 @@ impl Coating {
 impl Persist for Coating {
     fn save(&self, writer: &mut Writer) {
         self.plastic.save(writer);
+        self.cutting.iter().for_each(|cutting| cutting.save(writer));
     }
     fn restore(&mut self, reader: &mut Reader) {
         self.plastic.restore(reader);
+        self.cutting.iter_mut().for_each(|cutting| cutting.restore(reader));
     }
     fn check(&self, reader: &mut Reader) {
         let mut bytes = reader.clone();
@@ -219,6 +279,7 @@ impl Persist for Coating {
                 reader.refuse("its coating is thicker than new");
             }
         }
+        self.cutting.iter().for_each(|cutting| cutting.check(reader, self.plastic.len()));
     }
 }
 

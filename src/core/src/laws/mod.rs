@@ -8,6 +8,7 @@ pub mod active_set;
 mod coated;
 pub mod coating;
 mod coulomb;
+mod cutting;
 pub mod de_saxce;
 mod film;
 mod lcp;
@@ -23,6 +24,7 @@ use crate::persist::{Persist, Reader, Writer};
 use crate::variables::Enumeration;
 pub use coated::Coated;
 pub use coulomb::Coulomb;
+pub use cutting::Cutting;
 pub use film::Film;
 pub use lcp::Lcp;
 
@@ -72,6 +74,10 @@ pub trait Prediction {
     fn slip(&self) -> [f64; 3];
     /// Contact force of the last step (N, own directions).
     fn last_force(&self) -> [f64; 3];
+    /// Unit direction of slip (own directions); 0 where nothing slides.
+    fn slip_direction(&self) -> [f64; 3];
+    /// Sector of the node.
+    fn sector(&self) -> usize;
     /// Angle at which the node faces the casing (rad, fixed frame).
     fn angle(&self) -> f64;
 }
@@ -111,8 +117,10 @@ pub enum Law {
     Lcp(Lcp),
     /// Complementarity with stick and slip.
     Coulomb(Coulomb),
-    /// Complementarity on an abradable coating.
+    /// Complementarity on an abradable coating that is pressed in.
     Coated(Coated),
+    /// Complementarity on one that is cut.
+    Cutting(Cutting),
 }
 
 /// The same call on every law.
@@ -123,6 +131,7 @@ macro_rules! each_law {
             Law::Lcp($law) => $call,
             Law::Coulomb($law) => $call,
             Law::Coated($law) => $call,
+            Law::Cutting($law) => $call,
         }
     };
 }
@@ -151,6 +160,7 @@ impl Law {
     /// Room for groups of up to `contacts` contacts; on a coating for whole blades.
     pub fn new(solver: Solver, coating: Option<Coating>, contacts: usize) -> Self {
         match (coating, solver) {
+            (Some(coating), _) if coating.is_cut() => Self::Cutting(Cutting::new(coating, contacts)),
             (Some(coating), _) => Self::Coated(Coated::new(coating, contacts)),
             (None, Solver::Film) => Self::Film(Film::new(contacts)),
             (None, Solver::Lcp) => Self::Lcp(Lcp::new(contacts)),
@@ -164,7 +174,7 @@ impl Law {
             Self::Film(_) => solver == Solver::Film,
             Self::Lcp(_) => solver == Solver::Lcp,
             Self::Coulomb(_) => solver == Solver::Coulomb,
-            Self::Coated(_) => true,
+            Self::Coated(_) | Self::Cutting(_) => true,
         }
     }
 
@@ -227,27 +237,47 @@ impl Law {
         each_law!(self, law => law.coating_shares())
     }
 
-    /// The law of a coating.
-    pub fn coated(&self) -> Option<&Coated> {
-        if let Self::Coated(law) = self { Some(law) } else { None }
+    /// Its coating.
+    pub fn coating(&self) -> Option<&Coating> {
+        match self {
+            Self::Coated(law) => Some(law.coating()),
+            Self::Cutting(law) => Some(law.coating()),
+            _ => None,
+        }
     }
 
     /// The same, to change its wear.
-    pub fn coated_mut(&mut self) -> Option<&mut Coated> {
-        if let Self::Coated(law) = self { Some(law) } else { None }
+    pub fn coating_mut(&mut self) -> Option<&mut Coating> {
+        match self {
+            Self::Coated(law) => Some(law.coating_mut()),
+            Self::Cutting(law) => Some(law.coating_mut()),
+            _ => None,
+        }
+    }
+
+    /// Take over the wear of the last solution; returns the energy it takes (J), of what is cut later.
+    pub fn commit(&mut self) -> f64 {
+        match self {
+            Self::Coated(law) => law.commit(),
+            Self::Cutting(law) => {
+                law.commit();
+                0.0
+            }
+            _ => 0.0,
+        }
     }
 }
 
 /// The state of a law is the wear of its coating.
 impl Persist for Law {
     fn save(&self, writer: &mut Writer) {
-        self.coated().into_iter().for_each(|law| law.coating().save(writer));
+        self.coating().into_iter().for_each(|coating| coating.save(writer));
     }
     fn restore(&mut self, reader: &mut Reader) {
-        self.coated_mut().into_iter().for_each(|law| law.coating_mut().restore(reader));
+        self.coating_mut().into_iter().for_each(|coating| coating.restore(reader));
     }
     fn check(&self, reader: &mut Reader) {
-        self.coated().into_iter().for_each(|law| law.coating().check(reader));
+        self.coating().into_iter().for_each(|coating| coating.check(reader));
     }
 }
 

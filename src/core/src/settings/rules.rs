@@ -118,6 +118,12 @@ static PARTS: &[Rule] = &[
         "pairs of one structure, or of surfaces on one flexible structure, push each other",
         "Leave out the coating, or give the pair a structure and a surface of its own",
     ),
+    excludes(
+        &[MODULUS, YIELD, HARDENING],
+        ("`contact.coating.cutting`", |at| at.is_cut()),
+        "what is cut off does not yield",
+        "Remove the line, or `cutting` for the plastic law",
+    ),
     needs(
         &[SOLVER],
         ("that of contact[1]", |at| at.contact().solver == at.settings.contacts[0].solver),
@@ -129,13 +135,13 @@ static PARTS: &[Rule] = &[
 /// Of outputs and inputs.
 static VARIABLES: &[Rule] = &[
     needs(
-        &[WEAR],
+        &[WEAR, WEAR_PROFILE],
         ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
         "nothing else wears",
         "Add a `coating` to the contact, or remove the line",
     ),
     needs(
-        &[STRESS],
+        &[STRESS, MODES, TIPS],
         ("`outputs.watched_sectors`", |at| !at.outputs().watched_sectors.is_empty()),
         "it is told of watched sectors",
         "Watch a sector, or remove the line",
@@ -147,6 +153,20 @@ static VARIABLES: &[Rule] = &[
         }),
         "it is radial: a rigid surface does not deform, and an open one has no axis",
         "Give the surface around a rotor a `structure`, or remove the line",
+    ),
+    needs(
+        &[SUPPORT],
+        ("`surface.structure` of a surface around an axis", |at| {
+            at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
+        }),
+        "what is rigid has no support of its own: its reaction is the contact force",
+        "Give the surface around a rotor a `structure`, or remove the line",
+    ),
+    excludes(
+        &[MODES, TIPS, CASING_FORCES],
+        ALL_FREE,
+        "it is told of rotors and of what stands around them",
+        "Remove the line",
     ),
     excludes(
         &[OTHER_SECTORS, ALL_SECTORS, DIAMETERS],
@@ -196,6 +216,18 @@ static METHODS: &[Rule] = &[
         ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
         "it seeks forces for gaps that close, and a coating takes force while they do",
         "Use \"modal-exact\", or remove the coating",
+    ),
+    excludes(
+        &[MASSLESS],
+        ("`contact.coating.cutting`", |at| at.contacts().any(|at| at.is_cut())),
+        "the way that is cut is that of the step in which the force acts, and its forces act a step later",
+        "Use \"modal-exact\" or \"central-difference\", or the plastic law",
+    ),
+    excludes(
+        &[GALERKIN],
+        ("`outputs.support_reaction`", |at| at.outputs().support_reaction),
+        "it keeps no means of what the casing does within a step",
+        "Use \"modal-exact\", or remove the output",
     ),
     excludes(
         &[GALERKIN],
@@ -289,6 +321,22 @@ static ROMS: &[Rule] = &[
         }),
         "stress comes from the finite elements that the ROM was reduced from",
         "Reduce the blade with --stress-modes or --stress-set, or remove the line",
+    ),
+    excludes(
+        &[MODES],
+        ("a rotor whose sectors are coupled by harmonics", |at| {
+            at.contacts().any(|at| at.master_rom().is_some_and(Rom::is_cyclic))
+        }),
+        "its modes are those of nodal diameters, not of a sector",
+        "Use `nodal_diameters`, or remove the line",
+    ),
+    needs(
+        &[SUPPORT],
+        ("rows of the support in the ROM of a casing", |at| {
+            at.contacts().any(|at| !at.is_free() && at.carrier_rom().is_some_and(|rom| rom.extras.support.is_some()))
+        }),
+        "they say what held nodes feel, of the finite elements that the ROM was reduced from",
+        "Reduce the casing again, held at some nodes, or remove the line",
     ),
     needs(
         &[LOAD],

@@ -232,7 +232,13 @@ impl CoatingSettings {
     fn validate(&self, at: &str) -> Result<()> {
         let ([thinnest, thickest], [softest, stiffest]) = (ranges::THICKNESS, ranges::MODULUS);
         within(&format!("{at}.thickness"), self.thickness, thinnest, thickest)?;
-        within(&format!("{at}.modulus"), self.modulus, softest, stiffest)?;
+        if let Some(cutting) = &self.cutting {
+            let ([least, most], [pulling, pushing]) = (ranges::CUTTING_ENERGY, ranges::NORMAL_RATIO);
+            within(&format!("{at}.cutting.specific_energy"), cutting.specific_energy, least, most)?;
+            within(&format!("{at}.cutting.normal_ratio"), cutting.normal_ratio, pulling, pushing)?;
+        } else {
+            within(&format!("{at}.modulus"), self.modulus, softest, stiffest)?;
+        }
         within(&format!("{at}.yield_stress"), self.yield_stress, 0.0, ranges::STRESS)?;
         within(&format!("{at}.hardening"), self.hardening, 0.0, ranges::STRESS)?;
         count(&format!("{at}.cells_around"), self.cells_around, 2, ranges::CELLS)?;

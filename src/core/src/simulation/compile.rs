@@ -12,6 +12,7 @@ use crate::gaps::surface_spline::SurfaceSpline;
 use crate::gaps::{GapLaw, RevolutionGap};
 use crate::laws::coating::Coating;
 use crate::ranges::SMALL;
+use crate::rom::Support;
 use crate::settings::{ContactSettings, Motion, StructureSettings};
 use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings, joined};
 use crate::variables::Quantity;
@@ -54,6 +55,8 @@ pub struct Body {
     pub watched: DMatrix<f64>,
     /// Stress at places per unit of each mode, 6·places × modes (Pa); empty where the scene does not ask for it.
     pub stress: DMatrix<f64>,
+    /// 1 or −1 per mode, so that the contact node it moves most goes along the positive direction; empty unless asked for.
+    pub senses: Vec<f64>,
 }
 
 /// A structure that carries surfaces.
@@ -66,6 +69,8 @@ pub struct CarrierParts {
     /// Nodal diameters of the load on it.
     pub load_order: u32,
     pub loads: CarrierLoads,
+    /// What its support feels per unit of each mode, where that is asked for.
+    pub support: Option<Support>,
 }
 
 /// The parts of a scene that do not change while it runs.
@@ -97,7 +102,17 @@ impl Body {
         let disk = rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()?;
         let (reference_speed, stiffness_range, centrifugal) = (0.0, None, Vec::new());
         let (watched, stress) = (DMatrix::zeros(0, 0), DMatrix::zeros(0, 0));
-        Ok(Self { model, disk, translations, reference_speed, stiffness_range, centrifugal, watched, stress })
+        Ok(Self {
+            model,
+            disk,
+            translations,
+            reference_speed,
+            stiffness_range,
+            centrifugal,
+            watched,
+            stress,
+            senses: Vec::new(),
+        })
     }
 
     /// Largest angular frequency (rad/s), of all nodal diameters where sectors are coupled.
@@ -128,7 +143,13 @@ impl Compiled {
             let (settings, rom) = (&scene.settings.structures[*structure], &scene.roms[*structure]);
             let load_order = settings.load.map_or(0, |load| load.order);
             let (model, loads) = (modes(settings, rom, 0.0)?, CarrierLoads::default());
-            Ok(CarrierParts { structure: *structure, model, load_order, loads })
+            let support = rom.extras.support.as_ref().filter(|_| scene.settings.outputs.support_reaction);
+            let support = support.map(|rows| Support {
+                stiffness: &rows.stiffness * &model.shapes,
+                mass: &rows.mass * &model.shapes,
+                thermal: rows.thermal.clone(),
+            });
+            Ok(CarrierParts { structure: *structure, model, load_order, loads, support })
         };
         let carriers = plan.carriers.iter().map(carrier).collect::<Result<_>>()?;
         let (table, _) = super::table::build(scene)?;
@@ -243,6 +264,7 @@ impl Compiled {
             (self.bodies[body].stiffness_range, self.bodies[body].model) = (ranges, model);
         }
         let asked = self.scene.settings.outputs.stress;
+        let modes_told = self.scene.settings.outputs.modal_amplitudes.is_some();
         let body = &mut self.bodies[body];
         body.reference_speed = speed;
         body.centrifugal = centrifugal(structure, rom, &body.model);
@@ -251,6 +273,12 @@ impl Compiled {
         }
         if let Some(stress) = rom.extras.stress.as_ref().filter(|_| asked) {
             body.stress = &stress.map * &body.model.shapes;
+        }
+        if modes_told {
+            let largest = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
+            let shapes = body.model.contact_modes.column_iter();
+            body.senses =
+                shapes.map(|shape| shape.iter().fold(0.0, largest)).map(|most| 1.0_f64.copysign(most)).collect();
         }
         Ok(())
     }
@@ -333,7 +361,9 @@ impl Compiled {
                 rows[carrier] += 3 * gap.spline().map_or(0, |surface| surface.control_points().len());
                 Carrier { structure: self.bodies.len() + carrier, first_row }
             });
-            pairs.push(PairParts { structure: plan.body, gap, carrier, friction: self.contact(index).friction });
+            let contact = self.contact(index);
+            let cutting = contact.coating.and_then(|coating| coating.cutting).map_or(0.0, |cut| 1.0 / cut.normal_ratio);
+            pairs.push(PairParts { structure: plan.body, gap, carrier, friction: contact.friction, cutting });
         }
         let coating = |pair| self.coating(pair).map_err(|error| self.of_pair(pair, error));
         let coatings = (0..pairs.len()).filter_map(|pair| Some((pair, coating(pair).transpose()?)));

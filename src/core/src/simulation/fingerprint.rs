@@ -15,6 +15,7 @@ pub fn of_scene(scene: &Scene) -> u64 {
         }
         matrices.extend(rom.extras.thermal.iter().map(|thermal| &thermal.loads));
         matrices.extend(rom.extras.watched.iter().map(|watched| &watched.map));
+        matrices.extend(rom.extras.support.iter().flat_map(|own| [&own.stiffness, &own.mass, &own.thermal]));
         for matrix in matrices {
             for value in matrix.iter() {
                 hash = fingerprint(&value.to_bits().to_le_bytes(), hash);

@@ -181,7 +181,7 @@ impl Simulation {
         let compiled = Compiled::new(scene)?;
         let (table, readers) = table::build(scene)?;
         let system = compiled.system()?;
-        let window = Window::new(system.structures(), &compiled.patches);
+        let window = Window::new(system.structures(), &compiled.patches, &compiled.scene.settings.outputs);
         let watched_gaps = WatchedGaps::new(&compiled)?;
         let sets = system.sets().count();
         let (energies, initial_energies) = (vec![SetEnergy::default(); sets], vec![0.0; sets]);

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+use super::compile::Compiled;
 use super::units::LENGTH;
-use super::window::Window;
+use super::window::{Window, speed_of};
 use super::{Phase, Simulation};
 use crate::dynamics::sectors::Sectors;
 use crate::gaps::sector_angle;
@@ -169,6 +170,13 @@ impl View<'_> {
         self.system.coating(pair).map_or(0.0, read)
     }
 
+    /// Mean wear depth of the coating of a pair around, or along (m).
+    pub fn wear_profile(&self, pair: usize, around: bool, out: &mut [f64]) {
+        if let Some(coating) = self.system.coating(pair) {
+            coating.wear_profile(around, out);
+        }
+    }
+
     pub fn modes(&self, body: usize) -> &Sectors {
         self.system.structures()[body].modes()
     }
@@ -251,6 +259,32 @@ impl View<'_> {
                 *value += model.contact_modes[(3 * node, mode)] * position;
             }
         }
+    }
+
+    /// Amplitude of a mode of a sector.
+    pub fn modal_amplitude(&self, body: usize, sector: usize, mode: usize) -> f64 {
+        self.simulation.compiled.bodies[body].senses[mode] * self.modes(body).modal_state(mode, sector).0
+    }
+
+    /// Displacement of a contact node of a sector along an axis of its frame (m).
+    pub fn displacement(&self, body: usize, sector: usize, node: usize, axis: usize) -> f64 {
+        self.modes(body).row(3 * node + axis, sector)
+    }
+
+    /// Force (N) or moment (N·m) of the support on a structure that carries surfaces, mean over the communication step.
+    pub fn support(&self, carrier: usize, row: usize) -> f64 {
+        let Compiled { carriers, bodies, .. } = &self.simulation.compiled;
+        let (Some(rows), own) = (&carriers[carrier].support, &self.window.supports[carrier]) else { return 0.0 };
+        let structure = &self.system.structures()[bodies.len() + carrier];
+        let mut sum = 0.0;
+        for (mode, (moved, speed)) in own.moved.iter().zip(&own.speeds).enumerate() {
+            let gained = speed_of(structure, mode) - speed;
+            sum += rows.stiffness[(row, mode)] * moved + rows.mass[(row, mode)] * gained;
+        }
+        let temperatures = self.simulation.inputs.carriers[carrier].temperatures.iter().enumerate();
+        let heated = temperatures.map(|(patch, input)| rows.thermal[(row, patch)] * input.at(0.5 * self.elapsed));
+        let heat: f64 = heated.sum();
+        self.mean * (sum - self.elapsed * heat)
     }
 
     /// Displacement of a watched point of a sector along an axis of its frame (m).

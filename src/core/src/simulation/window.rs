@@ -1,7 +1,10 @@
 //! What is gathered over one communication step: impulses, extremes, friction heat.
 
 use super::patches::Patches;
+use crate::dynamics::bank::ModalBank;
+use crate::gaps::wrench::cross;
 use crate::persist::persist_fields;
+use crate::settings::OutputSettings;
 use crate::system::{Structure, System};
 
 /// Of a structure that touches: sums and extremes since the communication step began, `[node · lanes + lane]`.
@@ -30,6 +33,17 @@ pub struct PairWindow {
     pub friction_heat: f64,
     /// The same per patch; empty where the scene has none.
     pub patch_heat: Vec<f64>,
+    /// ∫M dt on what touches about the origin (N·m·s); empty unless asked for.
+    pub casing_moment: Vec<f64>,
+}
+
+/// Of a structure that carries surfaces, per mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SupportWindow {
+    /// ∫q dt.
+    pub moved: Vec<f64>,
+    /// Velocity when the communication step began.
+    pub speeds: Vec<f64>,
 }
 
 /// Sums and extremes since the communication step began.
@@ -39,6 +53,8 @@ pub struct Window {
     pub bodies: Vec<BodyWindow>,
     /// Of the pairs.
     pub pairs: Vec<PairWindow>,
+    /// Of the structures under surfaces; empty unless asked for.
+    pub supports: Vec<SupportWindow>,
     /// Friction heat (J).
     pub friction_heat: f64,
     /// Largest λ (N).
@@ -46,12 +62,13 @@ pub struct Window {
 }
 
 persist_fields!(BodyWindow { lowest, normal_impulse, tangential_impulse, force_impulse, moment_impulse });
-persist_fields!(PairWindow { force_impulse, moment_impulse, friction_heat, patch_heat });
-persist_fields!(Window { bodies, pairs, friction_heat, normal_peak });
+persist_fields!(PairWindow { force_impulse, moment_impulse, friction_heat, patch_heat, casing_moment });
+persist_fields!(SupportWindow { moved, speeds });
+persist_fields!(Window { bodies, pairs, supports, friction_heat, normal_peak });
 
 impl Window {
     /// Room for the contact nodes of all structures and the patches of all pairs.
-    pub fn new(structures: &[Structure], patches: &[Option<Patches>]) -> Self {
+    pub fn new(structures: &[Structure], patches: &[Option<Patches>], outputs: &OutputSettings) -> Self {
         let body = |structure: &Structure| {
             let len = structure.gaps().len();
             BodyWindow {
@@ -67,10 +84,17 @@ impl Window {
             moment_impulse: [0.0; 3],
             friction_heat: 0.0,
             patch_heat: vec![0.0; patches.as_ref().map_or(0, Patches::len)],
+            casing_moment: vec![0.0; if outputs.casing_forces { 3 } else { 0 }],
         };
+        let support = |structure: &Structure| {
+            let modes = structure.modes().uncoupled().map_or(0, ModalBank::modes);
+            SupportWindow { moved: vec![0.0; modes], speeds: vec![0.0; modes] }
+        };
+        let carriers = structures.iter().filter(|structure| outputs.support_reaction && structure.nodes() == 0);
         Self {
             bodies: structures.iter().filter(|structure| structure.nodes() > 0).map(body).collect(),
             pairs: patches.iter().map(pair).collect(),
+            supports: carriers.map(support).collect(),
             friction_heat: 0.0,
             normal_peak: 0.0,
         }
@@ -88,6 +112,14 @@ impl Window {
             (pair.force_impulse, pair.moment_impulse) = ([0.0; 3], [0.0; 3]);
             pair.friction_heat = 0.0;
             pair.patch_heat.fill(0.0);
+            pair.casing_moment.fill(0.0);
+        }
+        let carriers = structures.iter().filter(|structure| structure.nodes() == 0);
+        for (support, structure) in self.supports.iter_mut().zip(carriers) {
+            support.moved.fill(0.0);
+            for (mode, speed) in support.speeds.iter_mut().enumerate() {
+                *speed = speed_of(structure, mode);
+            }
         }
         (self.friction_heat, self.normal_peak) = (0.0, 0.0);
     }
@@ -97,6 +129,14 @@ impl Window {
         for (body, structure) in self.bodies.iter_mut().zip(system.structures()) {
             for (lowest, gap) in body.lowest.iter_mut().zip(structure.lowest_gaps()) {
                 *lowest = if *gap < *lowest { *gap } else { *lowest };
+            }
+        }
+        let carriers = system.structures().iter().filter(|structure| structure.nodes() == 0);
+        for (support, structure) in self.supports.iter_mut().zip(carriers) {
+            for (mode, moved) in support.moved.iter_mut().enumerate() {
+                // Forces of the step are those of its beginning.
+                let (now, increment) = structure.modes().modal_state(mode, 0);
+                *moved += step * (now - increment);
             }
         }
         for event in system.events() {
@@ -115,6 +155,10 @@ impl Window {
             ] {
                 *sum = std::array::from_fn(|i| sum[i] + step * term[i]);
             }
+            if !pair.casing_moment.is_empty() {
+                let moment = cross(event.wrench.point, event.wrench.force);
+                pair.casing_moment.iter_mut().zip(moment).for_each(|(sum, term)| *sum += step * term);
+            }
             self.friction_heat += event.friction_heat;
             pair.friction_heat += event.friction_heat;
             if let Some(patches) = &patches[event.pair] {
@@ -128,4 +172,10 @@ impl Window {
     pub fn all_lowest(&self) -> Vec<f64> {
         self.bodies.iter().flat_map(|body| &body.lowest).copied().collect()
     }
+}
+
+/// Velocity of a mode of a structure under a surface.
+pub fn speed_of(structure: &Structure, mode: usize) -> f64 {
+    let step = structure.modes().step();
+    if step > 0.0 { structure.modes().modal_state(mode, 0).1 / step } else { 0.0 }
 }

@@ -119,7 +119,7 @@ pub fn stepped(
 }
 
 /// Of motions e^st.
-fn fastest(eigenvalues: &[Complex<f64>]) -> Fastest {
+pub(super) fn fastest(eigenvalues: &[Complex<f64>]) -> Fastest {
     let none = Fastest { rate: f64::NEG_INFINITY, frequency: 0.0 };
     eigenvalues.iter().fold(
         none,

@@ -131,7 +131,7 @@ impl Held {
 }
 
 /// Eigenvalues of a general matrix; `None` where the iteration does not end (entries of extreme size).
-fn general_eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+pub(super) fn general_eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     // Of nothing there are none; the iteration would look for its last row.
     if matrix.is_empty() {
         return Some(Vec::new());

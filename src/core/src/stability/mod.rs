@@ -8,6 +8,7 @@
 //!   scheme adds growth: the spectral radius of the constrained step map is compared with the growth of the
 //!   constrained differential equation.
 
+pub mod cutting;
 pub mod digging;
 mod growing;
 mod held;

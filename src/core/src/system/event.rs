@@ -19,7 +19,8 @@ pub struct ContactEvent {
     pub normal: f64,
     /// Largest λ within the step (N): a scheme may find it at several instants.
     pub peak: f64,
-    /// Magnitude of the friction force (N): µλ against slip, less where the contact sticks; 0 without slip.
+    /// Magnitude of the friction force (N): µλ against slip, less where the contact sticks; 0 without slip. With that of
+    /// what is cut.
     pub tangential: f64,
     /// Force on the structure (N) in the coordinates of its displacements.
     pub force: [f64; 3],
@@ -31,6 +32,8 @@ pub struct ContactEvent {
     pub coating: f64,
     /// Friction heat of the step (J).
     pub friction_heat: f64,
+    /// Way against the tangential force in the step (m).
+    pub slid: f64,
 }
 
 impl ContactEvent {
@@ -58,6 +61,7 @@ impl ContactEvent {
             wrench,
             coating,
             friction_heat: 0.0,
+            slid: 0.0,
         }
     }
 }

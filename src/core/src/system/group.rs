@@ -190,7 +190,7 @@ impl Group {
 
     /// Take a node into the group; on a coating the whole blade, whose nodes share cells.
     fn choose(&mut self, side: usize, index: usize, bodies: &Bodies) {
-        let (side, coated) = (&mut self.sides[side], self.law.coated().is_some());
+        let (side, coated) = (&mut self.sides[side], self.law.coating().is_some());
         side.chosen[index] = true;
         if coated {
             let structure = &bodies.structures[side.structure];
@@ -366,8 +366,8 @@ impl Group {
         for reaction in &self.reactions {
             reaction.apply(&mut bodies.structures[reaction.structure], bodies.ledger);
         }
-        if let Some(coated) = self.law.coated_mut() {
-            found.wear_energy.add(coated.commit());
+        if self.law.coating().is_some() {
+            found.wear_energy.add(self.law.commit());
         }
     }
 

@@ -112,7 +112,7 @@ impl System {
         friction: f64,
         settings: SystemSettings,
     ) -> Self {
-        let pair = PairParts { structure: 0, gap, carrier: None, friction };
+        let pair = PairParts { structure: 0, gap, carrier: None, friction, cutting: 0.0 };
         Self::of(vec![StructureParts::Touching(model, options)], vec![pair], Vec::new(), settings)
     }
 
@@ -180,7 +180,7 @@ impl System {
     pub fn coating(&self, pair: usize) -> Option<&Coating> {
         let structure = self.pairs[pair].structure();
         let group = self.groups.iter().find(|group| group.structures().any(|one| one == structure))?;
-        Some(group.law().coated()?.coating())
+        group.law().coating()
     }
 
     /// Contacts whose forces acted over the last step, and whose work was entered for it: those of that step, or of schemes whose
@@ -292,10 +292,7 @@ impl System {
     /// `drives`, one per pair.
     pub fn start(&mut self, drives: &[Drive]) {
         self.structures.iter_mut().for_each(Structure::start);
-        self.groups
-            .iter_mut()
-            .filter_map(|group| group.law_mut().coated_mut())
-            .for_each(|law| law.coating_mut().reset());
+        self.groups.iter_mut().filter_map(|group| group.law_mut().coating_mut()).for_each(Coating::reset);
         self.events.now.clear();
         self.events.before.clear();
         self.pairs.iter_mut().zip(drives).for_each(|(pair, drive)| pair.start(drive));

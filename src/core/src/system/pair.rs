@@ -29,6 +29,8 @@ pub struct PairParts {
     pub carrier: Option<Carrier>,
     /// Coulomb coefficient µ.
     pub friction: f64,
+    /// Tangential per normal force of a coating that is cut (-); 0 without one.
+    pub cutting: f64,
 }
 
 /// How prescribed motion has gone on.
@@ -82,6 +84,11 @@ impl Pair {
     /// Coulomb coefficient µ.
     pub fn friction(&self) -> f64 {
         self.parts.friction
+    }
+
+    /// Tangential per normal force of a coating that is cut (-); 0 without one.
+    pub fn cutting(&self) -> f64 {
+        self.parts.cutting
     }
 
     /// The gap function, to evaluate it.

@@ -155,6 +155,12 @@ impl Prediction for Posed<'_> {
     fn last_force(&self) -> [f64; 3] {
         self.structure.three(&self.structure.history.force.before, self.member.node, self.member.sector)
     }
+    fn slip_direction(&self) -> [f64; 3] {
+        Posed::slip_direction(self, self.normal())
+    }
+    fn sector(&self) -> usize {
+        self.member.sector
+    }
     fn angle(&self) -> f64 {
         let Member { node, index, .. } = self.member;
         self.pair.gap().angle_on_casing(At { node, index, drive: self.pair.drive(When::Now) }, self.displacement())

@@ -13,6 +13,8 @@ struct Work {
     shift: f64,
     casing: f64,
     heat: f64,
+    /// Against what is cut off.
+    cut: f64,
     /// Of the node that stops at the surface.
     closing: f64,
     /// The part of it that a coating takes.
@@ -32,6 +34,7 @@ impl Work {
         self.shift += other.shift;
         self.casing += other.casing;
         self.heat += other.heat;
+        self.cut += other.cut;
         self.closing += other.closing;
         self.worn += other.worn;
         self.exact += other.exact;
@@ -40,7 +43,7 @@ impl Work {
 
     /// What has no other name.
     fn curvature(&self) -> f64 {
-        self.exact + self.heat + self.closing - (self.shaft + self.whirl + self.shift + self.casing)
+        self.exact + self.heat + self.cut + self.closing - (self.shaft + self.whirl + self.shift + self.casing)
     }
 }
 
@@ -89,6 +92,9 @@ impl System {
             }
             let work = self.work_of(event, moved, &motion, when);
             event.friction_heat = work.heat;
+            if event.tangential > 0.0 {
+                event.slid = (work.heat + work.cut) / event.tangential;
+            }
             total.add(&work);
         }
         if !events.is_empty() {
@@ -107,6 +113,19 @@ impl System {
     /// When the contacts that acted over the last step were found.
     pub(super) fn when_acted(&self) -> When {
         if self.settings.scheme.acts_later() { When::Before } else { When::Now }
+    }
+
+    /// Remove what blades have cut on their way over the step just done.
+    pub(crate) fn remove_cut(&mut self) {
+        for (group, ledger) in self.groups.iter_mut().zip(&mut self.counted.ledgers) {
+            let Some(structure) = group.structures().next() else { continue };
+            let Some(coating) = group.law_mut().coating_mut().filter(|coating| coating.is_cut()) else { continue };
+            for event in self.events.now.iter().filter(|event| event.structure == structure) {
+                let place = self.pairs[event.pair].nodes().iter().position(|node| *node == event.node);
+                place.into_iter().for_each(|node| coating.slid(event.sector, node, event.slid));
+            }
+            ledger.wear_energy.add(coating.cut());
+        }
     }
 
     fn enter_loads(&mut self) {
@@ -128,6 +147,7 @@ impl System {
         ledger.wear_work.add(work.worn);
         ledger.impact_loss.add(work.closing - work.worn);
         ledger.friction_loss.add(work.heat);
+        ledger.cutting_work.add(work.cut);
         ledger.shaft_work.add(work.shaft);
         ledger.whirl_work.add(work.whirl);
         ledger.shift_work.add(work.shift);
@@ -155,13 +175,16 @@ impl System {
         let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -dot(normal, moved) };
         let ([x, y, z], across) = (event.wrench.force, motion.shaft);
         let (shaft, casing) = (-dot(event.force, spin), event.normal * surface);
+        let opposed = -dot(tangential, slip);
+        let cut = if pair.cutting() > 0.0 { opposed * share_cut(event, pair.cutting()) } else { 0.0 };
         let (whirl, shift) = (-(x * across[0] + y * across[1]), -z * across[2]);
         Work {
             shaft,
             whirl,
             shift,
             casing,
-            heat: -dot(tangential, slip),
+            heat: opposed - cut,
+            cut,
             closing: event.normal * approach,
             worn: event.coating * approach,
             exact: dot(event.force, moved),
@@ -201,4 +224,9 @@ impl System {
         let carried = at_place(surface, place, frame, |row| 0.5 * (now[row] - oldest[row]));
         std::array::from_fn(|i| moved[i] - carried[i])
     }
+}
+
+/// Part of the tangential force of a contact that cuts.
+fn share_cut(event: &ContactEvent, tangential: f64) -> f64 {
+    if event.tangential > 0.0 { (tangential * event.coating / event.tangential).min(1.0) } else { 0.0 }
 }

@@ -22,6 +22,7 @@ fn settings() -> CoatingSettings {
         hardening: HARDENING,
         cells_around: 360,
         cells_along: 20,
+        cutting: None,
     }
 }
 

@@ -2,10 +2,12 @@
 //! are those of the first release.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Patch, RomExtras, STRESSES, Spin, Thermal, Watched};
+use tiprub_core::rom::{
+    Basis, ContactGrid, ContactNode, Patch, RomExtras, STRESSES, SUPPORT_ROWS, Spin, Support, Thermal, Watched,
+};
 
 use super::{Array, Arrays, Metadata, Reader, WRITE_AGAIN, list, matrix, names};
-use crate::rom_layout::{SPIN_ARRAYS, STRESS_ARRAYS, THERMAL_ARRAYS, WATCHED_ARRAYS};
+use crate::rom_layout::{SPIN_ARRAYS, STRESS_ARRAYS, SUPPORT_ARRAYS, SUPPORT_THERMAL, THERMAL_ARRAYS, WATCHED_ARRAYS};
 use crate::{Result, suggestion};
 
 /// Third word of a contact grid with free edges all around.
@@ -31,6 +33,7 @@ impl Reader<'_> {
             harmonics: Vec::new(),
             watched: self.watched((arrays, metadata), (&WATCHED_ARRAYS, 3), order)?,
             stress: self.watched((arrays, metadata), (&STRESS_ARRAYS, STRESSES), order)?,
+            support: self.support(arrays, order)?,
             basis: self.basis(metadata)?,
             rows: self.rows(metadata)?,
         })
@@ -145,6 +148,33 @@ impl Reader<'_> {
         Ok(Some(Thermal { loads, patches: places.iter().map(patch).collect() }))
     }
 
+    fn support(&self, arrays: &Arrays, order: usize) -> Result<Option<Support>> {
+        if !self.group(arrays, &SUPPORT_ARRAYS)? {
+            if arrays.contains_key(SUPPORT_THERMAL) {
+                let problem = format!("given without the array `{}`", SUPPORT_ARRAYS[0]);
+                return Err(self.error(format!("array `{SUPPORT_THERMAL}`"), problem, "Remove it, or add the others"));
+            }
+            return Ok(None);
+        }
+        let rows = |name: &str, columns: usize, reason: &str| {
+            let array = self.required(arrays, name, 2)?;
+            self.shape(name, array, &[SUPPORT_ROWS, columns], reason)?;
+            Ok(DMatrix::from_row_slice(SUPPORT_ROWS, columns, &array.values))
+        };
+        let patches = arrays.get("thermal_patches").map_or(0, |patches| patches.shape[0]);
+        let reason = "three forces and three moments, coordinates as in `mass`";
+        Ok(Some(Support {
+            stiffness: rows(SUPPORT_ARRAYS[0], order, reason)?,
+            mass: rows(SUPPORT_ARRAYS[1], order, reason)?,
+            thermal: match arrays.get(SUPPORT_THERMAL) {
+                Some(_) => {
+                    rows(SUPPORT_THERMAL, patches, "three forces and three moments, patches as in `thermal_patches`")?
+                }
+                None => DMatrix::zeros(SUPPORT_ROWS, patches),
+            },
+        }))
+    }
+
     fn grid(&self, metadata: &Metadata) -> Result<Option<ContactGrid>> {
         let Some(text) = metadata.get("contact_grid") else { return Ok(None) };
         let words: Vec<&str> = text.split(',').map(str::trim).collect();
@@ -190,6 +220,13 @@ pub(super) fn arrays(extras: &RomExtras) -> Vec<(&'static str, Array)> {
         let shape = vec![count, watched.map.nrows() / count, watched.map.ncols()];
         let places = watched.points.iter().flat_map(|point| point.position).collect();
         arrays.extend([(map, Array { shape, ..matrix(&watched.map) }), (positions, list(places, vec![count, 3]))]);
+    }
+    if let Some(support) = &extras.support {
+        let [stiffness, mass] = SUPPORT_ARRAYS;
+        arrays.extend([(stiffness, matrix(&support.stiffness)), (mass, matrix(&support.mass))]);
+        if support.thermal.ncols() > 0 {
+            arrays.push((SUPPORT_THERMAL, matrix(&support.thermal)));
+        }
     }
     arrays
 }

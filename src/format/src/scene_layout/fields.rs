@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 74] = [
+pub const FIELDS: [SceneField; 82] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
     field(
@@ -310,7 +310,7 @@ pub const FIELDS: [SceneField; 74] = [
         "table",
         Some("none"),
         "with the solver `lcp` only",
-        "Abradable coating of the slave: cells of rods that yield and harden. `gap` ends at its unworn surface.",
+        "Abradable coating of the slave: cells of rods that yield and harden, or that are cut. `gap` ends at its unworn surface.",
     ),
     field(
         "contact.coating.thickness",
@@ -319,19 +319,25 @@ pub const FIELDS: [SceneField; 74] = [
         "1e-9 to 0.1",
         "Thickness; the hard surface lies this far behind the unworn one.",
     ),
-    field("contact.coating.modulus", "number, Pa", None, "5e-324 to 1e13", "Modulus of elasticity."),
+    field(
+        "contact.coating.modulus",
+        "number, Pa",
+        None,
+        "5e-324 to 1e13; not with `cutting`",
+        "Modulus of elasticity.",
+    ),
     field(
         "contact.coating.yield_stress",
         "number, Pa",
         None,
-        "0 to 1e13",
+        "0 to 1e13; not with `cutting`",
         "Stress at which the unworn coating yields.",
     ),
     field(
         "contact.coating.hardening",
         "number, Pa",
         None,
-        "0 to 1e13",
+        "0 to 1e13; not with `cutting`",
         "Increase of the yield stress per plastic strain; 0 is perfectly plastic.",
     ),
     field(
@@ -347,6 +353,27 @@ pub const FIELDS: [SceneField; 74] = [
         None,
         "≥ 1",
         "Cells along the axis, over the axial extent of the contact nodes.",
+    ),
+    field(
+        "contact.coating.cutting",
+        "table",
+        Some("none"),
+        "in place of `modulus`, `yield_stress`, `hardening`",
+        "The tips cut the coating off along their way: tangential force u·b·a of a cut of width b and depth a, paid by the shaft.",
+    ),
+    field(
+        "contact.coating.cutting.specific_energy",
+        "number, J/m³",
+        None,
+        "1e3 to 1e12",
+        "Energy u of cutting per volume removed.",
+    ),
+    field(
+        "contact.coating.cutting.normal_ratio",
+        "number",
+        None,
+        "0.05 to 20",
+        "Normal force of a cut per tangential force.",
     ),
     field(
         "contact.heat_to_slave",
@@ -429,6 +456,41 @@ pub const FIELDS: [SceneField; 74] = [
         Some("false"),
         "",
         "Stress of watched sectors at the places that the ROM recovers it at.",
+    ),
+    field(
+        "outputs.modal_amplitudes",
+        "whole number",
+        Some("none"),
+        "1 to the number of modes; not with coupled sectors",
+        "Amplitudes of so many modes of watched sectors, from the lowest, of modal mass 1 kg.",
+    ),
+    field(
+        "outputs.tip_displacements",
+        "true or false",
+        Some("false"),
+        "",
+        "Displacements of the contact nodes of watched sectors.",
+    ),
+    field(
+        "outputs.casing_forces",
+        "true or false",
+        Some("false"),
+        "",
+        "Force and moment on every surface around an axis, in fixed directions and about the origin on the axis.",
+    ),
+    field(
+        "outputs.support_reaction",
+        "true or false",
+        Some("false"),
+        "",
+        "Force and moment of the support on the casing, of a ROM that carries the rows of its held nodes.",
+    ),
+    field(
+        "outputs.wear_profile",
+        "true or false",
+        Some("false"),
+        "",
+        "Mean wear depth at each place around, and of each row along the axis.",
     ),
     field("outputs.wear", "true or false", Some("false"), "", "Wear depth of every coating cell."),
     field(

@@ -27,6 +27,8 @@ pub fn scene_with_every_feature() -> SceneSettings {
     scene.contacts[0].heat_to_slave = Some(0.4);
     (scene.outputs.wear, scene.outputs.slave_displacement) = (true, true);
     scene.outputs.stress = true;
+    (scene.outputs.modal_amplitudes, scene.outputs.tip_displacements) = (Some(5), true);
+    (scene.outputs.casing_forces, scene.outputs.support_reaction, scene.outputs.wear_profile) = (true, true, true);
     scene.time.input_interpolation = InputInterpolation::Hold;
     scene.time.tolerance = Some(2e-3);
     scene.time.steps_at_most = Some(5000);
@@ -42,6 +44,7 @@ fn coating() -> CoatingSettings {
         hardening: 1e8,
         cells_around: 1000,
         cells_along: 20,
+        cutting: None,
     }
 }
 

@@ -5,7 +5,9 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Frame, Patch, RomExtras, RubErrors, Spin, Thermal, Watched};
+use tiprub_core::rom::{
+    Basis, ContactGrid, ContactNode, Frame, Patch, RomExtras, RubErrors, Spin, Support, Thermal, Watched,
+};
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
 
@@ -65,6 +67,11 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
     let points: Vec<ContactNode> = ["leading_edge", "mid_chord"].into_iter().enumerate().map(point).collect();
     rom.extras.watched = Some(Watched { map: DMatrix::from_fn(6, order, |_, _| value()), points: points.clone() });
     rom.extras.stress = Some(Watched { map: DMatrix::from_fn(12, order, |_, _| value()), points });
+    rom.extras.support = Some(Support {
+        stiffness: DMatrix::from_fn(6, order, |_, _| value()),
+        mass: DMatrix::from_fn(6, order, |_, _| value()),
+        thermal: DMatrix::from_fn(6, patches, |_, _| value()),
+    });
     rom.extras.basis = Basis::FreeInterface;
     (rom.checks.response_frequencies, rom.checks.response_deviation) = (vec![100.0, 2e3], vec![0.1, value()]);
     rom.checks.flexibility_deviation = vec![1e-9; rom.contact_nodes.len()];
@@ -78,6 +85,7 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
 fn of_the_first_format(rom: &Rom) -> Rom {
     let mut rom = rom.clone();
     (rom.extras.watched, rom.extras.stress, rom.extras.basis) = (None, None, Basis::default());
+    rom.extras.support = None;
     rom.checks.response_frequencies.clear();
     rom.checks.response_deviation.clear();
     rom.checks.flexibility_deviation.clear();
@@ -125,7 +133,8 @@ fn a_file_is_of_the_first_format_that_holds_it() {
     let plain = of_the_first_format(&full);
     let version = |rom: &Rom| Loose::of(rom).entries["format_version"].clone();
     assert_eq!(version(&plain), "1");
-    let with: [fn(&mut Rom, &Rom); 9] = [
+    let with: [fn(&mut Rom, &Rom); 10] = [
+        |rom, full| rom.extras.support.clone_from(&full.extras.support),
         |rom, full| rom.extras.stress.clone_from(&full.extras.stress),
         |rom, full| rom.extras.watched.clone_from(&full.extras.watched),
         |rom, full| rom.extras.basis = full.extras.basis,
@@ -180,10 +189,12 @@ pub fn with_extras() -> impl Strategy<Value = Rom> {
     (0..u64::MAX / 2, 1..7usize, 1..5usize, prop::array::uniform5(any::<bool>())).prop_map(
         |(seed, order, patches, has)| {
             let mut rom = complete(seed, order, patches);
-            let RomExtras { spin, thermal, grid, harmonics, watched, stress, basis, rows } = rom.extras;
+            let RomExtras { spin, thermal, grid, harmonics, watched, stress, support, basis, rows } = rom.extras;
             let (spin, thermal) = (spin.filter(|_| has[0]), thermal.filter(|_| has[1]));
+            // Its columns are the patches.
+            let support = support.filter(|_| has[1]);
             let (grid, watched) = (grid.filter(|_| has[2]), watched.filter(|_| has[3]));
-            rom.extras = RomExtras { spin, thermal, grid, harmonics, watched, stress, basis, rows };
+            rom.extras = RomExtras { spin, thermal, grid, harmonics, watched, stress, support, basis, rows };
             if has[4] { of_the_first_format(&rom) } else { rom }
         },
     )

@@ -10,6 +10,7 @@ mod grid;
 mod modal_form;
 mod reduction;
 mod ring_mesh;
+mod support;
 
 pub use casing37::{CASING37, casing37_contour};
 pub use condense::condense;

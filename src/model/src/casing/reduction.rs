@@ -12,6 +12,7 @@ use tiprub_core::rom::{Frame, Patch, RomChecks, RomExtras, Thermal};
 use super::condense::condense;
 use super::grid::GridNodes;
 use super::modal_form::{ModalForm, modal_form};
+use super::support::HeldRows;
 use crate::Result;
 use crate::assembly::{assemble_with, free_dofs};
 use crate::craig_bampton::{CraigBampton, InnerBasis, craig_bampton_with};
@@ -67,9 +68,11 @@ pub fn reduce_casing(
     grid.validate()?;
     check_nodes(&mesh.nodes, clamped, &grid.contact_points(), Frame::Cylindrical)?;
     let free = free_dofs(mesh.nodes.len(), clamped);
-    let loads = patch_loads(&mesh, material, patches)?;
-    let loads = Mat::from_fn(free.len(), patches.len(), |i, k| loads[(free[i], k)]);
+    let all_loads = patch_loads(&mesh, material, patches)?;
+    let loads = Mat::from_fn(free.len(), patches.len(), |i, k| all_loads[(free[i], k)]);
     let assembled = assemble_with(&mesh, material, options.formulation, listener)?;
+    let held = || HeldRows::new(&assembled, &mesh.nodes, clamped, &free, &all_loads);
+    let held = (!clamped.is_empty()).then(held);
     let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
     drop(assembled);
     let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)?;
@@ -99,6 +102,7 @@ pub fn reduce_casing(
         extras: RomExtras {
             thermal: thermal(&reduced_loads, patches, &modes),
             grid: Some(grid.shape()),
+            support: held.map(|rows| rows.reduced(&reduced, &modes)),
             ..RomExtras::default()
         },
     };

@@ -203,6 +203,101 @@ fn heat_and_contact_forces_are_answered_at_rest_as_by_the_full_model() {
     }
 }
 
+/// The support of a casing at rest takes forces and moments of its contact nodes, and those alone: heat has none.
+#[test]
+fn a_support_takes_what_acts_on_its_casing() {
+    for support in [Support::Low, Support::Both] {
+        let rom = &reduced(support).rom;
+        let rows = rom.extras.support.as_ref().unwrap();
+        let felt = |forces: &DVector<f64>| {
+            let answer = DVector::from_fn(rom.order(), |i, _| forces[i] / rom.stiffness[(i, i)]);
+            &rows.stiffness * answer
+        };
+        let mut worst = [0.0_f64; 2];
+        for node in [0, 30, 71] {
+            let [radius, angle, z] = rom.contact_nodes[node].position;
+            let (sine, cosine) = angle.sin_cos();
+            let [x, y] = [radius * cosine, radius * sine];
+            for (component, [fx, fy, fz]) in
+                [[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]].into_iter().enumerate()
+            {
+                let moment = [y * fz - z * fy, z * fx - x * fz, x * fy - y * fx];
+                let found = felt(&rom.contact_map.row(3 * node + component).transpose());
+                for (row, acting) in [fx, fy, fz].into_iter().chain(moment).enumerate() {
+                    let size = if row < 3 { 1.0 } else { radius };
+                    worst[0] = worst[0].max((found[row] + acting).abs() / size);
+                }
+            }
+        }
+        let thermal = rom.extras.thermal.as_ref().unwrap();
+        for patch in 0..thermal.patches.len() {
+            let elastic = felt(&thermal.loads.column(patch).into_owned());
+            let left = &elastic - rows.thermal.column(patch);
+            // Against the force that keeps the patch from growing.
+            worst[1] = worst[1].max(left.amax() / thermal_size(patch));
+        }
+        println!(
+            "{support:?}: reaction off by {:.1e} of a contact force, {:.1e} of the force of a patch",
+            worst[0], worst[1]
+        );
+        assert!(worst[0] < 1e-8 && worst[1] < 1e-8, "{support:?}: {worst:?}");
+    }
+    assert!(reduced(Support::Free).rom.extras.support.is_none());
+}
+
+/// Sum of the magnitudes of the nodal forces of a patch of the coarse casing (N/K).
+fn thermal_size(patch: usize) -> f64 {
+    let options = coarse(Support::Low);
+    let ring = supported_ring(&options).unwrap();
+    let patches = equal_patches(12, 2, options.geometry.contour.axial());
+    let loads = patch_loads(&ring.mesh, &options.material, &patches).unwrap();
+    (0..loads.nrows()).map(|dof| loads[(dof, patch)].abs()).sum()
+}
+
+/// In a mode of the full model the support accelerates all of its mass: force and moment are those of M ü over all nodes.
+#[test]
+fn a_support_gives_a_vibrating_casing_its_momentum() {
+    let reduction = reduced(Support::Low);
+    let (rom, options) = (&reduction.rom, coarse(Support::Low));
+    let ring = supported_ring(&options).unwrap();
+    let mass = assemble(&ring.mesh, &options.material, &silent).unwrap().mass;
+    let rows = rom.extras.support.as_ref().unwrap();
+    let (mut seen, mut inertia_told) = (0, 0.0_f64);
+    for (index, mode) in reduction.modes.iter().take(10).enumerate() {
+        let square = rom.stiffness[(index, index)];
+        let shape = Mat::from_fn(mass.order(), 1, |dof, _| mode.shape[dof / 3][dof % 3]);
+        let carried = mass.times(shape.as_ref());
+        let mut expected = [0.0; 6];
+        for (node, [x, y, z]) in ring.mesh.nodes.iter().enumerate() {
+            let [fx, fy, fz] = [0, 1, 2].map(|i| -square * carried[(3 * node + i, 0)]);
+            let terms = [fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx];
+            expected.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        }
+        let inertia = rows.mass.column(index) * -square;
+        let found = rows.stiffness.column(index) + &inertia;
+        let size = expected.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
+        // Nodal diameters from 2 on have no momentum; of double modes any mixture is one.
+        let single = [index.wrapping_sub(1), index + 1].iter().all(|other| {
+            rom.checks.full_frequencies.get(*other).is_none_or(|f| (f / mode.frequency - 1.0).abs() > 1e-3)
+        });
+        let scale = square * 0.1 * carried.norm_max() * 100.0;
+        println!(
+            "mode {index} {:.1} Hz single {single}: {expected:.4?} {:.4?} (of mass {:.1e})",
+            mode.frequency,
+            found.as_slice(),
+            inertia.amax()
+        );
+        if size > 1e-3 * scale && single {
+            let sign = if (0..6).map(|i| found[i] * expected[i]).sum::<f64>() > 0.0 { 1.0 } else { -1.0 };
+            let off = (0..6).map(|i| (sign * found[i] - expected[i]).abs()).fold(0.0, f64::max) / size;
+            assert!(off < 2e-2, "mode {index}: {off:e}");
+            (seen, inertia_told) = (seen + 1, inertia_told.max(inertia.amax() / size));
+        }
+    }
+    println!("{seen} modes with momentum; part of the rows of the mass up to {inertia_told:.1e}");
+    assert!(seen > 0);
+}
+
 fn box_pencil() -> (Mesh, SparseMatrix, SparseMatrix) {
     let mesh = distorted_box(ElementKind::Hex8, [4, 2, 2], [0.3, 0.04, 0.05], wobble(0.1));
     let assembled = assemble(&mesh, &Material::steel(), &silent).unwrap();

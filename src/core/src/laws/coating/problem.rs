@@ -45,6 +45,8 @@ pub struct CoatedProblem {
     /// Normal gap of node i per multiplier of node j (m/N), friction included; capacity × capacity, the leading
     /// `size` × `size` part in use.
     pub delassus: DMatrix<f64>,
+    /// The same per force of a coating that is cut, which pulls differently from friction on the hard casing.
+    pub cut: Option<DMatrix<f64>>,
     /// As in [`ContactSolver::monotone`](crate::laws::active_set::ContactSolver::monotone).
     pub monotone: bool,
     /// Predicted gaps to the unworn surface (m); corrected gaps on return.
@@ -78,6 +80,7 @@ impl CoatedProblem {
             thickness,
             size: 0,
             delassus: DMatrix::zeros(nodes, nodes),
+            cut: None,
             monotone: false,
             gaps: vec![0.0; nodes],
             coating: vec![0.0; nodes],

@@ -19,7 +19,7 @@ fn material(
     cells_around: usize,
     cells_along: usize,
 ) -> CoatingSettings {
-    CoatingSettings { thickness: THICKNESS, modulus, yield_stress, hardening, cells_around, cells_along }
+    CoatingSettings { thickness: THICKNESS, modulus, yield_stress, hardening, cells_around, cells_along, cutting: None }
 }
 
 /// One blade with nodes at z = 0, 1, ... on radius 1.

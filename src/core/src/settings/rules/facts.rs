@@ -62,6 +62,10 @@ pub(super) const GAP: Fact = fact("contact.gap", "", |at| at.contact().gap != 0.
 pub(super) const SECTOR_GAPS: Fact = fact("contact.sector_gaps", "", |at| !at.contact().sector_gaps.is_empty());
 pub(super) const MERIDIAN: Fact = fact("contact.meridian", "", |at| at.contact().meridian != Meridian::default());
 pub(super) const COATING: Fact = fact("contact.coating", "", |at| at.is_coated());
+pub(super) const MODULUS: Fact = fact("contact.coating.modulus", "", |at| at.plastic(|coating| coating.modulus));
+pub(super) const YIELD: Fact =
+    fact("contact.coating.yield_stress", "", |at| at.plastic(|coating| coating.yield_stress));
+pub(super) const HARDENING: Fact = fact("contact.coating.hardening", "", |at| at.plastic(|coating| coating.hardening));
 pub(super) const HEAT: Fact = fact("contact.heat_to_slave", "", |at| at.contact().heat_to_slave.is_some());
 pub(super) const SOLVER: Fact = fact("contact.solver", "", |_| true);
 pub(super) const FILM: Fact = fact("contact.solver", "`film`", |at| at.solver == Solver::Film);
@@ -83,5 +87,10 @@ pub(super) const OTHER_SECTORS: Fact =
 pub(super) const ALL_SECTORS: Fact = fact("outputs.all_sectors", "", |at| at.outputs().all_sectors);
 pub(super) const DIAMETERS: Fact = fact("outputs.nodal_diameters", "", |at| at.outputs().nodal_diameters.is_some());
 pub(super) const STRESS: Fact = fact("outputs.stress", "", |at| at.outputs().stress);
+pub(super) const MODES: Fact = fact("outputs.modal_amplitudes", "", |at| at.outputs().modal_amplitudes.is_some());
+pub(super) const TIPS: Fact = fact("outputs.tip_displacements", "", |at| at.outputs().tip_displacements);
+pub(super) const CASING_FORCES: Fact = fact("outputs.casing_forces", "", |at| at.outputs().casing_forces);
+pub(super) const SUPPORT: Fact = fact("outputs.support_reaction", "", |at| at.outputs().support_reaction);
+pub(super) const WEAR_PROFILE: Fact = fact("outputs.wear_profile", "", |at| at.outputs().wear_profile);
 pub(super) const WEAR: Fact = fact("outputs.wear", "", |at| at.outputs().wear);
 pub(super) const DISPLACEMENT: Fact = fact("outputs.slave_displacement", "", |at| at.outputs().slave_displacement);

@@ -2,7 +2,8 @@
 
 use crate::Rom;
 use crate::settings::{
-    ContactSettings, Motion, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings, SurfaceSettings,
+    CoatingSettings, ContactSettings, Motion, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings,
+    SurfaceSettings,
 };
 
 /// A place of a scene: one of its structures or contacts, or the scene as a whole.
@@ -73,6 +74,15 @@ impl<'a> Place<'a> {
 
     pub(super) fn is_coated(&self) -> bool {
         self.contact().coating.is_some()
+    }
+
+    pub(super) fn is_cut(&self) -> bool {
+        self.contact().coating.is_some_and(|coating| coating.cutting.is_some())
+    }
+
+    /// Whether it is given for a coating.
+    pub(super) fn plastic(&self, value: fn(&CoatingSettings) -> f64) -> bool {
+        self.contact().coating.is_some_and(|coating| value(&coating) != 0.0)
     }
 
     /// Place among the structures of the one under the surface of the contact.

@@ -57,9 +57,22 @@ fn flight() -> Scene {
     scene(Motion::Free, Frame::Cartesian)
 }
 
+fn cut() -> Option<CoatingSettings> {
+    let cutting = Some(CuttingSettings { specific_energy: 1e9, normal_ratio: 1.0 });
+    Some(CoatingSettings { modulus: 0.0, yield_stress: 0.0, hardening: 0.0, cutting, ..coating()? })
+}
+
 fn coating() -> Option<CoatingSettings> {
     let (thickness, modulus, yield_stress, hardening) = (1e-4, 2e8, 1e6, 2e7);
-    Some(CoatingSettings { thickness, modulus, yield_stress, hardening, cells_around: 500, cells_along: 3 })
+    Some(CoatingSettings {
+        thickness,
+        modulus,
+        yield_stress,
+        hardening,
+        cells_around: 500,
+        cells_along: 3,
+        cutting: None,
+    })
 }
 
 /// A second contact of the same master, on a surface of the same structure.
@@ -113,6 +126,29 @@ const OF_ROTORS: &[(&str, Change)] = &[
     ("contact[2].coating: excludes contacts solved together", |scene| {
         second(&mut scene.settings);
         scene.settings.contacts[1].coating = coating();
+    }),
+    ("contact[1].coating.modulus: excludes `contact.coating.cutting`", |scene| {
+        scene.settings.contacts[0].coating = cut().map(|cut| CoatingSettings { modulus: 2e8, ..cut });
+    }),
+    ("time.scheme: `massless-boundary` excludes `contact.coating.cutting`", |scene| {
+        scene.settings.contacts[0].coating = cut();
+        scene.settings.time.scheme = Scheme::MasslessBoundary;
+    }),
+    ("outputs.support_reaction: needs `surface.structure`", |scene| {
+        scene.settings.surfaces[0].structure = None;
+        scene.settings.outputs.support_reaction = true;
+    }),
+    ("outputs.support_reaction: needs rows of the support", |scene| {
+        scene.settings.outputs.support_reaction = true;
+    }),
+    ("time.scheme: `galerkin` excludes `outputs.support_reaction`", |scene| {
+        galerkin(&mut scene.settings);
+        scene.settings.surfaces[0].structure = Some("under".into());
+        scene.settings.outputs.support_reaction = true;
+    }),
+    ("outputs.modal_amplitudes: excludes a rotor whose sectors", |scene| {
+        scene.settings.outputs.modal_amplitudes = Some(1);
+        couple(&mut scene.roms[0]);
     }),
     ("contact[2].solver: needs that of contact[1]", |scene| {
         second(&mut scene.settings);
@@ -194,6 +230,9 @@ const OF_FREE_MASTERS: &[(&str, Change)] = &[
     ("contact[1].gap: excludes a free master", |scene| scene.settings.contacts[0].gap = 1e-3),
     ("contact[1].master: a free structure needs `surface.structure`", |scene| {
         scene.settings.surfaces[0].structure = None;
+    }),
+    ("outputs.casing_forces: excludes a scene of free masters only", |scene| {
+        scene.settings.outputs.casing_forces = true;
     }),
     ("outputs.all_sectors: excludes a scene of free masters only", |scene| scene.settings.outputs.all_sectors = true),
     ("outputs.slave_displacement: needs `surface.structure` of a surface around an axis", |scene| {

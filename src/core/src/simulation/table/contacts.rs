@@ -62,7 +62,7 @@ pub fn totals(table: &mut Builder, friction: bool) {
 type Energy = (&'static str, Span, Quantity, &'static str, fn(&View) -> f64);
 
 /// All rows of the ledger; what has no text is told in other words of rotors and of free bodies.
-const ENERGIES: [Energy; 17] = [
+const ENERGIES: [Energy; 18] = [
     ("kinetic_energy", Span::Point, Quantity::KineticEnergy, "", |view| view.energies.0),
     ("strain_energy", Span::Point, Quantity::StrainEnergy, "", |view| view.energies.1),
     (
@@ -86,6 +86,13 @@ const ENERGIES: [Energy; 17] = [
         Quantity::Output,
         "Work of the coating's normal force against the approach of the blades since the start",
         |view| view.ledger().wear_work.value(),
+    ),
+    (
+        "cutting_work",
+        Span::Total,
+        Quantity::Output,
+        "Work along the way against what blades cut off the coating since the start: specific cutting energy times volume",
+        |view| view.ledger().cutting_work.value(),
     ),
     (
         "load_work",
@@ -191,6 +198,7 @@ fn exists(parts: &Parts, name: &str) -> bool {
     match name {
         "friction_loss" => parts.has_friction(),
         "wear_work" => pairs.iter().any(|pair| pair.contact.coating.is_some()),
+        "cutting_work" => parts.is_cut(),
         "load_work" => features::is_loaded(parts),
         // What flies freely has no inputs that could work.
         "external_work" => bodies.iter().any(|body| !body.free),

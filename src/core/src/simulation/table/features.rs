@@ -1,12 +1,12 @@
 //! Rows of what only some scenes ask for.
 
 use super::builder::Builder;
-use super::parts::{Body, Carrier, Pair, Parts, largest_length};
+use super::parts::{AXES, Body, Carrier, Pair, Parts, largest_length};
 use crate::laws::coating::Coating;
 use crate::ranges;
 use crate::settings::{CoatingSettings, StructureSettings};
 use crate::simulation::outputs::{each, scalar, whole};
-use crate::simulation::units::{ANGLE, ENERGY, LENGTH, LINE_LOAD, POWER, TEMPERATURE, VOLUME};
+use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
 use crate::variables::{Kind, Quantity, Span, Start, Variability};
 
 /// Temperatures beyond this are not what a linear expansion describes (K).
@@ -129,6 +129,16 @@ pub fn outputs(table: &mut Builder, parts: &Parts) {
             wear(table, parts, pair, coating);
         }
     }
+    for pair in pairs.iter().filter(|pair| parts.settings.outputs.casing_forces && !pair.body.free) {
+        table.belongs(pair.index, parts.of_pair(pair));
+        casing_forces(table, pair);
+    }
+    for carrier in parts.carriers().iter().filter(|_| parts.settings.outputs.support_reaction) {
+        if carrier.rom.extras.support.is_some() && !carrier.open {
+            table.belongs(carrier.index, parts.of_carrier(carrier));
+            support(table, carrier);
+        }
+    }
     for carrier in parts.carriers().iter().filter(|carrier| parts.settings.outputs.slave_displacement && !carrier.open)
     {
         table.belongs(carrier.index, parts.of_carrier(carrier));
@@ -138,6 +148,44 @@ pub fn outputs(table: &mut Builder, parts: &Parts) {
         let row = table.output("casing_displacement", Span::Point, Some((&LENGTH, 1e-4)), text, read);
         (row.dimension, row.display) = (Some(carrier.rom.contact_nodes.len()), Some(1));
         row.quantity = Quantity::SlaveDisplacement;
+    }
+}
+
+/// Force and moment on a surface: opposite to those on the rotor, at the same points.
+fn casing_forces(table: &mut Builder, pair: &Pair) {
+    let index = pair.index;
+    for (axis, letter) in AXES.into_iter().enumerate() {
+        let text = format!("Contact force on the casing along fixed {letter}, mean over the communication step");
+        let read = scalar(move |view| -view.mean * view.window.pairs[index].force_impulse[axis]);
+        table.output(format!("casing_force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
+    }
+    for (axis, letter) in AXES.into_iter().enumerate() {
+        let text = format!(
+            "Moment of the contact forces on the casing about fixed {letter} through the origin on its axis, mean over the \
+             communication step"
+        );
+        let read = scalar(move |view| -view.mean * view.window.pairs[index].casing_moment[axis]);
+        table.output(format!("casing_moment_{letter}"), Span::Mean, Some((&TORQUE, 10.0)), text, read);
+    }
+}
+
+/// Force and moment of the support on a casing.
+fn support(table: &mut Builder, carrier: &Carrier) {
+    let index = carrier.index;
+    for (row, (axis, letter)) in (0..2).flat_map(|_| AXES.into_iter().enumerate()).enumerate() {
+        let (name, text, unit) = if row < 3 {
+            let text =
+                format!("Force of the support on the casing along fixed {letter}, mean over the communication step");
+            ("force", text, (&FORCE, 100.0))
+        } else {
+            let text = format!(
+                "Moment of the support on the casing about fixed {letter} through the origin on its axis, mean over the \
+                 communication step"
+            );
+            ("moment", text, (&TORQUE, 10.0))
+        };
+        let read = scalar(move |view| view.support(index, row / 3 * 3 + axis));
+        table.output(format!("support_{name}_{letter}"), Span::Mean, Some(unit), text, read);
     }
 }
 
@@ -167,10 +215,26 @@ fn wear(table: &mut Builder, parts: &Parts, pair: &Pair, coating: &CoatingSettin
     // Of all coatings together.
     if parts.settings.contacts[..index].iter().all(|contact| contact.coating.is_none()) {
         table.belongs_to_all();
-        let text = "Energy that wearing the coating takes since the start; no cutting force or torque carries it";
+        let text = "Energy that wearing the coating takes since the start; the shaft pays it where it is cut, no force where it is \
+                    pressed in";
         let read = scalar(|view| view.ledger().wear_energy.value());
         table.output("wear_energy", Span::Total, Some((&ENERGY, 1.0)), text, read);
         table.belongs(index, parts.of_pair(pair));
+    }
+    if parts.settings.outputs.wear_profile {
+        for (name, around, text) in [
+            (
+                "wear_profile_around",
+                true,
+                "Wear depth at each place around, from theta = 0, mean over the rows along z",
+            ),
+            ("wear_profile_along", false, "Wear depth of each row along z, mean over the circumference"),
+        ] {
+            let read = whole(move |view, out| view.wear_profile(index, around, out));
+            let row = table.output(name, Span::Total, depth, text, read);
+            let count = if around { coating.cells_around } else { coating.cells_along };
+            (row.dimension, row.display) = (Some(count), Some(1));
+        }
     }
     if parts.settings.outputs.wear {
         let text = format!(

@@ -85,6 +85,17 @@ impl<'a> Parts<'a> {
         self.settings.contacts.iter().any(|contact| contact.friction > 0.0)
     }
 
+    /// Whether blades cut a coating.
+    pub fn is_cut(&self) -> bool {
+        let mut coatings = self.settings.contacts.iter().filter_map(|contact| contact.coating);
+        coatings.any(|coating| coating.cutting.is_some())
+    }
+
+    /// Whether there are forces along the way.
+    pub fn has_tangential_forces(&self) -> bool {
+        self.has_friction() || self.is_cut()
+    }
+
     pub fn of_body(&self, body: &Body) -> String {
         prefix(self.plan.bodies.len(), &body.structure.name)
     }

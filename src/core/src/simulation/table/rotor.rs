@@ -60,6 +60,12 @@ pub fn watched(table: &mut Builder, parts: &Parts) -> Result<()> {
         }
     }
     for body in bodies.iter().filter(|body| !body.free) {
+        if let Some(count) =
+            parts.settings.outputs.modal_amplitudes.filter(|count| !(1..=body.rom.order()).contains(count))
+        {
+            let problem = format!("{count} modes of {}, which has {}", parts.rotor(body), body.rom.order());
+            return refuse("modal_amplitudes", problem, "Ask for 1 up to as many modes as it has".to_owned());
+        }
         table.belongs(body.index, parts.of_body(body));
         for sector in &parts.settings.outputs.watched_sectors {
             if *sector <= body.rom.sectors {
@@ -75,10 +81,14 @@ fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
     if parts.settings.outputs.stress {
         stresses(table, body, sector);
     }
+    modes(table, parts, body, sector);
+    if parts.settings.outputs.tip_displacements {
+        tips(table, parts, body, sector);
+    }
     patches(table, body, sector);
     let list = node_list(body);
     for row in watched_rows(body.index, sector - 1, [nominal(parts, body), Some((&FORCE, 100.0))]) {
-        if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_friction()) {
+        if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_tangential_forces()) {
             let untouched = if row.is_length() { untouched(parts, body) } else { "" };
             let text = format!("{} ({list}){untouched}", row.text);
             row.add(table, format!("blade[{sector}].{}", row.name), text, body.rom.contact_nodes.len());
@@ -114,6 +124,31 @@ fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize
     let name = format!("blade[{sector}].watched_clearance");
     let row = table.output(name, Span::Point, nominal(parts, body), text, read);
     (row.dimension, row.display) = (Some(names.len()), Some(1));
+}
+
+/// Amplitudes of the lowest modes.
+fn modes(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
+    let Some(count) = parts.settings.outputs.modal_amplitudes else { return };
+    let index = body.index;
+    let text = format!(
+        "Amplitudes of the lowest {count} modes, of modal mass 1 kg for displacements in m per unit amplitude, positive where the \
+         contact node that a mode moves most goes along its positive direction"
+    );
+    let read = each(move |view, mode| view.modal_amplitude(index, sector - 1, mode));
+    let row = table.output(format!("blade[{sector}].modal_amplitude"), Span::Point, None, text, read);
+    row.dimension = Some(count);
+}
+
+/// Displacements of the contact nodes.
+fn tips(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
+    let index = body.index;
+    for (axis, name) in COMPONENTS[usize::from(body.rom.frame == Frame::Cartesian)].into_iter().enumerate() {
+        let text = format!("Displacement of contact nodes, {name} ({})", node_list(body));
+        let read = each(move |view, node| view.displacement(index, sector - 1, node, axis));
+        let name = format!("blade[{sector}].tip_{name}_displacement");
+        let row = table.output(name, Span::Point, nominal(parts, body), text, read);
+        (row.dimension, row.display) = (Some(body.rom.contact_nodes.len()), Some(1));
+    }
 }
 
 /// Components of stress in both frames.

@@ -68,8 +68,9 @@ impl CoatedProblem {
         }
         let (offset, tangent) = self.rod.line(branch, plastic);
         let (constant, stiffness) = (area * offset, area * tangent / self.thickness);
+        let delassus = self.cut.as_ref().unwrap_or(&self.delassus);
         for (row, i) in self.members.iter().enumerate() {
-            let reach: f64 = (0..2).map(|end| self.delassus[(*i, nodes[end])] * weights[end]).sum();
+            let reach: f64 = (0..2).map(|end| delassus[(*i, nodes[end])] * weights[end]).sum();
             self.right[row] += reach * constant;
             for (node, weight) in nodes.into_iter().zip(weights) {
                 if self.closed[node] {
@@ -127,6 +128,15 @@ impl CoatedProblem {
         }
     }
 
+    /// Change of a gap by all forces (m).
+    fn moved(&self, node: usize) -> f64 {
+        let (w, members) = (&self.delassus, self.members.iter());
+        match &self.cut {
+            None => members.map(|j| w[(node, *j)] * (self.coating[*j] + self.hard[*j])).sum(),
+            Some(cut) => members.map(|j| cut[(node, *j)] * self.coating[*j] + w[(node, *j)] * self.hard[*j]).sum(),
+        }
+    }
+
     /// From the solution of the members to gaps and forces of all nodes.
     fn distribute(&mut self) {
         self.coating[..self.size].fill(0.0);
@@ -152,8 +162,7 @@ impl CoatedProblem {
         self.largest = self.members.iter().map(force).fold(0.0, f64::max);
         for node in 0..self.size {
             if self.slot[node] == usize::MAX {
-                let moved = self.members.iter().map(|j| self.delassus[(node, *j)] * (self.coating[*j] + self.hard[*j]));
-                self.corrected[node] = self.gaps[node] + moved.sum::<f64>();
+                self.corrected[node] = self.gaps[node] + self.moved(node);
             }
         }
     }

@@ -1,0 +1,223 @@
+//! Cutting: a blade shears the coating off along its way. Per width b of a row and depth of cut a the force against the way
+//! is u·b·a, u being the specific cutting energy, and κ times that away from the casing. What is removed per way is b·a, so
+//! that the work along the way is u times the volume.
+//!
+//! A blade cuts what lay in front of it as it came into a cell: the depth of a cell as a whole grows while it is passed, the
+//! depth of its part ahead does not. The way of one step may lie in two cells, each with the share of the way in it. So forces
+//! do not know how wide cells are.
+
+use super::{Branch, CellContact, CoatedProblem, Coating, Rod, Row, place};
+use crate::persist::{Persist, Reader, Writer};
+use crate::settings::CuttingSettings;
+
+/// What one row of a blade is cutting.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Edge {
+    /// Number of the cell, from 1; 0: it cuts nothing.
+    cell: u64,
+    /// Depth of that cell ahead of the blade, as a share of the thickness.
+    ahead: f64,
+    /// Sense of the way around: 1, −1, or 0 at rest.
+    sense: f64,
+}
+
+crate::persist::persist_fields!(Edge { cell, ahead, sense });
+
+/// What is being removed from a cell in a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Chip {
+    cell: usize,
+    row: usize,
+    blade: usize,
+    /// Force against the way (N).
+    force: f64,
+}
+
+/// How a blade moves along the coating.
+#[derive(Debug, Clone, Copy)]
+pub struct Way<'a> {
+    /// Which blade.
+    pub blade: usize,
+    /// Angles at which its contact nodes face the casing (rad).
+    pub angles: &'a [f64],
+    /// Way of each over the step (m), positive towards growing angles.
+    pub slid: &'a [f64],
+}
+
+/// The cutting of a coating.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Cutting {
+    /// Specific cutting energy (J/m³).
+    energy: f64,
+    /// Tangential per normal force.
+    tangential: f64,
+    /// `[blade · rows + row]`.
+    edges: Vec<Edge>,
+    /// The same after the step under way: a row that is not pressed in any more starts anew.
+    next: Vec<Edge>,
+    /// Of the step under way; none between steps.
+    chips: Vec<Chip>,
+    /// Way against the force of each contact node (m), `[blade · nodes + node]`; of the step under way.
+    ways: Vec<f64>,
+}
+
+impl Cutting {
+    pub(super) fn new(settings: CuttingSettings, blades: usize, rows: usize, nodes: usize) -> Self {
+        Self {
+            energy: settings.specific_energy,
+            tangential: 1.0 / settings.normal_ratio,
+            edges: vec![Edge::default(); blades * rows],
+            next: vec![Edge::default(); blades * rows],
+            chips: Vec::with_capacity(2 * blades * rows),
+            ways: vec![0.0; blades * nodes],
+        }
+    }
+
+    /// The normal force κ·u·b·a as that of a rod: of the area b·h₀ it has the modulus κ·u, and it never yields.
+    pub(super) fn rod(settings: CuttingSettings) -> Rod {
+        let modulus = settings.normal_ratio * settings.specific_energy;
+        Rod { modulus, yield_stress: f64::INFINITY, hardening: 0.0 }
+    }
+
+    pub(super) fn reset(&mut self) {
+        self.edges.fill(Edge::default());
+        self.forget();
+    }
+
+    pub(super) fn save(&self, writer: &mut Writer) {
+        self.edges.save(writer);
+    }
+
+    pub(super) fn restore(&mut self, reader: &mut Reader) {
+        self.edges.restore(reader);
+        self.forget();
+    }
+
+    /// What a step under way has found.
+    fn forget(&mut self) {
+        self.next.fill(Edge::default());
+        self.chips.clear();
+        self.ways.fill(0.0);
+    }
+
+    pub(super) fn check(&self, reader: &mut Reader, cells: usize) {
+        let mut bytes = reader.clone();
+        self.edges.check(reader);
+        for _ in &self.edges {
+            let mut edge = Edge::default();
+            edge.restore(&mut bytes);
+            if edge.cell > cells as u64 || edge.ahead < 0.0 || edge.sense.abs() > 1.0 {
+                reader.refuse("its blades cut where no coating is");
+            }
+        }
+    }
+}
+
+impl Coating {
+    /// Whether it is cut instead of pressed in.
+    pub fn is_cut(&self) -> bool {
+        self.cutting.is_some()
+    }
+
+    /// Tangential per normal force of what is cut (-); 0 where the coating is pressed in.
+    pub fn tangential_ratio(&self) -> f64 {
+        self.cutting.as_ref().map_or(0.0, |cutting| cutting.tangential)
+    }
+
+    /// As [`Coating::locate`], of a blade that cuts: the one or two cells of each row in which its way of the step lies.
+    pub fn locate_cut(&self, problem: &mut CoatedProblem, way: Way) {
+        let Some(cutting) = &self.cutting else { return };
+        let first = problem.append_nodes(self.nodes);
+        for (index, row) in self.rows.iter().enumerate() {
+            let (angle, [a, b]) = (row.angle(way.angles), row.nodes);
+            let slid = row.weights[0] * way.slid[a] + row.weights[1] * way.slid[b];
+            let edge = cutting.edges[way.blade * self.rows.len() + index];
+            let mut append = |place: usize, share: f64, faced: bool| {
+                let cell = index * self.around + place;
+                let known = edge.cell == cell as u64 + 1 && edge.sense == sense(slid);
+                problem.append_contact(CellContact {
+                    cell,
+                    nodes: [first + a, first + b],
+                    weights: row.weights,
+                    area: row.width * self.thickness * share,
+                    plastic: if known { edge.ahead } else { self.plastic[cell] },
+                    branch: Branch::Free,
+                    blade: way.blade,
+                    row: index,
+                    faced,
+                });
+            };
+            let (here, behind) = (place(angle, self.around), self.behind(angle, slid, row.radius));
+            append(here, 1.0 - behind, true);
+            if behind > 0.0 {
+                let back = if slid > 0.0 { here + self.around - 1 } else { here + 1 };
+                append(back % self.around, behind, false);
+            }
+        }
+    }
+
+    /// Share of the way (m, to an angle, on a radius) that lies behind the border of the cell it ends in.
+    fn behind(&self, angle: f64, slid: f64, radius: f64) -> f64 {
+        let turned = slid / radius;
+        if turned == 0.0 {
+            return 0.0;
+        }
+        let places = angle / self.width();
+        let within = places - places.floor();
+        let since = if turned > 0.0 { within } else { 1.0 - within };
+        (1.0 - since * self.width() / turned.abs()).clamp(0.0, 1.0)
+    }
+
+    /// Take up what a solved problem cuts, of nodes that have slid so far (m).
+    pub(in crate::laws) fn take_chips(&mut self, problem: &CoatedProblem, slid: &[f64]) {
+        let (rows, Some(cutting)) = (self.rows.len(), &mut self.cutting) else { return };
+        for contact in &problem.contacts {
+            let CellContact { cell, row, blade, plastic: ahead, .. } = *contact;
+            let sense = sense((0..2).map(|end| contact.weights[end] * slid[contact.nodes[end]]).sum());
+            let pressed = problem.strain(contact, &problem.gaps) > 0.0;
+            let next = &mut cutting.next[blade * rows + row];
+            if contact.faced && pressed {
+                *next = Edge { cell: cell as u64 + 1, ahead, sense };
+            }
+            if contact.branch != Branch::Free && sense != 0.0 {
+                let force = cutting.tangential * problem.force(contact, &problem.gaps).max(0.0);
+                cutting.chips.push(Chip { cell, row, blade, force });
+            }
+        }
+    }
+
+    /// Way of a contact node against the force on it in the step (m).
+    pub fn slid(&mut self, blade: usize, node: usize, way: f64) {
+        let nodes = self.nodes;
+        if let Some(cutting) = &mut self.cutting {
+            cutting.ways[blade * nodes + node] = way;
+        }
+    }
+
+    /// Remove what the blades have cut on their way; returns the energy this takes (J).
+    pub fn cut(&mut self) -> f64 {
+        let Some(cutting) = &mut self.cutting else { return 0.0 };
+        let mut energy = 0.0;
+        for Chip { cell, row, blade, force } in cutting.chips.drain(..) {
+            let (Row { nodes, weights, area, .. }, first) = (self.rows[row], blade * self.nodes);
+            let way = (0..2).map(|end| weights[end] * cutting.ways[first + nodes[end]]).sum::<f64>().max(0.0);
+            energy += force * way;
+            self.plastic[cell] += force * way / (cutting.energy * area * self.thickness);
+        }
+        cutting.ways.fill(0.0);
+        std::mem::swap(&mut cutting.edges, &mut cutting.next);
+        cutting.next.fill(Edge::default());
+        energy
+    }
+}
+
+/// 1, −1 or 0.
+fn sense(way: f64) -> f64 {
+    if way > 0.0 {
+        1.0
+    } else if way < 0.0 {
+        -1.0
+    } else {
+        0.0
+    }
+}

@@ -1,0 +1,141 @@
+//! Contact with a coating that is cut, and the hard casing behind it. On a coating the tangential force is 1/κ of the normal
+//! one, on the hard casing µ of it, both against the slide.
+
+use nalgebra::DMatrix;
+
+use super::{ContactLaw, Prediction};
+use crate::gaps::dot;
+use crate::laws::active_set::Outcome;
+use crate::laws::coating::{CoatedProblem, Coating, Way};
+
+/// A coating with what is cut of it, and the problem of the blades on it. Groups are whole blades, whose nodes share cells.
+#[derive(Debug, Clone)]
+pub struct Cutting {
+    coating: Coating,
+    problem: CoatedProblem,
+    size: usize,
+    /// Delassus matrix along normals and tangents (m/N).
+    matrix: DMatrix<f64>,
+    contacts: Vec<Posed>,
+    angles: Vec<f64>,
+    /// Way of each contact over the step (m), positive along its first tangent.
+    slid: Vec<f64>,
+    /// Along normals and tangents (N).
+    multipliers: Vec<f64>,
+}
+
+/// A contact as it was posed.
+#[derive(Debug, Clone, Copy, Default)]
+struct Posed {
+    gap: f64,
+    closed: bool,
+    /// Coulomb coefficient of the hard casing.
+    friction: f64,
+    /// Component of the direction of sliding along the first tangent.
+    sense: f64,
+    sector: usize,
+}
+
+impl Cutting {
+    /// Room for `contacts` contacts, all of whole blades.
+    pub fn new(coating: Coating, contacts: usize) -> Self {
+        let mut problem = coating.problem(contacts / coating.nodes());
+        problem.cut = Some(DMatrix::zeros(contacts, contacts));
+        Self {
+            problem,
+            coating,
+            size: 0,
+            matrix: DMatrix::zeros(3 * contacts, 3 * contacts),
+            contacts: vec![Posed::default(); contacts],
+            angles: vec![0.0; contacts],
+            slid: vec![0.0; contacts],
+            multipliers: vec![0.0; 3 * contacts],
+        }
+    }
+
+    /// The coating.
+    pub fn coating(&self) -> &Coating {
+        &self.coating
+    }
+
+    /// The same, to change its wear.
+    pub fn coating_mut(&mut self) -> &mut Coating {
+        &mut self.coating
+    }
+
+    /// Take up what the last solution cuts; it is removed once the way is known ([`Coating::cut`]).
+    pub fn commit(&mut self) {
+        self.coating.take_chips(&self.problem, &self.slid);
+    }
+
+    /// Gaps per normal force that comes with its tangential one: on the hard casing, and on the coating.
+    fn fill(&mut self) {
+        let tangential = self.coating.tangential_ratio();
+        let Some(cut) = &mut self.problem.cut else { return };
+        for (j, &Posed { friction, sense, .. }) in self.contacts[..self.size].iter().enumerate() {
+            for i in 0..self.size {
+                let (normal, across) = (self.matrix[(3 * i, 3 * j)], sense * self.matrix[(3 * i, 3 * j + 1)]);
+                self.problem.delassus[(i, j)] = normal - friction * across;
+                cut[(i, j)] = normal - tangential * across;
+            }
+        }
+    }
+}
+
+impl ContactLaw for Cutting {
+    const DIRECTIONS: usize = 3;
+    const LOOKS_AGAIN: bool = true;
+
+    fn begin(&mut self, size: usize) {
+        self.problem.clear();
+        self.problem.monotone = false;
+        self.size = size;
+    }
+
+    fn matrix(&mut self) -> &mut DMatrix<f64> {
+        &mut self.matrix
+    }
+
+    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl Prediction) {
+        let (along, friction) = (at.slip_direction(), at.friction());
+        let (gap, closed) = (at.gap(), at.gap_before() <= -self.coating.thickness());
+        let sense = dot(along, directions[1]);
+        self.contacts[contact] = Posed { gap, closed, friction, sense, sector: at.sector() };
+        self.angles[contact] = at.angle();
+        self.slid[contact] = sense * dot(along, at.slip());
+    }
+
+    #[inline(never)]
+    fn solve(&mut self) -> Outcome {
+        let (size, nodes) = (self.size, self.coating.nodes());
+        self.fill();
+        for first in (0..size).step_by(nodes) {
+            let (angles, slid) = (&self.angles[first..first + nodes], &self.slid[first..first + nodes]);
+            let way = Way { blade: self.contacts[first].sector, angles, slid };
+            self.coating.locate_cut(&mut self.problem, way);
+        }
+        for (contact, posed) in self.contacts[..size].iter().enumerate() {
+            (self.problem.gaps[contact], self.problem.closed[contact]) = (posed.gap, posed.closed);
+        }
+        let outcome = self.problem.solve();
+        let tangential = self.coating.tangential_ratio();
+        for (contact, &Posed { friction, sense, .. }) in self.contacts[..size].iter().enumerate() {
+            let (cut, hard) = (self.problem.coating[contact], self.problem.hard[contact]);
+            let across = -sense * (tangential * cut + friction * hard);
+            self.multipliers[3 * contact..][..3].copy_from_slice(&[cut + hard, across, 0.0]);
+        }
+        outcome
+    }
+
+    fn multipliers(&self) -> &[f64] {
+        &self.multipliers[..3 * self.size]
+    }
+
+    fn gaps(&self) -> &[f64] {
+        &self.problem.gaps[..self.size]
+    }
+
+    fn coating_shares(&self) -> &[f64] {
+        &self.problem.coating[..self.size]
+    }
+}

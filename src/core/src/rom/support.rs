@@ -1,0 +1,47 @@
+//! What the held nodes of a structure feel: force and moment of its support.
+
+use nalgebra::DMatrix;
+
+use super::{Rom, entries};
+use crate::{Error, Result, ranges};
+
+/// Forces along x, y, z (N) and moments about x, y, z through the origin (N·m).
+pub const SUPPORT_ROWS: usize = 6;
+
+/// Rows of the finite-element equations at the held nodes, which a reduction leaves out: R = S_K q + S_M q̈ − S_T T is force and
+/// moment of the support on the structure, in fixed directions and about the origin.
+///
+/// With r the six rigid motions of the held nodes s and u = Vq the displacements of the others f, S_K = rᵀK_sf V, S_M =
+/// rᵀM_sf V, and S_T = rᵀf_s with the loads f per kelvin of each patch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Support {
+    /// S_K, 6 × n (N or N·m per unit coordinate).
+    pub stiffness: DMatrix<f64>,
+    /// S_M, 6 × n (kg or kg·m for coordinates that are displacements).
+    pub mass: DMatrix<f64>,
+    /// S_T, 6 × patches (N/K or N·m/K); no column without thermal loads.
+    pub thermal: DMatrix<f64>,
+}
+
+impl Rom {
+    pub(super) fn validate_support(&self, remedy: &str) -> Result<()> {
+        let Some(support) = &self.extras.support else { return Ok(()) };
+        let patches = self.extras.thermal.as_ref().map_or(0, |thermal| thermal.patches.len());
+        for (name, matrix, columns, most) in [
+            ("support_stiffness", &support.stiffness, self.order(), ranges::MATRIX),
+            ("support_mass", &support.mass, self.order(), ranges::MATRIX),
+            ("support_thermal", &support.thermal, patches, ranges::THERMAL_LOAD),
+        ] {
+            if matrix.shape() != (SUPPORT_ROWS, columns) {
+                let problem = format!("shape {:?}, {SUPPORT_ROWS} x {columns} expected", matrix.shape());
+                return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
+            }
+            entries(name, matrix, most, remedy)?;
+        }
+        if self.sectors != 1 {
+            let problem = format!("given with {} sectors", self.sectors);
+            return Err(Error::invalid("ROM array `support_stiffness`", problem, "It belongs to a single structure"));
+        }
+        Ok(())
+    }
+}
