@@ -100,7 +100,7 @@ class Files:
         """The thermal unit that ships: {2: file, 3: file}."""
         say("thermal unit of the casing")
         place = self.into / "casing"
-        self.tiprub("thermal", "--output", place, *self._library("TIPRUB_THERMAL_LIBRARY"))
+        self.tiprub("thermal", "--output", place, *self._library("TIPRUB_LIBRARY_THERMAL"))
         found = {fmi: sorted(place.glob(f"*_fmi{fmi}.fmu")) for fmi in (2, 3)}
         return {fmi: files[0] for fmi, files in found.items()}
 

@@ -1,6 +1,8 @@
 """A rub and the casing it heats as an SSP package, run by Ecos and by FMPy, against the script of the example."""
 
+import csv
 import importlib.metadata
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -54,3 +56,25 @@ def test_ssp_by_ecos(package, told):
 def test_ssp_by_fmpy(package, told):
     file, course = package
     told("FMPy", importlib.metadata.version("fmpy"), "2.0", judged(ssp.run_fmpy(file, STEP, COUNT, PATCHES), course))
+
+
+def test_the_example_from_nothing():
+    """Its quick form, in an environment of its own: what it writes, by what it claims."""
+    environment = {**os.environ, "TIPRUB": str(Path(TIPRUB).resolve()), "TIPRUB_LIBRARY": str(LIBRARIES.resolve())}
+    command = [ROOT / "examples" / "run.sh", "thermal", "--quick", "--only", "couplings", "--only", "jump"]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr[-2000:]
+    into = ROOT / "target" / "examples" / "thermal"
+    tables = {}
+    for name in ("couplings", "jump"):
+        assert (into / f"{name}.svg").stat().st_size > 1000
+        with (into / f"{name}.csv").open(newline="") as file:
+            tables[name] = list(csv.DictReader(file))
+    same = [row for row in tables["couplings"] if "FMI" in row["coupling"] or "SSP" in row["coupling"]]
+    assert len(same) >= 3 and all(float(row["temperatures apart (K)"]) == 0.0 for row in same), same
+    (turn,) = (row for row in tables["couplings"] if row["coupling"] == "script, in turn")
+    assert abs(float(turn["apart (J)"])) < 1e-12 * float(turn["received (J)"])
+    for row in tables["jump"]:
+        assert abs(float(row["friction less received (J)"])) < 1e-12 * float(row["heat received (J)"])
+        if row["tolerance (K)"] != "resolved":
+            assert float(row["error of temperatures (K)"]) < float(row["tolerance (K)"])

@@ -1,5 +1,6 @@
 """The thermal example: cycle jump on units whose answer is known, conduction against closed forms, and the pair with a rub FMU."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import ssp  # noqa: E402
 from conduction import Casing as Ring  # noqa: E402
 from conduction import Conduction  # noqa: E402
 from cycle_jump import Plan, cycle_jump, resolved  # noqa: E402
-from pair import Rub, script  # noqa: E402
+from pair import Casing, Rub, script  # noqa: E402
 from units import Unit, UnitError  # noqa: E402
 
 STEP, CYCLE = 1e-3, 8
@@ -222,14 +223,48 @@ REVOLUTION = 2.0 * numpy.pi / 1800.0
 @pytest.fixture(scope="module")
 def rubs(tiprub, scene, tmp_path_factory):
     """FMUs of the example's scene, with three contact nodes to a blade."""
-    import os
-
     work = tmp_path_factory.mktemp("thermal")
     text = (EXAMPLE / "rub.toml").read_text(encoding="utf-8").replace("rotor.rom.safetensors", str(scene.parent / "rotor37.rom.safetensors"))
     (work / "rub.toml").write_text(text, encoding="utf-8")
     library = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.environ else []
     tiprub("package", work / "rub.toml", "--scalars", "-o", work, *library)
     return {fmi: work / f"thermal_rub_fmi{fmi}.fmu" for fmi in (2, 3)}
+
+
+@pytest.fixture(scope="module")
+def casings(tiprub, tmp_path_factory):
+    """The thermal unit of the casing."""
+    work = tmp_path_factory.mktemp("casing")
+    library = ["--library", os.environ["TIPRUB_LIBRARY_THERMAL"]] if "TIPRUB_LIBRARY_THERMAL" in os.environ else []
+    tiprub("thermal", "--output", work, *library)
+    return {fmi: next(work.glob(f"*_fmi{fmi}.fmu")) for fmi in (2, 3)}
+
+
+def test_finite_volumes_stand_beside_the_finite_elements(casings):
+    """Two discretisations of one casing that share no line: heat in two patches, a second long and ten."""
+    heat = numpy.zeros(12)
+    heat[2], heat[3], heat[8] = 5e3, 1e3, 4e3
+    model = Conduction(around=144, along=2.5e-3)
+    with Unit(casings[2]) as unit:
+        casing = Casing(unit)
+        for length in (1.0, 9.0):
+            casing.step(length, heat)
+            model.step(length, heat)
+            apart = numpy.abs(casing.values() - model.patch).max()
+            assert apart < 0.02 * model.patch.max(), (length, apart, model.patch.max())
+        stored, gas, ambient = unit.get(["stored_heat", "gas_heat", "ambient_heat"])
+    assert (stored, gas, ambient) == (pytest.approx(model.stored, rel=3e-3), pytest.approx(model.gas, rel=0.02), pytest.approx(model.ambient, rel=0.03))
+
+
+def test_a_script_and_the_package_in_fmpy_give_the_same_bits(rubs, casings, tmp_path):
+    file, count = tmp_path / "pair.ssp", 10
+    ssp.write(file, rubs[2], casings[2], 12, count * REVOLUTION / 10)
+    found = ssp.run_fmpy(file, REVOLUTION / 10, count, 12)
+    for fmi in (2, 3):
+        with Unit(rubs[fmi]) as rub, Unit(casings[fmi]) as casing:
+            course = script(Rub(rub, 0.5), Casing(casing), REVOLUTION / 10, count)
+        assert course.temperatures[-1].max() > 0.02, "it rubs"
+        assert (course.temperatures == found.temperatures).all() and (course.heat == found.heat).all()
 
 
 def test_both_versions_heat_the_casing_alike_and_hand_over_all_friction(rubs):
