@@ -4,8 +4,10 @@
 //! the tip's faces. `march` goes on in time. `gauge` tells stress. Mesh, element matrices and sparse factor are those of `tiprub-model`;
 //! contact, stepping and stress share nothing with the product.
 
+pub mod calculix;
 mod gauge;
 mod march;
+mod pushed;
 mod tip;
 
 use faer::Mat;
@@ -15,6 +17,7 @@ use tiprub_model::{FeModel, Material, Mesh, Result};
 
 pub use gauge::{COMPONENTS, Gauge, equivalent};
 pub use march::{History, Steps};
+pub use pushed::PushedBlade;
 pub use tip::Part;
 
 /// The full model of a blade.
@@ -54,6 +57,15 @@ impl Blade {
     /// # Errors
     /// A blade that is not held.
     pub fn at_rest(&self, forces: &[(usize, [f64; 3])], gauges: &[Gauge]) -> Result<Vec<f64>> {
+        let moved = self.moved(forces)?;
+        Ok(gauges.iter().flat_map(|gauge| gauge.read(|node| moved[node])).collect())
+    }
+
+    /// Displacements of all nodes along x, y, z under forces at rest (m): node, force along x, y, z (N).
+    ///
+    /// # Errors
+    /// A blade that is not held.
+    pub fn moved(&self, forces: &[(usize, [f64; 3])]) -> Result<Vec<[f64; 3]>> {
         let factor = self.stiffness.factor("K of the blade", "Clamp it, and mesh it soundly")?;
         let mut load = Mat::zeros(self.order(), 1);
         for (node, force) in forces {
@@ -62,8 +74,9 @@ impl Blade {
             }
         }
         let moved = factor.solve(load);
-        let moved: Vec<f64> = (0..self.order()).map(|row| moved[(row, 0)]).collect();
-        Ok(self.stress(gauges, &moved))
+        let node =
+            |first: &Option<usize>| first.map_or([0.0; 3], |first| [0, 1, 2].map(|axis| moved[(first + axis, 0)]));
+        Ok(self.rows.iter().map(node).collect())
     }
 
     /// Stress at the gauges.

@@ -36,6 +36,13 @@ impl Told {
         (Self { displacements: history.displacements, stresses: history.stresses, equivalents }, history.forces)
     }
 
+    /// Stress at one place beside that of another run (L2).
+    fn apart_at(&self, other: &Self, place: usize) -> f64 {
+        let at = |all: &Vec<f64>| all[STRESSES * place..STRESSES * (place + 1)].to_vec();
+        let of = |told: &Self| told.stresses.iter().map(at).collect::<Vec<_>>();
+        parts_apart(&of(self), &of(other), &[STRESSES])
+    }
+
     /// Largest von Mises of every place (Pa).
     fn largest(&self) -> Vec<f64> {
         let count = self.equivalents.first().map_or(0, Vec::len);
@@ -85,7 +92,12 @@ impl Apart {
 
 /// Numbers of modes, ascending.
 fn counts(quick: bool) -> &'static [usize] {
-    if quick { &[8, 16, 50] } else { &[5, 10, 20, 40, 80, 160, 400] }
+    if quick { &[8, 30, 120] } else { &[5, 10, 20, 40, 80, 160, 400] }
+}
+
+/// Steps of the full model in a sample, ascending.
+fn divisions(quick: bool) -> &'static [u32] {
+    if quick { &[4, 8, 16] } else { &[8, 16, 32] }
 }
 
 impl Setting {
@@ -108,6 +120,18 @@ impl Setting {
             gauges.push(Gauge::at(mesh, &self.material, node).map_err(|error| failure("a gauge of the blade", error))?);
         }
         Ok((points.iter().map(|point| point.name.clone()).collect(), gauges))
+    }
+
+    /// Where the places of a ROM are between hub (0) and tip (1), at the mean radii of either.
+    fn heights(&self, rom: &Rom) -> Vec<f64> {
+        let mesh = &self.blade.mesh;
+        let mean = |set: &str| {
+            let nodes = mesh.sets.get(set).map_or(&[][..], Vec::as_slice);
+            nodes.iter().map(|node| mesh.nodes[*node][0].hypot(mesh.nodes[*node][1])).sum::<f64>() / nodes.len() as f64
+        };
+        let (hub, tip) = (mean("hub"), mean("tip"));
+        let points = rom.extras.stress.iter().flat_map(|stress| &stress.points);
+        points.map(|point| (point.position[0] - hub) / (tip - hub)).collect()
     }
 
     /// The product's run, as an importer sees it; or why it is refused.
@@ -207,12 +231,14 @@ fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<Told> {
 /// Everything that is found.
 struct Found {
     names: Vec<String>,
+    /// Radii of the places as shares of the way from hub to tip.
+    heights: Vec<f64>,
     /// The full model with steps in a sample, ascending, and the mean forces of its shortest steps.
     full: Vec<(u32, Told)>,
     /// By the number of modes: under the full model's forces, and in a rub of its own or why that is refused.
     reduced: Vec<(usize, Told, std::result::Result<Told, String>)>,
-    /// As it ships, by a tolerance.
-    ships: Told,
+    /// As it ships, by a tolerance: its modes, and its rub.
+    ships: (usize, Told),
     /// Difference of stress at rest with the fewest modes.
     rest: f64,
 }
@@ -227,13 +253,18 @@ impl Found {
     fn rows(&self) -> Vec<(String, Option<Apart>, Option<Apart>)> {
         let witness = self.witness();
         let own = self.full[..self.full.len() - 1].iter().map(|(division, told)| {
-            (format!("full model, steps of {} µs", 1e6 * INTERVAL / f64::from(*division)), None, Some(told.apart(witness)))
+            (
+                format!("full model, steps of {} µs", 1e6 * INTERVAL / f64::from(*division)),
+                None,
+                Some(told.apart(witness)),
+            )
         });
         let reduced = self.reduced.iter().map(|(modes, forced, rubbed)| {
             let rubbed = rubbed.as_ref().ok().map(|told| told.apart(witness));
             (format!("{modes} modes"), Some(forced.apart(witness)), rubbed)
         });
-        let ships = ("80 modes, by the tolerance that ships".to_owned(), None, Some(self.ships.apart(witness)));
+        let (modes, told) = &self.ships;
+        let ships = (format!("{modes} modes, by the tolerance that ships"), None, Some(told.apart(witness)));
         own.chain(reduced).chain([ships]).collect()
     }
 }
@@ -245,13 +276,15 @@ fn find(setting: &Setting, quick: bool, console: &Console) -> Result<Found> {
     let roms: Vec<Rom> =
         counts(quick).iter().map(|modes| setting.stressed_rom(&model(*modes, FINE))).collect::<Result<_>>()?;
     let (names, gauges) = setting.gauges(&roms[0])?;
+    let heights = setting.heights(&roms[0]);
     let rest = setting.at_rest(&roms[0], &gauges, touching)?;
-    let task = console.task("The full blade rubs", Some(size.divisions.len() as u64));
+    let divisions = divisions(quick);
+    let task = console.task("The full blade rubs", Some(divisions.len() as u64));
     let march = |division: &u32| setting.run_full(touching, *division, &gauges).map(Told::full);
-    let mut full = sweep::sweep(&size.divisions, sweep::processors(), march, |done| task.at(done as u64))?;
+    let mut full = sweep::sweep(divisions, sweep::processors(), march, |done| task.at(done as u64))?;
     let forces = full.last_mut().map(|(_, forces)| std::mem::take(forces)).unwrap_or_default();
-    let full = size.divisions.iter().copied().zip(full.into_iter().map(|(told, _)| told)).collect();
-    let finest = size.divisions[size.divisions.len() - 1];
+    let full = divisions.iter().copied().zip(full.into_iter().map(|(told, _)| told)).collect();
+    let finest = divisions[divisions.len() - 1];
     let task = console.task("Reduced blades rub", Some(roms.len() as u64));
     let all: Vec<(usize, Rom)> = counts(quick).iter().copied().zip(roms).collect();
     let rub = |(modes, rom): &(usize, Rom)| {
@@ -262,7 +295,7 @@ fn find(setting: &Setting, quick: bool, console: &Console) -> Result<Found> {
     let by_tolerance = model(size.modes[0], GALERKIN);
     let ships = setting.told_by(&by_tolerance, setting.stressed_rom(&by_tolerance)?)?;
     let ships = ships.map_err(|why| Failure::new("lab stress", why, ""))?;
-    Ok(Found { names, full, reduced, ships, rest })
+    Ok(Found { names, heights, full, reduced, ships: (by_tolerance.modes, ships), rest })
 }
 
 fn tables(found: &Found) -> String {
@@ -280,9 +313,22 @@ fn tables(found: &Found) -> String {
             None => {}
         }
     }
-    text.push_str("\n| place | full model (MPa) | what ships (MPa) |\n|---|---|---|\n");
-    for ((name, full), ships) in found.names.iter().zip(found.witness().largest()).zip(found.ships.largest()) {
-        text.push_str(&format!("| `{name}` | {:.1} | {:.1} |\n", 1e-6 * full, 1e-6 * ships));
+    text.push_str(
+        "\n| place | height | largest von Mises: full model (MPa) | what ships (MPa) | stress: what ships | halving the full model's steps |\n\
+         |---|---|---|---|---|---|\n",
+    );
+    let (full, ships) = (found.witness().largest(), found.ships.1.largest());
+    let coarser = &found.full[found.full.len() - 2].1;
+    for (place, name) in found.names.iter().enumerate() {
+        let apart = |told: &Told| percent(told.apart_at(found.witness(), place));
+        text.push_str(&format!(
+            "| `{name}` | {:.0} % | {:.1} | {:.1} | {} | {} |\n",
+            100.0 * found.heights[place],
+            1e-6 * full[place],
+            1e-6 * ships[place],
+            apart(&found.ships.1),
+            apart(coarser)
+        ));
     }
     text
 }
@@ -291,7 +337,7 @@ fn figure(found: &Found) -> Result<Figure> {
     let largest = found.witness().largest();
     let most = (0..largest.len()).max_by(|a, b| largest[*a].total_cmp(&largest[*b])).unwrap_or_default();
     let few = found.reduced.iter().find_map(|(modes, _, rubbed)| Some((*modes, rubbed.as_ref().ok()?)));
-    let mut shown = vec![("full model".to_owned(), found.witness()), ("what ships".to_owned(), &found.ships)];
+    let mut shown = vec![("full model".to_owned(), found.witness()), ("what ships".to_owned(), &found.ships.1)];
     shown.extend(few.map(|(modes, told)| (format!("{modes} modes"), told)));
     let time = |sample: usize| 1e3 * (sample + 1) as f64 * INTERVAL;
     let line = |told: &Told| -> Vec<(f64, f64)> {
@@ -300,13 +346,16 @@ fn figure(found: &Found) -> Result<Figure> {
     let series = shown.iter().map(|(name, told)| Series::line(name.as_str(), line(told))).collect();
     let mut sheet = Sheet::new(["time (ms)"]);
     sheet.columns.extend(shown.iter().map(|(name, _)| format!("{name} (MPa)")));
-    for sample in 0..found.ships.equivalents.len() {
+    for sample in 0..found.ships.1.equivalents.len() {
         let values = shown.iter().map(|(_, told)| 1e-6 * told.equivalents[sample][most]);
         sheet.rows.push([time(sample)].into_iter().chain(values).collect());
     }
     Ok(Figure {
         name: "von-mises",
-        caption: format!("Von Mises at `{}`, the place that has most, while the blade passes the bumps.", found.names[most]),
+        caption: format!(
+            "Von Mises at `{}`, the place that has most, while the blade passes the bumps.",
+            found.names[most]
+        ),
         picture: Picture::plot(&Plot::new("time (ms)", "von Mises (MPa)", series))?,
         sheet,
     })
@@ -317,7 +366,7 @@ fn statements(found: &Found) -> Vec<Statement> {
     let apart: Vec<Apart> = found.reduced.iter().map(|(_, forced, _)| forced.apart(witness)).collect();
     let (first, last) = (apart[0], apart[apart.len() - 1]);
     let coarser = found.full[found.full.len() - 2].1.apart(witness);
-    let ships = found.ships.apart(witness);
+    let ships = found.ships.1.apart(witness);
     let most = found.reduced.last().and_then(|(_, _, rubbed)| rubbed.as_ref().ok()).map(|told| told.apart(witness));
     vec![
         Statement::tested(
@@ -357,10 +406,11 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let rows = found.rows().into_iter().map(|(name, forced, rubbed)| {
         json!({ "run": name, "same_forces": forced.map(Apart::json), "same_rub": rubbed.map(Apart::json) })
     });
-    let refused = found.reduced.iter().filter_map(|(modes, _, rubbed)| {
-        Some(json!({ "modes": modes, "why": rubbed.as_ref().err()? }))
-    });
-    let largest = json!({ "full": found.witness().largest(), "ships": found.ships.largest() });
+    let refused = found
+        .reduced
+        .iter()
+        .filter_map(|(modes, _, rubbed)| Some(json!({ "modes": modes, "why": rubbed.as_ref().err()? })));
+    let largest = json!({ "full": found.witness().largest(), "ships": found.ships.1.largest() });
     Ok(Study {
         name: "stress",
         title: "Stress of reduced blades against full finite elements".into(),
