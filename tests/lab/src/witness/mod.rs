@@ -1,6 +1,8 @@
 //! Reduced blades against the full finite-element model, which nothing was reduced of, stepped and touched by other code than the
 //! product's.
 
+mod stress;
+
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use serde_json::{Value, json};
@@ -20,7 +22,7 @@ use tiprub_model::{
     stress::StressPlaces,
 };
 use tiprub_reference::{
-    blade::{Blade, Part, Steps},
+    blade::{Blade, Gauge, History, Part, Steps},
     reduced::rub::Obstacle,
 };
 use tiprub_shell::{Failure, Result, console::Console, sweep};
@@ -29,6 +31,8 @@ use tiprub_study::{
     arguments::StudyCommon,
     convergence::march::{Marched, march},
 };
+
+pub(crate) use stress::study as stress;
 
 /// Time between samples (s).
 const INTERVAL: f64 = 4e-6;
@@ -209,6 +213,10 @@ impl Setting {
     }
 
     fn rom(&self, reduced: &Reduced) -> Result<Rom> {
+        self.rom_with(reduced, StressPlaces::default())
+    }
+
+    fn rom_with(&self, reduced: &Reduced, stress: StressPlaces) -> Result<Rom> {
         let told = |error| failure("reducing the blade", error);
         let options = ReductionOptions {
             name: "rotor37".into(),
@@ -221,7 +229,7 @@ impl Setting {
             sectors: 1,
             frame: Frame::Cylindrical,
             watched: self.blade.contact_points(3).map_err(told)?,
-            stress: StressPlaces::default(),
+            stress,
             damping_ratio: 0.0,
         };
         let (mesh, contact) = (self.blade.mesh.clone(), self.contact(reduced.touching)?);
@@ -232,6 +240,10 @@ impl Setting {
 
     /// The scene around a reduced model.
     fn scene(&self, reduced: &Reduced) -> Result<Scene> {
+        self.scene_of(reduced, self.rom(reduced)?)
+    }
+
+    fn scene_of(&self, reduced: &Reduced, rom: Rom) -> Result<Scene> {
         let mut settings = scene_source::settings("builtin:rotor37-one-row")?;
         let surface = &mut settings.surfaces[0];
         surface.ramp_time = 0.0;
@@ -242,7 +254,7 @@ impl Setting {
         settings.experiment.communication_step = INTERVAL;
         settings.time.step = INTERVAL / f64::from(reduced.division);
         (settings.time.scheme, settings.contacts[0].solver) = reduced.method;
-        Ok(Scene { settings, roms: vec![self.rom(reduced)?] })
+        Ok(Scene { settings, roms: vec![rom] })
     }
 
     /// A run, or why it is refused.
@@ -250,8 +262,8 @@ impl Setting {
         Ok(march(&self.scene(reduced)?, &[], reduced.division, self.size.samples))
     }
 
-    /// The full model; energy that its steps lose or make beside what contact supplies.
-    fn run_witness(&self, touching: Touching, division: u32) -> Result<(Marched, f64)> {
+    /// The full model, with stress at gauges.
+    fn run_full(&self, touching: Touching, division: u32, gauges: &[Gauge]) -> Result<History> {
         let told = |error| failure("the full blade", error);
         let settings = scene_source::settings("builtin:rotor37-one-row")?;
         let Shape::TwoLobe { depth, width, .. } = settings.surfaces[0].shape else {
@@ -265,16 +277,25 @@ impl Setting {
             bumps: [2.0 * contact.gap * depth, width, 0.0],
         };
         let parts: Vec<Part> = self.parts(touching)?.into_iter().map(|part| part.turned(-self.phase())).collect();
-        let watched = self.blade.contact_points(3).map_err(told)?;
-        let nodes: Vec<usize> = watched.iter().map(|point| point.node).collect();
         let steps = Steps { interval: INTERVAL, division, samples: self.size.samples };
-        let found = self.full.march(&parts, &obstacle, steps, &nodes).map_err(told)?;
+        self.full.march(&parts, &obstacle, steps, (&self.watched()?, gauges)).map_err(told)
+    }
+
+    /// Nodes whose displacements are compared.
+    fn watched(&self) -> Result<Vec<usize>> {
+        let points = self.blade.contact_points(3).map_err(|error| failure("the full blade", error))?;
+        Ok(points.iter().map(|point| point.node).collect())
+    }
+
+    /// The full model; energy that its steps lose or make beside what contact supplies.
+    fn run_witness(&self, touching: Touching, division: u32) -> Result<(Marched, f64)> {
+        let found = self.run_full(touching, division, &[])?;
         let place = |node: &usize| {
             let [x, y, z] = self.blade.mesh.nodes[*node];
             ContactNode { position: [x.hypot(y), y.atan2(x), z], ..ContactNode::default() }
         };
         let marched = Marched {
-            points: nodes.iter().map(place).collect(),
+            points: self.watched()?.iter().map(place).collect(),
             impulse: found.impulses.iter().sum(),
             friction_work: found.friction_work.last().copied().unwrap_or_default(),
             peak_force: found.impulses.iter().fold(0.0, |most: f64, impulse| most.max(impulse / INTERVAL)),
