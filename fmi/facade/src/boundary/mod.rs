@@ -12,13 +12,15 @@ pub(crate) use calls::{StateHandle, set_debug_logging, strings};
 pub(crate) use calls::{get, set, state};
 pub(crate) use derivatives::{ADJOINT, DIRECTIONAL, derivatives};
 pub(crate) use instance::{Callbacks, Instantiation, enter, instantiate, release};
-pub(crate) use instance::{Handle, guard, refuse_instantiation, unsupported};
-pub(crate) use log::{Fmi2Logger, Fmi3Logger, Sink};
-pub(crate) use pointers::{Environment, Out};
-pub(crate) use pointers::{In, Text};
+pub use instance::Handle;
+pub(crate) use instance::{guard, refuse_instantiation, unsupported};
+pub use log::{Fmi2Logger, Fmi3Logger};
+pub(crate) use log::Sink;
+pub use pointers::{Environment, In, Text};
+pub(crate) use pointers::Out;
 
 /// `fmi3IntermediateUpdateCallback`.
-pub(crate) type IntermediateUpdate = unsafe extern "C" fn(
+pub type IntermediateUpdate = unsafe extern "C" fn(
     environment: Environment,
     intermediate_update_time: f64,
     set_requested: u8,

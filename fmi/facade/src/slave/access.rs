@@ -1,9 +1,10 @@
 //! Reading and setting variables: every request is checked in full before anything is read or written.
 
 use tiprub_core::variables::{Causality, Kind, Variability, Variable};
-use tiprub_core::{Error, Simulation};
+use tiprub_core::Error;
 
 use super::{Dialect, Phase, Refusal, Result, Slave};
+use crate::unit::Unit;
 
 /// A get or set call as the importer made it.
 #[derive(Debug, Clone, Copy)]
@@ -29,10 +30,10 @@ pub(crate) trait Value: Sized {
     }
 
     /// Read one element.
-    fn get(simulation: &Simulation, reference: u32) -> tiprub_core::Result<Self>;
+    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self>;
 
     /// Set one element.
-    fn set(&self, simulation: &mut Simulation, reference: u32) -> tiprub_core::Result<()>;
+    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()>;
 }
 
 impl Value for f64 {
@@ -52,12 +53,12 @@ impl Value for f64 {
         Some(time)
     }
 
-    fn get(simulation: &Simulation, reference: u32) -> tiprub_core::Result<Self> {
-        simulation.real(reference)
+    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+        unit.real(reference)
     }
 
-    fn set(&self, simulation: &mut Simulation, reference: u32) -> tiprub_core::Result<()> {
-        simulation.set_real(reference, *self)
+    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
+        unit.set_real(reference, *self)
     }
 }
 
@@ -66,12 +67,12 @@ impl Value for i32 {
         i64::from(*self).problem(variable)
     }
 
-    fn get(simulation: &Simulation, reference: u32) -> tiprub_core::Result<Self> {
-        simulation.integer(reference)
+    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+        unit.integer(reference)
     }
 
-    fn set(&self, simulation: &mut Simulation, reference: u32) -> tiprub_core::Result<()> {
-        simulation.set_integer(reference, *self)
+    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
+        unit.set_integer(reference, *self)
     }
 }
 
@@ -87,11 +88,11 @@ impl Value for i64 {
         })
     }
 
-    fn get(simulation: &Simulation, reference: u32) -> tiprub_core::Result<Self> {
-        simulation.integer(reference).map(Self::from)
+    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+        unit.integer(reference).map(Self::from)
     }
 
-    fn set(&self, simulation: &mut Simulation, reference: u32) -> tiprub_core::Result<()> {
+    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
         let value = i32::try_from(*self).map_err(|_| {
             Error::invalid(
                 format!("value reference {reference}"),
@@ -99,27 +100,27 @@ impl Value for i64 {
                 "Set a 32-bit integer",
             )
         })?;
-        simulation.set_integer(reference, value)
+        unit.set_integer(reference, value)
     }
 }
 
 impl Value for bool {
-    fn get(simulation: &Simulation, reference: u32) -> tiprub_core::Result<Self> {
-        simulation.boolean(reference)
+    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+        unit.boolean(reference)
     }
 
-    fn set(&self, simulation: &mut Simulation, reference: u32) -> tiprub_core::Result<()> {
-        simulation.set_boolean(reference, *self)
+    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
+        unit.set_boolean(reference, *self)
     }
 }
 
 impl Value for String {
-    fn get(simulation: &Simulation, reference: u32) -> tiprub_core::Result<Self> {
-        simulation.string(reference).map(Self::from)
+    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+        unit.string(reference).map(Self::from)
     }
 
-    fn set(&self, simulation: &mut Simulation, reference: u32) -> tiprub_core::Result<()> {
-        simulation.set_string(reference, self)
+    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
+        unit.set_string(reference, self)
     }
 }
 
@@ -139,7 +140,7 @@ impl Slave {
     /// Most value references a single call may bring. More than this can only be a mistaken count, and following it would
     /// read beyond the importer's array; repeating references is legal, hence the margin.
     pub(crate) fn reference_limit(&self) -> usize {
-        16 * self.simulation.table().references() + 1024
+        16 * self.unit.table().references() + 1024
     }
 
     /// Value references of the single elements a request stands for.
@@ -149,7 +150,7 @@ impl Slave {
     pub(crate) fn elements(&self, request: &Request<'_>) -> Result<Vec<u32>> {
         let mut elements = Vec::with_capacity(request.references.len());
         for &reference in request.references {
-            let (variable, index) = self.simulation.table().locate(reference)?;
+            let (variable, index) = self.unit.table().locate(reference)?;
             let expected = type_name(self.dialect, variable.kind);
             if expected != request.type_name {
                 return Err(Refusal::error(format!(
@@ -198,18 +199,18 @@ impl Slave {
 
     /// One value; time is the instance's own in every phase.
     fn value<T: Value>(&self, element: u32) -> Result<T> {
-        let (variable, _) = self.simulation.table().locate(element)?;
+        let (variable, _) = self.unit.table().locate(element)?;
         let time = (variable.causality == Causality::Independent).then(|| T::of_time(self.time())).flatten();
-        time.map_or_else(|| Ok(T::get(&self.simulation, element)?), Ok)
+        time.map_or_else(|| Ok(T::get(&*self.unit, element)?), Ok)
     }
 
     fn is_computed(&self, element: u32) -> bool {
-        self.simulation.table().locate(element).is_ok_and(|(variable, _)| variable.start.is_none())
+        self.unit.table().locate(element).is_ok_and(|(variable, _)| variable.start.is_none())
     }
 
     fn require_start_values(&self, elements: &[u32]) -> Result<()> {
         for &element in elements {
-            let (variable, index) = self.simulation.table().locate(element)?;
+            let (variable, index) = self.unit.table().locate(element)?;
             if variable.start.is_none() {
                 return Err(Refusal::error(format!(
                     "{} (value reference {element}) is computed and has no value before initialisation. Enter \
@@ -227,7 +228,7 @@ impl Slave {
     /// As [`Slave::elements`]; a variable that cannot be set now; a value out of range.
     pub(crate) fn write<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
         for (&element, value) in elements.iter().zip(values) {
-            let (variable, index) = self.simulation.table().locate(element)?;
+            let (variable, index) = self.unit.table().locate(element)?;
             let problem = self.not_settable(variable).or_else(|| value.problem(variable));
             if let Some(problem) = problem {
                 let name = variable.element_name(index);
@@ -243,15 +244,15 @@ impl Slave {
 
     /// The core has the last word; what was written before its refusal is taken back.
     fn apply<T: Value>(&mut self, elements: &[u32], values: &[T]) -> Result<()> {
-        let (courses, mut former) = (self.simulation.courses(), Vec::with_capacity(elements.len()));
+        let (courses, mut former) = (self.unit.courses(), Vec::with_capacity(elements.len()));
         for (&element, value) in elements.iter().zip(values) {
-            let before = T::get(&self.simulation, element)?;
-            if let Err(error) = value.set(&mut self.simulation, element) {
+            let before = T::get(&*self.unit, element)?;
+            if let Err(error) = value.set(&mut *self.unit, element) {
                 for (element, before) in former.into_iter().rev() {
-                    T::set(&before, &mut self.simulation, element)?;
+                    T::set(&before, &mut *self.unit, element)?;
                 }
                 // Derivatives and ramps under way, which setting a value ends.
-                self.simulation.restore_courses(courses);
+                self.unit.restore_courses(courses);
                 return Err(error.into());
             }
             former.push((element, before));
@@ -291,10 +292,10 @@ impl Slave {
             }
         }
         self.invalidate()?;
-        let courses = self.simulation.courses();
+        let courses = self.unit.courses();
         for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
-            if let Err(error) = self.simulation.set_input_derivative(reference, order, value) {
-                self.simulation.restore_courses(courses);
+            if let Err(error) = self.unit.set_input_derivative(reference, order, value) {
+                self.unit.restore_courses(courses);
                 return Err(error.into());
             }
         }
@@ -303,7 +304,7 @@ impl Slave {
 
     /// One order per element, of one order per value reference.
     pub(crate) fn orders_of_elements(&self, references: &[u32], orders: &[i32]) -> Vec<i32> {
-        let table = self.simulation.table();
+        let table = self.unit.table();
         let count = |reference: u32| match table.locate(reference) {
             Ok((variable, _)) if self.arrays => variable.len(),
             _ => 1,
@@ -322,13 +323,13 @@ impl Slave {
     pub(crate) fn output_derivatives(&self, elements: &[u32], orders: &[i32]) -> Result<Vec<f64>> {
         let derivative = |(&element, &order): (&u32, &i32)| {
             self.check_derivative(element, order, Causality::Output)?;
-            Ok(self.simulation.output_derivative(element, order)?)
+            Ok(self.unit.output_derivative(element, order)?)
         };
         elements.iter().zip(orders).map(derivative).collect()
     }
 
     fn check_derivative(&self, reference: u32, order: i32, causality: Causality) -> Result<String> {
-        let (variable, index) = self.simulation.table().locate(reference)?;
+        let (variable, index) = self.unit.table().locate(reference)?;
         let what = format!("{} (value reference {reference})", variable.element_name(index));
         let continuous = variable.kind == Kind::Real && variable.variability == Variability::Continuous;
         if variable.causality != causality || !continuous {

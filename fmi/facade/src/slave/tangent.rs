@@ -1,31 +1,23 @@
-//! Derivatives of outputs over the last communication step: an extension, which a parameter of the FMU switches on.
+//! Derivatives of outputs over the last communication step: an extension, where the unit has it.
 
 use super::{Refusal, Result, Slave};
 
 impl Slave {
-    /// Refuse where the parameter is off, or not there.
+    /// Refuse where the unit has none.
     ///
     /// # Errors
     /// Says what it would need.
     pub(crate) fn check_derivatives(&self) -> Result<()> {
-        if self.simulation.is_differentiated() {
-            return Ok(());
-        }
-        Err(Refusal::error(if self.simulation.table().find("step_derivatives").is_some() {
-            "this FMU has no derivatives at an instant: outputs do not depend on inputs of the same instant. For those of outputs at the \
-             end of the last step by inputs over it, set the parameter step_derivatives to on (2) before initialisation"
-        } else {
-            "this FMU has no inputs that move or load something, and no derivatives. Ask for such inputs in the scene (whirl, moving, thermal), or do without"
-        }))
+        self.unit.no_derivatives().map_or(Ok(()), |reason| Err(Refusal::error(reason)))
     }
 
     /// Σ_j ∂y_i(t+H)/∂u_j s_j of the last communication step, for each output.
     ///
     /// # Errors
-    /// As [`tiprub_core::Simulation::step_derivative`].
+    /// As [`crate::Unit::step_derivative`].
     pub(crate) fn directional(&mut self, outputs: &[u32], inputs: &[u32], seed: &[f64]) -> Result<Vec<f64>> {
         let mut sensitivity = vec![0.0; outputs.len()];
-        self.simulation.step_derivative(outputs, inputs, seed, &mut sensitivity)?;
+        self.unit.step_derivative(outputs, inputs, seed, &mut sensitivity)?;
         Ok(sensitivity)
     }
 

@@ -8,11 +8,11 @@ use super::Environment;
 use crate::slave::Status;
 
 /// `fmi2CallbackLogger`: variadic, with a printf format.
-pub(crate) type Fmi2Logger =
+pub type Fmi2Logger =
     unsafe extern "C" fn(Environment, *const c_char, Status, *const c_char, *const c_char, ...);
 
 /// `fmi3LogMessageCallback`.
-pub(crate) type Fmi3Logger = unsafe extern "C" fn(Environment, Status, *const c_char, *const c_char);
+pub type Fmi3Logger = unsafe extern "C" fn(Environment, Status, *const c_char, *const c_char);
 
 /// Categories as `modelDescription.xml` lists them; the last one stands for everything.
 const CATEGORIES: [&CStr; 5] =

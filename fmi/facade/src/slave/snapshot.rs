@@ -118,7 +118,7 @@ impl Slave {
         let index = self.index(handle)?;
         let snapshot = std::mem::take(&mut *self.snapshots[index]);
         let outcome = self.decode(&snapshot).and_then(|(phase, state)| {
-            self.simulation.restore_state(state)?;
+            self.unit.restore_state(state)?;
             Ok(phase)
         });
         *self.snapshots[index] = snapshot;
@@ -146,7 +146,7 @@ impl Slave {
 
     /// Length of every saved state of this FMU (bytes).
     pub(crate) fn serialised_size(&self) -> usize {
-        MAGIC.len() + 4 + 4 + self.token.len() + 4 + 8 + 8 + 8 + self.simulation.state_size() + CHECKSUM
+        MAGIC.len() + 4 + 4 + self.token.len() + 4 + 8 + 8 + 8 + self.unit.state_size() + CHECKSUM
     }
 
     /// Make a saved state of bytes that came from [`Slave::serialised`], perhaps in another process.
@@ -166,14 +166,14 @@ impl Slave {
         out.extend(u32::try_from(self.token.len()).map_err(damaged)?.to_le_bytes());
         out.extend(self.token.as_bytes());
         encode_phase(&self.phase, &mut out);
-        let state = self.simulation.state_size();
+        let state = self.unit.state_size();
         out.extend(u64::try_from(state).map_err(damaged)?.to_le_bytes());
         let start = out.len();
         out.resize(start + state, 0);
         match &self.phase {
             // Outputs computed in Initialization Mode are computed again when asked for.
             Phase::Initialising { before: Some(before), .. } => out[start..].copy_from_slice(before),
-            _ => self.simulation.save_state(&mut out[start..])?,
+            _ => self.unit.save_state(&mut out[start..])?,
         }
         out.extend(checksum(&out).to_le_bytes());
         Ok(out)

@@ -3,10 +3,10 @@
 #![allow(non_snake_case, reason = "names of the standard")]
 #![allow(clippy::too_many_arguments, reason = "signatures of the standard")]
 
-mod common;
+pub(crate) mod common;
 mod refused;
 mod step;
 mod values;
 
 /// `fmi3Boolean`, `fmi3Clock`: a C `bool`, read as a byte because an importer's byte may hold anything.
-type Boolean = u8;
+pub type Boolean = u8;

@@ -12,7 +12,7 @@ use std::ffi::CString;
 use std::fmt;
 use std::path::Path;
 
-use tiprub_core::Simulation;
+use crate::unit::{Load, Unit};
 
 pub(crate) use access::{Request, Value};
 pub(crate) use phase::{Experiment, Phase};
@@ -21,7 +21,7 @@ pub(crate) use phase::{Experiment, Phase};
 /// FMI 2.0 it would condemn all instances of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(i32)]
-pub(crate) enum Status {
+pub enum Status {
     /// All well.
     Ok = 0,
     /// Done, and the message logged deserves attention.
@@ -85,7 +85,7 @@ pub(crate) type Result<T, E = Refusal> = std::result::Result<T, E>;
 #[derive(Debug)]
 pub(crate) struct Slave {
     dialect: Dialect,
-    simulation: Simulation,
+    unit: Box<dyn Unit>,
     token: String,
     arrays: bool,
     phase: Phase,
@@ -102,12 +102,12 @@ pub(crate) struct Slave {
 }
 
 impl Slave {
-    /// Load the scene from the FMU's resources directory and compile it.
+    /// Load the unit from the FMU's resources directory.
     ///
     /// # Errors
-    /// Unreadable or damaged resources, a token that does not belong to them, a scene that the core refuses.
-    pub(crate) fn new(dialect: Dialect, resources: &Path, token: &str) -> Result<Self> {
-        let loaded = tiprub_format::load_resources(resources).map_err(|error| Refusal::error(error.to_string()))?;
+    /// Unreadable or damaged resources, a token that does not belong to them, a model that the unit refuses.
+    pub(crate) fn new(dialect: Dialect, resources: &Path, token: &str, load: Load) -> Result<Self> {
+        let loaded = load(resources).map_err(Refusal::error)?;
         if loaded.token != token {
             let (name, file) = match dialect {
                 Dialect::Fmi2 => ("fmuGUID", "attribute guid"),
@@ -122,7 +122,7 @@ impl Slave {
         }
         Ok(Self {
             dialect,
-            simulation: Simulation::new(&loaded.scene)?,
+            unit: (loaded.unit)()?,
             token: loaded.token,
             arrays: loaded.fmi3_arrays && dialect == Dialect::Fmi3,
             phase: Phase::Instantiated { experiment: Experiment::default() },
@@ -146,7 +146,7 @@ impl Slave {
     pub(crate) fn time(&self) -> f64 {
         match self.phase {
             Phase::Instantiated { experiment } | Phase::Initialising { experiment, .. } => experiment.start,
-            Phase::Stepping { .. } => self.simulation.time(),
+            Phase::Stepping { .. } => self.unit.time(),
             Phase::Updating { reached, .. } => reached,
             Phase::Failed { last_good: time } | Phase::Terminated { time } => time,
         }
@@ -163,9 +163,9 @@ impl Slave {
         std::mem::take(&mut self.notes)
     }
 
-    /// Hand on what the simulation has to say since it was last asked.
+    /// Hand on what the unit has to say since it was last asked.
     pub(super) fn hear(&mut self) {
-        self.notes.extend(self.simulation.take_notes().into_iter().map(|text| (Status::Warning, text)));
+        self.notes.extend(self.unit.take_notes().into_iter().map(|text| (Status::Warning, text)));
     }
 
     /// Add a message to be handed to the importer after the call.

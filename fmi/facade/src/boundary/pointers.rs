@@ -7,12 +7,12 @@ use std::mem::size_of;
 use crate::slave::{Refusal, Result};
 
 /// The importer's pointer that goes back to it with every callback, never followed.
-pub(crate) type Environment = *mut c_void;
+pub type Environment = *mut c_void;
 
 /// Array or single value to read from.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub(crate) struct In<T>(*const T);
+pub struct In<T>(*const T);
 
 /// Array or single value to write to.
 #[derive(Debug, Clone, Copy)]
@@ -22,7 +22,7 @@ pub(crate) struct Out<T>(*mut T);
 /// NUL-terminated text.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub(crate) struct Text(*const c_char);
+pub struct Text(*const c_char);
 
 /// A checked place for a known number of values.
 #[derive(Debug)]

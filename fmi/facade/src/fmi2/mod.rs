@@ -4,8 +4,8 @@
 #![allow(clippy::too_many_arguments, reason = "signatures of the standard")]
 
 mod co_simulation;
-mod common;
+pub(crate) mod common;
 mod model_exchange;
 
 /// `fmi2Boolean`: a C `int`.
-type Boolean = i32;
+pub type Boolean = i32;

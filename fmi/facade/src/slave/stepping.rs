@@ -34,15 +34,11 @@ impl Slave {
                 )));
             }
         }
-        if partial {
-            self.simulation.begin_partial_step(current_time, step_size)?;
-        } else {
-            self.simulation.begin_step(current_time, step_size)?;
-        }
+        self.unit.begin_step(current_time, step_size, partial)?;
         self.hear();
         #[cfg(feature = "test-panic")]
         assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic asked for by the test of panics");
-        self.phase = Phase::Updating { stop, reached: self.simulation.time(), fresh: false };
+        self.phase = Phase::Updating { stop, reached: self.unit.time(), fresh: false };
         Ok(())
     }
 
@@ -52,15 +48,15 @@ impl Slave {
     /// The state became non-finite; the phase is [`Phase::Failed`] then. Or the internal steps allowed are used up: the phase is
     /// [`Phase::Stepping`] as if the step had not begun, or [`Phase::Updating`] where it may end at the internal step reached.
     pub(crate) fn advance(&mut self) -> Result<Progress> {
-        let last_good = self.simulation.time();
+        let last_good = self.unit.time();
         let Phase::Updating { stop, .. } = self.phase else {
             return Err(Refusal::error("no step is under way"));
         };
-        let progress = match self.simulation.advance() {
+        let progress = match self.unit.advance() {
             Ok(progress) => progress,
             Err(error @ tiprub_core::Error::Exhausted { .. }) => {
                 match &mut self.phase {
-                    Phase::Updating { fresh, .. } if self.simulation.is_stepping() => *fresh = false,
+                    Phase::Updating { fresh, .. } if self.unit.is_stepping() => *fresh = false,
                     phase => *phase = Phase::Stepping { stop },
                 }
                 return Err(error.into());
@@ -82,7 +78,7 @@ impl Slave {
         match self.advance() {
             Err(refusal) if refusal.status == Status::Discard && matches!(self.phase, Phase::Updating { .. }) => {
                 self.end_step(true)?;
-                let time = self.simulation.time();
+                let time = self.unit.time();
                 self.note(Status::Ok, format!("ended early at t = {time} s: {refusal}"));
                 Ok(None)
             }
@@ -95,10 +91,10 @@ impl Slave {
     /// # Errors
     /// Early: the state is not finite; the phase is [`Phase::Failed`] then.
     pub(crate) fn end_step(&mut self, early: bool) -> Result<()> {
-        let last_good = self.simulation.time();
+        let last_good = self.unit.time();
         if let Phase::Updating { stop, .. } = self.phase {
             if early {
-                self.simulation.end_step_early().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
+                self.unit.end_step_early().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
             }
             self.phase = Phase::Stepping { stop };
             self.hear();
@@ -112,7 +108,7 @@ impl Slave {
     /// As [`Slave::begin_step`] and [`Slave::advance`].
     pub(crate) fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size, false)?;
-        self.simulation.fly_ahead();
+        self.unit.fly_ahead();
         while !self.advance()?.finished {}
         self.end_step(false)
     }
@@ -123,7 +119,7 @@ impl Slave {
     /// As [`Slave::step`]; where not even one internal step is allowed, [`Status::Discard`].
     pub(crate) fn step_partially(&mut self, current_time: f64, step_size: f64) -> Result<bool> {
         self.begin_step(current_time, step_size, true)?;
-        self.simulation.fly_ahead();
+        self.unit.fly_ahead();
         loop {
             match self.advance_partially()? {
                 None => return Ok(true),

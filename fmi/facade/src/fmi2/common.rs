@@ -8,13 +8,14 @@ use crate::boundary::{
     refuse_instantiation, release, state,
 };
 use crate::location;
+use crate::unit::Load;
 use crate::slave::order::fmi2 as order;
 use crate::slave::{Dialect, Experiment, Refusal, Status};
 
 /// `fmi2CallbackFunctions`. Memory functions and `stepFinished` are never called.
 #[derive(Clone, Copy)]
 #[repr(C)]
-pub(crate) struct CallbackFunctions {
+pub struct CallbackFunctions {
     logger: Option<Fmi2Logger>,
     allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> Environment>,
     free_memory: Option<unsafe extern "C" fn(Environment)>,
@@ -45,14 +46,14 @@ pub(super) extern "C" fn fmi2SetDebugLogging(
     boundary::set_debug_logging(c, &order::SET_DEBUG_LOGGING, loggingOn != 0, (categories, nCategories))
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2Instantiate(
+/// `fmi2Instantiate` of a library: makes its unit by `load`. The library exports it, see [`crate::library`].
+pub fn instantiate_unit(
+    load: Load,
     instanceName: Text,
     fmuType: i32,
     fmuGUID: Text,
     fmuResourceLocation: Text,
     functions: In<CallbackFunctions>,
-    _visible: Boolean,
     loggingOn: Boolean,
 ) -> Handle {
     let function = "fmi2Instantiate";
@@ -69,6 +70,7 @@ pub(super) extern "C" fn fmi2Instantiate(
     }
     instantiate(Instantiation {
         dialect: Dialect::Fmi2,
+        load,
         function,
         name: instanceName,
         token: fmuGUID,

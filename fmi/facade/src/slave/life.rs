@@ -47,17 +47,16 @@ impl Slave {
     pub(super) fn refresh(&mut self) -> Result<()> {
         match &mut self.phase {
             Phase::Initialising { experiment, before: before @ None } => {
-                let mut state = vec![0; self.simulation.state_size()];
-                self.simulation.save_state(&mut state)?;
-                if let Err(error) = self.simulation.initialise(experiment.start) {
-                    self.simulation.restore_state(&state)?;
+                let mut state = vec![0; self.unit.state_size()];
+                self.unit.save_state(&mut state)?;
+                if let Err(error) = self.unit.initialise(experiment.start) {
+                    self.unit.restore_state(&state)?;
                     return Err(error.into());
                 }
                 *before = Some(state);
             }
             Phase::Updating { fresh: fresh @ false, reached, .. } => {
-                self.simulation.update_outputs();
-                self.simulation.check_outputs(*reached)?;
+                self.unit.update_outputs(*reached)?;
                 *fresh = true;
             }
             _ => {}
@@ -70,7 +69,7 @@ impl Slave {
         if let Phase::Initialising { before, .. } = &mut self.phase
             && let Some(state) = before.take()
         {
-            self.simulation.restore_state(&state)?;
+            self.unit.restore_state(&state)?;
         }
         Ok(())
     }
@@ -84,7 +83,7 @@ impl Slave {
         if let Phase::Initialising { experiment, .. } = self.phase {
             self.phase = Phase::Stepping { stop: experiment.stop };
         }
-        let warnings: Vec<_> = self.simulation.warnings().iter().map(|text| (Status::Warning, text.clone())).collect();
+        let warnings: Vec<_> = self.unit.warnings().iter().map(|text| (Status::Warning, text.clone())).collect();
         let status = if warnings.is_empty() { Status::Ok } else { Status::Warning };
         self.notes.extend(warnings);
         Ok(status)
@@ -97,7 +96,7 @@ impl Slave {
 
     /// Back to the state after instantiation. Saved states stay valid.
     pub(crate) fn reset(&mut self) {
-        self.simulation.reset();
+        self.unit.reset();
         self.strings.clear();
         self.phase = Phase::Instantiated { experiment: Experiment::default() };
     }
@@ -108,7 +107,7 @@ impl Slave {
     /// A reference that does not exist, or is no input, output or time.
     pub(crate) fn check_intermediate_variables(&self, references: &[u32]) -> Result<()> {
         for &reference in references {
-            let (variable, index) = self.simulation.table().locate(reference)?;
+            let (variable, index) = self.unit.table().locate(reference)?;
             let accessible = [Causality::Input, Causality::Output, Causality::Independent];
             if !accessible.contains(&variable.causality) {
                 return Err(Refusal::error(format!(

@@ -8,6 +8,7 @@ use crate::boundary::{
     Text, guard, instantiate, refuse_instantiation, release, state,
 };
 use crate::location;
+use crate::unit::Load;
 use crate::slave::order::fmi3 as order;
 use crate::slave::{Dialect, Experiment, Refusal, Status};
 
@@ -43,12 +44,12 @@ pub(super) extern "C" fn fmi3InstantiateModelExchange(
     )
 }
 
-#[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3InstantiateCoSimulation(
+/// `fmi3InstantiateCoSimulation` of a library: makes its unit by `load`. The library exports it, see [`crate::library`].
+pub fn instantiate_unit(
+    load: Load,
     instanceName: Text,
     instantiationToken: Text,
     resourcePath: Text,
-    _visible: Boolean,
     loggingOn: Boolean,
     eventModeUsed: Boolean,
     earlyReturnAllowed: Boolean,
@@ -60,6 +61,7 @@ pub(super) extern "C" fn fmi3InstantiateCoSimulation(
 ) -> Handle {
     instantiate(Instantiation {
         dialect: Dialect::Fmi3,
+        load,
         function: "fmi3InstantiateCoSimulation",
         name: instanceName,
         token: instantiationToken,

@@ -8,6 +8,7 @@ use super::float_environment::StandardFloats;
 use super::log::{Log, Sink};
 use super::{Environment, IntermediateUpdate, Text, panics};
 use crate::slave::order::{self, Rule};
+use crate::unit::Load;
 use crate::slave::{Dialect, Phase, Refusal, Result, Slave, Status};
 
 /// FMI 3.0 callbacks and flags that belong to stepping.
@@ -36,7 +37,7 @@ pub(crate) struct Instance {
 /// `fmi2Component`, `fmi3Instance`: NULL, or what [`instantiate`] returned and [`release`] has not yet taken back.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub(crate) struct Handle(*mut Instance);
+pub struct Handle(*mut Instance);
 
 impl Handle {
     const NULL: Self = Self(std::ptr::null_mut());
@@ -61,6 +62,8 @@ pub(crate) struct Instantiation<'a> {
     pub token: Text,
     /// `fmuResourceLocation`, `resourcePath`.
     pub location: Text,
+    /// Makes the unit.
+    pub load: Load,
     /// Reads the location.
     pub locate: fn(&str) -> Result<PathBuf, String>,
     /// Where messages go.
@@ -93,7 +96,7 @@ pub(crate) fn instantiate(request: Instantiation<'_>) -> Handle {
             || format!("{location} is NULL, but this FMU reads its model from there. Pass the unpacked resources");
         let location = request.location.read(location)?.ok_or_else(|| Refusal::error(unlocated()))?;
         let directory = (request.locate)(location).map_err(Refusal::error)?;
-        let slave = Slave::new(request.dialect, &directory, token)?;
+        let slave = Slave::new(request.dialect, &directory, token, request.load)?;
         (request.check)(&slave)?;
         Ok(slave)
     }));
