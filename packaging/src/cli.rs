@@ -69,9 +69,11 @@ pub enum Command {
     )]
     Package(PackageArguments),
     /// From a casing to the .fmu files of its heat conduction: the partner of a scene whose casing heats up.
-    #[command(after_help = "Examples:\n  tiprub thermal -o out/\n  tiprub thermal --patches 24x1 --gas-film 800 --fmi 3\n  \
+    #[command(
+        after_help = "Examples:\n  tiprub thermal -o out/\n  tiprub thermal --patches 24x1 --gas-film 800 --fmi 3\n  \
                             tiprub thermal --material titanium --modes 60 --name fan_case\n\n\
-                            Its casing_heat takes casing_friction_power of the scene's FMU, which takes casing_temperature back.")]
+                            Its casing_heat takes casing_friction_power of the scene's FMU, which takes casing_temperature back."
+    )]
     Thermal(ThermalArguments),
     /// Run a scene natively, without FMI; one row per communication point.
     #[command(after_help = "Examples:\n  tiprub run scene.toml --csv rub.csv\n  \

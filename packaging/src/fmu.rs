@@ -29,8 +29,7 @@ pub const MOST_SCALARS: usize = 300;
 pub type Related<'a> = (&'a str, &'a str, &'a str, &'a str);
 
 /// The scene inside the FMU.
-const SCENE: Related =
-    ("resources/scene.toml", "application/toml", "model", "The scene this FMU was made from");
+const SCENE: Related = ("resources/scene.toml", "application/toml", "model", "The scene this FMU was made from");
 
 /// What stands above all variables on the page inside the FMU.
 const ABOUT: &str = "This unit marches reduced-order models of flexible structures in time, together with their unilateral \
@@ -206,8 +205,7 @@ pub fn contents(
         FmiVersion::Three => (fmi3_xml(description), "3.0", "terminalsAndIcons/icon.png"),
     };
     let mut entries = vec![Entry::new("modelDescription.xml", xml), Entry::new(icon, ICON)];
-    let library =
-        |library: &Library| Entry::new(library.platform.place(number, identifier), library.bytes.as_slice());
+    let library = |library: &Library| Entry::new(library.platform.place(number, identifier), library.bytes.as_slice());
     entries.extend(libraries.iter().map(library));
     if let Some(terminals) = fmi3_terminals(description).filter(|_| version == FmiVersion::Three) {
         entries.push(Entry::new("terminalsAndIcons/terminalsAndIcons.xml", terminals));

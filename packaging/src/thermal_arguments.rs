@@ -31,7 +31,7 @@ pub struct ThermalArguments {
     /// Axial positions (m) between which the inner surface is heated [default: from the first to the last contact ring].
     #[arg(long, value_name = "FROM:TO", value_parser = axial, allow_hyphen_values = true)]
     pub heated: Option<[f64; 2]>,
-    /// Eigenmodes kept besides responses at rest [default: 40].
+    /// Eigenmodes kept besides responses at rest [default: 20].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
     /// Name of the model [default: casing37_thermal, of another casing casing_thermal].

@@ -82,9 +82,11 @@ impl<'a> ThermalPackage<'a> {
             structures: Vec::new(),
             features: vec![model.origin.clone()],
             limits: vec![
-                "Conductivity, heat capacity and film coefficients do not depend on temperature; nothing radiates.".into(),
+                "Conductivity, heat capacity and film coefficients do not depend on temperature; nothing radiates."
+                    .into(),
                 "The end faces let no heat through.".into(),
-                "Heat comes in evenly over the heated surface of a patch: flashes of single contacts are not resolved.".into(),
+                "Heat comes in evenly over the heated surface of a patch: flashes of single contacts are not resolved."
+                    .into(),
             ],
             warnings: Vec::new(),
         }

@@ -153,13 +153,8 @@ pub trait Unit: Debug + Send {
     ///
     /// # Errors
     /// No such step, or variables that have none.
-    fn step_derivative(
-        &mut self,
-        outputs: &[u32],
-        inputs: &[u32],
-        seed: &[f64],
-        sensitivity: &mut [f64],
-    ) -> Result<()>;
+    fn step_derivative(&mut self, outputs: &[u32], inputs: &[u32], seed: &[f64], sensitivity: &mut [f64])
+    -> Result<()>;
 }
 
 /// What the resources of an FMU hold.

@@ -25,7 +25,8 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
     // What is wrong with the command line is said before any work.
     targets(arguments.fmi, &arguments.output, "model")?;
     let given = library::given(&arguments.libraries)?;
-    let libraries = if given.is_empty() { None } else { Some(library::load(Unit::Scene, &arguments.libraries, console)?) };
+    let libraries =
+        if given.is_empty() { None } else { Some(library::load(Unit::Scene, &arguments.libraries, console)?) };
     let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
     let targets = targets(arguments.fmi, &arguments.output, &scene.settings.name)?;
     let files: Vec<Named> = targets.iter().map(|(_, path)| Named::new("--output", path)).collect();

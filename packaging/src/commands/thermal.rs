@@ -52,7 +52,11 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
         density: casing.material.density,
         conductor: Conductor {
             conductivity: property(arguments.conductivity, conductor.map(|known| known.conductivity), "conductivity")?,
-            specific_heat: property(arguments.heat_capacity, conductor.map(|known| known.specific_heat), "heat-capacity")?,
+            specific_heat: property(
+                arguments.heat_capacity,
+                conductor.map(|known| known.specific_heat),
+                "heat-capacity",
+            )?,
         },
         films: [arguments.gas_film.unwrap_or(GAS_FILM), arguments.ambient_film.unwrap_or(AMBIENT_FILM)],
         heated: arguments.heated.unwrap_or(casing.rings.axial),

@@ -19,7 +19,8 @@ pub(crate) const PACKAGE_FILE: &str = "package.toml";
 /// Version of the layout of `resources/`.
 pub(crate) const RESOURCES_FORMAT_VERSION: u32 = 1;
 
-pub(crate) const INTACT: &str = "The FMU is damaged or was changed: import it again, or write it again with `tiprub package`";
+pub(crate) const INTACT: &str =
+    "The FMU is damaged or was changed: import it again, or write it again with `tiprub package`";
 
 /// What an FMU instance needs.
 #[derive(Debug, Clone, PartialEq)]

@@ -92,7 +92,8 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<Model> {
         problem,
         remedy: WRITE_AGAIN.into(),
     };
-    let damaged = |error: safetensors::SafeTensorError| refuse("not a readable safetensors file".into(), error.to_string());
+    let damaged =
+        |error: safetensors::SafeTensorError| refuse("not a readable safetensors file".into(), error.to_string());
     let (_, header) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
     let metadata: Metadata = header.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect();
     for (key, expected) in [("format", FORMAT), ("format_version", VERSION)] {
@@ -121,12 +122,12 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<Model> {
         let found = arrays.get(name).ok_or_else(|| refuse(format!("array `{name}`"), "missing".into()))?;
         Ok(DMatrix::from_row_slice(found.shape[0], found.shape[1], &found.values))
     };
-    let entry = |key: &str| {
-        metadata.get(key).cloned().ok_or_else(|| refuse(format!("metadata `{key}`"), "missing".into()))
-    };
+    let entry =
+        |key: &str| metadata.get(key).cloned().ok_or_else(|| refuse(format!("metadata `{key}`"), "missing".into()));
     let capacity = entry("heat_capacity")?;
-    let heat_capacity =
-        capacity.parse().map_err(|_| refuse("metadata `heat_capacity`".into(), format!("{capacity:?} is no number")))?;
+    let heat_capacity = capacity
+        .parse()
+        .map_err(|_| refuse("metadata `heat_capacity`".into(), format!("{capacity:?} is no number")))?;
     let edges = array("patches")?;
     if edges.ncols() != 4 {
         return Err(refuse("array `patches`".into(), format!("{} columns found, 4 expected", edges.ncols())));

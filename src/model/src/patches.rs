@@ -303,7 +303,11 @@ pub(crate) fn face_points(
 }
 
 /// Shape functions of an element at a point of a face, area per parameters' area (m²), and the position (m).
-pub(crate) fn on_face(kind: ElementKind, coordinates: &[[f64; 3]], (natural, along): FacePoint) -> (Vec<f64>, f64, [f64; 3]) {
+pub(crate) fn on_face(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    (natural, along): FacePoint,
+) -> (Vec<f64>, f64, [f64; 3]) {
     let shape = kind.shape(natural);
     let tangent = |direction: [f64; 3]| -> [f64; 3] {
         let rate = |gradient: [f64; 3]| -> f64 { gradient.iter().zip(direction).map(|(g, d)| g * d).sum() };

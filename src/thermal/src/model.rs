@@ -106,19 +106,27 @@ impl Model {
             }
             let lowest = matrix.symmetric_eigenvalues().min();
             if lowest < -slack {
-                let problem = format!("it has the negative eigenvalue {}: heat would flow from cold to hot", shown(lowest));
+                let problem =
+                    format!("it has the negative eigenvalue {}: heat would flow from cold to hot", shown(lowest));
                 return refuse(name, problem);
             }
         }
         if self.conduction.row(0).amax() > 0.0 || self.conduction.column(0).amax() > 0.0 {
-            return refuse("conduction", "its first row and column are not zero: a uniform temperature would not last".into());
+            return refuse(
+                "conduction",
+                "its first row and column are not zero: a uniform temperature would not last".into(),
+            );
         }
         let share = 1.0 / self.heat_capacity.sqrt();
         if self.heat_loads.row(0).iter().any(|load| (load - share).abs() > ROUNDING * share) {
             return refuse("heat_loads", "a watt does not heat the whole by a watt (first row)".into());
         }
         let uniform = [&self.patch_means, &self.wetted_means, &self.places];
-        if uniform.iter().flat_map(|rows| rows.column(0).iter().copied().collect::<Vec<_>>()).any(|value| (value - share).abs() > ROUNDING * share) {
+        if uniform
+            .iter()
+            .flat_map(|rows| rows.column(0).iter().copied().collect::<Vec<_>>())
+            .any(|value| (value - share).abs() > ROUNDING * share)
+        {
             return refuse("patch_means", "a uniform temperature is not its own mean (first column)".into());
         }
         Ok(())

@@ -51,7 +51,8 @@ impl Simulation {
         let (order, patches) = (model.order(), model.patches.len());
         let model_rows = rows(&model);
         let operator = Operator::new(&model, &model_rows, [1.0; 2]);
-        let arrays = [&model.conduction, &model.gas_convection, &model.ambient_convection, &model.heat_loads, &model_rows];
+        let arrays =
+            [&model.conduction, &model.gas_convection, &model.ambient_convection, &model.heat_loads, &model_rows];
         let fingerprint = fingerprint_of(arrays.iter().map(|array| array.as_slice()));
         let mut simulation = Self {
             values: vec![0.0; table.references()],
@@ -322,4 +323,3 @@ impl State {
         }
     }
 }
-

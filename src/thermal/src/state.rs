@@ -126,7 +126,8 @@ impl Simulation {
         let mut state = self.state.clone();
         state.restore(&mut Reader::new(body));
         let items = [state.initial_state, state.interpolation].iter().all(|item| (1..=2).contains(item));
-        let factors = state.factors.iter().chain(&state.factors_used).all(|factor| crate::table::FACTORS.contains(factor));
+        let factors =
+            state.factors.iter().chain(&state.factors_used).all(|factor| crate::table::FACTORS.contains(factor));
         if reader.infinite() > 0 || state.phase > FAILED || !items || !factors || state.last_length < 0.0 {
             return damaged("it holds values that no state holds");
         }

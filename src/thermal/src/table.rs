@@ -156,8 +156,7 @@ fn inputs(table: &mut Builder, patches: usize) {
         let text = format!(
             "Temperature of the {what} above the reference; reached at the end of the step (input_interpolation)"
         );
-        let film =
-            table.input(Item::Film(index), &format!("{name}_temperature"), Some(&KELVIN), 0.0, &text);
+        let film = table.input(Item::Film(index), &format!("{name}_temperature"), Some(&KELVIN), 0.0, &text);
         film.nominal = Some(100.0);
         limit(film, &TEMPERATURES);
     }
@@ -224,7 +223,8 @@ fn heat(table: &mut Builder) {
     }
     let text = "Heat stored less heat stored at the start and all heat that came since: rounding";
     table.output(Item::Residual, "energy_residual", &JOULE, Span::Total, text);
-    let text = "The same as a share of the heat at the start and all exchanged since, each communication step by its size";
+    let text =
+        "The same as a share of the heat at the start and all exchanged since, each communication step by its size";
     let residual = table.push(Item::RelativeResidual, "energy_residual_relative", None, text);
     residual.span = Span::Total;
 }

@@ -70,7 +70,9 @@ impl Simulation {
             match self.item(variable) {
                 Item::Heat => heat[element] += seed,
                 Item::Film(index) => films[index] += seed,
-                _ => return Err(refused(variable, "it is no heat and no temperature of gas or air, which act linearly")),
+                _ => {
+                    return Err(refused(variable, "it is no heat and no temperature of gas or air, which act linearly"));
+                }
             }
         }
         let change = self.change(length, &heat, films);

@@ -16,7 +16,8 @@ fn number(seed: usize) -> f64 {
 
 /// Symmetric and not negative, with rates from slow to fast.
 fn positive(seed: usize, scale: f64) -> DMatrix<f64> {
-    let factor = DMatrix::from_fn(ORDER, ORDER, |i, j| number(seed + 7 * i + j) * 4.0_f64.powi(i32::try_from(j).unwrap()));
+    let factor =
+        DMatrix::from_fn(ORDER, ORDER, |i, j| number(seed + 7 * i + j) * 4.0_f64.powi(i32::try_from(j).unwrap()));
     &factor * factor.transpose() * scale
 }
 
@@ -80,7 +81,14 @@ fn warm() -> Simulation {
 }
 
 /// Fourth-order Runge-Kutta in the model's own coordinates, inputs linear over the step; patch means at the end.
-fn runge_kutta(model: &Model, start: f64, heat: [f64; PATCHES], films: [[f64; 2]; 2], factors: [f64; 2], length: f64) -> Vec<f64> {
+fn runge_kutta(
+    model: &Model,
+    start: f64,
+    heat: [f64; PATCHES],
+    films: [[f64; 2]; 2],
+    factors: [f64; 2],
+    length: f64,
+) -> Vec<f64> {
     let root = model.heat_capacity.sqrt();
     let matrix = &model.conduction + &model.gas_convection * factors[0] + &model.ambient_convection * factors[1];
     let sides = [&model.gas_convection, &model.ambient_convection];
@@ -146,12 +154,18 @@ fn steps_of_any_length_lead_to_the_same() {
     simulation.do_step(0.0, 1.0).unwrap();
     // Means are over the last step, and what is left of the balance is rounding.
     let skipped = ["gas_power", "ambient_power", "energy_residual", "energy_residual_relative"];
-    let skipped: Vec<usize> = skipped.iter().map(|name| {
-        let reference = reference(&simulation, name);
-        (0..reference).filter(|reference| simulation.real(*reference).is_ok()).count()
-    }).collect();
+    let skipped: Vec<usize> = skipped
+        .iter()
+        .map(|name| {
+            let reference = reference(&simulation, name);
+            (0..reference).filter(|reference| simulation.real(*reference).is_ok()).count()
+        })
+        .collect();
     for (index, (a, b)) in one.iter().zip(&many).enumerate() {
-        assert!(skipped.contains(&index) || (a - b).abs() <= 1e-11 * (a.abs() + 1.0), "output {index}: {a} against {b}");
+        assert!(
+            skipped.contains(&index) || (a - b).abs() <= 1e-11 * (a.abs() + 1.0),
+            "output {index}: {a} against {b}"
+        );
     }
 }
 
@@ -185,7 +199,8 @@ fn a_derivative_given_is_a_ramp_whatever_the_interpolation() {
 fn heat_from_gas_and_air_is_what_their_films_let_through() {
     let (model, mut simulation) = (model(), warm());
     let flow = |simulation: &Simulation| {
-        let rates = ["gas_heat", "ambient_heat"].map(|name| simulation.output_derivative(reference(simulation, name), 1).unwrap());
+        let rates = ["gas_heat", "ambient_heat"]
+            .map(|name| simulation.output_derivative(reference(simulation, name), 1).unwrap());
         rates
     };
     // At the start the temperature is uniform: h A (T_gas − T), by numbers of the model alone.
@@ -218,9 +233,19 @@ fn derivatives_over_a_step_are_differences_exactly() {
     let mut state = vec![0; simulation.state_size()];
     simulation.save_state(&mut state).unwrap();
     let first = reference(&simulation, "casing_heat");
-    let inputs = [first, first + 2, reference(&simulation, "gas_temperature"), reference(&simulation, "ambient_temperature")];
+    let inputs =
+        [first, first + 2, reference(&simulation, "gas_temperature"), reference(&simulation, "ambient_temperature")];
     let seed = [2.0, -1.0, 3.0, 0.5];
-    let names = ["casing_temperature", "surface_temperature", "temperature_mean", "temperature_max", "gas_power", "stored_heat", "supplied_heat", "ambient_heat"];
+    let names = [
+        "casing_temperature",
+        "surface_temperature",
+        "temperature_mean",
+        "temperature_max",
+        "gas_power",
+        "stored_heat",
+        "supplied_heat",
+        "ambient_heat",
+    ];
     let references = names.map(|name| reference(&simulation, name));
     let run = |simulation: &mut Simulation, scale: f64| {
         simulation.restore_state(&state).unwrap();
@@ -237,7 +262,11 @@ fn derivatives_over_a_step_are_differences_exactly() {
     simulation.step_derivative(&references, &inputs, &seed, &mut sensitivity).unwrap();
     for (index, name) in names.iter().enumerate() {
         let difference = 0.5 * (high[index] - low[index]);
-        assert!((sensitivity[index] - difference).abs() < 1e-9 * (1.0 + difference.abs()), "{name}: {} against {difference}", sensitivity[index]);
+        assert!(
+            (sensitivity[index] - difference).abs() < 1e-9 * (1.0 + difference.abs()),
+            "{name}: {} against {difference}",
+            sensitivity[index]
+        );
     }
     let factor = reference(&simulation, "gas_convection_factor");
     let error = simulation.step_derivative(&references[..1], &[factor], &[1.0], &mut [0.0]).unwrap_err();
@@ -249,7 +278,9 @@ fn output_derivatives_are_rates() {
     let mut simulation = warm();
     set(&mut simulation, "casing_heat", 30.0);
     simulation.do_step(0.0, 2.0).unwrap();
-    for name in ["casing_temperature", "temperature_mean", "temperature_max", "stored_heat", "gas_heat", "supplied_heat"] {
+    for name in
+        ["casing_temperature", "temperature_mean", "temperature_max", "stored_heat", "gas_heat", "supplied_heat"]
+    {
         let reference = reference(&simulation, name);
         let rate = simulation.output_derivative(reference, 1).unwrap();
         let mut later = simulation.clone();
@@ -339,7 +370,14 @@ fn a_casing_that_nothing_cools_keeps_its_heat() {
 fn what_means_nothing_is_refused() {
     let mut simulation = warm();
     let heat = reference(&simulation, "casing_heat");
-    for (reference, value) in [(heat, f64::NAN), (heat, 1e12), (reference(&simulation, "gas_convection_factor"), -0.1), (reference(&simulation, "temperature_max"), 1.0), (reference(&simulation, "initial_temperature"), 1.0), (9999, 0.0)] {
+    for (reference, value) in [
+        (heat, f64::NAN),
+        (heat, 1e12),
+        (reference(&simulation, "gas_convection_factor"), -0.1),
+        (reference(&simulation, "temperature_max"), 1.0),
+        (reference(&simulation, "initial_temperature"), 1.0),
+        (9999, 0.0),
+    ] {
         assert!(simulation.set_real(reference, value).is_err(), "{reference} {value}");
     }
     for (time, step) in [(0.0, 0.0), (0.0, -1.0), (0.0, f64::NAN), (5.0, 1.0), (f64::NAN, 1.0), (0.0, 1e12)] {

@@ -61,7 +61,8 @@ struct References {
 }
 
 /// Functions of the tables that this unit has, and the contact unit of the tests has not.
-const DERIVATIVES: [&str; 3] = ["fmi2GetDirectionalDerivative", "fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative"];
+const DERIVATIVES: [&str; 3] =
+    ["fmi2GetDirectionalDerivative", "fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative"];
 
 /// A scene whose casing an importer can drive to infinity, so that a step fails; or a casing that conducts heat.
 fn subject(thermal: bool) -> Subject {
@@ -342,7 +343,8 @@ fn fmi3_pair_by_pair() {
 fn fmi3_pairs<const THERMAL: bool>() {
     let subject = &subject(THERMAL);
     let (api, known) = (fmi3::load(&subject.path), subject.known);
-    let arguments = fmi3::Arguments { update: Some(call_inside::<THERMAL>), ..fmi3::Arguments::new(&subject.resources) };
+    let arguments =
+        fmi3::Arguments { update: Some(call_inside::<THERMAL>), ..fmi3::Arguments::new(&subject.resources) };
     let slave = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
     slave.wish(-1.0);
     let mut states = vec![('I', slave.save())];

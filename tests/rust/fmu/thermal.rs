@@ -155,7 +155,15 @@ fn derivatives_are_those_of_the_native_simulation() {
     let (seed, mut value) = (3.0, 0.0);
     // SAFETY: arrays of one element.
     let ask = |input: u32, value: &mut f64| unsafe {
-        (api.fmi2GetDirectionalDerivative)(slave.handle, &raw const output, 1, &raw const input, 1, &raw const seed, &raw mut *value)
+        (api.fmi2GetDirectionalDerivative)(
+            slave.handle,
+            &raw const output,
+            1,
+            &raw const input,
+            1,
+            &raw const seed,
+            &raw mut *value,
+        )
     };
     assert_eq!(ask(heat, &mut value), ERROR);
     assert!(slave.log().contains("no communication step"));

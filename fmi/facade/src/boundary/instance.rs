@@ -8,8 +8,8 @@ use super::float_environment::StandardFloats;
 use super::log::{Log, Sink};
 use super::{Environment, IntermediateUpdate, Text, panics};
 use crate::slave::order::{self, Rule};
-use crate::unit::Load;
 use crate::slave::{Dialect, Phase, Refusal, Result, Slave, Status};
+use crate::unit::Load;
 
 /// FMI 3.0 callbacks and flags that belong to stepping.
 #[derive(Debug, Clone, Copy)]

@@ -8,8 +8,7 @@ use super::Environment;
 use crate::slave::Status;
 
 /// `fmi2CallbackLogger`: variadic, with a printf format.
-pub type Fmi2Logger =
-    unsafe extern "C" fn(Environment, *const c_char, Status, *const c_char, *const c_char, ...);
+pub type Fmi2Logger = unsafe extern "C" fn(Environment, *const c_char, Status, *const c_char, *const c_char, ...);
 
 /// `fmi3LogMessageCallback`.
 pub type Fmi3Logger = unsafe extern "C" fn(Environment, Status, *const c_char, *const c_char);

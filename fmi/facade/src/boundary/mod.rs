@@ -11,13 +11,13 @@ mod pointers;
 pub(crate) use calls::{StateHandle, set_debug_logging, strings};
 pub(crate) use calls::{get, set, state};
 pub(crate) use derivatives::{ADJOINT, DIRECTIONAL, derivatives};
-pub(crate) use instance::{Callbacks, Instantiation, enter, instantiate, release};
 pub use instance::Handle;
+pub(crate) use instance::{Callbacks, Instantiation, enter, instantiate, release};
 pub(crate) use instance::{guard, refuse_instantiation, unsupported};
-pub use log::{Fmi2Logger, Fmi3Logger};
 pub(crate) use log::Sink;
-pub use pointers::{Environment, In, Text};
+pub use log::{Fmi2Logger, Fmi3Logger};
 pub(crate) use pointers::Out;
+pub use pointers::{Environment, In, Text};
 
 /// `fmi3IntermediateUpdateCallback`.
 pub type IntermediateUpdate = unsafe extern "C" fn(

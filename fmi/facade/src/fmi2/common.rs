@@ -8,9 +8,9 @@ use crate::boundary::{
     refuse_instantiation, release, state,
 };
 use crate::location;
-use crate::unit::Load;
 use crate::slave::order::fmi2 as order;
 use crate::slave::{Dialect, Experiment, Refusal, Status};
+use crate::unit::Load;
 
 /// `fmi2CallbackFunctions`. Memory functions and `stepFinished` are never called.
 #[derive(Clone, Copy)]

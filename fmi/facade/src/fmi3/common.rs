@@ -8,9 +8,9 @@ use crate::boundary::{
     Text, guard, instantiate, refuse_instantiation, release, state,
 };
 use crate::location;
-use crate::unit::Load;
 use crate::slave::order::fmi3 as order;
 use crate::slave::{Dialect, Experiment, Refusal, Status};
+use crate::unit::Load;
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3GetVersion() -> *const c_char {

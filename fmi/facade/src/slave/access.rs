@@ -1,7 +1,7 @@
 //! Reading and setting variables: every request is checked in full before anything is read or written.
 
-use tiprub_core::variables::{Causality, Kind, Variability, Variable};
 use tiprub_core::Error;
+use tiprub_core::variables::{Causality, Kind, Variability, Variable};
 
 use super::{Dialect, Phase, Refusal, Result, Slave};
 use crate::unit::Unit;

@@ -69,10 +69,13 @@ pub const GAS_FILM: f64 = 500.0;
 /// The same of the air outside: weak forced convection.
 pub const AMBIENT_FILM: f64 = 25.0;
 /// Eigenmodes where no number is given.
-pub const MODES: usize = 40;
+pub const MODES: usize = 20;
 
 impl ConductionOptions {
     pub(crate) fn validate(&self) -> Result<()> {
+        if self.modes == 0 {
+            return Err(Error::invalid("thermal model, number of modes", "it is zero", "Ask for one at least"));
+        }
         for (what, value) in [
             ("density (kg/m³)", self.density),
             ("conductivity (W/(m K))", self.conductor.conductivity),

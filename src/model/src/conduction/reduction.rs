@@ -3,16 +3,17 @@
 //! The basis holds the uniform temperature, so that heat is conserved; the slowest eigenmodes of K + H_g + H_a and C, for what lasts;
 //! and responses at rest to the heat of each patch and to gas and air, so that every steady state at the film coefficients given is
 //! exact. More such responses, with the gas standing still and with it four times as strong, make steady states at other factors
-//! good: what is left is measured.
+//! good. Responses to heat that grows as exp(σt), at σ of ten, a hundred and a thousand times the slowest rate, make its beginning
+//! good: of what is local and young eigenmodes know little (a rational Krylov space). What is left is measured.
 
-use faer::{Mat, MatRef};
+use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::rom::Patch;
 use tiprub_thermal::Model;
 
 use super::{ConductionOptions, FullConduction};
 use crate::casing::{CasingOptions, supported_ring};
-use crate::eigen::{lowest_modes, positive_factor};
+use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
 use crate::sparse::tall_product;
@@ -21,6 +22,8 @@ use crate::{Error, Result};
 
 /// What is left of a vector, as a share of it, that depends on those before.
 const DEPENDENT: f64 = 1e-9;
+/// Rates of growth, as multiples of the slowest rate of decay, whose responses are in the basis.
+const GROWTHS: [f64; 3] = [10.0, 100.0, 1000.0];
 /// Factors of gas and air whose steady states are held against the full model.
 const CHECKED: [[f64; 2]; 6] = [[1.0, 1.0], [0.1, 1.0], [0.3, 1.0], [3.0, 1.0], [10.0, 1.0], [1.0, 10.0]];
 
@@ -85,7 +88,7 @@ pub fn reduce_conduction(
     let nominal = full.operator([1.0; 2]);
     let factor = positive_factor(&nominal, &full.capacity, "K + H (conduction and films)", NO_HOLD)?;
     let modes = lowest_modes(&full.capacity, &factor, 0.0, options.modes, Stage::FullModes, listener)?;
-    let basis = basis(&full, modes.shapes.as_ref(), options.films)?;
+    let basis = basis(&full, &modes, options.films)?;
     report(listener, Stage::Checks, 0, 1);
     let model = project(mesh, &full, &basis, (patches, options))?;
     model.validate()?;
@@ -109,13 +112,16 @@ pub fn reduce_conduction(
 const NO_HOLD: &str = "Check the mesh for parts that hang together with nothing";
 
 /// C-orthonormal vectors, the uniform temperature first; nodes × coordinates.
-fn basis(full: &FullConduction, modes: MatRef<'_, f64>, films: [f64; 2]) -> Result<Mat<f64>> {
+fn basis(full: &FullConduction, modes: &Modes, films: [f64; 2]) -> Result<Mat<f64>> {
     let nodes = full.capacity.order();
-    let mut vectors: Vec<Mat<f64>> = vec![Mat::from_fn(nodes, 1, |_, _| 1.0), modes.to_owned()];
+    let mut vectors: Vec<Mat<f64>> = vec![Mat::from_fn(nodes, 1, |_, _| 1.0), modes.shapes.clone()];
     // With the gas standing still, air alone must carry the heat away.
     let still = [if films[1] > 0.0 { 0.0 } else { 0.05 }, 1.0];
     for factors in [[1.0, 1.0], still, [4.0, 1.0]] {
-        vectors.push(steady(full, factors)?);
+        vectors.push(response(full, factors, 0.0)?);
+    }
+    for growth in GROWTHS {
+        vectors.push(response(full, [1.0; 2], growth * modes.eigenvalues[0])?);
     }
     let mut basis = Mat::<f64>::zeros(nodes, vectors.iter().map(Mat::ncols).sum());
     let mut size = 0;
@@ -144,13 +150,15 @@ fn norm(full: &FullConduction, column: &Mat<f64>) -> f64 {
     (column.col(0).transpose() * weighted.col(0)).max(0.0).sqrt()
 }
 
-/// Steady states under a watt of each patch, and a kelvin of the gas and of the air; nodes × (patches + 2).
-fn steady(full: &FullConduction, factors: [f64; 2]) -> Result<Mat<f64>> {
+/// Responses to a watt of each patch, and a kelvin of the gas and of the air, that grow by the rate `growth` (1/s, 0 of steady states);
+/// nodes × (patches + 2).
+fn response(full: &FullConduction, factors: [f64; 2], growth: f64) -> Result<Mat<f64>> {
     let (patches, films) = (full.heat.ncols(), full.film_loads());
     let loads = Mat::from_fn(full.capacity.order(), patches + 2, |i, k| {
         if k < patches { full.heat[(i, k)] } else { films[(i, k - patches)] }
     });
-    Ok(full.operator(factors).factor("K + H (conduction and films)", NO_HOLD)?.solve(loads))
+    let operator = full.operator(factors).plus_scaled(growth, &full.capacity);
+    Ok(operator.factor("K + H (conduction and films)", NO_HOLD)?.solve(loads))
 }
 
 fn project(
@@ -178,7 +186,11 @@ fn project(
     heat_loads.row_mut(0).fill(1.0 / heat_capacity.sqrt());
     let mut wetted_means = means(&full.wetted);
     if full.areas[1] == 0.0 {
-        return Err(Error::invalid("thermal model", "no face of the mesh is in the air outside", "Check the mesh and its axis, z"));
+        return Err(Error::invalid(
+            "thermal model",
+            "no face of the mesh is in the air outside",
+            "Check the mesh and its axis, z",
+        ));
     }
     let mut patch_means = means(&full.patch_means);
     let mut places = DMatrix::from_fn(full.places.len(), order, |i, j| basis[(full.places[i], j)]);
@@ -223,13 +235,12 @@ fn origin(mesh: &Mesh, full: &FullConduction, order: usize, options: &Conduction
 /// Steady states under a watt of each patch.
 fn check(full: &FullConduction, model: &Model, factors: [f64; 2]) -> Result<SteadyCheck> {
     let patches = full.heat.ncols();
-    let exact = steady(full, factors)?;
+    let exact = response(full, factors, 0.0)?;
     let exact = exact.get(.., ..patches);
     let matrix = &model.conduction + &model.gas_convection * factors[0] + &model.ambient_convection * factors[1];
-    let reduced = matrix.cholesky().ok_or_else(|| Error::NotPositiveDefinite {
-        matrix: "K + H (reduced)".into(),
-        remedy: NO_HOLD.into(),
-    })?;
+    let reduced = matrix
+        .cholesky()
+        .ok_or_else(|| Error::NotPositiveDefinite { matrix: "K + H (reduced)".into(), remedy: NO_HOLD.into() })?;
     let reduced = reduced.solve(&model.heat_loads);
     let deviation = |rows: &DMatrix<f64>, columns: &Mat<f64>| {
         let exact = tall_product(columns.as_ref(), exact);

@@ -62,7 +62,8 @@ impl Surfaces {
         }
         let [gas, _] = &surfaces.sides;
         if gas.is_empty() || surfaces.heated.is_empty() {
-            let which = if gas.is_empty() { "faces of the mesh look towards the axis" } else { "face in the gas lies there" };
+            let which =
+                if gas.is_empty() { "faces of the mesh look towards the axis" } else { "face in the gas lies there" };
             let problem = format!("of z = {} m to {} m: no {which}", heated[0], heated[1]);
             let remedy = "Give axial positions within the casing; its axis is z";
             return Err(Error::invalid("thermal model, heated surface", problem, remedy));
@@ -104,16 +105,21 @@ impl Surfaces {
             || Ok(normalised(means)),
             |patch| {
                 let what = format!("thermal model, patch {}", patch + 1);
-                Err(Error::invalid(what, "no heated face lies in it", "Give one row of patches, or heat all of the length"))
+                Err(Error::invalid(
+                    what,
+                    "no heated face lies in it",
+                    "Give one row of patches, or heat all of the length",
+                ))
             },
         )
     }
 
     /// Corner nodes of heated faces, ascending.
     pub(super) fn places(&self, mesh: &Mesh) -> Vec<usize> {
-        let nodes = self.heated.iter().flat_map(|face| {
-            face.corners.iter().map(|&corner| mesh.elements[face.element].nodes[corner])
-        });
+        let nodes = self
+            .heated
+            .iter()
+            .flat_map(|face| face.corners.iter().map(|&corner| mesh.elements[face.element].nodes[corner]));
         nodes.collect::<BTreeSet<_>>().into_iter().collect()
     }
 
