@@ -167,6 +167,8 @@ pub fn description<'a>(table: &'a VariableTable, roms: &'a [Rom], fmi3_arrays: b
     Description {
         model_name: "rotor_rub",
         identifier: "tiprub",
+        about: "It steps.",
+        steps: "They are long.",
         token: "{}",
         description: "",
         generated: "",
