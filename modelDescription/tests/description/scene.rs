@@ -14,6 +14,12 @@ pub fn complete() -> Scene {
     let rotor = &mut scene.settings.structures[0];
     rotor.spin = SpinSettings { stiffening: true, growth: true, coriolis: true };
     (rotor.whirl, rotor.axial_shift) = (true, true);
+    (rotor.thermal, rotor.softening, rotor.damping_ratios) = (true, 3e-4, vec![0.002, 0.004]);
+    let (mode, node, direction) = (Some(1), None, None);
+    rotor.excitation = Some(ExcitationSettings { order: 4, mode, node, direction, amplitude: 0.0, phase: 0.0 });
+    let (mode, sector, nodal_diameter) = (1, None, Some(3));
+    rotor.initial =
+        vec![InitialSettings { mode, sector, nodal_diameter, phase: 0.0, displacement: 0.0, velocity: 0.0 }];
     models::on_ring(&mut scene, models::ring(24, 3), 0.01);
     let ring = &mut scene.settings.structures[1];
     (ring.thermal, ring.load) = (true, Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 }));
@@ -54,13 +60,6 @@ pub fn rigid() -> Scene {
     let mut scene = models::bumps(rom);
     let settings = &mut scene.settings;
     settings.structures[0].speed = 1800.0;
-    let rotor = &mut settings.structures[0];
-    (rotor.thermal, rotor.softening, rotor.damping_ratios) = (true, 3e-4, vec![0.002, 0.004]);
-    let (mode, node, direction) = (Some(1), None, None);
-    rotor.excitation = Some(ExcitationSettings { order: 4, mode, node, direction, amplitude: 0.0, phase: 0.0 });
-    let (mode, sector, nodal_diameter) = (1, None, Some(3));
-    rotor.initial =
-        vec![InitialSettings { mode, sector, nodal_diameter, phase: 0.0, displacement: 0.0, velocity: 0.0 }];
     settings.surfaces[0].shape = Shape::TwoLobe { depth: 1.2, width: 0.15, phase: 0.0 };
     settings.surfaces[0].ramp_time = 1e-4;
     settings.outputs = OutputSettings {

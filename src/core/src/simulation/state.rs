@@ -53,8 +53,9 @@ struct Lead {
     inputs: Inputs,
     rotors: Vec<RotorAngle>,
     values: Vec<f64>,
-    /// Speed (rad/s) and temperature (K) of each structure that touches.
-    references: Vec<[f64; 2]>,
+    /// Of each structure that touches (rad/s), and their temperatures (K).
+    reference_speeds: Vec<f64>,
+    reference_temperatures: Vec<f64>,
     /// Internal step (s).
     step: f64,
 }
@@ -141,7 +142,8 @@ impl Simulation {
         self.window.save(writer);
         self.values.save(writer);
         self.previous.save(writer);
-        self.compiled.references().iter().for_each(|reference| reference.save(writer));
+        self.compiled.bodies.iter().for_each(|body| body.reference_speed.save(writer));
+        self.compiled.bodies.iter().for_each(|body| body.reference_temperature.save(writer));
         self.system.save(writer);
     }
 
@@ -156,7 +158,8 @@ impl Simulation {
             inputs: self.inputs.clone(),
             rotors: self.rotors.clone(),
             values: self.values.clone(),
-            references: vec![[0.0; 2]; self.rotors.len()],
+            reference_speeds: vec![0.0; self.rotors.len()],
+            reference_temperatures: vec![0.0; self.rotors.len()],
             step: 0.0,
         };
         lead.phase.restore(reader);
@@ -180,7 +183,8 @@ impl Simulation {
         reader.up_to(f64::MAX);
         take(&mut lead.values, reader);
         self.previous.check(reader);
-        take(&mut lead.references, reader);
+        take(&mut lead.reference_speeds, reader);
+        take(&mut lead.reference_temperatures, reader);
         reader.up_to(largest);
         let endless;
         (lead.step, endless) = self.system.check(reader, runs);
@@ -267,14 +271,16 @@ impl Simulation {
             (std::mem::replace(&mut self.values, lead.values), std::mem::replace(&mut self.inputs, lead.inputs));
         // Before initialisation nothing has been computed from them, and what does not fit together is not refused yet.
         let moves = self.is_moved_within_reason(lead.communication.length, lead.time);
+        let references = lead.reference_speeds.iter().zip(&lead.reference_temperatures);
+        let references: Vec<[f64; 2]> = references.map(|(speed, temperature)| [*speed, *temperature]).collect();
         let outcome = match lead.phase {
             Phase::Ready | Phase::Stepping if !moves => damaged("an input moves something beyond all bounds"),
             Phase::Created => Ok(()),
             // Looked at when a step begins and when a speed is given, not at every internal step.
-            Phase::Stepping => self
-                .check_turning_of_all(lead.step, lead.communication.length)
-                .and_then(|()| self.adopt(&lead.references)),
-            Phase::Ready | Phase::Failed => self.adopt(&lead.references),
+            Phase::Stepping => {
+                self.check_turning_of_all(lead.step, lead.communication.length).and_then(|()| self.adopt(&references))
+            }
+            Phase::Ready | Phase::Failed => self.adopt(&references),
         };
         if outcome.is_err() {
             (self.values, self.inputs) = before;
