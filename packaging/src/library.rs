@@ -464,6 +464,20 @@ mod tests {
     }
 
     #[test]
+    fn libraries_of_both_units_are_told_apart() {
+        let (root, console) = (tempfile::tempdir().unwrap(), Console::new(true, false));
+        let [scene, thermal] = ["x86_64-linux.so", "thermal-x86_64-linux.so"].map(|name| root.path().join(name));
+        let conducts = [elf(62), tiprub_format::THERMAL_FILE.as_bytes().to_vec()].concat();
+        std::fs::write(&scene, elf(62)).unwrap();
+        std::fs::write(&thermal, &conducts).unwrap();
+        for (unit, bytes, other) in [(Unit::Scene, elf(62), thermal), (Unit::Thermal, conducts, scene)] {
+            let found = load(unit, &arguments(&[root.path().to_path_buf()], &[]), &console).unwrap();
+            assert!(found.len() == 1 && found[0].bytes == bytes, "{unit:?}");
+            assert!(load(unit, &arguments(&[other], &[]), &console).unwrap_err().problem.contains("another unit"));
+        }
+    }
+
+    #[test]
     fn places_of_the_builder_get_neutral_names() {
         let root = tempfile::tempdir().unwrap();
         let home = root.path().join("home");

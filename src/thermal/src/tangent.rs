@@ -71,7 +71,10 @@ impl Simulation {
                 Item::Heat => heat[element] += seed,
                 Item::Film(index) => films[index] += seed,
                 _ => {
-                    return Err(refused(variable, "it is no heat and no temperature of gas or air, which act linearly"));
+                    return Err(refused(
+                        variable,
+                        "it is no heat and no temperature of gas or air, which act linearly",
+                    ));
                 }
             }
         }
