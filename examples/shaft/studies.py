@@ -114,6 +114,7 @@ def stability(file, quick, say, masses=None):
         matrices = {}
         for step in steps:
             disk, before = pressed(mass)
+            say(f"stability: {mass:g} kg, stiffness over H = {step:g} s")
             slopes = []
             coupled(file, disk, Way.NEWTON, step, 8e-3, before=before, slopes=slopes)
             # The force is a mean over the step, the whirl that of its end: twice the derivative is what a spring would have.
