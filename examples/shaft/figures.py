@@ -15,7 +15,7 @@ def shown(value):
     if isinstance(value, (int, numpy.integer)):
         return str(value)
     size = abs(value)
-    return f"{value:.1e}" if value and (size < 1e-2 or size >= 1e5) else f"{value:.4g}"
+    return f"{value:.2e}" if value and (size < 1e-2 or size >= 1e5) else f"{value:.4g}"
 
 
 def markdown(table):

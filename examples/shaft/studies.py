@@ -114,6 +114,7 @@ def stability(file, quick, say, masses=None):
         matrices = {}
         for step in steps:
             disk, before = pressed(mass)
+            say(f"stability: {mass:g} kg, stiffness over H = {step:g} s")
             slopes = []
             coupled(file, disk, Way.NEWTON, step, 8e-3, before=before, slopes=slopes)
             # The force is a mean over the step, the whirl that of its end: twice the derivative is what a spring would have.
@@ -175,7 +176,7 @@ def books(file, shafts, quick, say):
         run = coupled(file, rotor, way, step, length, before=blade_off(0.5e-3), watch=TOLD)
         columns.append(balance(rotor, run, start))
     table.rows = [[name, *[column[name] for column in columns]] for name in columns[0]]
-    header = ["internal step (s)", "impulse handed over (N s)", "less the sum over internal steps", "forces × whirl (J)", "less whirl work of the ledger"]
+    header = ["internal step (s)", "impulse handed over (N s)", "less the sum over internal steps", "forces × whirl (J)", "less whirl work"]
     impulse = Table("impulse", header)
     for inner in (1e-6, 5e-7):
         say(f"impulse: internal step {inner:g} s")

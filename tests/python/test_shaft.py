@@ -279,7 +279,7 @@ def test_what_is_missing_is_said(whirling, monkeypatch):
     with pytest.raises(ValueError, match="can move without force"):
         jeffcott(1.0, 0.0, 0.0, speed=1.0, clearance=1.0)
     ask = lambda *more: subprocess.run([sys.executable, str(EXAMPLE / "shaft.py"), *more], capture_output=True, text=True, check=False)
-    assert "there are errors, stability" in ask("eror").stderr
+    assert "no study eror: there are response, errors, stability" in ask("eror").stderr
     assert "--quick" in ask("--help").stdout
     monkeypatch.setenv("TIPRUB", "/nowhere/tiprub")
     refused = ask("books", "--into", str(Path(whirling.three).parent / "none"))
