@@ -304,9 +304,9 @@ fn the_quick_study_of_stress_recovers_that_of_the_full_model() {
     );
     let rows = results["runs"].as_array().unwrap();
     let forced: Vec<f64> = rows.iter().filter_map(|row| row["same_forces"]["stress"].as_f64()).collect();
-    assert!(forced.len() == 3 && forced[2] < 0.05 && forced[0] > 0.2, "{forced:?}");
+    assert!(forced.len() == 3 && forced[2] < 0.06 && forced[0] > 0.2, "{forced:?}");
     let largest = |row: &Value| row["same_forces"]["worst_place"].as_f64();
-    assert!(rows.iter().filter_map(largest).next_back().unwrap() < 0.02, "{rows:#?}");
+    assert!(rows.iter().filter_map(largest).next_back().unwrap() < 0.05, "{rows:#?}");
     let full = results["largest_von_mises"]["full"].as_array().unwrap();
     assert!(full.len() == 6 && full.iter().all(|value| value.as_f64().unwrap() > 5e7), "{full:?}");
 }
