@@ -47,21 +47,21 @@ def step(file, rows):
     _save(figure, file)
 
 
-def _power(journey, cycle):
+def power(journey, cycle):
     """Heat into the casing, averaged over a cycle where steps are shorter than one."""
     times, power = numpy.array(journey.times), numpy.array(journey.fluxes).sum(axis=1)
     lengths = numpy.diff([0.0, *times])
     totals = numpy.concatenate([[0.0], numpy.cumsum(power * lengths)])
-    edges = numpy.arange(0.0, times[-1] + 0.5 * cycle, cycle)
+    edges = cycle * numpy.arange(int(times[-1] / cycle + 1e-6) + 1)
     return 0.5 * (edges[1:] + edges[:-1]), numpy.diff(numpy.interp(edges, [0.0, *times], totals)) / cycle
 
 
 def jump(file, truth, journeys, rows):
     figure, (left, right) = _axes(2, (9.0, 3.8))
     cycle = truth.times[0] * 40
-    left.plot(*_power(truth, cycle), color="black", label="every revolution resolved")
+    left.plot(*power(truth, cycle), color="black", label="every revolution resolved")
     for tolerance, journey in (journeys[0], journeys[-1]):
-        left.plot(*_power(journey, cycle), linewidth=1.0, label=f"cycle jump, {tolerance} K")
+        left.plot(*power(journey, cycle), linewidth=1.0, label=f"cycle jump, {tolerance} K")
     left.set(xlabel="time (s)", ylabel="heat into the casing (W)", ylim=(0.0, None))
     left.legend()
     right.loglog([row[2] for row in rows], [row[5] for row in rows], marker="o")
@@ -74,7 +74,7 @@ def jump(file, truth, journeys, rows):
 def long(file, journeys, revolution):
     figure, (left, right) = _axes(2, (9.0, 3.8))
     for (name, journey), colour in zip(journeys.items(), ("tab:blue", "tab:orange")):
-        left.plot(*_power(journey, 16 * revolution), color=colour, label=name)
+        left.plot(*power(journey, 16 * revolution), color=colour, label=name)
         values = numpy.array(journey.values)
         right.plot(journey.times, values.max(axis=1), color=colour, label="hottest patch")
         right.plot(journey.times, values.mean(axis=1), color=colour, linestyle="dashed", label="mean of the casing")

@@ -35,7 +35,7 @@ REVOLUTION = 2.0 * math.pi / SPEED
 STEP, CYCLE = REVOLUTION / 10, 10
 ROTOR = ["--contact-patches", "5", "--modes", "12", "--mesh", "16x2x20"]
 # Revolutions of `couplings`, `choice` and `step`; seconds of `jump`, of `long`; tolerances (K).
-FULL = {"couplings": 10, "choice": 16, "step": 24, "jump": 1.0, "long": 10.0, "tolerances": (2.0, 0.5, 0.2, 0.1), "tolerance": 0.25}
+FULL = {"couplings": 10, "choice": 16, "step": 24, "jump": 1.5, "long": 10.0, "tolerances": (2.0, 0.5, 0.2, 0.1), "tolerance": 0.25}
 QUICK = {"couplings": 3, "choice": 2, "step": 4, "jump": 0.12, "long": 0.3, "tolerances": (0.5, 0.1), "tolerance": 0.5}
 
 
@@ -112,16 +112,24 @@ class Files:
         options = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
         return Path(FmuBuilder.build_FMU(HERE / "casing_slave.py", dest=self.into, project_files=[HERE / "conduction.py"], **options))
 
-    def table(self, name, header, rows):
+    def table(self, name, header, rows, show=True):
         """A CSV file, and the same as a table on stdout."""
         with (self.into / f"{name}.csv").open("w", encoding="utf-8") as file:
             for row in [header, *rows]:
-                file.write(",".join(str(value) for value in row) + "\n")
-        shown = [[f"{value:.3g}" if isinstance(value, float) else str(value) for value in row] for row in rows]
+                file.write(",".join("" if value != value else str(value) for value in row) + "\n")
+        if not show:
+            return
+        shown = [["" if value != value else f"{value:.3g}" if isinstance(value, float) else str(value) for value in row] for row in rows]
         print(f"\n{name}\n| " + " | ".join(header) + " |\n|" + "---|" * len(header))
         for row in shown:
             print("| " + " | ".join(row) + " |")
         sys.stdout.flush()
+
+
+    def course(self, name, journey):
+        """Temperatures and heat of a journey over time."""
+        header = ["time (s)", *(f"temperature {k + 1} (K)" for k in range(PATCHES)), *(f"heat {k + 1} (W)" for k in range(PATCHES))]
+        self.table(name, header, [[time, *map(float, values), *map(float, heat)] for time, values, heat in zip(journey.times, journey.values, journey.fluxes)], show=False)
 
 
 class Pair:
@@ -246,11 +254,13 @@ def jump(files, rub, casing, size):
     """Cycle jump at several tolerances, against every revolution resolved."""
     stop = size["jump"]
     truth, supplied, seconds = _journey(rub[2], casing[2], resolved, _plan(1.0), stop, "fully resolved")
+    files.course("jump-resolved", truth)
     rows = [["resolved", truth.fast_steps / CYCLE, 1.0, 0, 0, 0.0, 0.0, supplied, _residual(truth, supplied), seconds]]
     journeys = []
     for tolerance in size["tolerances"]:
         found, supplied, seconds = _journey(rub[2], casing[2], cycle_jump, _plan(tolerance), stop, f"cycle jump, {tolerance} K")
         journeys.append((tolerance, found))
+        files.course(f"jump-{tolerance:g}", found)
         kept, tried = len(found.kept), len(found.jumps)
         speed_up = truth.fast_steps / found.fast_steps
         error = abs(found.handed / numpy.interp(found.times[-1], truth.times, _handed(truth)) - 1.0)
@@ -277,6 +287,7 @@ def long(files, rub, finer, casing, size):
     for name, unit in (("5 patches, 12 modes", rub[2]), ("9 patches, 80 modes", finer[2])):
         journey, supplied, seconds = _journey(unit, casing[2], cycle_jump, _plan(size["tolerance"]), stop, f"long, {name}")
         found[name] = journey
+        files.course(f"long-{len(found)}", journey)
         turns = journey.times[-1] / REVOLUTION
         share = journey.in_windows / journey.given
         rows.append([name, turns, journey.fast_steps / CYCLE, len(journey.kept), float(numpy.max(journey.values[-1])), supplied, share, _residual(journey, supplied), seconds])
@@ -289,10 +300,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--into", type=Path, default=Path("thermal"), help="directory for units, figures and tables [default: thermal]")
     parser.add_argument("--quick", action="store_true", help="a few revolutions of each: does it work?")
+    parser.add_argument("--seconds", type=float, help="thermal time of `jump` and `long`, in place of 1.5 s and 10 s (quick: 0.12 s and 0.3 s)")
     parser.add_argument("--casing", choices=("unit", "python"), default="unit", help="partner of the rub: the thermal unit that ships, or the one by PythonFMU [default: unit]")
     parser.add_argument("--only", choices=PARTS, action="append", help="this part only; may be given several times")
     arguments = parser.parse_args()
-    size, parts = (QUICK if arguments.quick else FULL), arguments.only or PARTS
+    size, parts = dict(QUICK if arguments.quick else FULL), arguments.only or PARTS
+    if arguments.seconds is not None:
+        if not arguments.seconds >= 0.05:
+            parser.error(f"--seconds {arguments.seconds:g} is less than a few windows take: give 0.05 or more")
+        size["jump"] = size["long"] = arguments.seconds
     try:
         files = Files(arguments.into.resolve())
         rub, python = files.rub("rub", ROTOR), files.casing_in_python()
