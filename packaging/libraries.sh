@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Build the FMU library for every platform, or for those named, into target/libraries, and show what each needs:
+# Build the FMU libraries, of scenes and of heat conduction (thermal-PLATFORM), for every platform, or for those named, into target/libraries, and show what each needs:
 #
 #     packaging/libraries.sh [x86_64-linux|x86_64-windows|aarch64-linux|x86_64-darwin|aarch64-darwin]...
 #
@@ -25,23 +25,27 @@ export SOURCE_DATE_EPOCH=315532800
 export MACOSX_DEPLOYMENT_TARGET=11.0
 mkdir -p "$out"
 for platform in "$@"; do
-    flags=$library_flags
     case $platform in
-    *-linux) triple=${platform%-linux}-unknown-linux-gnu glibc=.2.17 built=libtiprub_fmi.so extension=so ;;
-    *-windows) triple=${platform%-windows}-pc-windows-gnu glibc= built=tiprub_fmi.dll extension=dll ;;
-    *-darwin) triple=${platform%-darwin}-apple-darwin glibc= built=libtiprub_fmi.dylib extension=dylib
-        # A name that does not tell where it was built.
-        flags=$library_flags$separator-Clink-arg=-Wl,-install_name,@rpath/tiprub.dylib ;;
+    *-linux) triple=${platform%-linux}-unknown-linux-gnu glibc=.2.17 prefix=lib extension=so ;;
+    *-windows) triple=${platform%-windows}-pc-windows-gnu glibc= prefix= extension=dll ;;
+    *-darwin) triple=${platform%-darwin}-apple-darwin glibc= prefix=lib extension=dylib ;;
     *) echo "libraries.sh: $platform is none of $all" >&2; exit 2 ;;
     esac
     rustup target add --toolchain "$(rustc -V | cut -d' ' -f2)" "$triple" >/dev/null 2>&1 || rustup target add "$triple"
-    CARGO_ENCODED_RUSTFLAGS=$flags PATH=$bin:$PATH \
-        cargo zigbuild --quiet -p tiprub-fmi --profile fmu --target "$triple$glibc"
-    library=$out/$platform.$extension
-    cp "$target_dir/$triple/fmu/$built" "$library"
-    echo "$library: $(stat -c %s "$library") bytes, $(gzip -9 -c "$library" | wc -c) packed"
-    if [ $extension = so ]; then
-        readelf -d "$library" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/  needs \1/p'
-        echo "  newest glibc symbol: $(readelf -V --wide "$library" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -1)"
-    fi
+    # Crate, its file, and the identifier of the FMUs that it is in.
+    for unit in tiprub-fmi:tiprub_fmi:tiprub: tiprub-fmi-thermal:tiprub_thermal_fmi:tiprub_thermal:thermal-; do
+        IFS=: read -r crate file identifier named <<< "$unit"
+        flags=$library_flags
+        # A name that does not tell where it was built.
+        [ $extension != dylib ] || flags=$flags$separator-Clink-arg=-Wl,-install_name,@rpath/$identifier.dylib
+        CARGO_ENCODED_RUSTFLAGS=$flags PATH=$bin:$PATH \
+            cargo zigbuild --quiet -p "$crate" --profile fmu --target "$triple$glibc"
+        library=$out/$named$platform.$extension
+        cp "$target_dir/$triple/fmu/$prefix$file.$extension" "$library"
+        echo "$library: $(stat -c %s "$library") bytes, $(gzip -9 -c "$library" | wc -c) packed"
+        if [ $extension = so ]; then
+            readelf -d "$library" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/  needs \1/p'
+            echo "  newest glibc symbol: $(readelf -V --wide "$library" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -1)"
+        fi
+    done
 done

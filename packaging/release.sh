@@ -33,7 +33,7 @@ fi
 [ -x "$tools/bin/cargo-cyclonedx" ] || cargo install --quiet --locked --root "$tools" cargo-cyclonedx@0.5.9
 "$tools/bin/cargo-cyclonedx" cyclonedx --quiet --format json --override-filename bill-of-materials
 # Without the directory of these sources.
-for part in packaging:tiprub fmi:tiprub-fmi; do
+for part in packaging:tiprub fmi:tiprub-fmi fmi/thermal:tiprub-fmi-thermal; do
     sed "s|path+file://$PWD/|path+file:///tiprub/|g" "${part%:*}/bill-of-materials.json" > "$out/${part#*:}-$version.cdx.json"
 done
 find . -name bill-of-materials.json -not -path './target/*' -delete

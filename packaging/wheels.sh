@@ -46,9 +46,13 @@ wheel() {
 if [ "${1:-}" = --native ]; then
     # Apart from what cargo builds for the sources, which is told where they are.
     triple=$(rustc -vV | sed -n 's/^host: //p')
-    cargo build --quiet -p tiprub-fmi --profile fmu --target "$triple"
-    place "$target_dir/$triple/fmu/libtiprub_fmi.so"
+    # One after the other: together their features would be one.
+    for crate in tiprub-fmi tiprub-fmi-thermal; do
+        cargo build --quiet -p $crate --profile fmu --target "$triple"
+    done
+    place "$target_dir/$triple"/fmu/libtiprub{,_thermal}_fmi.so
     mv "$data/libtiprub_fmi.so" "$data/$(uname -m)-linux.so"
+    mv "$data/libtiprub_thermal_fmi.so" "$data/thermal-$(uname -m)-linux.so"
     wheel --target "$triple" --compatibility linux
     ls -l "$target_dir/wheels"
     exit

@@ -21,14 +21,16 @@ mkdir -p "$logs" || exit 1
 . packaging/remap.sh
 
 library() {
-    CARGO_ENCODED_RUSTFLAGS=$library_flags cargo rustc -p tiprub-fmi --profile fmu --target-dir target/product "$@"
+    crate=$1
+    shift
+    CARGO_ENCODED_RUSTFLAGS=$library_flags cargo rustc -p "$crate" --profile fmu --target-dir target/product "$@"
 }
 
 # What both are made of is compiled once. Only what ships is optimised as a whole.
 libraries() {
-    library --features test-panic -- -C opt-level=0 -C debug-assertions=off &&
+    library tiprub-fmi --features test-panic -- -C opt-level=0 -C debug-assertions=off &&
         cp target/product/fmu/libtiprub_fmi.so target/product/test_panic.so &&
-        library
+        library tiprub-fmi && library tiprub-fmi-thermal
 }
 
 python_environment() {
@@ -67,10 +69,11 @@ told environment $? || exit 1
 
 [ "$failed" -eq 0 ] || exit 1
 TIPRUB_LIBRARY=$root/target/product/fmu/libtiprub_fmi.so
+TIPRUB_LIBRARY_THERMAL=$root/target/product/fmu/libtiprub_thermal_fmi.so
 TIPRUB_LIBRARY_TEST_PANIC=$root/target/product/test_panic.so
 # The command line that the tests in Rust run, too.
 TIPRUB=$root/target/release/tiprub
-export TIPRUB_LIBRARY TIPRUB_LIBRARY_TEST_PANIC TIPRUB
+export TIPRUB_LIBRARY TIPRUB_LIBRARY_THERMAL TIPRUB_LIBRARY_TEST_PANIC TIPRUB
 
 "$venv/bin/python" -m pytest -p no:cacheprovider "$here/python" > "$logs/pytest" 2>&1 &
 pytest_job=$!

@@ -33,15 +33,23 @@ const TERMINALS: [Terminal; 2] = [
     ),
 ];
 
-/// Thermal port of each casing patch, or of all where arrays are whole. Of several pairs none: heat is of a pair, temperature
-/// of a structure.
-const PATCH: Terminal = (
-    "casing_patch",
-    "Thermal port of the casing",
-    &[("temperature", "casing_temperature", SIGNAL), ("heat", "casing_friction_power", OUTFLOW)],
-);
+/// Thermal port of each casing patch, or of all where arrays are whole: of the contact and of the heat that it makes, and of
+/// conduction, which takes that. Of several pairs none: heat is of a pair, temperature of a structure.
+const PATCHES: [Terminal; 2] = [
+    (
+        "casing_patch",
+        "Thermal port of the casing",
+        &[("temperature", "casing_temperature", SIGNAL), ("heat", "casing_friction_power", OUTFLOW)],
+    ),
+    (
+        "casing_patch",
+        "Thermal port of the casing",
+        &[("temperature", "casing_temperature", SIGNAL), ("heat", "casing_heat", INFLOW)],
+    ),
+];
 
 const SIGNAL: &str = "signal";
+const INFLOW: &str = "inflow";
 const OUTFLOW: &str = "outflow";
 
 /// `terminalsAndIcons.xml` of FMI 3.0; none where the scene has nothing to connect.
@@ -54,13 +62,15 @@ pub fn fmi3_terminals(description: &Description) -> Option<String> {
             prefixes.push(prefix);
         }
     }
+    let rows = &rows;
     let of_prefix = |prefix: &&str| {
-        let port = |terminal: &Terminal| terminal_of(&rows, terminal, prefix, None);
+        let port = |terminal: &Terminal| terminal_of(rows, terminal, prefix, None);
         let patches = rows.iter().filter_map(|row| {
             let (of, base, index) = parts(&row.name);
-            (description.patches_of_roms && of == *prefix && base == PATCH.2[0].1).then_some(index)
+            (description.patches_of_roms && of == *prefix && base == PATCHES[0].2[0].1).then_some(index)
         });
-        let patches = patches.filter_map(|index| terminal_of(&rows, &PATCH, prefix, index));
+        let of_patch = |index| PATCHES.iter().filter_map(move |patch| terminal_of(rows, patch, prefix, index));
+        let patches = patches.flat_map(of_patch);
         let turns = rows.iter().any(|row| row.name == format!("{prefix}speed"));
         TERMINALS.iter().filter(|_| turns).filter_map(port).chain(patches).collect::<Vec<_>>()
     };

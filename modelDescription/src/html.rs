@@ -51,12 +51,7 @@ fn model(page: &mut String, description: &Description) {
     if !description.description.is_empty() {
         let _ = writeln!(page, "<p>{}</p>", text(description.description));
     }
-    page.push_str(
-        "<p>This unit marches reduced-order models of flexible structures in time, together with their unilateral \
-         contact against a surface around them, rigid or flexible. The importer sets inputs, calls the unit step by step, and reads clearances, \
-         forces, torques and energies. Inside each communication step the unit takes as many smaller steps of its own \
-         as its time step asks for, and lands exactly on the communication point.</p>\n",
-    );
+    let _ = writeln!(page, "<p>{}</p>", text(description.about));
 }
 
 fn time(page: &mut String, description: &Description) {
@@ -65,12 +60,12 @@ fn time(page: &mut String, description: &Description) {
         page,
         "<h2>Running it</h2>\n<p>Proposed experiment: from {} s to {} s with a communication step of {} s. Any other \
          step works, also one that changes.</p>\n\
-         <p>A communication step is usually much longer than an impact. Forces and torques are therefore given as \
-         averages over the step just finished, and extremes within it stand beside them. The column &#8220;value&#8221; \
+         <p>{} The column &#8220;value&#8221; \
          of the tables says which it is:</p>\n<dl>",
         readable(experiment.start),
         readable(experiment.stop),
-        readable(experiment.step)
+        readable(experiment.step),
+        text(description.steps),
     );
     for span in [Span::Point, Span::Mean, Span::Window, Span::Total] {
         let (name, meaning) = meaning_of_span(span);

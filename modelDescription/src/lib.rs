@@ -34,6 +34,10 @@ pub struct Description<'a> {
     pub token: &'a str,
     /// One or a few sentences for an importer's catalogue.
     pub description: &'a str,
+    /// What the unit does and how it is used, for the page.
+    pub about: &'a str,
+    /// What is to be known of communication steps, for the page.
+    pub steps: &'a str,
     /// Generation date as `xs:dateTime`, for example `2026-01-31T12:00:00Z`. The caller decides, so that equal input
     /// can give equal files.
     pub generated: &'a str,

@@ -1,4 +1,4 @@
-//! Options of `tiprub reduce casing`: a ring described on the command line.
+//! Options of `tiprub reduce casing` and `tiprub thermal`: a ring described on the command line.
 
 use crate::shared_arguments::{MaterialChoice, MeshSize, Written, axial, pair};
 use clap::{Args, ValueEnum};
@@ -11,9 +11,9 @@ use tiprub_model::{
 /// Share of a casing's length before the first and behind the last contact ring, where no positions are given.
 const MARGIN: f64 = 0.1;
 
-/// What describes a casing; absent options are those of casing37.
+/// What a casing looks like; absent options are those of casing37.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
-pub struct CasingArguments {
+pub struct RingArguments {
     /// Inner contour as points z:r in m, by growing z (the tip of rotor 37 and the design gap when absent).
     #[arg(long, value_name = "Z:R,Z:R,...", value_parser = contour, allow_hyphen_values = true)]
     pub contour: Option<Contour>,
@@ -26,15 +26,9 @@ pub struct CasingArguments {
     /// Flange at the high end of z, in the same way [default: 0.004x0.006].
     #[arg(long, value_name = "TxH", value_parser = flange)]
     pub high_flange: Option<FlangeChoice>,
-    /// End faces that are held [default: low].
-    #[arg(long, value_enum)]
-    pub support: Option<SupportChoice>,
     /// Material [default: steel].
     #[arg(long, value_enum)]
     pub material: Option<MaterialChoice>,
-    /// Coefficient of linear thermal expansion (1/K), instead of the material's.
-    #[arg(long, value_name = "A", allow_negative_numbers = true)]
-    pub expansion: Option<f64>,
     /// Elements: quadratic or linear bricks; linear ones are far too stiff in bending [default: hex20].
     #[arg(long, value_enum)]
     pub element: Option<ElementChoice>,
@@ -48,15 +42,29 @@ pub struct CasingArguments {
     /// Thermal patches around and along; 0x0 leaves heat out [default: 12x1].
     #[arg(long, value_name = "AxL", value_parser = pair)]
     pub patches: Option<[usize; 2]>,
+    /// Elements around, through the thickness and along the axis [default: 72x1x12].
+    #[arg(long, value_name = "AxTxL")]
+    pub mesh: Option<MeshSize>,
+}
+
+/// What describes a casing; absent options are those of casing37.
+#[derive(Debug, Clone, PartialEq, Default, Args)]
+pub struct CasingArguments {
+    /// What it looks like.
+    #[command(flatten)]
+    pub ring: RingArguments,
+    /// End faces that are held [default: low].
+    #[arg(long, value_enum)]
+    pub support: Option<SupportChoice>,
+    /// Coefficient of linear thermal expansion (1/K), instead of the material's.
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    pub expansion: Option<f64>,
     /// Modes kept in the ROM, those below the cut-off [default: 60].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
     /// Fixed-interface modes to reduce with [default: 156].
     #[arg(long, value_name = "N")]
     pub fixed_interface_modes: Option<usize>,
-    /// Elements around, through the thickness and along the axis [default: 72x1x12].
-    #[arg(long, value_name = "AxTxL")]
-    pub mesh: Option<MeshSize>,
     /// What is written; a casing other than casing37 is called casing.
     #[command(flatten)]
     pub written: Written,
@@ -88,8 +96,8 @@ pub enum ElementChoice {
     Hex8,
 }
 
-impl CasingArguments {
-    /// The casing asked for.
+impl RingArguments {
+    /// The casing asked for, with the name, support and modes of casing37.
     pub fn options(&self) -> CasingOptions {
         let defaults = CasingOptions::default();
         let mut options = defaults.clone();
@@ -109,11 +117,20 @@ impl CasingArguments {
             let [around, through, along] = size.0;
             RingCounts { around, through, along, flange: through }
         });
-        options.support = self.support.map_or(defaults.support, SupportChoice::support);
         options.material = self.material.map_or(defaults.material.clone(), MaterialChoice::material);
-        options.material.expansion = self.expansion.unwrap_or(options.material.expansion);
         options.kind = self.element.map_or(defaults.kind, ElementChoice::kind);
         options.patches = self.patches.unwrap_or(defaults.patches);
+        options
+    }
+}
+
+impl CasingArguments {
+    /// The casing asked for.
+    pub fn options(&self) -> CasingOptions {
+        let defaults = CasingOptions::default();
+        let mut options = self.ring.options();
+        options.support = self.support.map_or(defaults.support, SupportChoice::support);
+        options.material.expansion = self.expansion.unwrap_or(options.material.expansion);
         options.fixed_interface_modes = self.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes);
         options.modes = self.modes.unwrap_or(defaults.modes);
         // The name stands for the one casing that ships, and not for any other.

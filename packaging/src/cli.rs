@@ -9,6 +9,7 @@ use crate::{
     library::PlatformChoice,
     own_arguments::{ConvergenceCommand, ErrorCommand},
     reduce_arguments::ReduceArguments,
+    thermal_arguments::ThermalArguments,
 };
 
 /// Blade-tip/casing contact (rub) as an FMU.
@@ -67,6 +68,13 @@ pub enum Command {
                             SOURCE_DATE_EPOCH (seconds since 1970) is set."
     )]
     Package(PackageArguments),
+    /// From a casing to the .fmu files of its heat conduction: the partner of a scene whose casing heats up.
+    #[command(
+        after_help = "Examples:\n  tiprub thermal -o out/\n  tiprub thermal --patches 24x1 --gas-film 800 --fmi 3\n  \
+                            tiprub thermal --material titanium --modes 60 --name fan_case\n\n\
+                            Its casing_heat takes casing_friction_power of the scene's FMU, which takes casing_temperature back."
+    )]
+    Thermal(ThermalArguments),
     /// Run a scene natively, without FMI; one row per communication point.
     #[command(after_help = "Examples:\n  tiprub run scene.toml --csv rub.csv\n  \
                             tiprub run builtin:rotor37 --stop 0.002 --set speed=1700 --csv - | head\n\n\

@@ -47,7 +47,7 @@ pub fn check(command: &Command) -> Result<()> {
             StudyCommand::Error(own) => study(&own.study.scene, own.study.common.out.as_deref(), own.from.files()),
         },
         // Names follow from the scene: see the command.
-        Command::Package(_) | Command::Inspect(_) => Ok(()),
+        Command::Package(_) | Command::Thermal(_) | Command::Inspect(_) => Ok(()),
     }
 }
 

@@ -25,22 +25,20 @@ const REFERENCE_STEPS: usize = 100;
 /// element for the whole; no person reads a list of more.
 pub const MOST_SCALARS: usize = 300;
 
-/// What FMI-LS-REF says of the files of an FMU: path, MIME type, role, description.
-const RELATED: [(&str, &str, &str, &str); 3] = [
-    (
-        "documentation/tiprub_ref.csv",
-        "text/csv",
-        "result",
-        "All outputs of the default experiment, of its first 100 communication steps if there are more",
-    ),
-    (
-        "documentation/index.html",
-        "text/html",
-        "document",
-        "The model, its variables, its limits and its reduced-order models",
-    ),
-    ("resources/scene.toml", "application/toml", "model", "The scene this FMU was made from"),
-];
+/// What FMI-LS-REF says of a file of an FMU: path, MIME type, role, description.
+pub type Related<'a> = (&'a str, &'a str, &'a str, &'a str);
+
+/// The scene inside the FMU.
+const SCENE: Related = ("resources/scene.toml", "application/toml", "model", "The scene this FMU was made from");
+
+/// What stands above all variables on the page inside the FMU.
+const ABOUT: &str = "This unit marches reduced-order models of flexible structures in time, together with their unilateral \
+    contact against a surface around them, rigid or flexible. The importer sets inputs, calls the unit step by step, and reads clearances, \
+    forces, torques and energies. Inside each communication step the unit takes as many smaller steps of its own \
+    as its time step asks for, and lands exactly on the communication point.";
+/// What is to be known of its steps.
+const STEPS: &str = "A communication step is usually much longer than an impact. Forces and torques are therefore given as \
+    averages over the step just finished, and extremes within it stand beside them.";
 
 const ICON: &[u8] = include_bytes!("../assets/icon.png");
 const THIRD_PARTY: &str = include_str!("../assets/third-party.txt");
@@ -131,30 +129,7 @@ impl<'a> Package<'a> {
         let resources = tiprub_format::resource_files(self.scene, arrays);
         let token = tiprub_format::instantiation_token(&resources);
         let description = self.description(&token, arrays);
-        let (xml, number, icon) = match version {
-            FmiVersion::Two => (fmi2_xml(&description), "2.0", "model.png"),
-            FmiVersion::Three => (fmi3_xml(&description), "3.0", "terminalsAndIcons/icon.png"),
-        };
-        let mut entries = vec![Entry::new("modelDescription.xml", xml), Entry::new(icon, ICON)];
-        entries.extend(
-            self.libraries
-                .iter()
-                .map(|library| Entry::new(library.platform.place(number, MODEL_IDENTIFIER), library.bytes.as_slice())),
-        );
-        if let Some(terminals) = fmi3_terminals(&description).filter(|_| version == FmiVersion::Three) {
-            entries.push(Entry::new("terminalsAndIcons/terminalsAndIcons.xml", terminals));
-        }
-        entries.extend(resources.into_iter().map(|(name, bytes)| Entry::new(format!("resources/{name}"), bytes)));
-        entries.extend([
-            Entry::new("documentation/index.html", html(&description)),
-            Entry::new(format!("documentation/{MODEL_IDENTIFIER}_ref.csv"), self.reference_csv.as_str()),
-            Entry::new("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml", references_manifest(&RELATED)),
-            Entry::new("documentation/licenses/license.txt", LICENSE),
-            Entry::new("documentation/licenses/LICENSE-MIT.txt", LICENSE_MIT),
-            Entry::new("documentation/licenses/LICENSE-APACHE.txt", LICENSE_APACHE),
-            Entry::new("documentation/licenses/third-party.txt", THIRD_PARTY),
-        ]);
-        entries
+        contents(version, &description, self.libraries, resources, Some(&self.reference_csv), SCENE)
     }
 
     /// The internal step (s) where every communication step that is a multiple of it is divided by it: the largest step
@@ -174,6 +149,8 @@ impl<'a> Package<'a> {
         Description {
             model_name: &settings.name,
             identifier: MODEL_IDENTIFIER,
+            about: ABOUT,
+            steps: STEPS,
             token,
             description: &settings.description,
             generated: &self.generated,
@@ -199,8 +176,55 @@ impl<'a> Package<'a> {
     }
 }
 
+/// Files of an .fmu in their order: what its description says, the libraries, and the model that it reads.
+pub fn contents(
+    version: FmiVersion,
+    description: &Description,
+    libraries: &[Library],
+    resources: Vec<(String, Vec<u8>)>,
+    reference_csv: Option<&str>,
+    model: Related,
+) -> Vec<Entry> {
+    let identifier = description.identifier;
+    let reference = format!("documentation/{identifier}_ref.csv");
+    let result = (
+        reference.as_str(),
+        "text/csv",
+        "result",
+        "All outputs of the default experiment, of its first 100 communication steps if there are more",
+    );
+    let page = (
+        "documentation/index.html",
+        "text/html",
+        "document",
+        "The model, its variables, its limits and its reduced-order models",
+    );
+    let related: Vec<Related> = reference_csv.map(|_| result).into_iter().chain([page, model]).collect();
+    let (xml, number, icon) = match version {
+        FmiVersion::Two => (fmi2_xml(description), "2.0", "model.png"),
+        FmiVersion::Three => (fmi3_xml(description), "3.0", "terminalsAndIcons/icon.png"),
+    };
+    let mut entries = vec![Entry::new("modelDescription.xml", xml), Entry::new(icon, ICON)];
+    let library = |library: &Library| Entry::new(library.platform.place(number, identifier), library.bytes.as_slice());
+    entries.extend(libraries.iter().map(library));
+    if let Some(terminals) = fmi3_terminals(description).filter(|_| version == FmiVersion::Three) {
+        entries.push(Entry::new("terminalsAndIcons/terminalsAndIcons.xml", terminals));
+    }
+    entries.extend(resources.into_iter().map(|(name, bytes)| Entry::new(format!("resources/{name}"), bytes)));
+    entries.push(Entry::new("documentation/index.html", html(description)));
+    entries.extend(reference_csv.map(|csv| Entry::new(reference.as_str(), csv)));
+    entries.extend([
+        Entry::new("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml", references_manifest(&related)),
+        Entry::new("documentation/licenses/license.txt", LICENSE),
+        Entry::new("documentation/licenses/LICENSE-MIT.txt", LICENSE_MIT),
+        Entry::new("documentation/licenses/LICENSE-APACHE.txt", LICENSE_APACHE),
+        Entry::new("documentation/licenses/third-party.txt", THIRD_PARTY),
+    ]);
+    entries
+}
+
 /// The optional generation date: left out (equal inputs, equal bytes) unless SOURCE_DATE_EPOCH gives one.
-fn generation_date(source_date_epoch: Option<&str>) -> Result<String> {
+pub(crate) fn generation_date(source_date_epoch: Option<&str>) -> Result<String> {
     let Some(text) = source_date_epoch else { return Ok(String::new()) };
     // Four-digit years only: xs:dateTime allows more, importers do not.
     match text.trim().parse::<i64>() {

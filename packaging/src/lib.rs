@@ -2,11 +2,11 @@
 //!
 //! It wires the lower floors together. [`commands`] holds one module per command; the rest are the parts they share.
 //!
-//! - [`cli`], [`reduce_arguments`], [`casing_arguments`], [`own_arguments`], [`shared_arguments`]: what can be asked for; [`spelling`]: what was;
+//! - [`cli`], [`reduce_arguments`], [`casing_arguments`], [`thermal_arguments`], [`own_arguments`], [`shared_arguments`]: what can be asked for; [`spelling`]: what was;
 //! - [`command_files`]: what each command reads and writes, looked at before any work;
 //! - [`scene_features`], [`rom_facts`]: what is to be known of a scene or a ROM before it is trusted;
 //! - [`users_model`], [`cube_models`], [`mod@reduced`]: models read, judged, reduced, and what is told of them;
-//! - [`fmu`], [`library`]: what is in an FMU, and where its shared library comes from;
+//! - [`fmu`], [`thermal_fmu`], [`library`]: what is in an FMU, and where its shared library comes from;
 //! - [`report`]: the HTML report of the demo.
 
 pub mod casing_arguments;
@@ -24,4 +24,6 @@ pub mod rom_facts;
 pub mod scene_features;
 pub mod shared_arguments;
 pub mod spelling;
+pub mod thermal_arguments;
+pub mod thermal_fmu;
 pub mod users_model;

@@ -3,7 +3,7 @@
 //! In this order: the files and directories given with `--library`; for a tiprub that runs from a cargo target directory
 //! of the workspace, a fresh build of the fmi crate alone (profile `fmu`, so that no other crate's features leak in);
 //! else the libraries beside the executable, where an installation puts them, one for each platform. What a file is made
-//! for is read from its content.
+//! for, and of which unit it is, is read from its content.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -42,6 +42,42 @@ const EXTENSIONS: [&str; 3] = ["so", "dll", "dylib"];
 /// Lines of cargo's stderr kept for the error message.
 const LINES_KEPT: usize = 30;
 
+/// What a library makes of the resources of an FMU.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// Contact of a scene.
+    Scene,
+    /// Heat conduction of a casing.
+    Thermal,
+}
+
+impl Unit {
+    /// Crate that the library is built of, and its file without prefix and extension.
+    fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Scene => ("tiprub-fmi", "tiprub_fmi"),
+            Self::Thermal => ("tiprub-fmi-thermal", "tiprub_thermal_fmi"),
+        }
+    }
+
+    /// What names of installed libraries begin with.
+    fn prefix(self) -> &'static str {
+        match self {
+            Self::Scene => "",
+            Self::Thermal => "thermal-",
+        }
+    }
+
+    /// The unit of a library: that of heat conduction knows the name of the file it reads.
+    fn of_library(bytes: &[u8]) -> Self {
+        if holds(bytes, tiprub_format::THERMAL_FILE.as_bytes()) { Self::Thermal } else { Self::Scene }
+    }
+}
+
+fn holds(bytes: &[u8], name: &[u8]) -> bool {
+    bytes.windows(name.len()).any(|part| part == name)
+}
+
 /// The FMU's code for one platform.
 #[derive(Debug, Clone)]
 pub struct Library {
@@ -56,12 +92,20 @@ pub struct Library {
 /// # Errors
 /// No library found, the build failed, a file that is no shared library for a known platform, two for one platform, or
 /// none for a platform asked for.
-pub fn load(arguments: &LibraryArguments, console: &Console) -> Result<Vec<Library>> {
+pub fn load(unit: Unit, arguments: &LibraryArguments, console: &Console) -> Result<Vec<Library>> {
     let mut found: BTreeMap<Platform, (PathBuf, Vec<u8>)> = BTreeMap::new();
-    for path in find(arguments, console)? {
+    for path in find(unit, arguments, console)? {
         let bytes =
             tiprub_format::read_file(&path, LARGEST).map_err(|error| Failure::file(&path, "cannot be read", &error))?;
         let platform = recognised(&path, &bytes)?;
+        if Unit::of_library(&bytes) != unit {
+            // A directory holds those of all units.
+            if !arguments.library.contains(&path) {
+                continue;
+            }
+            let problem = "a library of another unit: scenes and heat conduction have one each";
+            return Err(Failure::new(path.display(), problem, format!("Give {}", unit.names().1)));
+        }
         if let Some((other, _)) = found.get(&platform) {
             return Err(Failure::new(
                 path.display(),
@@ -70,6 +114,10 @@ pub fn load(arguments: &LibraryArguments, console: &Console) -> Result<Vec<Libra
             ));
         }
         found.insert(platform, (path, bytes));
+    }
+    if found.is_empty() {
+        let problem = format!("none of {} is among the files given", unit.names().1);
+        return Err(Failure::new("FMU library", problem, "Make it with packaging/libraries.sh and give --library DIR"));
     }
     wanted(&arguments.platform, found.keys().copied().collect())?;
     Ok(found
@@ -124,7 +172,7 @@ pub fn given(arguments: &LibraryArguments) -> Result<Vec<PathBuf>> {
     Ok(arguments.library.iter().map(|path| files(path)).collect::<Result<Vec<_>>>()?.concat())
 }
 
-fn find(arguments: &LibraryArguments, console: &Console) -> Result<Vec<PathBuf>> {
+fn find(unit: Unit, arguments: &LibraryArguments, console: &Console) -> Result<Vec<PathBuf>> {
     if !arguments.library.is_empty() {
         return given(arguments);
     }
@@ -133,9 +181,9 @@ fn find(arguments: &LibraryArguments, console: &Console) -> Result<Vec<PathBuf>>
         && let Some(target) = cargo_target(&executable)
         && workspace.join("fmi/Cargo.toml").is_file()
     {
-        return Ok(vec![build(workspace, target, console)?]);
+        return Ok(vec![build(unit, workspace, target, console)?]);
     }
-    let installed = installed(&executable);
+    let installed = installed(unit, &executable);
     if installed.is_empty() {
         return Err(Failure::new(
             "FMU library",
@@ -168,10 +216,11 @@ fn is_library(path: &Path) -> bool {
     path.extension().is_some_and(|extension| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
 
-fn installed(executable: &Path) -> Vec<PathBuf> {
+fn installed(unit: Unit, executable: &Path) -> Vec<PathBuf> {
     let directory = executable.parent().unwrap_or(Path::new("."));
     let place = |platform: Platform| {
-        INSTALLED.iter().map(|part| directory.join(part).join(platform.file_name())).find(|path| path.is_file())
+        let name = format!("{}{}", unit.prefix(), platform.file_name());
+        INSTALLED.iter().map(|part| directory.join(part).join(&name)).find(|path| path.is_file())
     };
     Platform::ALL.into_iter().filter_map(place).collect()
 }
@@ -181,12 +230,12 @@ fn cargo_target(executable: &Path) -> Option<&Path> {
     executable.ancestors().skip(1).find(|directory| directory.join(".rustc_info.json").is_file())
 }
 
-/// Build the fmi crate alone and return the library cargo reports.
-fn build(workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> {
+/// Build the crate of the unit alone and return the library cargo reports.
+fn build(unit: Unit, workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> {
     let task = console.task("Building the FMU library", None);
     let failed = |problem: String, remedy: &str| Failure::new("building the FMU library", problem, remedy);
     let mut child = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["build", "--package", "tiprub-fmi", "--profile", "fmu", "--message-format", "json-render-diagnostics"])
+        .args(["build", "--package", unit.names().0, "--profile", "fmu", "--message-format", "json-render-diagnostics"])
         .arg("--manifest-path")
         .arg(workspace.join("Cargo.toml"))
         .arg("--target-dir")
@@ -218,7 +267,7 @@ fn build(workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> 
         let lines = Vec::from(last_lines).join("\n");
         return Err(failed(format!("cargo ended with {status}:\n{lines}\n"), "Correct what it names, then try again"));
     }
-    artifact(&messages.join().unwrap_or_default())
+    artifact(&messages.join().unwrap_or_default(), unit.names().1)
         .ok_or_else(|| failed("cargo reported no shared library".into(), "Give --library FILE"))
 }
 
@@ -252,11 +301,11 @@ fn remaps(home: Option<&Path>, workspace: &Path) -> Vec<(PathBuf, &'static str)>
 }
 
 /// The shared library in cargo's JSON messages, one per line.
-fn artifact(messages: &str) -> Option<PathBuf> {
+fn artifact(messages: &str, name: &str) -> Option<PathBuf> {
     messages
         .lines()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .filter(|message| message["reason"] == "compiler-artifact" && message["target"]["name"] == "tiprub_fmi")
+        .filter(|message| message["reason"] == "compiler-artifact" && message["target"]["name"] == name)
         .flat_map(|message| message["filenames"].as_array().cloned().unwrap_or_default())
         .filter_map(|name| name.as_str().map(PathBuf::from))
         .find(|path| is_library(path))
@@ -270,8 +319,9 @@ fn recognised(path: &Path, bytes: &[u8]) -> Result<Platform> {
     };
     let platform = Platform::of_library(bytes)
         .ok_or_else(|| refused("not a whole 64-bit shared library for Linux, Windows or macOS"))?;
-    let called =
-        Platform::ALL.into_iter().find(|named| path.file_name().is_some_and(|name| name == &*named.file_name()));
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let name = name.strip_prefix(Unit::Thermal.prefix()).unwrap_or(name);
+    let called = Platform::ALL.into_iter().find(|named| name == &*named.file_name());
     if called.is_some_and(|called| called != platform) {
         return Err(Failure::new(
             path.display(),
@@ -279,8 +329,7 @@ fn recognised(path: &Path, bytes: &[u8]) -> Result<Platform> {
             "Put the right library there, or call this one as what it is",
         ));
     }
-    let named = |name: &[u8]| bytes.windows(name.len()).any(|part| part == name);
-    if !(named(b"fmi2DoStep") && named(b"fmi3DoStep")) {
+    if !(holds(bytes, b"fmi2DoStep") && holds(bytes, b"fmi3DoStep")) {
         return Err(refused("a library, but of no FMU: it has no function fmi2DoStep or none fmi3DoStep"));
     }
     Ok(platform)
@@ -298,8 +347,8 @@ mod tests {
             r#"{"reason":"compiler-artifact","target":{"name":"tiprub_fmi"},"filenames":["/t/libtiprub_fmi.so"]}"#,
             "\n{\"reason\":\"build-finished\",\"success\":true}\n"
         );
-        assert_eq!(artifact(messages), Some(PathBuf::from("/t/libtiprub_fmi.so")));
-        assert_eq!(artifact(""), None);
+        assert_eq!(artifact(messages, "tiprub_fmi"), Some(PathBuf::from("/t/libtiprub_fmi.so")));
+        assert_eq!(artifact("", "tiprub_fmi"), None);
     }
 
     /// What a library of an FMU has somewhere.
@@ -352,14 +401,14 @@ mod tests {
         std::fs::write(root.path().join("README.md"), "Libraries of all platforms.").unwrap();
         let directory = [root.path().to_path_buf()];
         let platforms = |libraries: Vec<Library>| Vec::from_iter(libraries.iter().map(|library| library.platform));
-        assert_eq!(platforms(load(&arguments(&directory, &[]), &console).unwrap()), Platform::ALL);
+        assert_eq!(platforms(load(Unit::Scene, &arguments(&directory, &[]), &console).unwrap()), Platform::ALL);
         let two = [Platform::Aarch64Darwin, Platform::X86_64Windows];
-        let chosen = platforms(load(&arguments(&directory, &two), &console).unwrap());
+        let chosen = platforms(load(Unit::Scene, &arguments(&directory, &two), &console).unwrap());
         assert_eq!(chosen, [Platform::X86_64Windows, Platform::Aarch64Darwin]);
         let one = [root.path().join("e.DLL")];
-        let missing = load(&arguments(&one, &two), &console).unwrap_err();
+        let missing = load(Unit::Scene, &arguments(&one, &two), &console).unwrap_err();
         assert!(missing.what.contains("aarch64-darwin") && missing.problem.contains("x86_64-windows"), "{missing}");
-        let twice = load(&arguments(&[one[0].clone(), one[0].clone()], &[]), &console).unwrap_err();
+        let twice = load(Unit::Scene, &arguments(&[one[0].clone(), one[0].clone()], &[]), &console).unwrap_err();
         assert!(twice.problem.contains("a second library for x86_64-windows"), "{twice}");
     }
 
@@ -372,7 +421,7 @@ mod tests {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, "").unwrap();
         }
-        let found = installed(&program);
+        let found = installed(Unit::Scene, &program);
         let names: Vec<_> = found.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
         assert_eq!(names, ["x86_64-linux.so", "x86_64-windows.dll"]);
     }
@@ -381,7 +430,7 @@ mod tests {
     fn a_file_that_is_no_library_is_refused_by_name() {
         let root = tempfile::tempdir().unwrap();
         let console = Console::new(true, false);
-        let refused = |path: PathBuf| load(&arguments(&[path], &[]), &console).unwrap_err();
+        let refused = |path: PathBuf| load(Unit::Scene, &arguments(&[path], &[]), &console).unwrap_err();
         std::fs::write(root.path().join("README.md"), "None yet.").unwrap();
         assert!(refused(root.path().to_path_buf()).problem.contains("holds no library"));
         let mut program = elf(62);
@@ -409,9 +458,23 @@ mod tests {
         let other = refused(path.clone());
         assert!(other.what.ends_with("x86_64-linux.so") && other.problem.contains("aarch64-linux"), "{other}");
         std::fs::write(&path, elf(62)).unwrap();
-        assert!(load(&arguments(&[path], &[]), &console).is_ok());
+        assert!(load(Unit::Scene, &arguments(&[path], &[]), &console).is_ok());
         let missing = refused(root.path().join("none.so"));
         assert!(missing.what.ends_with("none.so") && missing.problem.contains("cannot be read"), "{missing}");
+    }
+
+    #[test]
+    fn libraries_of_both_units_are_told_apart() {
+        let (root, console) = (tempfile::tempdir().unwrap(), Console::new(true, false));
+        let [scene, thermal] = ["x86_64-linux.so", "thermal-x86_64-linux.so"].map(|name| root.path().join(name));
+        let conducts = [elf(62), tiprub_format::THERMAL_FILE.as_bytes().to_vec()].concat();
+        std::fs::write(&scene, elf(62)).unwrap();
+        std::fs::write(&thermal, &conducts).unwrap();
+        for (unit, bytes, other) in [(Unit::Scene, elf(62), thermal), (Unit::Thermal, conducts, scene)] {
+            let found = load(unit, &arguments(&[root.path().to_path_buf()], &[]), &console).unwrap();
+            assert!(found.len() == 1 && found[0].bytes == bytes, "{unit:?}");
+            assert!(load(unit, &arguments(&[other], &[]), &console).unwrap_err().problem.contains("another unit"));
+        }
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use tiprub_core::{
     Rom, Scene,
     settings::{
-        CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver, StructureSettings,
-        SurfaceSettings, TOLERANCE,
+        CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver,
+        StructureSettings, SurfaceSettings, TOLERANCE,
     },
 };
 
@@ -64,7 +64,26 @@ fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String
         let (sectors, largest) = (rom.sectors, rom.largest_nodal_diameter());
         found.push(format!("the {sectors} sectors of `{name}` are coupled: nodal diameters 0 to {largest}"));
     }
-    if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
+    if let Some(excitation) = &structure.excitation {
+        let where_to = match (excitation.mode, &excitation.node) {
+            (Some(mode), Some(node)) => format!("mode {mode} as by a force at {node}"),
+            (Some(mode), None) => format!("mode {mode}"),
+            (None, node) => format!("a force at {}", node.as_deref().unwrap_or_default()),
+        };
+        found.push(format!("`{name}` is excited by engine order {}: {where_to}", excitation.order));
+    }
+    if !structure.initial.is_empty() {
+        found.push(format!("blades of `{name}` move at the start: {} motions", structure.initial.len()));
+    }
+    if !structure.damping_ratios.is_empty() {
+        found.push(format!("the first {} modes of `{name}` have damping of their own", structure.damping_ratios.len()));
+    }
+    if structure.softening > 0.0 {
+        found.push(format!("`{name}` softens: {} of its stiffness per kelvin", structure.softening));
+    }
+    if structure.thermal && structure.motion == Motion::Rotating {
+        found.push(format!("`{name}` heats up: its temperature is an input"));
+    } else if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
         found.push(format!("`{name}` heats up: temperatures of {} patches are inputs", thermal.patches.len()));
     }
     if let Some(load) = structure.load {

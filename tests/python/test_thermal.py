@@ -1,316 +1,115 @@
-"""The thermal example: cycle jump on units whose answer is known, conduction against closed forms, and the pair with a rub FMU."""
+"""The FMUs of heat conduction in FMPy: valid, the same in both versions, in balance, exact at any step, and back to any state."""
 
+import math
 import os
-import sys
-from pathlib import Path
+from types import SimpleNamespace
 
 import numpy
 import pytest
+from fmpy import read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "thermal"
-sys.path.insert(0, str(EXAMPLE))
-
-import ssp  # noqa: E402
-from conduction import Casing as Ring  # noqa: E402
-from conduction import Conduction  # noqa: E402
-from cycle_jump import Plan, cycle_jump, resolved  # noqa: E402
-from pair import Casing, Rub, script  # noqa: E402
-from units import Unit, UnitError  # noqa: E402
-
-STEP, CYCLE = 1e-3, 8
+# A coarse casing: what is held here is one model against itself, and its balance.
+CASING = ["--mesh", "24x1x8", "--modes", "15", "--name", "coarse"]
+PATCHES = 12
 
 
-class Pulses:
-    """Fluxes gain (limit − value) in pulses, once per cycle, of values that are followed with a lag: it settles in a cycle or two."""
-
-    def __init__(self, gains, limits, kink=None):
-        self.gains, self.limits, self.kink = numpy.array(gains), numpy.array(limits), kink
-        self.felt, self.count, self.account = numpy.zeros(len(gains)), 0, 0.0
-
-    def step(self, length, values):
-        self.felt = self.felt + (values - self.felt) * 0.5
-        pulse = 1.0 + numpy.cos(2.0 * numpy.pi * (self.count + 0.5) / CYCLE)
-        limits = self.limits if self.kink is None else numpy.where(self.felt < self.kink, self.limits, 0.0)
-        flux = self.gains * (limits - self.felt) * pulse
-        self.count += 1
-        self.account += float(flux.sum()) * length
-        return flux
-
-    def total(self):
-        return self.account
-
-    def save(self):
-        return self.felt.copy(), self.count, self.account
-
-    def restore(self, saved):
-        self.felt, self.count, self.account = saved[0].copy(), saved[1], saved[2]
-
-    def drop(self, saved):
-        pass
-
-
-class Stores:
-    """Capacities that keep what they receive."""
-
-    def __init__(self, capacities):
-        self.capacities, self.now, self.received, self.time = numpy.array(capacities), numpy.zeros(len(capacities)), 0.0, 0.0
-
-    def step(self, length, fluxes):
-        self.now = self.now + fluxes * length / self.capacities
-        self.received += float(fluxes.sum()) * length
-        self.time += length
-
-    def values(self):
-        return self.now.copy()
-
-    def save(self):
-        return self.now.copy(), self.received, self.time
-
-    def restore(self, saved):
-        self.now, self.received, self.time = saved[0].copy(), saved[1], saved[2]
-
-    def drop(self, saved):
-        pass
-
-
-GAINS, LIMITS, CAPACITIES, STOP = (3.0, 1.0), (20.0, 40.0), (2.0, 1.0), 2.0
-
-
-def exact(times):
-    """C v' = gain (limit − v)."""
-    rates = numpy.array(GAINS) / numpy.array(CAPACITIES)
-    return numpy.array(LIMITS) * -numpy.expm1(-rates * numpy.array(times)[:, None])
-
-
-def journey(run, **plan):
-    fast, slow = Pulses(GAINS, LIMITS), Stores(CAPACITIES)
-    found = run(fast, slow, Plan(STEP, CYCLE, **plan), STOP)
-    assert found.times[-1] == pytest.approx(slow.time, rel=1e-12)
-    return found, fast, slow
-
-
-def error(found):
-    return numpy.abs(numpy.array(found.values) - exact(found.times)).max()
-
-
-def test_jumps_come_nearer_with_their_tolerance_and_save_cycles():
-    truth, _, _ = journey(resolved, tolerance=1.0)
-    # What is left resolved is the lag of the pulses, some steps.
-    lag = error(truth)
-    assert lag < 0.4
-    errors, steps = [], []
-    for tolerance in (1.0, 0.1, 0.01):
-        found, _, _ = journey(cycle_jump, tolerance=tolerance)
-        assert all(jump.error <= tolerance for jump in found.kept)
-        columns = [numpy.interp(found.times, truth.times, numpy.array(truth.values)[:, k]) for k in range(2)]
-        apart = numpy.abs(numpy.array(found.values) - numpy.array(columns).T)
-        errors.append(apart[-1].max())
-        steps.append(found.fast_steps)
-    assert errors[0] > 3.0 * errors[1] and errors[2] < 0.02, errors
-    assert steps[0] < steps[1] < steps[2] < truth.fast_steps, steps
-    assert steps[1] < 0.5 * truth.fast_steps
-
-
-def test_jumps_of_one_length_are_of_second_order():
-    errors = []
-    truth, _, _ = journey(resolved, tolerance=1.0)
-    for length in (0.32, 0.16, 0.08):
-        found, _, _ = journey(cycle_jump, tolerance=1e9, first=length, longest=length, window=1, settling=3, begin=2)
-        at = numpy.interp(found.times[-1], truth.times, numpy.array(truth.values)[:, 0])
-        errors.append(abs(found.values[-1][0] - at))
-    assert errors[0] > 3.3 * errors[1] > 3.3 * 3.3 * errors[2], errors
-
-
-@pytest.mark.parametrize("run", [resolved, cycle_jump])
-def test_books_close_over_jumps(run):
-    found, fast, slow = journey(run, tolerance=0.1)
-    assert found.handed == pytest.approx(slow.received, rel=1e-12)
-    assert found.given == pytest.approx(slow.received, rel=1e-12)
-    # What the fast unit gave itself is what was stepped together, and what it took to settle.
-    assert 0.0 < found.in_windows <= fast.account * (1.0 + 1e-12)
-    if run is cycle_jump:
-        assert found.in_windows < 0.7 * found.given
-
-
-def test_a_jump_over_a_kink_is_taken_back():
-    """The flux stops at a value. Jumps that leap over that are too far, and both units go back to where they were."""
-    fast, slow = Pulses((3.0,), (40.0,), kink=15.0), Stores((1.0,))
-    found = cycle_jump(fast, slow, Plan(STEP, CYCLE, tolerance=0.3, first=0.2), 1.0)
-    back = [jump for jump in found.jumps if not jump.kept]
-    assert back and all(jump.error > 0.3 for jump in back)
-    assert found.given == pytest.approx(slow.received, rel=1e-12)
-    # The pulse that crosses it is a step long; jumps add the tolerance at most.
-    truth = Stores((1.0,))
-    resolved(Pulses((3.0,), (40.0,), kink=15.0), truth, Plan(STEP, CYCLE, tolerance=1.0), 1.0)
-    at_kink = [value[0] for time, value in zip(found.times, found.values) if time < back[-1].start + back[-1].length]
-    assert max(at_kink) < truth.now[0] + 1.0
-
-
-def test_a_plan_says_what_is_wrong():
-    with pytest.raises(ValueError, match="tolerance"):
-        Plan(STEP, CYCLE, tolerance=0.0)
-    with pytest.raises(ValueError, match="window"):
-        Plan(STEP, CYCLE, tolerance=1.0, window=9)
-
-
-def test_conduction_keeps_heat_and_takes_any_step():
-    heat = numpy.zeros(12)
-    heat[2], heat[8] = 1e4, 8e3
-    many, once = Conduction(), Conduction()
-    for _ in range(200):
-        many.step(0.05, heat, (5.0, 1.0))
-        once.sides = many.sides  # ramped once, held since
-    once.sides = numpy.zeros(2)
-    once.step(0.05, heat, (5.0, 1.0))
-    once.step(9.95, heat, (5.0, 1.0))
-    assert numpy.abs(many.patch - once.patch).max() < 1e-10 * many.patch.max()
-    for model in (many, once):
-        assert abs(model.residual) < 1e-12 * model.supplied
-        assert model.supplied == pytest.approx(1.8e5, rel=1e-12)
-        assert model.gas < 0.0 and model.ambient < 0.0
-
-
-def test_conduction_without_films_warms_by_heat_over_capacity():
-    model = Conduction(Ring(films=(0.0, 0.0)))
-    model.step(100.0, numpy.full(12, 1000.0))
-    assert model.patch == pytest.approx(numpy.full(12, 1.2e6 / model.capacity), rel=1e-10)
-    assert model.stored == pytest.approx(1.2e6, rel=1e-10)
-
-
-def test_a_thin_ring_levels_out_around_as_it_should():
-    """cos θ decays with κ/R², κ = k/(ρc): the error of finite volumes is of second order in the angle."""
-    errors = []
-    for around in (24, 48):
-        ring = Ring(radii=(0.25, 0.25, 0.25), thickness=1e-4, flanges=((5e-3, 1e-7), (4e-3, 1e-7)), films=(0.0, 0.0))
-        model = Conduction(ring, around=around, layers=1)
-        radius = 0.25 + 0.5e-4
-        rate = 53.3 / (7850.0 * 439.8) / radius**2
-        slowest = numpy.sort(model._rates[1])[0]
-        errors.append(abs(slowest / rate - 1.0))
-    assert errors[0] == pytest.approx(4.0 * errors[1], rel=0.05) and errors[1] < 2e-3, errors
-
-
-class Wall:
-    """The conduction of this example as the slow side, without FMI."""
-
-    def __init__(self):
-        self.model = Conduction()
-
-    def step(self, length, fluxes):
-        self.model.step(length, fluxes)
-
-    def values(self):
-        return self.model.patch
-
-    def supplied(self):
-        return self.model.supplied
-
-    def save(self):
-        model = self.model
-        return model.amplitudes.copy(), model.supplied, model.gas, model.ambient
-
-    def restore(self, saved):
-        amplitudes, self.model.supplied, self.model.gas, self.model.ambient = saved
-        self.model.amplitudes = amplitudes.copy()
-
-    def drop(self, saved):
-        pass
-
-
-REVOLUTION = 2.0 * numpy.pi / 1800.0
-
-
-@pytest.fixture(scope="module")
-def rubs(tiprub, scene, tmp_path_factory):
-    """FMUs of the example's scene, with three contact nodes to a blade."""
-    work = tmp_path_factory.mktemp("thermal")
-    text = (EXAMPLE / "rub.toml").read_text(encoding="utf-8").replace("rotor.rom.safetensors", str(scene.parent / "rotor37.rom.safetensors"))
-    (work / "rub.toml").write_text(text, encoding="utf-8")
-    library = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.environ else []
-    tiprub("package", work / "rub.toml", "--scalars", "-o", work, *library)
-    return {fmi: work / f"thermal_rub_fmi{fmi}.fmu" for fmi in (2, 3)}
-
-
-@pytest.fixture(scope="module")
-def casings(tiprub, tmp_path_factory):
-    """The thermal unit of the casing."""
-    work = tmp_path_factory.mktemp("casing")
+@pytest.fixture(scope="session")
+def conduction(tiprub, tmp_path_factory):
+    """FMUs of both versions, and what the command told of them."""
+    directory = tmp_path_factory.mktemp("thermal")
     library = ["--library", os.environ["TIPRUB_LIBRARY_THERMAL"]] if "TIPRUB_LIBRARY_THERMAL" in os.environ else []
-    tiprub("thermal", "--output", work, *library)
-    return {fmi: next(work.glob(f"*_fmi{fmi}.fmu")) for fmi in (2, 3)}
+    told = tiprub("thermal", *CASING, "-o", directory, *library)
+    arrays = directory / "arrays.fmu"
+    tiprub("thermal", *CASING, "--fmi", "3", "--arrays", "-o", arrays, *library)
+    return SimpleNamespace(two=directory / "coarse_fmi2.fmu", three=directory / "coarse_fmi3.fmu", arrays=arrays, told=told)
 
 
-def test_finite_volumes_stand_beside_the_finite_elements(casings):
-    """Two discretisations of one casing that share no line: heat in two patches, a second long and ten."""
-    heat = numpy.zeros(12)
-    heat[2], heat[3], heat[8] = 5e3, 1e3, 4e3
-    model = Conduction(around=144, along=2.5e-3)
-    with Unit(casings[2]) as unit:
-        casing = Casing(unit)
-        for length in (1.0, 9.0):
-            casing.step(length, heat)
-            model.step(length, heat)
-            apart = numpy.abs(casing.values() - model.patch).max()
-            assert apart < 0.02 * model.patch.max(), (length, apart, model.patch.max())
-        stored, gas, ambient = unit.get(["stored_heat", "gas_heat", "ambient_heat"])
-    assert (stored, gas, ambient) == (pytest.approx(model.stored, rel=3e-3), pytest.approx(model.gas, rel=0.02), pytest.approx(model.ambient, rel=0.03))
+@pytest.mark.parametrize("kind", ["two", "three", "arrays"])
+def test_fmpy_finds_nothing_wrong(conduction, kind):
+    assert validate_fmu(str(getattr(conduction, kind))) == []
+    description = read_model_description(str(getattr(conduction, kind)))
+    assert description.coSimulation.modelIdentifier == "tiprub_thermal"
+    assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
+    # No output depends on an input of the same instant: importers find no algebraic loop.
+    assert all(unknown.dependencies == [] for unknown in description.outputs)
 
 
-def test_a_script_and_the_package_in_fmpy_give_the_same_bits(rubs, casings, tmp_path):
-    file, count = tmp_path / "pair.ssp", 10
-    ssp.write(file, rubs[2], casings[2], 12, count * REVOLUTION / 10)
-    found = ssp.run_fmpy(file, REVOLUTION / 10, count, 12)
-    for fmi in (2, 3):
-        with Unit(rubs[fmi]) as rub, Unit(casings[fmi]) as casing:
-            course = script(Rub(rub, 0.5), Casing(casing), REVOLUTION / 10, count)
-        assert course.temperatures[-1].max() > 0.02, "it rubs"
-        assert (course.temperatures == found.temperatures).all() and (course.heat == found.heat).all()
+def rub(step, stop):
+    """Heat of a rub that runs around, hot gas, and shutdown after half of the time."""
+    names = [f"casing_heat[{patch + 1}]" for patch in range(PATCHES)]
+    names += ["gas_temperature", "ambient_temperature", "gas_convection_factor"]
+    kinds = [("time", float)] + [(name, float) for name in names]
+    rows = []
+    for number in range(round(stop / step)):
+        time = number * step
+        hot = time < 0.5 * stop
+        heat = [300.0 * max(0.0, math.cos(2.0 * math.pi * (patch / PATCHES - time / 7.0))) if hot else 0.0 for patch in range(PATCHES)]
+        rows.append((time, *heat, 150.0, 10.0, 1.0 if hot else 0.05))
+    return numpy.array(rows, dtype=kinds)
 
 
-def test_both_versions_heat_the_casing_alike_and_hand_over_all_friction(rubs):
-    found = {}
-    for fmi, file in rubs.items():
-        with Unit(file) as unit:
-            found[fmi] = script(Rub(unit, 0.5), Wall(), REVOLUTION / 10, 20, together=False)
-    two, three = found[2], found[3]
-    assert two.temperatures[-1].max() > 0.05, "it rubs"
-    assert (two.temperatures == three.temperatures).all() and (two.heat == three.heat).all()
-    assert two.supplied == pytest.approx(two.friction, rel=1e-12)
+def run(file, signals, stop, step, **options):
+    description = read_model_description(str(file))
+    outputs = [variable.name for variable in description.modelVariables if variable.causality == "output"]
+    return simulate_fmu(str(file), stop_time=stop, output_interval=step, step_size=step, input=signals, output=outputs, **options)
 
 
-def test_a_jump_of_the_pair_that_is_taken_back_leaves_no_trace(rubs):
-    """A tolerance nobody meets: all jumps are taken back, and the run is the resolved one to the last bit."""
-    count = 8
-    found = []
-    for run, plan in ((resolved, {}), (cycle_jump, {"first": 1.2 * REVOLUTION, "longest": 1.2 * REVOLUTION})):
-        with Unit(rubs[2]) as unit:
-            rub, wall = Rub(unit, 0.5), Wall()
-            made = run(rub, wall, Plan(REVOLUTION / 10, 10, 1e-12, window=1, settling=1, begin=2, **plan), count * REVOLUTION)
-            found.append((made, wall.values(), rub.total(), unit.time))
-    (truth, values, total, _), (jumped, same, again, time) = found
-    assert jumped.jumps and not jumped.kept
-    assert (values == same).all() and total == again
-    assert time == pytest.approx(count * REVOLUTION)
-    assert jumped.given == pytest.approx(truth.given, rel=1e-12)
+def test_both_versions_are_one_and_heat_is_conserved(conduction):
+    step, stop = 0.25, 40.0
+    results = [run(file, rub(step, stop), stop, step) for file in (conduction.two, conduction.three)]
+    assert results[0].dtype.names == results[1].dtype.names
+    for name in results[0].dtype.names:
+        assert numpy.array_equal(results[0][name], results[1][name]), name
+    last = results[0][-1]
+    came = last["supplied_heat"] + last["gas_heat"] + last["ambient_heat"]
+    assert abs(last["stored_heat"] - came) < 1e-10 * last["supplied_heat"]
+    assert abs(last["energy_residual_relative"]) < 1e-12
+    # The rub heats, the soak cools: the largest temperature lies between.
+    hottest = results[0]["temperature_max"]
+    assert 0 < numpy.argmax(hottest) <= round(0.5 * stop / step) + 1 and hottest[-1] < hottest.max()
+    # Heat flows as stated: means over steps add up to totals.
+    assert math.isclose(results[0]["gas_power"][1:].sum() * step, last["gas_heat"], rel_tol=1e-9)
 
 
-def test_a_unit_names_what_it_lacks(rubs):
-    with Unit(rubs[2]) as unit:
-        with pytest.raises(UnitError, match="no variable casing_heat"):
-            unit.names("casing_heat")
-        with pytest.raises(UnitError, match="no variable nothing"):
-            unit.get(["nothing"])
+def test_a_long_step_is_many_short_ones(conduction):
+    held = numpy.array([(0.0, 250.0)], dtype=[("time", float), ("casing_heat[3]", float)])
+    fine, coarse = (run(conduction.three, held, 20.0, step)[-1] for step in (0.01, 20.0))
+    for name in ("casing_temperature[3]", "casing_temperature[9]", "surface_temperature[3]", "stored_heat", "gas_heat"):
+        assert math.isclose(fine[name], coarse[name], rel_tol=1e-10), name
 
 
-def test_the_package_is_ssp(rubs, tmp_path):
-    """Valid by the schema of SSP 1.0; each connector is a variable of its FMU."""
-    from fmpy import read_model_description
-    from fmpy.ssp.ssd import get_connections
+def test_steady_state_is_what_films_carry_away(conduction):
+    """All patches alike for a long time: heat in is heat out, by conductances that the description tells."""
+    heat = 100.0
+    signals = numpy.array([(0.0, *[heat] * PATCHES)], dtype=[("time", float)] + [(f"casing_heat[{k + 1}]", float) for k in range(PATCHES)])
+    last = run(conduction.two, signals, 4000.0, 400.0)[-1]
+    gas, ambient = conduction.told["model"]["conductances"]
+    out = gas * last["gas_surface_temperature"] + ambient * last["ambient_surface_temperature"]
+    assert math.isclose(out, PATCHES * heat, rel_tol=1e-9)
+    assert math.isclose(-last["gas_power"] - last["ambient_power"], PATCHES * heat, rel_tol=1e-9)
+    patches = [last[f"casing_temperature[{k + 1}]"] for k in range(PATCHES)]
+    assert max(patches) - min(patches) < 1e-6 * max(patches)
 
-    file = tmp_path / "pair.ssp"
-    ssp.write(file, rubs[2], rubs[2], 12, 1.0)
-    system = ssp.validate(file).system
-    assert len(get_connections(system)) == 24
-    known = {variable.name for variable in read_model_description(str(rubs[2])).modelVariables}
-    rub = next(element for element in system.elements if element.name == "rub")
-    assert {connector.name for connector in rub.connectors} <= known
+
+def test_the_command_checks_what_it_made(conduction):
+    model = conduction.told["model"]
+    nominal = next(check for check in model["steady_states"] if check["factors"] == [1.0, 1.0])
+    assert nominal["patches"] < 1e-9 and nominal["surfaces"] < 1e-9
+    assert all(check["patches"] < 5e-3 for check in model["steady_states"])
+    assert model["time_constants"] == sorted(model["time_constants"], reverse=True)
+
+
+def test_wrong_ones_are_refused_by_name(tiprub, conduction, tmp_path):
+    for options, expected in [
+        (["--gas-film", "0", "--ambient-film", "0"], "film"),
+        (["--patches", "0x0"], "patch"),
+        (["--heated", "1:2"], "heated"),
+        (["--material", "maraging-steel"], "conduct"),
+    ]:
+        error = tiprub("thermal", *CASING, "-o", tmp_path, *options, fails=True)
+        assert expected in str(error), (options, error)
+    scenes = os.environ.get("TIPRUB_LIBRARY")
+    if scenes:
+        error = tiprub("thermal", *CASING, "-o", tmp_path, "--library", scenes, fails=True)
+        assert "another unit" in str(error)

@@ -28,31 +28,42 @@ pub fn root() -> PathBuf {
 
 /// Build the FMU library as it is shipped (or with the feature that makes it panic on request) and give its path.
 ///
-/// The environment variables `TIPRUB_LIBRARY` and `TIPRUB_LIBRARY_TEST_PANIC` name libraries built elsewhere (against an
-/// old glibc, say) to be tested instead. It is built alone (`-p`), because a workspace build would unify features, and in its own target directory, because the
-/// one in use may be locked.
+/// The environment variables `TIPRUB_LIBRARY`, `TIPRUB_LIBRARY_TEST_PANIC` and `TIPRUB_LIBRARY_THERMAL` name libraries built elsewhere
+/// (against an old glibc, say) to be tested instead. It is built alone (`-p`), because a workspace build would unify features, and in its
+/// own target directory, because the one in use may be locked.
 #[track_caller]
 pub fn library(profile: &str, features: &[&str]) -> PathBuf {
     let elsewhere = if features.is_empty() { "TIPRUB_LIBRARY" } else { "TIPRUB_LIBRARY_TEST_PANIC" };
+    library_of(("tiprub-fmi", "libtiprub_fmi.so", elsewhere), profile, features)
+}
+
+#[track_caller]
+fn library_of((package, file, elsewhere): (&str, &str, &str), profile: &str, features: &[&str]) -> PathBuf {
     if let Some(path) = std::env::var_os(elsewhere) {
         return path.into();
     }
     let target = root().join("target").join(if features.is_empty() { "product" } else { "product-features" });
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.current_dir(root()).args(["build", "--quiet", "-p", "tiprub-fmi", "--profile", profile]);
+    command.current_dir(root()).args(["build", "--quiet", "-p", package, "--profile", profile]);
     command.arg("--target-dir").arg(&target);
     if !features.is_empty() {
         command.args(["--features", &features.join(",")]);
     }
     let output = command.output().expect("cargo can be run");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    target.join(profile).join("libtiprub_fmi.so")
+    target.join(profile).join(file)
 }
 
 /// The shipped library.
 #[track_caller]
 pub fn shipped() -> PathBuf {
     library("fmu", &[])
+}
+
+/// The shipped library of heat conduction.
+#[track_caller]
+pub fn thermal() -> PathBuf {
+    library_of(("tiprub-fmi-thermal", "libtiprub_thermal_fmi.so", "TIPRUB_LIBRARY_THERMAL"), "fmu", &[])
 }
 
 /// One message an importer was given.

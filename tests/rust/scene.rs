@@ -188,12 +188,21 @@ impl Resources {
     /// Write a scene.
     #[track_caller]
     pub fn of(scene: &Scene, arrays: bool) -> Self {
-        let files = tiprub_format::resource_files(scene, arrays);
+        Self::of_files(&tiprub_format::resource_files(scene, arrays))
+    }
+
+    /// Write a model of heat conduction.
+    #[track_caller]
+    pub fn of_thermal(model: &tiprub_thermal::Model, arrays: bool) -> Self {
+        Self::of_files(&tiprub_format::thermal_resource_files(model, arrays))
+    }
+
+    fn of_files(files: &[(String, Vec<u8>)]) -> Self {
         let directory = tempfile::tempdir().expect("a temporary directory");
-        for (name, content) in &files {
+        for (name, content) in files {
             std::fs::write(directory.path().join(name), content).expect("the temporary directory can be written");
         }
-        Self { directory, token: tiprub_format::instantiation_token(&files) }
+        Self { directory, token: tiprub_format::instantiation_token(files) }
     }
 
     /// Where they are.

@@ -28,9 +28,12 @@ fn free_of(package: &str, unwanted: &[&str]) {
 fn imports_run_one_way() {
     let offline = ["faer", "rayon", "quick-xml", "zip", "clap", "plotters", "indicatif", "libloading"];
     let floors = ["tiprub-model", "tiprub-reference", "tiprub-model-description", "tiprub"];
-    let files = ["tiprub-format", "tiprub-fmi", "toml", "safetensors", "serde_json"];
+    let files = ["tiprub-format", "tiprub-fmi", "tiprub-fmi-facade", "toml", "safetensors", "serde_json"];
     free_of("tiprub-core", &[&offline[..], &floors, &files].concat());
+    free_of("tiprub-thermal", &[&offline[..], &floors, &files].concat());
+    free_of("tiprub-fmi-facade", &[&offline[..], &floors, &["tiprub-format", "tiprub-thermal", "tiprub-fmi"]].concat());
     free_of("tiprub-fmi", &[&offline[..], &floors].concat());
+    free_of("tiprub-fmi-thermal", &[&offline[..], &floors, &["tiprub-fmi"]].concat());
     free_of("tiprub-format", &[&offline[..], &floors, &["tiprub-fmi"]].concat());
     let above_model = ["tiprub-fmi", "tiprub", "tiprub-model-description", "tiprub-reference"];
     free_of("tiprub-model", &[&above_model[..], &["quick-xml", "zip", "clap", "toml", "safetensors"]].concat());
@@ -65,12 +68,17 @@ fn lines_with(path: &Path, word: &str) -> Vec<String> {
 
 #[test]
 fn the_boundary_is_the_only_place_of_unsafe_code_in_the_library() {
-    let (mut files, source) = (Vec::new(), root().join("fmi/src"));
+    let (mut files, source) = (Vec::new(), root().join("fmi/facade/src"));
     sources(&source, &mut files);
     assert!(files.len() > 10);
     for path in files.iter().filter(|path| !path.starts_with(source.join("boundary"))) {
         let blocks: Vec<_> = lines_with(path, "unsafe").into_iter().filter(|line| line.contains("unsafe {")).collect();
         assert!(blocks.is_empty(), "{}: {blocks:?}", path.display());
+    }
+    for unit in ["fmi/src", "fmi/thermal/src", "src/thermal/src"] {
+        let mut files = Vec::new();
+        sources(&root().join(unit), &mut files);
+        assert!(!files.is_empty() && files.iter().all(|path| lines_with(path, "unsafe {").is_empty()), "{unit}");
     }
     let lib = std::fs::read_to_string(source.join("lib.rs")).expect("a source file");
     assert!(lib.contains("#[forbid(unsafe_code)]\nmod slave;"));
@@ -78,12 +86,14 @@ fn the_boundary_is_the_only_place_of_unsafe_code_in_the_library() {
 
 #[test]
 fn the_library_is_only_a_shared_library() {
-    let manifest = std::fs::read_to_string(root().join("fmi/Cargo.toml")).expect("the manifest");
-    assert!(
-        manifest.contains("crate-type = [\"cdylib\"]"),
-        "an rlib beside it would silently drop link-time optimisation"
-    );
-    assert!(!manifest.contains("default = "), "no feature is on in the shipped library");
+    for unit in ["fmi", "fmi/thermal"] {
+        let manifest = std::fs::read_to_string(root().join(unit).join("Cargo.toml")).expect("the manifest");
+        assert!(
+            manifest.contains("crate-type = [\"cdylib\"]"),
+            "{unit}: an rlib beside it would silently drop link-time optimisation"
+        );
+        assert!(!manifest.contains("default = "), "{unit}: no feature is on in the shipped library");
+    }
 }
 
 /// `tests/run.sh` runs no examples of docstrings, since there are none: one that is code would never be compiled.

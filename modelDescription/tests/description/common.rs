@@ -120,6 +120,8 @@ pub fn description<'a>(table: &'a VariableTable, rom: &'a Rom, fmi3_arrays: bool
     Description {
         model_name: "rotor37_rub",
         identifier: "tiprub",
+        about: "It steps.",
+        steps: "They are long.",
         token: "{01234567-89ab-cdef-0123-456789abcdef}",
         description: "Tip rub of 36 blades & a casing",
         generated: "2026-01-31T12:00:00Z",

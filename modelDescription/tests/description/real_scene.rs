@@ -31,7 +31,7 @@ fn inputs(simulation: &Simulation) -> Vec<u32> {
 
 #[test]
 fn outputs_do_not_depend_on_inputs_set_after_the_step() {
-    for (scene, inputs) in [(scene::rigid(), 4), (scene::complete(), 12)] {
+    for (scene, inputs) in [(scene::rigid(), 4), (scene::complete(), 15)] {
         keep_after_the_step(&scene, inputs);
     }
 }

@@ -1,7 +1,7 @@
 //! A scene with every option on, small blades in a small flexible casing, and what each option is.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{SUPPORT_ROWS, Support, Watched};
+use tiprub_core::rom::{Patch, SUPPORT_ROWS, Support, Thermal, Watched};
 use tiprub_core::settings::*;
 use tiprub_core::{Rom, Scene, VariableTable};
 use tiprub_model_description::{Description, Experiment};
@@ -14,6 +14,12 @@ pub fn complete() -> Scene {
     let rotor = &mut scene.settings.structures[0];
     rotor.spin = SpinSettings { stiffening: true, growth: true, coriolis: true };
     (rotor.whirl, rotor.axial_shift) = (true, true);
+    (rotor.thermal, rotor.softening, rotor.damping_ratios) = (true, 3e-4, vec![0.002, 0.004]);
+    let (mode, node, direction) = (Some(1), None, None);
+    rotor.excitation = Some(ExcitationSettings { order: 4, mode, node, direction, amplitude: 0.0, phase: 0.0 });
+    let (mode, sector, nodal_diameter) = (1, None, Some(3));
+    rotor.initial =
+        vec![InitialSettings { mode, sector, nodal_diameter, phase: 0.0, displacement: 0.0, velocity: 0.0 }];
     models::on_ring(&mut scene, models::ring(24, 3), 0.01);
     let ring = &mut scene.settings.structures[1];
     (ring.thermal, ring.load) = (true, Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 }));
@@ -30,7 +36,8 @@ pub fn complete() -> Scene {
         cutting: Some(CuttingSettings { specific_energy: 1e8, normal_ratio: 1.0 }),
     });
     let outputs = &mut scene.settings.outputs;
-    (outputs.wear, outputs.wear_profile, outputs.slave_displacement, outputs.support_reaction) = (true, true, true, true);
+    (outputs.wear, outputs.wear_profile, outputs.slave_displacement, outputs.support_reaction) =
+        (true, true, true, true);
     let rom = &mut scene.roms[1];
     let zeros = |columns: usize| DMatrix::zeros(SUPPORT_ROWS, columns);
     let patches = rom.extras.thermal.as_ref().map_or(0, |thermal| thermal.patches.len());
@@ -43,6 +50,8 @@ pub fn complete() -> Scene {
 pub fn rigid() -> Scene {
     let mut rom = models::blade(36);
     rom.extras.spin = Some(models::spin(rom.order()));
+    let whole = Patch { angle: [0.0, std::f64::consts::TAU], axial: [-1.0, 1.0] };
+    rom.extras.thermal = Some(Thermal { loads: DMatrix::zeros(rom.order(), 1), patches: vec![whole] });
     let points = ["edge_1", "edge_2"].map(|name| models::node(name, rom.contact_nodes[0].position, 0.0)).to_vec();
     let two = |rows: usize| DMatrix::from_fn(rows * points.len(), rom.order(), |i, j| rom.contact_map[(i % 6, j)]);
     let (moved, stress) = (two(3), two(6));
@@ -73,12 +82,21 @@ pub fn rigid() -> Scene {
 pub type Switch = (&'static str, fn(&mut Scene));
 
 /// Every option that adds variables, in a scene with a flexible casing.
-pub const OPTIONS: [Switch; 27] = [
+pub const OPTIONS: [Switch; 32] = [
     ("`tolerance`, or the scheme `galerkin`", |scene| scene.settings.time.tolerance = None),
     ("`motion = \"rotating\"`", |scene| {
         let rotor = &mut scene.settings.structures[0];
         (rotor.motion, rotor.speed, rotor.spin) = (Motion::Still, 0.0, SpinSettings::default());
         (rotor.whirl, rotor.axial_shift) = (false, false);
+        (rotor.excitation, rotor.softening) = (None, 0.0);
+        rotor.initial.clear();
+    }),
+    ("`excitation`", |scene| scene.settings.structures[0].excitation = None),
+    ("`initial`", |scene| scene.settings.structures[0].initial.clear()),
+    ("`damping_ratios`", |scene| scene.settings.structures[0].damping_ratios.clear()),
+    ("`softening`", |scene| scene.settings.structures[0].softening = 0.0),
+    ("`thermal = true` of the rotor", |scene| {
+        (scene.settings.structures[0].thermal, scene.settings.structures[0].softening) = (false, 0.0);
     }),
     ("`whirl = true`", |scene| scene.settings.structures[0].whirl = false),
     ("`axial_shift = true`", |scene| scene.settings.structures[0].axial_shift = false),
@@ -126,15 +144,20 @@ pub const OPTIONS: [Switch; 27] = [
 ];
 
 /// Options of which any one will do: the last word on variables that no single option switches off.
-pub const ALTERNATIVES: [Switch; 2] = [
+pub const ALTERNATIVES: [Switch; 3] = [
     ("`patches` of the surface or `thermal = true`", |scene| {
         scene.settings.surfaces[0].patches = None;
         scene.settings.structures[1].thermal = false;
     }),
     ("`spin.growth`, `thermal` or `load`", |scene| {
         scene.settings.structures[0].spin.growth = false;
+        (scene.settings.structures[0].thermal, scene.settings.structures[0].softening) = (false, 0.0);
         scene.settings.structures[1].thermal = false;
         scene.settings.structures[1].load = None;
+    }),
+    ("`spin.stiffening` or `softening`", |scene| {
+        scene.settings.structures[0].spin.stiffening = false;
+        scene.settings.structures[0].softening = 0.0;
     }),
 ];
 
@@ -143,6 +166,8 @@ pub fn description<'a>(table: &'a VariableTable, roms: &'a [Rom], fmi3_arrays: b
     Description {
         model_name: "rotor_rub",
         identifier: "tiprub",
+        about: "It steps.",
+        steps: "They are long.",
         token: "{}",
         description: "",
         generated: "",

@@ -76,7 +76,8 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
     output_file::create_directory(directory)?;
     let mut watch = Stopwatch::default();
 
-    let libraries = watch.measure("building the FMU library", || library::load(&arguments.libraries, console))?;
+    let libraries = watch
+        .measure("building the FMU library", || library::load(library::Unit::Scene, &arguments.libraries, console))?;
     let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::in_rows(), console))?;
     let scene = write_inputs(directory, &reduction, &scene_text)?;
     let schedule = Schedule::new(&scene.settings.experiment, None, None)?;

@@ -6,6 +6,7 @@ pub mod package;
 pub mod reduce;
 pub mod run;
 pub mod study;
+pub mod thermal;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -28,6 +29,7 @@ pub fn run(command: &Command, console: &Console) -> Result<Outcome> {
             Command::Demo(arguments) => demo::run(arguments, console),
             Command::Reduce(arguments) => reduce::run(arguments, console),
             Command::Package(arguments) => package::run(arguments, console),
+            Command::Thermal(arguments) => thermal::run(arguments, console),
             Command::Run(arguments) => run::run(arguments, console),
             Command::Inspect(arguments) => inspect::run(arguments, console),
             Command::Study(arguments) => study::run(arguments, console),

@@ -14,7 +14,7 @@ use crate::{
     cli::{FmiChoice, PackageArguments},
     command_files,
     fmu::{FmiVersion, Package},
-    library,
+    library::{self, Unit},
 };
 
 /// Load the scene, find the library, zip.
@@ -23,18 +23,19 @@ use crate::{
 /// A wrong scene, no library, or files that cannot be written.
 pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
     // What is wrong with the command line is said before any work.
-    targets(arguments, "model")?;
+    targets(arguments.fmi, &arguments.output, "model")?;
     let given = library::given(&arguments.libraries)?;
-    let libraries = if given.is_empty() { None } else { Some(library::load(&arguments.libraries, console)?) };
+    let libraries =
+        if given.is_empty() { None } else { Some(library::load(Unit::Scene, &arguments.libraries, console)?) };
     let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
-    let targets = targets(arguments, &scene.settings.name)?;
+    let targets = targets(arguments.fmi, &arguments.output, &scene.settings.name)?;
     let files: Vec<Named> = targets.iter().map(|(_, path)| Named::new("--output", path)).collect();
     let library_files = given.iter().map(|path| Named::new("--library", path));
     places::outputs(
         &command_files::scene(&arguments.scene).into_iter().chain(library_files).collect::<Vec<_>>(),
         &files,
     )?;
-    let libraries = libraries.map_or_else(|| library::load(&arguments.libraries, console), Ok)?;
+    let libraries = libraries.map_or_else(|| library::load(Unit::Scene, &arguments.libraries, console), Ok)?;
     let package =
         Package::new(&scene, &libraries).map_err(|failure| scene_source::located(&arguments.scene, failure))?;
     console.warn(package.warnings());
@@ -58,21 +59,20 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
     Ok(Outcome { text: text.join("\n"), json })
 }
 
-fn size(path: &Path) -> u64 {
+pub(crate) fn size(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |metadata| metadata.len())
 }
 
 /// Which files to write: NAME_fmi2.fmu and NAME_fmi3.fmu in a directory, or one file as named.
-fn targets(arguments: &PackageArguments, name: &str) -> Result<Vec<(FmiVersion, PathBuf)>> {
-    let versions = match arguments.fmi {
+pub(crate) fn targets(fmi: FmiChoice, output: &Path, name: &str) -> Result<Vec<(FmiVersion, PathBuf)>> {
+    let versions = match fmi {
         FmiChoice::Two => vec![FmiVersion::Two],
         FmiChoice::Three => vec![FmiVersion::Three],
         FmiChoice::Both => vec![FmiVersion::Two, FmiVersion::Three],
     };
-    let output = &arguments.output;
     let is_file = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("fmu")) && !output.is_dir();
     match (is_file, versions.as_slice()) {
-        (true, [version]) => Ok(vec![(*version, output.clone())]),
+        (true, [version]) => Ok(vec![(*version, output.to_path_buf())]),
         (true, _) => Err(Failure::usage(
             format!("--output {}", output.display()),
             "is one file for two FMUs",
@@ -88,29 +88,15 @@ fn targets(arguments: &PackageArguments, name: &str) -> Result<Vec<(FmiVersion, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::LibraryArguments;
-    use tiprub_study::arguments::CacheArguments;
-
-    fn arguments(fmi: FmiChoice, output: &str) -> PackageArguments {
-        PackageArguments {
-            scene: "s".into(),
-            fmi,
-            output: output.into(),
-            arrays: false,
-            scalars: false,
-            libraries: LibraryArguments::default(),
-            cache: CacheArguments::default(),
-        }
-    }
 
     #[test]
     fn files_and_directories_are_told_apart() {
-        let both = targets(&arguments(FmiChoice::Both, "out"), "rub").unwrap();
+        let both = targets(FmiChoice::Both, Path::new("out"), "rub").unwrap();
         let paths: Vec<_> = both.iter().map(|(_, path)| path.display().to_string()).collect();
         assert_eq!(paths, ["out/rub_fmi2.fmu", "out/rub_fmi3.fmu"]);
-        let one = targets(&arguments(FmiChoice::Three, "a/x.fmu"), "rub").unwrap();
+        let one = targets(FmiChoice::Three, Path::new("a/x.fmu"), "rub").unwrap();
         assert_eq!(one, [(FmiVersion::Three, PathBuf::from("a/x.fmu"))]);
-        let failure = targets(&arguments(FmiChoice::Both, "x.fmu"), "rub").unwrap_err();
+        let failure = targets(FmiChoice::Both, Path::new("x.fmu"), "rub").unwrap_err();
         assert!(failure.usage && failure.problem.contains("two FMUs"), "{failure}");
     }
 }

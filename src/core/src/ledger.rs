@@ -1,4 +1,4 @@
-//! Energy ledger: kinetic + strain = initial + external work + curvature work + load work + step changes − damping −
+//! Energy ledger: kinetic + strain = initial + external work + curvature work + load work + excitation work + step changes − damping −
 //! friction − impact losses − wear work.
 //!
 //! All terms are those of the discrete equations (see [`crate::schemes`]), so the closure residual measures
@@ -50,6 +50,8 @@ pub struct Ledger {
     pub wear_energy: Sum,
     /// Work of centrifugal, thermal and nodal-diameter loads.
     pub load_work: Sum,
+    /// Work of the excitation of blades.
+    pub excitation_work: Sum,
     /// Work of the shaft through the contacts, −∫ torque dθ_r; of what slides along fixed obstacles.
     pub shaft_work: Sum,
     /// Work of the shaft on rotors whose modes depend on the speed: strain energy by stiffening.
@@ -83,7 +85,7 @@ macro_rules! sums_of_ledger {
     };
 }
 
-sums_of_ledger! { 15:
+sums_of_ledger! { 16:
     damping_loss,
     friction_loss,
     impact_loss,
@@ -91,6 +93,7 @@ sums_of_ledger! { 15:
     cutting_work,
     wear_energy,
     load_work,
+    excitation_work,
     shaft_work,
     stiffening_work,
     whirl_work,
@@ -134,6 +137,7 @@ impl Ledger {
         balance.add(-self.wear_work.value());
         balance.add(-self.cutting_work.value());
         balance.add(self.load_work.value());
+        balance.add(self.excitation_work.value());
         balance.add(-mechanical);
         balance.value()
     }
@@ -148,6 +152,7 @@ impl Ledger {
     /// heat of friction and damping and work on the coating. Impacts, which only take, are left out.
     pub fn supplied(&self) -> f64 {
         let put_in = self.external_work() + self.load_work.value() + self.step_change.value();
+        let put_in = put_in + self.excitation_work.value();
         let left = put_in - self.friction_loss.value() - self.damping_loss.value();
         left - self.wear_work.value() - self.cutting_work.value()
     }

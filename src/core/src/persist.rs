@@ -189,6 +189,7 @@ impl<T: Persist, const N: usize> Persist for [T; N] {
 }
 
 /// Implements [`Persist`] for a struct from the list of its fields; a field left out does not compile.
+#[macro_export]
 macro_rules! persist_fields {
     ($name:ident { $($field:ident),+ $(,)? }) => {
         impl $crate::persist::Persist for $name {
@@ -207,7 +208,7 @@ macro_rules! persist_fields {
         }
     };
 }
-pub(crate) use persist_fields;
+pub use persist_fields;
 
 /// FNV-1a over bytes, for fingerprints and checksums of saved states (not for security).
 pub fn fingerprint(bytes: &[u8], seed: u64) -> u64 {

@@ -49,6 +49,16 @@ pub const TOLERANCE: [f64; 2] = [1e-9, 0.1];
 pub const FRICTION: f64 = 2.0;
 /// Largest damping ratio of a scene.
 pub const DAMPING: f64 = 0.99;
+/// Largest amplitude of the excitation of a blade (N): a thousand times what tears it off.
+pub const EXCITATION: f64 = 1e9;
+/// Largest engine order.
+pub const ENGINE_ORDER: f64 = 1e6;
+/// Largest angle of an excitation per internal step (rad): a step of the recurrences takes it as constant.
+pub const EXCITED_ANGLE: f64 = 1.0;
+/// Largest share of stiffness lost per kelvin (1/K): twenty times that of a metal.
+pub const SOFTENING: f64 = 1e-2;
+/// Least and largest share of the stiffness that a temperature may leave (-).
+pub const SOFTENED: [f64; 2] = [0.1, 2.0];
 /// Mistuning beyond these factors is another blade.
 pub const FREQUENCY_FACTORS: [f64; 2] = [0.5, 2.0];
 /// Fewest data points that a closed cubic spline needs, and more than any mesh has.

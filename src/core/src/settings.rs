@@ -1,5 +1,6 @@
 //! The scene: every setting with its unit, default and range. `tiprub-format` reads it from TOML.
 
+mod blades;
 mod coating;
 pub mod rules;
 mod validation;
@@ -9,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::Rom;
 pub use crate::laws::Solver;
 pub use crate::schemes::Scheme;
+pub use blades::{Direction, ExcitationSettings, InitialSettings};
 pub use coating::{CoatingSettings, CuttingSettings};
 
 /// Shape of a rigid surface of revolution: radial clearance change around the circumference.
@@ -147,6 +149,10 @@ pub struct StructureSettings {
     /// Modal damping ratio ξ (-), 0 ≤ ξ < 1; the ROM's own when absent.
     #[serde(default)]
     pub damping_ratio: Option<f64>,
+    /// Damping ratios ξ (-) of the first modes, of each nodal diameter where sectors are coupled; `damping_ratio` is that of the
+    /// others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub damping_ratios: Vec<f64>,
     /// Effects of spin.
     #[serde(default, skip_serializing_if = "is_default")]
     pub spin: SpinSettings,
@@ -159,12 +165,21 @@ pub struct StructureSettings {
     /// Mistuning: factor on the natural frequencies of each sector, one value per sector; empty = all equal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub frequency_factors: Vec<f64>,
-    /// Make the temperatures of the ROM's patches inputs.
+    /// Make the temperatures of the ROM's patches inputs; of a rotor one temperature.
     #[serde(default, skip_serializing_if = "is_default")]
     pub thermal: bool,
+    /// Share of its elastic stiffness that a rotor loses per kelvin (1/K).
+    #[serde(default, skip_serializing_if = "is_positive_zero")]
+    pub softening: f64,
     /// Nodal-diameter load with amplitude and phase as inputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load: Option<LoadSettings>,
+    /// Excitation by an engine order, with amplitude and phase as inputs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub excitation: Option<ExcitationSettings>,
+    /// Motion of the blades at the start.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub initial: Vec<InitialSettings>,
 }
 
 /// What happens to a surface spline where it closes around the circumference.

@@ -166,6 +166,12 @@ pub enum Quantity {
     LoadPhase,
     /// Number of nodal diameters of that load, parameter.
     LoadOrder,
+    /// Amplitude and phase (component 0, 1) of the excitation of blades, input.
+    Excitation(usize),
+    /// Its engine order, parameter.
+    ExcitationOrder,
+    /// Temperature of a rotor above the reference, input.
+    RotorTemperature,
     /// µ, parameter.
     Friction,
     /// Added to every clearance, parameter.
@@ -174,6 +180,14 @@ pub enum Quantity {
     DampingRatio,
     /// ξ of a structure that carries surfaces, parameter.
     CarrierDampingRatio,
+    /// ξ of the first modes, parameter.
+    ModeDamping,
+    /// The same of a structure that carries surfaces, parameter.
+    CarrierModeDamping,
+    /// Displacement of blades at the start, parameter.
+    InitialDisplacement,
+    /// Velocity of blades at the start, parameter.
+    InitialRate,
     /// Velocity of a free master at the start along x, y, z (component 0, 1, 2), parameter.
     InitialVelocity(usize),
     /// Share of the friction heat that goes into the slave, parameter.

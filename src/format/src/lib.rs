@@ -17,6 +17,7 @@ mod scene_diagnosis;
 mod scene_file;
 mod scene_layout;
 mod suggestion;
+mod thermal_file;
 
 pub use error::Error;
 pub use input::{open_file, read_file};
@@ -26,6 +27,9 @@ pub use rom_file::{read_rom, write_rom};
 pub use rom_layout::{ARRAYS, ArrayLayout, METADATA, MetadataLayout};
 pub use scene_file::{PAPER_SUFFIX, builtin_model, parse_scene, position_of, write_scene};
 pub use scene_layout::{FIELDS, SceneField};
+pub use thermal_file::{
+    THERMAL_FILE, ThermalResources, load_thermal_resources, read_thermal, thermal_resource_files, write_thermal,
+};
 
 /// Result of this crate.
 pub(crate) type Result<T, E = Error> = core::result::Result<T, E>;

@@ -20,7 +20,8 @@ pub(crate) const PACKAGE_FILE: &str = "package.toml";
 /// Version of the layout of `resources/`.
 pub(crate) const RESOURCES_FORMAT_VERSION: u32 = 1;
 
-const INTACT: &str = "The FMU is damaged or was changed: import it again, or write it again with `tiprub package`";
+pub(crate) const INTACT: &str =
+    "The FMU is damaged or was changed: import it again, or write it again with `tiprub package`";
 
 /// What an FMU instance needs.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,10 +53,29 @@ pub fn resource_files(scene: &Scene, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)
     for (structure, rom) in settings.structures.iter().zip(packed_roms(scene)) {
         files.push((structure.rom.clone(), write_rom(&rom)));
     }
+    files.push(package_file(fmi3_arrays));
+    files
+}
+
+/// The packaging choices as a file.
+pub(crate) fn package_file(fmi3_arrays: bool) -> (String, Vec<u8>) {
     let package = Package { format_version: RESOURCES_FORMAT_VERSION, fmi3_arrays };
     let package = toml::to_string(&package).expect("a number and a flag can be written");
-    files.push((PACKAGE_FILE.to_owned(), package.into_bytes()));
-    files
+    (PACKAGE_FILE.to_owned(), package.into_bytes())
+}
+
+/// Read the packaging choices beside what else was read; whether FMI 3.0 has arrays.
+pub(crate) fn read_package(directory: &Path, files: &mut Vec<(String, Vec<u8>)>) -> Result<bool> {
+    let text = read_into(directory, PACKAGE_FILE, files)?;
+    Ok(parse_package(&directory.join(PACKAGE_FILE), &text)?.fmi3_arrays)
+}
+
+/// Refuse a place that is no directory.
+pub(crate) fn check_directory(directory: &Path) -> Result<()> {
+    if directory.is_dir() {
+        return Ok(());
+    }
+    Err(Error::file(directory, "no such directory (the FMU's resources are expected here)", INTACT))
 }
 
 /// The ROMs of a scene as an FMU holds them: without what this scene does not use.
@@ -134,9 +154,7 @@ pub fn instantiation_token(files: &[(String, Vec<u8>)]) -> String {
 /// [`Error::File`] with the path of a file that is missing, unreadable or from another release; else as
 /// [`parse_scene`] and [`read_rom`].
 pub fn load_resources(directory: &Path) -> Result<Resources> {
-    if !directory.is_dir() {
-        return Err(Error::file(directory, "no such directory (the FMU's resources are expected here)", INTACT));
-    }
+    check_directory(directory)?;
     let mut files = Vec::new();
     let scene_path = directory.join(SCENE_FILE);
     let settings = parse_scene(&read_into(directory, SCENE_FILE, &mut files)?, &scene_path.display().to_string())?;
@@ -152,10 +170,9 @@ pub fn load_resources(directory: &Path) -> Result<Resources> {
         roms.push(read_rom(&bytes, &path.display().to_string())?);
         files.push((name.clone(), bytes));
     }
-    let package = read_into(directory, PACKAGE_FILE, &mut files)?;
-    let package = parse_package(&directory.join(PACKAGE_FILE), &package)?;
+    let fmi3_arrays = read_package(directory, &mut files)?;
     let token = instantiation_token(&files);
-    Ok(Resources { scene: Scene { settings, roms }, token, fmi3_arrays: package.fmi3_arrays })
+    Ok(Resources { scene: Scene { settings, roms }, token, fmi3_arrays })
 }
 
 fn read_into(directory: &Path, name: &str, files: &mut Vec<(String, Vec<u8>)>) -> Result<String> {

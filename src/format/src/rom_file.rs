@@ -18,13 +18,13 @@ use crate::{Error, Result, suggestion};
 const WRITE_AGAIN: &str = "Write the ROM again; the ROM file chapter of the user guide lists arrays and metadata";
 
 /// An array of the file: shape and values in row-major order.
-struct Array {
-    shape: Vec<usize>,
-    values: Vec<f64>,
+pub(crate) struct Array {
+    pub(crate) shape: Vec<usize>,
+    pub(crate) values: Vec<f64>,
 }
 
-type Arrays = BTreeMap<String, Array>;
-type Metadata = BTreeMap<String, String>;
+pub(crate) type Arrays = BTreeMap<String, Array>;
+pub(crate) type Metadata = BTreeMap<String, String>;
 
 /// Read a ROM from the bytes of a ROM file; `origin` names the file in messages.
 ///
@@ -296,7 +296,7 @@ fn quoted(value: Option<&str>) -> String {
 }
 
 /// SHA-256 over metadata (without the checksum itself) and arrays, both by name, every item with its length.
-fn checksum(arrays: &Arrays, metadata: &Metadata) -> String {
+pub(crate) fn checksum(arrays: &Arrays, metadata: &Metadata) -> String {
     let mut hash = Sha256::new();
     let mut item = |bytes: &[u8]| {
         hash.update((bytes.len() as u64).to_le_bytes());
@@ -361,7 +361,7 @@ fn names(points: &[ContactNode]) -> String {
 }
 
 /// The file stores rows, nalgebra columns.
-fn matrix(matrix: &DMatrix<f64>) -> Array {
+pub(crate) fn matrix(matrix: &DMatrix<f64>) -> Array {
     Array { shape: vec![matrix.nrows(), matrix.ncols()], values: matrix.transpose().as_slice().to_vec() }
 }
 
@@ -411,7 +411,7 @@ fn rom_arrays(rom: &Rom) -> Arrays {
 /// The safetensors container: header length, JSON header padded to 8 bytes, data. Written here because the library's
 /// writer takes the metadata from a hash map, whose order, and so the bytes, differ from run to run. Keys are inserted
 /// in alphabetical order, so that serde_json gives the same text whether or not it keeps insertion order.
-fn container(arrays: &Arrays, metadata: &Metadata) -> Vec<u8> {
+pub(crate) fn container(arrays: &Arrays, metadata: &Metadata) -> Vec<u8> {
     let mut header = serde_json::Map::new();
     header.insert("__metadata__".into(), serde_json::json!(metadata));
     let mut data = Vec::new();

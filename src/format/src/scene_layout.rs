@@ -37,9 +37,10 @@ pub(crate) const REPEATED_TABLES: [&str; 3] = ["structure", "surface", "contact"
 pub(crate) const SINGLE_TABLES: [&str; 3] = ["time", "outputs", "experiment"];
 
 /// Tables inside the repeated ones, each with an example: written inline, or below as `[structure.spin]`.
-pub(crate) const INNER_TABLES: [(&str, &str); 7] = [
+pub(crate) const INNER_TABLES: [(&str, &str); 8] = [
     ("structure.spin", "{ stiffening = true }"),
     ("structure.load", "{ order = 2, amplitude = 100.0 }"),
+    ("structure.excitation", "{ order = 4, mode = 1, amplitude = 1.0 }"),
     ("surface.shape", "{ kind = \"circular\" } or with the keys of another kind"),
     ("surface.spline", "{ around = 72, along = 5 }"),
     ("surface.patches", "{ around = 8 }"),

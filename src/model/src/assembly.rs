@@ -25,7 +25,7 @@ pub struct Assembled {
 }
 
 /// Neighbours of each node, itself included, ascending.
-fn neighbours(mesh: &Mesh) -> Vec<Vec<usize>> {
+pub(crate) fn neighbours(mesh: &Mesh) -> Vec<Vec<usize>> {
     let mut lists = vec![Vec::new(); mesh.nodes.len()];
     for element in &mesh.elements {
         for &node in &element.nodes {

@@ -10,6 +10,7 @@
 
 pub mod assembly;
 pub mod casing;
+pub mod conduction;
 mod contact_point;
 pub mod craig_bampton;
 pub mod cube;

@@ -275,15 +275,25 @@ fn point(mesh: &Mesh, set: &[usize], places: &Places, (weights, length): (&[f64]
 }
 
 /// Natural coordinates and the vectors along the two directions of a face there.
-type FacePoint = ([f64; 3], [[f64; 3]; 2]);
+pub(crate) type FacePoint = ([f64; 3], [[f64; 3]; 2]);
 
 /// Points of a face, given by its corners, with shares of the parameters' area.
 fn quadrature(kind: ElementKind, corners: &[usize]) -> impl Iterator<Item = (FacePoint, f64)> {
+    let part = |part: usize| GAUSS.map(|(x, w)| ((part as f64 + x) / PARTS as f64, w / PARTS as f64));
+    face_points(kind, corners, (0..PARTS).flat_map(part).collect())
+}
+
+/// The same by a rule on 0 to 1 for both directions.
+pub(crate) fn face_points(
+    kind: ElementKind,
+    corners: &[usize],
+    rule: Vec<(f64, f64)>,
+) -> impl Iterator<Item = (FacePoint, f64)> {
     let at: Vec<[f64; 3]> = corners.iter().map(|&corner| kind.natural_nodes()[corner]).collect();
     // Of a triangle the third and the fourth corner are one: its sides degenerate, its area does not.
     let at: [[f64; 3]; 4] = std::array::from_fn(|corner| at[corner.min(at.len() - 1)]);
-    let line = || (0..PARTS).flat_map(|part| GAUSS.map(|(x, w)| ((part as f64 + x) / PARTS as f64, w / PARTS as f64)));
-    line().flat_map(move |first| line().map(move |second| (first, second))).map(move |((a, wa), (b, wb))| {
+    let pairs: Vec<_> = rule.iter().flat_map(|first| rule.iter().map(|second| (*first, *second))).collect();
+    pairs.into_iter().map(move |((a, wa), (b, wb))| {
         let mix =
             |weights: [f64; 4]| std::array::from_fn(|i| (0..4).map(|corner| weights[corner] * at[corner][i]).sum());
         let natural = mix([(1.0 - a) * (1.0 - b), a * (1.0 - b), a * b, (1.0 - a) * b]);
@@ -293,7 +303,11 @@ fn quadrature(kind: ElementKind, corners: &[usize]) -> impl Iterator<Item = (Fac
 }
 
 /// Shape functions of an element at a point of a face, area per parameters' area (m²), and the position (m).
-fn on_face(kind: ElementKind, coordinates: &[[f64; 3]], (natural, along): FacePoint) -> (Vec<f64>, f64, [f64; 3]) {
+pub(crate) fn on_face(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    (natural, along): FacePoint,
+) -> (Vec<f64>, f64, [f64; 3]) {
     let shape = kind.shape(natural);
     let tangent = |direction: [f64; 3]| -> [f64; 3] {
         let rate = |gradient: [f64; 3]| -> f64 { gradient.iter().zip(direction).map(|(g, d)| g * d).sum() };

@@ -7,7 +7,7 @@ mod response;
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{Basis, Frame, RomChecks, Watched};
+use tiprub_core::rom::{Basis, Frame, RomChecks, Thermal, Watched};
 use tiprub_core::shown;
 
 use crate::assembly::{Assembled, free_dofs};
@@ -22,6 +22,7 @@ use crate::progress::{Listener, Stage, report, silent};
 use crate::sparse::{Factor, SparseMatrix, principal_pair, tall_product};
 use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
 use crate::stress::{StressPlaces, all_places, stress_rows};
+use crate::thermal::{patch_loads, whole_mesh};
 use crate::{Error, Result};
 
 pub use crate::contact_point::ContactPoint;
@@ -194,6 +195,7 @@ pub fn reduce_model(
     let (spin, spin_checks) = spin.map_or((None, Vec::new()), |ReducedSpin { spin, checks }| (Some(spin), checks));
     let mut rom = build_rom(&model, clamped.len(), contact, options, &craig_bampton, checks);
     rom.extras.spin = spin;
+    rom.extras.thermal = uniform_heat(&model, &free, &craig_bampton.transformation)?;
     rom.extras.watched = watched(&model, &free, &craig_bampton.transformation, options)?;
     rom.extras.stress = stress(&model, &free, &craig_bampton.transformation, &full.modes.shapes, options)?;
     let fixed_interface_frequencies = craig_bampton.fixed_interface_frequencies;
@@ -351,6 +353,19 @@ fn contact_loads(free: &[usize], nodes: &[[f64; 3]], contact: &[ContactPoint], f
         }
     }
     Ok(loads)
+}
+
+/// Load per kelvin of the whole structure in reduced coordinates, of a mesh of one material that expands. Static responses to contact
+/// forces are among these coordinates, so that the free expansion of the contact nodes is that of the full model.
+fn uniform_heat(model: &FeModel, free: &[usize], transformation: &Mat<f64>) -> Result<Option<Thermal>> {
+    let Some((mesh, material)) = model.mesh.as_ref().filter(|(_, material)| material.expansion != 0.0) else {
+        return Ok(None);
+    };
+    let patches = vec![whole_mesh(mesh)];
+    let forces = patch_loads(mesh, material, &patches)?;
+    let forces = Mat::from_fn(free.len(), 1, |row, _| forces[(free[row], 0)]);
+    let loads = tall_product(transformation.as_ref(), forces.as_ref());
+    Ok(Some(Thermal { loads: DMatrix::from_fn(loads.nrows(), 1, |i, j| loads[(i, j)]), patches }))
 }
 
 /// Displacements of the watched points per reduced coordinate, in the directions of the contact nodes.

@@ -29,6 +29,15 @@ pub fn equal_patches(around: usize, along: usize, axial: [f64; 2]) -> Vec<Patch>
     (0..along).flat_map(ring).collect()
 }
 
+/// The patch that holds all of a mesh.
+pub fn whole_mesh(mesh: &Mesh) -> Patch {
+    let axial = mesh.nodes.iter().map(|node| node[2]);
+    let (low, high) = axial.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
+    // Beyond the last centroid.
+    let margin = 0.01 * (high - low);
+    Patch { angle: [0.0, TAU], axial: [low - margin, high + margin] }
+}
+
 /// The patch of every element: the one that its centroid (mean of its corners) lies in.
 ///
 /// # Errors

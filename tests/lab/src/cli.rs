@@ -77,6 +77,8 @@ pub enum Command {
     Scatter(StudyCommon),
     /// Reduced blades against a full finite-element model with steps and contact of its own, without any reduction.
     Witness(StudyCommon),
+    /// Stress that reduced blades recover in a rub, against that of the full finite-element model, by the number of modes.
+    Stress(StudyCommon),
 }
 
 /// Arguments of `lab estimates`.
@@ -237,6 +239,7 @@ impl Cli {
             Command::Beside(arguments) => ("beside", &arguments.common),
             Command::Scatter(common) => ("scatter", common),
             Command::Witness(common) => ("witness", common),
+            Command::Stress(common) => ("stress", common),
         };
         let directory = commands::study::directory(name, common);
         output_file::try_directory(&directory)?;
@@ -267,6 +270,7 @@ impl Cli {
             Command::Beside(arguments) => beside::study(arguments, console),
             Command::Scatter(common) => scatter::study(common, console),
             Command::Witness(common) => witness::study(common, console),
+            Command::Stress(common) => witness::stress(common, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }
     }

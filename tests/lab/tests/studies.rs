@@ -237,6 +237,7 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         "inputs",
         "coupling",
         "witness",
+        "stress",
         "bases",
         "tolerance",
         "scatter",
@@ -288,6 +289,26 @@ fn the_quick_study_of_the_witness_meets_reduced_models() {
     assert!(impulse("two rows, more modes") < 0.07 && impulse("more modes") > 0.2, "{rows:#?}");
     assert!(row("full model")["friction_work"].as_f64().unwrap() > 5.0);
     assert!(json["results"]["refused"].as_array().unwrap().is_empty());
+}
+
+/// Stress of the full model under the same contact forces comes back as modes are added, faster than in a rub where time steps differ too.
+#[test]
+fn the_quick_study_of_stress_recovers_that_of_the_full_model() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "stress", &[]);
+    only_no(&json, &[]);
+    let results = &json["results"];
+    assert!(
+        results["rest"].as_f64().unwrap() < 1e-6 && results["refused"].as_array().unwrap().is_empty(),
+        "{results:#}"
+    );
+    let rows = results["runs"].as_array().unwrap();
+    let forced: Vec<f64> = rows.iter().filter_map(|row| row["same_forces"]["stress"].as_f64()).collect();
+    assert!(forced.len() == 3 && forced[2] < 0.06 && forced[0] > 0.2, "{forced:?}");
+    let largest = |row: &Value| row["same_forces"]["worst_place"].as_f64();
+    assert!(rows.iter().filter_map(largest).next_back().unwrap() < 0.05, "{rows:#?}");
+    let full = results["largest_von_mises"]["full"].as_array().unwrap();
+    assert!(full.len() == 6 && full.iter().all(|value| value.as_f64().unwrap() > 5e7), "{full:?}");
 }
 
 #[test]

@@ -8,3 +8,4 @@ mod hostile;
 mod panics;
 mod states;
 mod stepping;
+mod thermal;

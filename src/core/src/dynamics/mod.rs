@@ -3,6 +3,7 @@
 pub mod bank;
 pub mod cyclic;
 pub mod dispatch;
+pub mod excitation;
 pub mod modal;
 pub mod rigid;
 pub mod sectors;

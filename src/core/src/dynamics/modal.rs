@@ -31,6 +31,10 @@ pub struct ModalModel {
 pub struct ModalSpin {
     /// Speed whose stiffness the modes are those of (rad/s).
     pub reference_speed: f64,
+    /// Temperature whose stiffness they are those of (K).
+    pub reference_temperature: f64,
+    /// What a kelvin adds to the stiffness, −s φᵀKφ, modes²; `None` without softening.
+    pub softening: Option<DMatrix<f64>>,
     /// φᵀK₁φ, modes².
     pub stiffness_speed2: DMatrix<f64>,
     /// φᵀK₂φ, modes².
@@ -51,10 +55,37 @@ impl ModalSpin {
         let coriolis = project(&spin.coriolis);
         Self {
             reference_speed,
+            reference_temperature: 0.0,
+            softening: None,
             stiffness_speed2: symmetric(&spin.stiffness_speed2),
             stiffness_speed4: symmetric(&spin.stiffness_speed4),
             coriolis: (&coriolis - coriolis.transpose()) * 0.5,
         }
+    }
+
+    /// Of modes that no spin couples.
+    pub fn without_spin(model: &ModalModel) -> Self {
+        let none = || DMatrix::zeros(model.len(), model.len());
+        let (reference_speed, reference_temperature, softening) = (0.0, 0.0, None);
+        let (stiffness_speed2, stiffness_speed4, coriolis) = (none(), none(), none());
+        Self { reference_speed, reference_temperature, softening, stiffness_speed2, stiffness_speed4, coriolis }
+    }
+
+    /// The same of a structure that loses `share` of the elastic `stiffness` of its ROM per kelvin above `temperature`, whose modes
+    /// `model` are.
+    #[must_use]
+    pub fn softened(self, stiffness: &DMatrix<f64>, model: &ModalModel, share: f64, temperature: f64) -> Self {
+        let projected = model.shapes.transpose() * stiffness * &model.shapes;
+        let symmetric = (&projected + projected.transpose()) * (-0.5 * share);
+        Self { reference_temperature: temperature, softening: Some(symmetric), ..self }
+    }
+}
+
+/// One ratio for all modes but the first, which have their `own`; each stands `copies` times in `ratios`.
+pub fn fill_ratios(ratios: &mut [f64], ratio: f64, own: &[f64], copies: usize) {
+    ratios.fill(ratio);
+    for (ratios, own) in ratios.chunks_mut(copies).zip(own) {
+        ratios.fill(*own);
     }
 }
 
@@ -75,6 +106,19 @@ impl ModalModel {
         let Some(spin) = &rom.extras.spin else { return Self::from_rom(rom, damping_ratio) };
         let square = speed * speed;
         let stiffness = &rom.stiffness + &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square);
+        Self::at_stiffness(rom, &stiffness, damping_ratio)
+    }
+
+    /// The same of a structure that heat leaves a `share` of its elastic stiffness; `speed` is `None` without stiffening.
+    ///
+    /// # Errors
+    /// As [`ModalModel::at_speed`].
+    pub fn softened(rom: &Rom, damping_ratio: f64, speed: Option<f64>, share: f64) -> Result<Self> {
+        let mut stiffness = &rom.stiffness * share;
+        if let (Some(spin), Some(speed)) = (&rom.extras.spin, speed) {
+            let square = speed * speed;
+            stiffness += &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square);
+        }
         Self::at_stiffness(rom, &stiffness, damping_ratio)
     }
 

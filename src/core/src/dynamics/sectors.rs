@@ -48,7 +48,7 @@ impl Sectors {
             SectorModel::Uncoupled(model, sectors) => Self::Uncoupled(ModalBank::with_options(model, sectors, options)),
             SectorModel::Coupled(model) => {
                 assert!(options.frequency_factors.is_empty() && options.coupling.is_none(), "refused beforehand");
-                Self::Coupled(CyclicBank::new(model, options.loads))
+                Self::Coupled(CyclicBank::new(model, options.loads).excited(options.excitation))
             }
         }
     }
@@ -68,8 +68,8 @@ impl Sectors {
         displacement_before[]() -> &[f64];
         /// New step size: coefficients and flexibility; the state is not touched.
         set_step[mut](scheme: Scheme, step: f64);
-        /// Modal damping ratio of all modes (takes effect with the next [`Sectors::set_step`]).
-        set_damping_ratio[mut](damping_ratio: f64);
+        /// Modal damping ratio of all modes but the first, which have their `own` (takes effect with the next [`Sectors::set_step`]).
+        set_damping_ratio[mut](damping_ratio: f64, own: &[f64]);
         /// Carry the state to another step size under the last contact forces (`forces[row · lanes + sector]`, N) and the
         /// modal loads.
         resample[mut](scheme: Scheme, new_step: f64, forces: &[f64]);
@@ -81,6 +81,12 @@ impl Sectors {
         rest[mut]();
         /// Modal loads of the next step, of every sector or of nodal diameter 0; to be set before [`Sectors::predict`].
         loads_mut[mut]() -> &mut [f64];
+        /// Engine order of the excitation, where there is one.
+        set_excitation_order[mut](order: u32);
+        /// Excitation of the next step, to be set before [`Sectors::predict`]: amplitude (N) and phase ψ (rad).
+        excite[mut](amplitude: f64, phase: f64);
+        /// Work of the excitation over the step just done (J), once contact has corrected it.
+        finish_excitation[mut]() -> f64;
         /// Displacements of now become those before.
         begin_span[mut]();
         /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements.
@@ -153,10 +159,11 @@ impl Sectors {
         }
     }
 
-    /// Follow the speed of the rotor (rad/s) where modes are coupled by it; returns the change of strain energy (J).
-    pub fn set_speed(&mut self, speed: f64) -> f64 {
+    /// Follow the speed of the rotor (rad/s) and its temperature (K) where modes are coupled by them; returns the change of strain
+    /// energy (J).
+    pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         match self {
-            Self::Uncoupled(bank) => bank.set_speed(speed),
+            Self::Uncoupled(bank) => bank.set_speed(speed, temperature),
             Self::Coupled(_) => 0.0,
         }
     }

@@ -1,6 +1,7 @@
 //! An abradable coating: material of what is pressed in, or of what is cut.
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// How a coating is cut: the tips shear it off along their way, at the cost of the shaft.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -16,11 +17,11 @@ pub struct CuttingSettings {
 /// Nonlinear Dyn. 2012), or that are cut. Its unworn surface is where `gap` ends; the hard surface lies `thickness`
 /// behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(into = "Written")]
 pub struct CoatingSettings {
     /// Thickness h₀ (m), 1e-9 to 0.1.
     pub thickness: f64,
     /// Modulus E (Pa), > 0; 0 where it is cut.
-    #[serde(skip_serializing_if = "super::is_positive_zero")]
     pub modulus: f64,
     /// Yield stress Y (Pa), ≥ 0.
     pub yield_stress: f64,
@@ -31,33 +32,52 @@ pub struct CoatingSettings {
     /// Cells along the axis, over the axial extent of the contact nodes.
     pub cells_along: usize,
     /// It is cut instead of pressed in; `modulus`, `yield_stress` and `hardening` are 0 then.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub cutting: Option<CuttingSettings>,
 }
 
-/// A coating that is cut has no modulus, yield stress and hardening; any other gives all of them.
+/// As in a scene file: a coating that is cut has no modulus, yield stress and hardening, any other gives all of them.
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "CoatingSettings", deny_unknown_fields)]
+struct Written {
+    thickness: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    modulus: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    yield_stress: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hardening: Option<f64>,
+    cells_around: usize,
+    cells_along: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cutting: Option<CuttingSettings>,
+}
+
+impl From<CoatingSettings> for Written {
+    fn from(settings: CoatingSettings) -> Self {
+        let CoatingSettings { thickness, modulus, yield_stress, hardening, cells_around, cells_along, cutting } =
+            settings;
+        let [modulus, yield_stress, hardening] =
+            [modulus, yield_stress, hardening].map(|value| (cutting.is_none() || value != 0.0).then_some(value));
+        Self { thickness, modulus, yield_stress, hardening, cells_around, cells_along, cutting }
+    }
+}
+
 impl<'de> Deserialize<'de> for CoatingSettings {
-    fn deserialize<D: serde::Deserializer<'de>>(source: D) -> std::result::Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(rename = "CoatingSettings", deny_unknown_fields)]
-        struct Written {
-            thickness: f64,
-            modulus: Option<f64>,
-            yield_stress: Option<f64>,
-            hardening: Option<f64>,
-            cells_around: usize,
-            cells_along: usize,
-            cutting: Option<CuttingSettings>,
-        }
+    fn deserialize<D: Deserializer<'de>>(source: D) -> Result<Self, D::Error> {
         let Written { thickness, modulus, yield_stress, hardening, cells_around, cells_along, cutting } =
             Written::deserialize(source)?;
-        let or_none = |value: Option<f64>, key: &'static str| match (value, cutting) {
-            (None, None) => Err(serde::de::Error::missing_field(key)),
+        let given = |value: Option<f64>, key: &'static str| match (value, cutting) {
+            (None, None) => Err(D::Error::missing_field(key)),
             (value, _) => Ok(value.unwrap_or(0.0)),
         };
-        let modulus = or_none(modulus, "modulus")?;
-        let yield_stress = or_none(yield_stress, "yield_stress")?;
-        let hardening = or_none(hardening, "hardening")?;
-        Ok(Self { thickness, modulus, yield_stress, hardening, cells_around, cells_along, cutting })
+        Ok(Self {
+            thickness,
+            modulus: given(modulus, "modulus")?,
+            yield_stress: given(yield_stress, "yield_stress")?,
+            hardening: given(hardening, "hardening")?,
+            cells_around,
+            cells_along,
+            cutting,
+        })
     }
 }

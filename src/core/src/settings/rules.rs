@@ -6,7 +6,7 @@ mod place;
 #[cfg(test)]
 mod tests;
 
-use super::{ContactSettings, Motion, Preset, Scene, SceneSettings, Scheme, Solver, SpinSettings};
+use super::{ContactSettings, Motion, Preset, Scene, SceneSettings, Scheme, Solver, SpinSettings, StructureSettings};
 use crate::rom::Frame;
 use crate::{Error, Result, Rom};
 use facts::*;
@@ -39,16 +39,28 @@ const COUPLED: Other = ("a ROM whose sectors are coupled by harmonics", |at| at.
 /// Of structures, surfaces and contacts.
 static PARTS: &[Rule] = &[
     needs(
-        &[SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT],
+        &[SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT, SOFTENING, EXCITATION, INITIAL],
         ("`motion = \"rotating\"`", |at| at.structure().motion == Motion::Rotating),
         "only a rotating structure has a speed, blades and a shaft",
         "Remove the line, or set motion = \"rotating\"",
     ),
     needs(
-        &[THERMAL, LOAD],
+        &[LOAD],
         ("`motion = \"still\"`", |at| at.structure().motion == Motion::Still),
-        "only a structure that stands still has heat and loads of its own",
+        "only a structure that stands still has a load on its contact grid",
         "Remove the line, or set motion = \"still\"",
+    ),
+    excludes(
+        &[THERMAL],
+        ("`motion = \"free\"`", |at| at.structure().motion == Motion::Free),
+        "what flies has no inputs",
+        "Remove the line",
+    ),
+    needs(
+        &[SOFTENING],
+        ("`structure.thermal`", |at| at.structure().thermal),
+        "without a temperature nothing softens",
+        "Set thermal = true, or remove the line",
     ),
     needs(
         &[VELOCITY],
@@ -213,6 +225,15 @@ static METHODS: &[Rule] = &[
     ),
     excludes(
         &[GALERKIN],
+        ("`structure.thermal` of a rotor, and `structure.excitation`", |at| {
+            let loaded = |own: &StructureSettings| own.thermal && own.motion == Motion::Rotating;
+            at.settings.structures.iter().any(|own| loaded(own) || own.excitation.is_some())
+        }),
+        "its tables are those of blades that are loaded by contact alone",
+        "Use \"modal-exact\", or leave the loads on the blades out",
+    ),
+    excludes(
+        &[GALERKIN],
         ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
         "it seeks forces for gaps that close, and a coating takes force while they do",
         "Use \"modal-exact\", or remove the coating",
@@ -295,16 +316,17 @@ static ROMS: &[Rule] = &[
         "Reduce it with `tiprub reduce --spin`, or leave spin out",
     ),
     excludes(
-        &[FACTORS, STIFFENING, CORIOLIS],
+        &[FACTORS, STIFFENING, CORIOLIS, SOFTENING],
         COUPLED,
-        "nodal diameters are modes of equal sectors, and the same at every speed",
+        "nodal diameters are modes of equal sectors, and the same at every speed and temperature",
         "Leave it out, or use a ROM of uncoupled sectors (without harmonics)",
     ),
+    excludes(&[INITIAL_SECTOR], COUPLED, "a blade of such a disk has no mode of its own", "Give a `nodal_diameter`"),
     needs(
         &[THERMAL],
         ("thermal loads in the ROM", |at| at.rom().extras.thermal.is_some()),
         "they say how each patch expands the structure",
-        "Reduce it with thermal patches, or leave thermal out",
+        "Reduce it from a mesh of one material (a casing: with thermal patches), or leave thermal out",
     ),
     excludes(
         &[COATING],

@@ -3,7 +3,8 @@
 mod pairs;
 
 use super::{
-    CoatingSettings, ContactSettings, Motion, SceneSettings, Shape, SplineSettings, StructureSettings, SurfaceSettings,
+    CoatingSettings, ContactSettings, ExcitationSettings, InitialSettings, Motion, SceneSettings, Shape,
+    SplineSettings, StructureSettings, SurfaceSettings,
 };
 use crate::ranges::{self, at_most, within};
 use crate::{Error, Result, shown};
@@ -113,6 +114,10 @@ impl StructureSettings {
         if let Some(ratio) = self.damping_ratio {
             within(&format!("{at}.damping_ratio"), ratio, 0.0, ranges::DAMPING)?;
         }
+        for (index, ratio) in self.damping_ratios.iter().enumerate() {
+            within(&format!("{at}.damping_ratios[{}]", index + 1), *ratio, 0.0, ranges::DAMPING)?;
+        }
+        within(&format!("{at}.softening"), self.softening, 0.0, ranges::SOFTENING)?;
         for (index, factor) in self.frequency_factors.iter().enumerate() {
             let [low, high] = ranges::FREQUENCY_FACTORS;
             within(&format!("{at}.frequency_factors[{}]", index + 1), *factor, low, high)?;
@@ -121,8 +126,51 @@ impl StructureSettings {
             at_most(&format!("{at}.load.amplitude"), load.amplitude, ranges::LINE_LOAD)?;
             at_most(&format!("{at}.load.phase"), load.phase, ranges::ANGLE)?;
         }
+        if let Some(excitation) = &self.excitation {
+            excitation.validate(&format!("{at}.excitation"))?;
+        }
+        for (index, initial) in self.initial.iter().enumerate() {
+            initial.validate(&format!("{at}.initial[{}]", index + 1))?;
+        }
         let field = format!("{at}.velocity");
         self.velocity.iter().try_for_each(|component| at_most(&field, *component, ranges::VELOCITY))
+    }
+}
+
+/// Modes and sectors count from 1.
+fn counted(field: String, number: Option<usize>) -> Result<()> {
+    if number == Some(0) { Err(Error::invalid(field, "0", "They are counted from 1")) } else { Ok(()) }
+}
+
+impl ExcitationSettings {
+    fn validate(&self, at: &str) -> Result<()> {
+        within(&format!("{at}.order"), f64::from(self.order), 0.0, ranges::ENGINE_ORDER)?;
+        at_most(&format!("{at}.amplitude"), self.amplitude, ranges::EXCITATION)?;
+        at_most(&format!("{at}.phase"), self.phase, ranges::ANGLE)?;
+        counted(format!("{at}.mode"), self.mode)?;
+        if self.node.is_some() != self.direction.is_some() {
+            let remedy = "Give `node` and `direction` together, or leave both out and give a `mode`";
+            return Err(Error::invalid(format!("{at}.node"), "without `direction`, or the other way round", remedy));
+        }
+        if self.node.is_none() && self.mode.is_none() {
+            let remedy = "Give the `mode` that is loaded, or the `node` and the `direction` of a force, or all three";
+            return Err(Error::invalid(format!("{at}.mode"), "neither a mode nor a node is given", remedy));
+        }
+        Ok(())
+    }
+}
+
+impl InitialSettings {
+    fn validate(&self, at: &str) -> Result<()> {
+        counted(format!("{at}.mode"), Some(self.mode))?;
+        counted(format!("{at}.sector"), self.sector)?;
+        if self.sector.is_some() && self.nodal_diameter.is_some() {
+            let remedy = "Give one of them; a further [[structure.initial]] adds to this one";
+            return Err(Error::invalid(format!("{at}.sector"), "beside `nodal_diameter`", remedy));
+        }
+        at_most(&format!("{at}.displacement"), self.displacement, ranges::POSITION)?;
+        at_most(&format!("{at}.velocity"), self.velocity, ranges::VELOCITY)?;
+        at_most(&format!("{at}.phase"), self.phase, ranges::ANGLE)
     }
 }
 

@@ -1,6 +1,5 @@
 //! From settings to kernels: what is decided once, before anything moves.
 
-use crate::dynamics::bank::BankOptions;
 use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::{ModalModel, ModalSpin};
 use crate::dynamics::rigid::{Translations, free_modes};
@@ -19,6 +18,7 @@ use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene, shown};
 use nalgebra::DMatrix;
 
+use super::blades::{heat, softened};
 use super::loads::{CarrierLoads, centrifugal};
 use super::patches::Patches;
 use super::plan::{PairPlan, Plan, prefix};
@@ -34,6 +34,8 @@ pub struct References {
     pub input_interpolation: Option<usize>,
     /// Of each pair whose shape grows in.
     pub ramp_times: Vec<Option<usize>>,
+    /// Of each structure that is excited.
+    pub engine_orders: Vec<Option<usize>>,
 }
 
 /// A structure whose contact nodes touch.
@@ -47,10 +49,14 @@ pub struct Body {
     pub translations: Option<Translations>,
     /// Speed whose stiffness `model` has (rad/s).
     pub reference_speed: f64,
+    /// Temperature whose stiffness it has, where heat softens it (K).
+    pub reference_temperature: f64,
     /// Lowest and highest eigenvalue of the modal stiffness per Ω² and per Ω⁴, where spin stiffens it.
     pub stiffness_range: Option<[[f64; 2]; 2]>,
     /// Modal load by growth, per Ω² and, with stiffening, per Ω⁴; empty without.
     pub centrifugal: Vec<[f64; 2]>,
+    /// Modal load per kelvin; empty without.
+    pub heat: Vec<f64>,
     /// Displacement of watched points per unit of each mode, 3·points × modes; empty without.
     pub watched: DMatrix<f64>,
     /// Stress at places per unit of each mode, 6·places × modes (Pa); empty where the scene does not ask for it.
@@ -97,7 +103,7 @@ impl Body {
             let (model, translations) = free_modes(rom, ratio)?;
             (model, Some(translations))
         } else {
-            (modes(structure, rom, 0.0)?, None)
+            (modes(structure, rom, [0.0; 2])?, None)
         };
         let disk = rom.is_cyclic().then(|| CyclicModel::from_rom(rom, ratio)).transpose()?;
         let (reference_speed, stiffness_range, centrifugal) = (0.0, None, Vec::new());
@@ -107,8 +113,10 @@ impl Body {
             disk,
             translations,
             reference_speed,
+            reference_temperature: 0.0,
             stiffness_range,
             centrifugal,
+            heat: Vec::new(),
             watched,
             stress,
             senses: Vec::new(),
@@ -142,7 +150,7 @@ impl Compiled {
         let carrier = |structure: &usize| {
             let (settings, rom) = (&scene.settings.structures[*structure], &scene.roms[*structure]);
             let load_order = settings.load.map_or(0, |load| load.order);
-            let (model, loads) = (modes(settings, rom, 0.0)?, CarrierLoads::default());
+            let (model, loads) = (modes(settings, rom, [0.0; 2])?, CarrierLoads::default());
             let support = rom.extras.support.as_ref().filter(|_| scene.settings.outputs.support_reaction);
             let support = support.map(|rows| Support {
                 stiffness: &rows.stiffness * &model.shapes,
@@ -155,10 +163,12 @@ impl Compiled {
         let (table, _) = super::table::build(scene)?;
         let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
         let ramp = |pair: usize| Some(table.with_quantity_of(Quantity::RampTime, pair)?.reference as usize);
+        let order = |body: usize| Some(table.with_quantity_of(Quantity::ExcitationOrder, body)?.reference as usize);
         let references = References {
             step_max: place(Quantity::StepMax).unwrap_or(0),
             input_interpolation: place(Quantity::InputInterpolation),
             ramp_times: (0..plan.pairs.len()).map(ramp).collect(),
+            engine_orders: (0..plan.bodies.len()).map(order).collect(),
         };
         let mut compiled = Self {
             fingerprint: super::fingerprint::of_scene(scene),
@@ -174,8 +184,9 @@ impl Compiled {
             compiled.load_carrier(carrier);
         }
         for body in 0..compiled.bodies.len() {
-            compiled.set_reference_speed(body, compiled.body(body).0.speed)?;
+            compiled.set_reference_speed(body, [compiled.body(body).0.speed, 0.0])?;
         }
+        compiled.check_blades()?;
         Ok(compiled)
     }
 
@@ -246,15 +257,20 @@ impl Compiled {
         spin.stiffening || spin.growth || spin.coriolis
     }
 
-    /// Take the modes of a structure at a steady speed (rad/s).
+    /// Take the modes of a structure at a steady speed (rad/s) and temperature (K).
     ///
     /// # Errors
-    /// A speed at which the stiffness is lost, or beyond what the ROM was fitted for.
-    pub fn set_reference_speed(&mut self, body: usize, speed: f64) -> Result<()> {
+    /// A speed or a temperature at which the stiffness is lost, or beyond what the ROM was fitted for.
+    pub fn set_reference_speed(&mut self, body: usize, [speed, temperature]: [f64; 2]) -> Result<()> {
         self.check_speed(body, speed)?;
+        self.check_temperature(body, temperature)?;
         let (structure, rom) = self.plan.structure(&self.scene, body);
+        if structure.softening != 0.0 {
+            self.bodies[body].model = modes(structure, rom, [speed, temperature])?;
+            self.bodies[body].reference_temperature = temperature;
+        }
         if structure.spin.stiffening {
-            let model = modes(structure, rom, speed)?;
+            let model = modes(structure, rom, [speed, temperature])?;
             let range = |matrix: &DMatrix<f64>| {
                 let values = matrix.symmetric_eigenvalues();
                 [values.min(), values.max()]
@@ -268,6 +284,7 @@ impl Compiled {
         let body = &mut self.bodies[body];
         body.reference_speed = speed;
         body.centrifugal = centrifugal(structure, rom, &body.model);
+        body.heat = heat(structure, rom, &body.model);
         if let Some(watched) = &rom.extras.watched {
             body.watched = &watched.map * &body.model.shapes;
         }
@@ -345,10 +362,12 @@ impl Compiled {
         let gap = |pair| self.gap(pair).map_err(|error| self.of_pair(pair, error));
         let gaps = (0..self.plan.pairs.len()).map(gap).collect::<Result<Vec<_>>>()?;
         let control = self.control_modes(&gaps);
+        let excitations = (0..self.bodies.len()).map(|body| self.excitation(body)).collect::<Result<Vec<_>>>()?;
         let touching = (0..self.bodies.len()).map(|body| {
             let uncoupled = SectorModel::Uncoupled(&self.bodies[body].model, self.body(body).1.sectors);
             let model = self.bodies[body].disk.as_ref().map_or(uncoupled, SectorModel::Coupled);
-            StructureParts::Touching(model, self.bank_options(body))
+            let excitation = excitations[body];
+            StructureParts::Touching(model, self.bank_options(body, excitation))
         });
         let carrying = self.carriers.iter().zip(&control);
         let carrying = carrying.map(|(carrier, model)| StructureParts::Carrying(model, carrier.loads.are_there()));
@@ -475,22 +494,6 @@ impl Compiled {
         Some(modes.at_control_points(gap.spline()?, first))
     }
 
-    fn bank_options(&self, body: usize) -> BankOptions {
-        let ((structure, rom), parts) = (self.body(body), &self.bodies[body]);
-        let coupled = structure.spin.stiffening || structure.spin.coriolis;
-        let spin = rom.extras.spin.as_ref().filter(|_| coupled);
-        let coupling = spin.map(|spin| {
-            let modal = ModalSpin::new(spin, &parts.model, parts.reference_speed);
-            (modal, structure.spin.stiffening, structure.spin.coriolis)
-        });
-        BankOptions {
-            frequency_factors: structure.frequency_factors.clone(),
-            loads: !parts.centrifugal.is_empty(),
-            coupling,
-            flexibility: true,
-        }
-    }
-
     fn coating(&self, pair: usize) -> Result<Option<Coating>> {
         let Some(settings) = &self.contact(pair).coating else { return Ok(None) };
         let plan = &self.plan.pairs[pair];
@@ -526,7 +529,11 @@ fn check_lengths(rom: &Rom, clearances: &[f64], surface: &Surface) -> Result<()>
     Ok(())
 }
 
-fn modes(structure: &StructureSettings, rom: &Rom, speed: f64) -> Result<ModalModel> {
+fn modes(structure: &StructureSettings, rom: &Rom, [speed, temperature]: [f64; 2]) -> Result<ModalModel> {
     let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
+    if structure.softening != 0.0 {
+        let speed = structure.spin.stiffening.then_some(speed);
+        return ModalModel::softened(rom, ratio, speed, softened(structure, temperature));
+    }
     if structure.spin.stiffening { ModalModel::at_speed(rom, ratio, speed) } else { ModalModel::from_rom(rom, ratio) }
 }

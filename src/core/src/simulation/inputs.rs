@@ -18,6 +18,10 @@ pub struct RotorInputs {
     pub spin: Input,
     /// Whirl x, whirl y, axial shift.
     pub shaft: [Input; 3],
+    /// Amplitude and phase of the excitation; empty where there is none.
+    pub excitation: Vec<Input>,
+    /// Temperature; empty where it is none of the inputs.
+    pub temperature: Vec<Input>,
 }
 
 /// What is prescribed of a surface.
@@ -53,14 +57,23 @@ pub struct Inputs {
     pub until: f64,
 }
 
-persist_fields!(RotorInputs { speed, spin, shaft });
+persist_fields!(RotorInputs { speed, spin, shaft, excitation, temperature });
 persist_fields!(PairInputs { gap_offset, shape_factor, shape_rotation, radius_change });
 persist_fields!(CarrierInputs { load_amplitude, load_phase, temperatures });
 persist_fields!(Inputs { rotors, pairs, carriers, pace, until });
 
 impl RotorInputs {
+    fn moving(&self) -> impl Iterator<Item = &Input> {
+        self.shaft.iter().chain(&self.excitation).chain(&self.temperature)
+    }
+
     fn moving_mut(&mut self) -> impl Iterator<Item = &mut Input> {
-        self.shaft.iter_mut()
+        self.shaft.iter_mut().chain(&mut self.excitation).chain(&mut self.temperature)
+    }
+
+    /// Temperature that acts at an offset (K).
+    pub fn temperature_at(&self, offset: f64) -> f64 {
+        self.temperature.first().map_or(0.0, |input| input.at(offset))
     }
 
     /// From `offset` on, growth and stiffening go where the speed is at `until`.
@@ -96,6 +109,8 @@ impl Inputs {
         match quantity {
             Quantity::Speed => Some(&self.rotors[of].speed),
             Quantity::ShaftDisplacement(component) => self.rotors[of].shaft.get(component),
+            Quantity::Excitation(component) => self.rotors[of].excitation.get(component),
+            Quantity::RotorTemperature => self.rotors[of].temperature.first(),
             Quantity::GapOffset => Some(&self.pairs[of].gap_offset),
             Quantity::ShapeFactor => Some(&self.pairs[of].shape_factor),
             Quantity::ShapeRotation => Some(&self.pairs[of].shape_rotation),
@@ -112,6 +127,8 @@ impl Inputs {
         match quantity {
             Quantity::Speed => Some(&mut self.rotors[of].speed),
             Quantity::ShaftDisplacement(component) => self.rotors[of].shaft.get_mut(component),
+            Quantity::Excitation(component) => self.rotors[of].excitation.get_mut(component),
+            Quantity::RotorTemperature => self.rotors[of].temperature.first_mut(),
             Quantity::GapOffset => Some(&mut self.pairs[of].gap_offset),
             Quantity::ShapeFactor => Some(&mut self.pairs[of].shape_factor),
             Quantity::ShapeRotation => Some(&mut self.pairs[of].shape_rotation),
@@ -125,7 +142,7 @@ impl Inputs {
 
     /// All that move or load something, which a jump would hit or shake.
     fn moving(&self) -> impl Iterator<Item = &Input> {
-        let shafts = self.rotors.iter().flat_map(|rotor| &rotor.shaft);
+        let shafts = self.rotors.iter().flat_map(RotorInputs::moving);
         let pairs = self.pairs.iter().flat_map(PairInputs::moving);
         shafts.chain(pairs).chain(self.carriers.iter().flat_map(CarrierInputs::moving))
     }
@@ -178,7 +195,7 @@ impl Inputs {
     /// Start values everywhere.
     pub fn clear(&mut self) {
         self.moving_mut().for_each(|input| *input = Input::default());
-        self.rotors.iter_mut().for_each(|rotor| *rotor = RotorInputs::default());
+        self.rotors.iter_mut().for_each(|rotor| (rotor.speed, rotor.spin) = Default::default());
         (self.pace, self.until) = (0.0, 0.0);
         for pair in &mut self.pairs {
             pair.shape_factor.value = 1.0;
@@ -259,7 +276,8 @@ impl Simulation {
             return Err(Error::invalid(what(), problem, remedy));
         }
         let rate = (end - reached) / (until - start);
-        let angle = matches!(variable.quantity, Quantity::ShapeRotation | Quantity::LoadPhase);
+        let angle =
+            matches!(variable.quantity, Quantity::ShapeRotation | Quantity::LoadPhase | Quantity::Excitation(1));
         let turned = if angle { (input.asked(start) - reached).abs() } else { 0.0 };
         if at_once || (rate.is_finite() && turned <= std::f64::consts::PI) {
             return Ok(());

@@ -8,7 +8,7 @@ mod told;
 
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
-use crate::dynamics::modal::ModalModel;
+use crate::dynamics::modal::{ModalModel, fill_ratios};
 use crate::settings::{Preset, Scheme, Solver, TOLERANCE};
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, massless};
@@ -27,6 +27,8 @@ pub struct Parameters {
     pub friction: Vec<f64>,
     /// Of the structures that touch, then of those that carry surfaces.
     pub damping_ratios: Vec<f64>,
+    /// The same of their first modes, where they have their own.
+    pub mode_damping: Vec<Vec<f64>>,
     /// Largest internal step (s).
     pub step: f64,
     pub scheme: Scheme,
@@ -101,6 +103,7 @@ impl Simulation {
         Parameters {
             friction: (0..pairs).map(friction).collect(),
             damping_ratios: damping.chain(carried).collect(),
+            mode_damping: self.mode_damping(),
             step: self.value_of(Quantity::StepMax, 0),
             tolerance: self
                 .table
@@ -134,10 +137,10 @@ impl Simulation {
         }
     }
 
-    /// Refuse a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` of a structure (rad/s)
-    /// forbids. Only looks up, so that a step does not allocate.
-    pub(super) fn check_step_size(&self, body: usize, step: f64, speeds: [f64; 3]) -> Result<()> {
-        self.is_step_allowed(body, step, speeds).map_err(|error| match self.compiled.of_preset(error) {
+    /// Refuse a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` of a structure (rad/s) and
+    /// at its `coldest` temperature (K) forbids. Only looks up, so that a step does not allocate.
+    pub(super) fn check_step_size(&self, body: usize, step: f64, speeds: [f64; 3], coldest: f64) -> Result<()> {
+        self.is_step_allowed(body, step, speeds, coldest).map_err(|error| match self.compiled.of_preset(error) {
             Error::Unstable { problem, remedy } => {
                 Error::Unstable { problem: self.compiled.named(body, problem), remedy }
             }
@@ -145,10 +148,11 @@ impl Simulation {
         })
     }
 
-    fn is_step_allowed(&self, body: usize, step: f64, speeds: [f64; 3]) -> Result<()> {
+    fn is_step_allowed(&self, body: usize, step: f64, speeds: [f64; 3], coldest: f64) -> Result<()> {
         let Some(limits) = &self.limits else { return Ok(()) };
         let (scheme, own) = (limits.parameters.scheme, &limits.bodies[body]);
-        let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(self.compiled.stiffened(body, speed)));
+        let stiffened = |speed: f64| self.compiled.stiffened(body, speed, coldest);
+        let stiffened = speeds.into_iter().fold(1.0, |most: f64, speed| most.max(stiffened(speed)));
         let largest = self.compiled.bodies[body].largest_frequency();
         stability::check_step_allowed(largest * self.compiled.stiffest(body) * stiffened, scheme, step)?;
         for carrier in self.compiled.carriers_of(body) {
@@ -190,15 +194,18 @@ impl Compiled {
         self.body(body).0.frequency_factors.iter().fold(1.0, |largest: f64, factor| largest.max(*factor))
     }
 
-    /// Bound on the factor by which spin raises the largest frequency from that of the reference speed.
-    fn stiffened(&self, body: usize, speed: f64) -> f64 {
+    /// Bound on the factor by which spin and cold raise the largest frequency from that of the reference speed and temperature.
+    fn stiffened(&self, body: usize, speed: f64, coldest: f64) -> f64 {
+        let structure = self.body(body).0;
         let body = &self.bodies[body];
-        let Some([second, fourth]) = body.stiffness_range else { return 1.0 };
+        let [hot, cold] = [body.reference_temperature, coldest].map(|one| super::blades::softened(structure, one));
+        let colder = if structure.softening == 0.0 { 1.0 } else { (cold / hot).max(1.0) };
+        let Some([second, fourth]) = body.stiffness_range else { return colder.sqrt() };
         let (square, reference) = (speed * speed, body.reference_speed * body.reference_speed);
         let most = |factor: f64, range: [f64; 2]| factor * if factor > 0.0 { range[1] } else { range[0] };
         let added = most(square - reference, second) + most(square * square - reference * reference, fourth);
         let largest = body.model.largest_frequency();
-        (1.0 + added.max(0.0) / (largest * largest)).sqrt()
+        (colder + added.max(0.0) / (largest * largest)).sqrt()
     }
 
     /// Largest ω h of structures of the system, stiffening aside, below 2.
@@ -240,10 +247,15 @@ impl Compiled {
             Some(disk) => (0..disk.diameters.len()).map(|diameter| disk.paired(diameter)).collect(),
             None => vec![parts.model.clone()],
         };
+        let copies = |diameter: usize| match &parts.disk {
+            Some(disk) if !disk.is_real(diameter) => 2,
+            _ => 1,
+        };
         // Of mistuned blades the stiffest has the tightest limits.
         let stiffest = self.stiffest(body);
-        for model in &mut models {
-            model.damping_ratios.fill(parameters.damping_ratios[body]);
+        for (diameter, model) in models.iter_mut().enumerate() {
+            let (ratio, own) = (parameters.damping_ratios[body], &parameters.mode_damping[body]);
+            fill_ratios(&mut model.damping_ratios, ratio, own, copies(diameter));
             model.frequencies.iter_mut().for_each(|frequency| *frequency *= stiffest);
         }
         let at = Checking::new(self, system, body, models, parameters);

@@ -1,6 +1,7 @@
 //! A compiled scene with its state: what an FMU instance, the native run and the tests all drive.
 
 mod access;
+mod blades;
 mod checks;
 mod compile;
 mod drive;
@@ -191,7 +192,7 @@ impl Simulation {
             ..CarrierInputs::default()
         };
         let inputs = Inputs {
-            rotors: vec![RotorInputs::default(); bodies],
+            rotors: (0..bodies).map(|body| RotorInputs::of(compiled.body(body).0)).collect(),
             pairs: vec![PairInputs::default(); pairs],
             carriers: compiled.carriers.iter().map(heated).collect(),
             ..Inputs::default()
@@ -256,7 +257,8 @@ impl Simulation {
         self.notes.clear();
         self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
         self.follow_load_orders()?;
-        self.follow_reference_speeds(&self.speeds())?;
+        self.check_launch(parameters.scheme)?;
+        self.follow_reference_speeds(&self.references())?;
         self.warnings = self.check_limits(&parameters)?;
         self.warn_of_sticking(&parameters);
         self.warn_of_tolerance(&parameters);
@@ -304,7 +306,7 @@ impl Simulation {
     fn is_prepared(&self, parameters: &limits::Parameters) -> bool {
         let deciding = |from: &limits::Parameters| {
             let numbers = [from.step, from.tolerance].map(f64::to_bits);
-            (numbers, from.scheme, from.solver, from.damping_ratios.clone())
+            (numbers, from.scheme, from.solver, from.damping_ratios.clone(), from.mode_damping.clone())
         };
         self.prepared.as_ref().is_some_and(|prepared| deciding(prepared) == deciding(parameters))
     }
@@ -351,16 +353,19 @@ impl Simulation {
         })
     }
 
-    /// With stiffening, the modes are those at the speeds of the start, one per structure that touches. A refusal of one leaves all
+    /// With stiffening and softening, the modes are those at the speeds and temperatures of the start, one per structure that touches. A refusal of one leaves all
     /// as they were.
-    fn follow_reference_speeds(&mut self, speeds: &[f64]) -> Result<()> {
-        let before: Vec<f64> = self.compiled.bodies.iter().map(|body| body.reference_speed).collect();
-        let differs = |body: &usize| self.compiled.spins(*body) && before[*body].to_bits() != speeds[*body].to_bits();
+    fn follow_reference_speeds(&mut self, states: &[[f64; 2]]) -> Result<()> {
+        let before: Vec<[f64; 2]> = self.compiled.references();
+        let differs = |body: &usize| {
+            let [speed, temperature] = [0, 1].map(|i| before[*body][i].to_bits() != states[*body][i].to_bits());
+            (self.compiled.spins(*body) && speed) || (self.compiled.softens(*body) && temperature)
+        };
         let changed: Vec<usize> = (0..before.len()).filter(differs).collect();
         if changed.is_empty() {
             return Ok(());
         }
-        let taken = changed.iter().try_for_each(|body| self.compiled.set_reference_speed(*body, speeds[*body]));
+        let taken = changed.iter().try_for_each(|body| self.compiled.set_reference_speed(*body, states[*body]));
         self.system = taken.and_then(|()| self.compiled.system()).inspect_err(|_| {
             // The speeds before were accepted before.
             changed.iter().for_each(|body| drop(self.compiled.set_reference_speed(*body, before[*body])));
@@ -371,10 +376,12 @@ impl Simulation {
 
     /// Undeformed and at rest, with the damping of the parameters.
     fn rest(&mut self, parameters: &limits::Parameters) {
-        for (structure, ratio) in self.system.structures_mut().iter_mut().zip(&parameters.damping_ratios) {
+        let ratios = parameters.damping_ratios.iter().zip(&parameters.mode_damping);
+        for (structure, (ratio, own)) in self.system.structures_mut().iter_mut().zip(ratios) {
             structure.modes_mut().rest();
-            structure.modes_mut().set_damping_ratio(*ratio);
+            structure.modes_mut().set_damping_ratio(*ratio, own);
         }
+        self.follow_engine_orders();
     }
 
     /// What flies freely starts with its initial velocity as a whole; again for another length of the first step.
@@ -386,15 +393,16 @@ impl Simulation {
                 self.system.structures_mut()[body].modes_mut().set_modal_state(mode, 0, 0.0, velocity);
             }
         }
+        self.launch_blades();
     }
 
     /// Static equilibrium under the loads of the start.
     fn settle(&mut self) {
         let structures = self.system.structures_mut();
-        for (body, parts) in self.compiled.bodies.iter().enumerate().filter(|(_, body)| !body.centrifugal.is_empty()) {
-            let mut load = vec![0.0; parts.centrifugal.len()];
-            let speed = self.inputs.rotors[body].speed.at(0.0);
-            loads::fill_centrifugal(&parts.centrifugal, speed, &mut load);
+        for body in (0..self.compiled.bodies.len()).filter(|body| self.compiled.loads_blades(*body)) {
+            let mut load = vec![0.0; self.compiled.bodies[body].model.len()];
+            let rotor = &self.inputs.rotors[body];
+            self.compiled.fill_loads(body, rotor.speed.at(0.0), rotor.temperature_at(0.0), &mut load);
             structures[body].modes_mut().settle(&load);
         }
         let under = structures.iter_mut().skip(self.compiled.bodies.len());

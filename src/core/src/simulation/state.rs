@@ -11,7 +11,7 @@ use crate::variables::{Causality, Kind, Variable};
 use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 11;
+const VERSION: u64 = 12;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done, tried, most });
@@ -53,8 +53,9 @@ struct Lead {
     inputs: Inputs,
     rotors: Vec<RotorAngle>,
     values: Vec<f64>,
-    /// Of each structure that touches (rad/s).
+    /// Of each structure that touches (rad/s), and their temperatures (K).
     reference_speeds: Vec<f64>,
+    reference_temperatures: Vec<f64>,
     /// Internal step (s).
     step: f64,
 }
@@ -142,6 +143,7 @@ impl Simulation {
         self.values.save(writer);
         self.previous.save(writer);
         self.compiled.bodies.iter().for_each(|body| body.reference_speed.save(writer));
+        self.compiled.bodies.iter().for_each(|body| body.reference_temperature.save(writer));
         self.system.save(writer);
     }
 
@@ -157,6 +159,7 @@ impl Simulation {
             rotors: self.rotors.clone(),
             values: self.values.clone(),
             reference_speeds: vec![0.0; self.rotors.len()],
+            reference_temperatures: vec![0.0; self.rotors.len()],
             step: 0.0,
         };
         lead.phase.restore(reader);
@@ -181,6 +184,7 @@ impl Simulation {
         take(&mut lead.values, reader);
         self.previous.check(reader);
         take(&mut lead.reference_speeds, reader);
+        take(&mut lead.reference_temperatures, reader);
         reader.up_to(largest);
         let endless;
         (lead.step, endless) = self.system.check(reader, runs);
@@ -267,14 +271,16 @@ impl Simulation {
             (std::mem::replace(&mut self.values, lead.values), std::mem::replace(&mut self.inputs, lead.inputs));
         // Before initialisation nothing has been computed from them, and what does not fit together is not refused yet.
         let moves = self.is_moved_within_reason(lead.communication.length, lead.time);
+        let references = lead.reference_speeds.iter().zip(&lead.reference_temperatures);
+        let references: Vec<[f64; 2]> = references.map(|(speed, temperature)| [*speed, *temperature]).collect();
         let outcome = match lead.phase {
             Phase::Ready | Phase::Stepping if !moves => damaged("an input moves something beyond all bounds"),
             Phase::Created => Ok(()),
             // Looked at when a step begins and when a speed is given, not at every internal step.
-            Phase::Stepping => self
-                .check_turning_of_all(lead.step, lead.communication.length)
-                .and_then(|()| self.adopt(&lead.reference_speeds)),
-            Phase::Ready | Phase::Failed => self.adopt(&lead.reference_speeds),
+            Phase::Stepping => {
+                self.check_turning_of_all(lead.step, lead.communication.length).and_then(|()| self.adopt(&references))
+            }
+            Phase::Ready | Phase::Failed => self.adopt(&references),
         };
         if outcome.is_err() {
             (self.values, self.inputs) = before;
@@ -300,12 +306,12 @@ impl Simulation {
         })
     }
 
-    fn adopt(&mut self, reference_speeds: &[f64]) -> Result<()> {
+    fn adopt(&mut self, references: &[[f64; 2]]) -> Result<()> {
         let parameters = self.parameters();
         self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
         let orders: Vec<u32> = self.compiled.carriers.iter().map(|carrier| carrier.load_order).collect();
         // The orders before were accepted before.
-        self.follow_load_orders().and_then(|()| self.follow_reference_speeds(reference_speeds)).inspect_err(|_| {
+        self.follow_load_orders().and_then(|()| self.follow_reference_speeds(references)).inspect_err(|_| {
             for (carrier, order) in orders.into_iter().enumerate() {
                 drop(self.compiled.set_load_order(carrier, f64::from(order)));
             }
@@ -375,7 +381,7 @@ impl Simulation {
         self.values.restore(reader);
         self.previous.restore(reader);
         // Followed already.
-        self.rotors.iter().for_each(|_| 0.0_f64.restore(reader));
+        self.rotors.iter().for_each(|_| [0.0_f64; 2].restore(reader));
     }
 }
 

@@ -1,7 +1,6 @@
 //! One communication step: begun, marched, ended.
 
 use super::drive::Input;
-use super::loads::fill_centrifugal;
 use super::{Communication, MOST_STEPS, Phase, Progress, Simulation, TIME_TOLERANCE, same_step};
 use crate::laws::coating::Coating;
 use crate::settings::Scheme;
@@ -77,9 +76,10 @@ impl Simulation {
             }
         }
         self.inputs.begin(step_size, hold);
-        for body in (0..self.rotors.len()).filter(|body| hold && self.compiled.spins(*body)) {
-            let speed = &self.inputs.rotors[body].speed;
-            self.system.set_speed(body, 0.5 * (speed.at(0.0) + speed.at(step_size)));
+        for body in (0..self.rotors.len()).filter(|body| hold && self.compiled.varies(*body)) {
+            let rotor = &self.inputs.rotors[body];
+            let speed = 0.5 * (rotor.speed.at(0.0) + rotor.speed.at(step_size));
+            self.system.set_speed(body, speed, 0.5 * (rotor.temperature_at(0.0) + rotor.temperature_at(step_size)));
         }
         self.tell(step, step_size);
         self.previous.copy_from_slice(&self.values);
@@ -103,7 +103,13 @@ impl Simulation {
         }
         for (body, rotor) in self.inputs.rotors.iter().enumerate() {
             let (first, last) = (rotor.speed.at(0.0), rotor.speed.at(step_size));
-            self.check_step_size(body, step, [first, last, rotor.spin.at(0.0)])?;
+            let reached = rotor.temperature_at(0.0);
+            let until = rotor.temperature.first().map_or(0.0, |input| input.asked(step_size));
+            if self.compiled.softens(body) {
+                self.compiled.check_temperature(body, until)?;
+            }
+            self.check_step_size(body, step, [first, last, rotor.spin.at(0.0)], reached.min(until))?;
+            self.check_excitation(body, step, [first, last])?;
             if self.compiled.spins(body) {
                 self.compiled.check_speed(body, if first.abs() > last.abs() { first } else { last })?;
             }
@@ -260,14 +266,18 @@ impl Simulation {
     /// of q.
     fn load(&mut self, offset: f64) {
         let hold = self.holds();
-        for (body, parts) in self.compiled.bodies.iter().enumerate() {
-            let speed = self.inputs.rotors[body].spin.at(offset);
-            if !parts.centrifugal.is_empty() {
+        for body in 0..self.compiled.bodies.len() {
+            let rotor = &self.inputs.rotors[body];
+            let (speed, temperature) = (rotor.spin.at(offset), rotor.temperature_at(offset));
+            if self.compiled.loads_blades(body) {
                 let loads = self.system.structures_mut()[body].modes_mut().loads_mut();
-                fill_centrifugal(&parts.centrifugal, speed, loads);
+                self.compiled.fill_loads(body, speed, temperature, loads);
             }
-            if !hold && self.compiled.spins(body) {
-                self.system.set_speed(body, speed);
+            if let Some([amplitude, phase]) = self.excitation_at(body, offset) {
+                self.system.structures_mut()[body].modes_mut().excite(amplitude, phase);
+            }
+            if !hold && self.compiled.varies(body) {
+                self.system.set_speed(body, speed, temperature);
             }
         }
         let under = self.system.structures_mut().iter_mut().skip(self.compiled.bodies.len());

@@ -235,10 +235,10 @@ impl Simulation {
             Quantity::Speed => {
                 (TURN / self.communication.length).min(if value > 0.0 { 10.0 * value } else { f64::INFINITY })
             }
-            Quantity::ShapeRotation | Quantity::LoadPhase => TURN,
+            Quantity::ShapeRotation | Quantity::LoadPhase | Quantity::Excitation(1) => TURN,
             Quantity::ShapeFactor => 1.0,
-            Quantity::LoadAmplitude => value.max(1.0),
-            Quantity::CasingTemperature => HEATING,
+            Quantity::LoadAmplitude | Quantity::Excitation(_) => value.max(1.0),
+            Quantity::CasingTemperature | Quantity::RotorTemperature => HEATING,
             _ => self.clearance(),
         };
         SMALL * size

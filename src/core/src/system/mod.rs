@@ -317,9 +317,19 @@ impl System {
         sum_of(self.structures.iter().map(|structure| structure.modes().energies()))
     }
 
-    /// Follow the speed of a rotor (rad/s) where its modes depend on it; the strain energy this adds is work of the shaft.
-    pub fn set_speed(&mut self, structure: usize, speed: f64) {
-        let work = self.structures[structure].modes_mut().set_speed(speed);
+    /// The modal state there is the first, of another length of the first step.
+    pub(crate) fn renew_start(&mut self) {
+        for set in 0..self.sets.count() {
+            self.counted.ledgers[set].initial = self.mechanical_energy(set);
+        }
+        // Gaps of two steps back are not known yet.
+        self.counted.witnessed = 2;
+    }
+
+    /// Follow speed (rad/s) and temperature (K) of a rotor where its modes depend on them; the strain energy this adds is work of
+    /// the shaft and of heat.
+    pub fn set_speed(&mut self, structure: usize, speed: f64, temperature: f64) {
+        let work = self.structures[structure].modes_mut().set_speed(speed, temperature);
         let ledger = &mut self.counted.ledgers[self.sets.of(structure)];
         ledger.stiffening_work.add(work);
         ledger.turnover.add(work.abs());

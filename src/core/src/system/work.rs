@@ -130,9 +130,14 @@ impl System {
 
     fn enter_loads(&mut self) {
         for (set, ledger) in self.counted.ledgers.iter_mut().enumerate() {
-            let mut work = 0.0;
+            let (mut work, mut excitation) = (0.0, 0.0);
             for member in self.sets.members(set) {
                 work += self.structures[*member].modes_mut().finish_loads();
+                excitation += self.structures[*member].modes_mut().finish_excitation();
+            }
+            if excitation != 0.0 {
+                ledger.excitation_work.add(excitation);
+                ledger.turnover.add(excitation.abs());
             }
             if work != 0.0 {
                 ledger.load_work.add(work);

@@ -55,21 +55,27 @@ fn a_steady_incursion_has_the_force_torque_and_volume_of_its_kinematics() {
     println!("| cells | step (s) | torque | volume | work/(u V) | shaft work | cutting/shaft work | residual |");
     let (rate, turn) = (5e-3, TAU / SPEED);
     let depth = rate * turn / BLADES as f64;
-    for (cells, step) in [([200, 1], 2e-6), ([400, 3], 2e-6), ([400, 3], 1e-6), ([800, 7], 5e-7)] {
-        let mut run = started(&scene(cells, step));
+    let cases = [([200, 1], 2e-6), ([400, 3], 2e-6), ([400, 3], 1e-6), ([800, 7], 5e-7)];
+    // The last one turns the other way round.
+    for (cells, step, speed) in
+        cases.map(|(cells, step)| (cells, step, SPEED)).into_iter().chain([(cases[1].0, 2e-6, -SPEED)])
+    {
+        let mut scene = scene(cells, step);
+        scene.settings.structures[0].speed = speed;
+        let mut run = started(&scene);
         move_on(&mut run, "casing_radius_change", 0.0, -rate);
         let (length, steps) = (turn / 20.0, 20 * 12);
         let (mut shaft, mut torque) = (0.0, 0.0);
         for index in 0..steps {
             go(&mut run, length);
-            shaft -= real(&run, "torque") * SPEED * length;
+            shaft -= real(&run, "torque") * speed * length;
             if index >= steps / 2 {
                 torque += real(&run, "torque") / f64::from(steps / 2);
             }
         }
         // Volume per time 2πR L v, of which the blades have half a depth of cut before them and yield by their flexibility.
         let flow = TAU * models::RADIUS * LENGTH;
-        let torque = torque / (-ENERGY * flow * rate / SPEED) - 1.0;
+        let torque = torque / (-ENERGY * flow * rate / speed) - 1.0;
         let yielded = 0.5 * RATIO * ENERGY * LENGTH * depth / STIFFNESS;
         let volume = real(&run, "worn_volume") / (flow * (rate * run.time() - GAP - 0.5 * depth - yielded)) - 1.0;
         let (work, booked) = (real(&run, "cutting_work"), real(&run, "shaft_work"));

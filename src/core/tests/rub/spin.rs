@@ -36,7 +36,7 @@ fn bank(scheme: Scheme, stiffening: bool, coriolis: bool) -> ModalBank {
     let coupling = Some((spin, stiffening, coriolis));
     let mut bank = ModalBank::with_options(&model, 1, BankOptions { coupling, ..BankOptions::default() });
     bank.set_step(scheme, 1e-6);
-    bank.set_speed(SPEED);
+    bank.set_speed(SPEED, 0.0);
     bank
 }
 

@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 82] = [
+pub const FIELDS: [SceneField; 98] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
     field(
@@ -58,7 +58,14 @@ pub const FIELDS: [SceneField; 82] = [
         "number",
         Some("that of the ROM"),
         "0 to 0.99",
-        "Modal damping ratio, the same for all modes.",
+        "Modal damping ratio of all modes that `damping_ratios` leaves out.",
+    ),
+    field(
+        "structure.damping_ratios",
+        "list of numbers",
+        Some("empty"),
+        "0 to 0.99 each",
+        "Modal damping ratios of the first modes, the lowest first; of the first of each nodal diameter where sectors are coupled.",
     ),
     field(
         "structure.spin",
@@ -107,8 +114,15 @@ pub const FIELDS: [SceneField; 82] = [
         "structure.thermal",
         "true or false",
         Some("false"),
-        "structures that stand still only",
-        "Make the temperatures of the patches of the ROM inputs; it needs a ROM with thermal loads.",
+        "not of `free` structures",
+        "Make the temperatures of the patches of the ROM inputs, or of a rotor its one temperature; it needs a ROM with thermal loads.",
+    ),
+    field(
+        "structure.softening",
+        "number, 1/K",
+        Some("0"),
+        "0 to 0.01; rotating structures with `thermal` only",
+        "Share of its elastic stiffness that a rotor loses per kelvin above the reference.",
     ),
     field(
         "structure.load",
@@ -132,6 +146,94 @@ pub const FIELDS: [SceneField; 82] = [
         "Start value of the amplitude input, per metre of circumference and outward positive.",
     ),
     field("structure.load.phase", "number, rad", Some("0"), "-1e6 to 1e6", "Start value of the phase input."),
+    field(
+        "structure.excitation",
+        "table",
+        Some("none"),
+        "rotating structures only",
+        "Aerodynamic excitation by an engine order: blade j of N feels amplitude·cos(order·(θ_r + 2π(j − 1)/N) − phase), with amplitude \
+         and phase as inputs.",
+    ),
+    field(
+        "structure.excitation.order",
+        "whole number",
+        None,
+        "0 to 1000000, at most 1 rad per internal step",
+        "Start value of the engine order.",
+    ),
+    field(
+        "structure.excitation.mode",
+        "whole number",
+        Some("all modes"),
+        "1 to the modes of the ROM, of every nodal diameter",
+        "Mode family that alone is loaded: by the modal load of the force at `node`, or, without one, at the component of a contact node \
+         that the mode moves most.",
+    ),
+    field(
+        "structure.excitation.node",
+        "text",
+        Some("none: give a `mode`"),
+        "a contact node of the ROM",
+        "Where the force acts.",
+    ),
+    field(
+        "structure.excitation.direction",
+        "text",
+        Some("none"),
+        "`radial`, `tangential`, `axial`; with `node`",
+        "Direction of the force.",
+    ),
+    field(
+        "structure.excitation.amplitude",
+        "number, N",
+        Some("0"),
+        "-1e9 to 1e9",
+        "Start value of the amplitude input, of each blade.",
+    ),
+    field("structure.excitation.phase", "number, rad", Some("0"), "-1e6 to 1e6", "Start value of the phase input."),
+    field(
+        "structure.initial",
+        "list of tables",
+        Some("empty"),
+        "rotating structures only",
+        "Motion of the blades at the start, on top of their static equilibrium; several add up.",
+    ),
+    field(
+        "structure.initial.mode",
+        "whole number",
+        None,
+        "1 to the modes with inertia, of every nodal diameter",
+        "Mode family. Displacement and velocity are those of the component of a contact node that it moves most.",
+    ),
+    field(
+        "structure.initial.sector",
+        "whole number",
+        Some("all sectors"),
+        "1 to the number of sectors; not of coupled ones",
+        "The blade that moves.",
+    ),
+    field(
+        "structure.initial.nodal_diameter",
+        "whole number",
+        Some("0"),
+        "up to half the sectors; not with `sector`",
+        "Blade j of N moves with cos(2πn(j − 1)/N − phase), n this number.",
+    ),
+    field("structure.initial.phase", "number, rad", Some("0"), "-1e6 to 1e6", "Phase of that pattern."),
+    field(
+        "structure.initial.displacement",
+        "number, m",
+        Some("0"),
+        "-1000 to 1000; not into the casing",
+        "Start value of the parameter `initial_displacement[k]`.",
+    ),
+    field(
+        "structure.initial.velocity",
+        "number, m/s",
+        Some("0"),
+        "-1e5 to 1e5",
+        "Start value of the parameter `initial_velocity[k]`.",
+    ),
     field("surface.name", "text", None, "as `name` of the scene", "Name by which contacts refer to it."),
     field("surface.shape", "table", Some("circular"), "see the shapes below", "Shape around the circumference."),
     field(

@@ -10,6 +10,19 @@ pub fn scene_with_every_feature() -> SceneSettings {
     let rotor = &mut scene.structures[0];
     rotor.spin = SpinSettings { stiffening: true, growth: true, coriolis: true };
     (rotor.whirl, rotor.axial_shift, rotor.frequency_factors) = (true, true, vec![0.99, 1.01]);
+    (rotor.thermal, rotor.softening, rotor.damping_ratios) = (true, 3e-4, vec![0.002, 0.004]);
+    rotor.excitation = Some(ExcitationSettings {
+        order: 7,
+        mode: Some(2),
+        node: Some("tip".into()),
+        direction: Some(Direction::Tangential),
+        amplitude: 1.5,
+        phase: 0.3,
+    });
+    let (mode, displacement, velocity, phase) = (1, 1e-5, -0.2, 0.6);
+    let nodal_diameter = Some(1);
+    let pattern = InitialSettings { mode, sector: None, nodal_diameter, phase, displacement, velocity };
+    rotor.initial = vec![pattern, InitialSettings { sector: Some(2), nodal_diameter: None, ..pattern }];
     scene.structures.push(StructureSettings {
         name: "ring".into(),
         rom: "ring.rom.safetensors".into(),

@@ -237,9 +237,22 @@ fn features_that_exclude_each_other_are_refused() {
     scene.time.scheme = Scheme::MasslessBoundary;
     scene.structures[0].spin.coriolis = false;
     parse_scene(&write_scene(&scene), "scene").unwrap();
-    (scene.contacts[0].coating, scene.outputs.wear) = (None, false);
+    (scene.contacts[0].coating, scene.outputs.wear, scene.outputs.wear_profile) = (None, false, false);
     scene.contacts[0].solver = Solver::Coulomb;
     parse_scene(&write_scene(&scene), "scene").unwrap();
+}
+
+/// It comes back as it was, without the figures of what yields, which it need not give.
+#[test]
+fn a_coating_that_is_cut_is_written_without_what_yields() {
+    let mut scene = features::scene_with_every_feature();
+    let coating = scene.contacts[0].coating.as_mut().unwrap();
+    (coating.modulus, coating.yield_stress, coating.hardening) = (0.0, 0.0, 0.0);
+    coating.cutting = Some(CuttingSettings { specific_energy: 3e8, normal_ratio: 0.7 });
+    let text = write_scene(&scene);
+    assert!(["modulus", "yield_stress", "hardening"].iter().all(|key| !text.contains(key)), "{text}");
+    assert!(text.contains("specific_energy = 3") && text.contains("normal_ratio = 0.7"), "{text}");
+    assert_eq!(parse_scene(&text, "scene").unwrap(), scene);
 }
 
 #[test]

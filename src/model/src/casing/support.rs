@@ -11,7 +11,7 @@ use crate::sparse::{SparseMatrix, tall_product};
 
 /// Rows of K, M and thermal loads of the held nodes, summed to three forces and three moments about the origin: over the free
 /// dofs × 6, and patches × 6.
-pub struct HeldRows {
+pub(super) struct HeldRows {
     stiffness: Mat<f64>,
     mass: Mat<f64>,
     thermal: Mat<f64>,
@@ -19,7 +19,7 @@ pub struct HeldRows {
 
 impl HeldRows {
     /// Of the `held` nodes of a model; `loads` of all dofs.
-    pub fn new(full: &Assembled, nodes: &[[f64; 3]], held: &[usize], free: &[usize], loads: &Mat<f64>) -> Self {
+    pub(super) fn new(full: &Assembled, nodes: &[[f64; 3]], held: &[usize], free: &[usize], loads: &Mat<f64>) -> Self {
         let motions = motions(nodes, held);
         // K_fs r: K and M are symmetric.
         let rows = |matrix: &SparseMatrix| {
@@ -34,7 +34,7 @@ impl HeldRows {
     }
 
     /// In the coordinates of the reduced model.
-    pub fn reduced(&self, reduced: &CraigBampton, modes: &ModalForm) -> Support {
+    pub(super) fn reduced(&self, reduced: &CraigBampton, modes: &ModalForm) -> Support {
         let seen = |rows: &Mat<f64>| {
             let rows = tall_product(reduced.transformation.as_ref(), rows.as_ref());
             DMatrix::from_fn(SUPPORT_ROWS, rows.nrows(), |k, i| rows[(i, k)]) * &modes.shapes

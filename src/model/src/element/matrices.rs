@@ -113,6 +113,30 @@ pub fn consistent_mass(
     Ok(matrix)
 }
 
+/// Conduction matrix ∫ k ∇N_a·∇N_b dV, n × n in W/K, with the conductivity k in W/(m K).
+///
+/// # Errors
+/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+pub fn conduction(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    conductivity: f64,
+    element: usize,
+) -> Result<DMatrix<f64>> {
+    let nodes = kind.node_count();
+    let mut matrix = DMatrix::zeros(nodes, nodes);
+    for (index, quadrature) in kind.stiffness_rule().iter().enumerate() {
+        let mapped = map_point(kind, coordinates, quadrature, (element, index))?;
+        let gradients = &mapped.shape.gradients[..nodes];
+        for (b, gb) in gradients.iter().enumerate() {
+            for (a, ga) in gradients.iter().enumerate() {
+                matrix[(a, b)] += conductivity * mapped.volume * (ga[0] * gb[0] + ga[1] * gb[1] + ga[2] * gb[2]);
+            }
+        }
+    }
+    Ok(matrix)
+}
+
 /// Nodal forces per kelvin of a uniform temperature of the element above the reference, 3n values in N/K.
 ///
 /// f_a = ∫ B_aᵀ D α (1, 1, 1, 0, 0, 0)ᵀ dV = (3λ + 2µ) α ∫ ∇N_a dV, with the rule of the stiffness, so that K αx = f holds

@@ -22,7 +22,7 @@ mod shape;
 pub use incompatible::{Formulation, incompatible_stiffness};
 pub(crate) use matrices::lumped_mass;
 pub use matrices::thermal_load;
-pub use matrices::{consistent_mass, stiffness, strain, stress};
+pub use matrices::{conduction, consistent_mass, stiffness, strain, stress};
 pub use nonlinear::{Tangent, geometric_stiffness, second_stresses, tangent};
 pub use quadrature::QuadraturePoint;
 pub use recovery::nodal_stress;

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use tiprub_model::sparse::Factor;
 use tiprub_model::{Error, Result};
 
-use super::{Blade, Part, dot, product};
+use super::{Blade, Gauge, Part, dot, product};
 use crate::reduced::complementarity;
 use crate::reduced::rub::{Obstacle, Touch};
 
@@ -35,6 +35,10 @@ pub struct Steps {
 pub struct History {
     /// Displacements of the watched nodes, node by node along radius, circumference, axis (m).
     pub displacements: Vec<Vec<f64>>,
+    /// Stress at the gauges, six components of each (Pa).
+    pub stresses: Vec<Vec<f64>>,
+    /// Mean forces on the parts, part by part along radius, circumference, axis (N): of every step, not of samples.
+    pub forces: Vec<Vec<f64>>,
     /// Impulse of all normal forces since the last sample (N·s).
     pub impulses: Vec<f64>,
     /// Strain energy (J).
@@ -139,11 +143,17 @@ impl Contact {
 }
 
 impl Blade {
-    /// March from rest, with contact on `parts`; displacements of the `watched` nodes are kept.
+    /// March from rest, with contact on `parts`; displacements of the `watched` nodes and stress at the gauges are kept.
     ///
     /// # Errors
     /// A clamped node among these, or a contact problem that is not solved.
-    pub fn march(&self, parts: &[Part], obstacle: &Obstacle, steps: Steps, watched: &[usize]) -> Result<History> {
+    pub fn march(
+        &self,
+        parts: &[Part],
+        obstacle: &Obstacle,
+        steps: Steps,
+        (watched, gauges): (&[usize], &[Gauge]),
+    ) -> Result<History> {
         let h = steps.interval / f64::from(steps.division);
         let factor = self.factor(0.25 * h * h)?;
         let contact = Contact::new(self, parts, &factor)?;
@@ -162,6 +172,7 @@ impl Blade {
                 let impulses = contact.impulses(&near, h, &contact.seen(&next)).ok_or_else(|| unsolved(time))?;
                 let forces = contact.forces(&near, &impulses);
                 contact.push(&forces, &mut next);
+                found.forces.push((&forces / h).as_slice().to_vec());
                 let mean: Vec<f64> = v.iter().zip(&next).map(|(v, next)| 0.5 * (v + next)).collect();
                 let moving = contact.seen(&mean);
                 work += forces.dot(&moving);
@@ -174,6 +185,7 @@ impl Blade {
             found.impulses.push(impulse);
             found.friction_work.push(friction);
             found.displacements.push(self.watch(&watched, &u));
+            found.stresses.push(self.stress(gauges, &u));
             found.strain.push(0.5 * dot(&u, &product(&self.stiffness, &u)));
             let energy = found.strain[sample] + 0.5 * dot(&v, &self.momentum(&v));
             largest = largest.max(energy);

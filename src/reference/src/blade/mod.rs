@@ -1,17 +1,23 @@
 //! One blade by full finite elements, without a reduction of any kind, rubbing against a rigid casing with two bumps.
 //!
 //! M ü + K u = Σ p F over all nodes of the mesh, undamped. `tip` says where contact is asked for: means over patches, or points of
-//! the tip's faces. `march` goes on in time. Mesh, element matrices and sparse factor are those of `tiprub-model`; contact and stepping
-//! share nothing with the product.
+//! the tip's faces. `march` goes on in time. `gauge` tells stress. Mesh, element matrices and sparse factor are those of `tiprub-model`;
+//! contact, stepping and stress share nothing with the product.
 
+pub mod calculix;
+mod gauge;
 mod march;
+mod pushed;
 mod tip;
 
+use faer::Mat;
 use tiprub_model::assembly::free_dofs;
 use tiprub_model::sparse::{Factor, SparseMatrix, principal_pair};
 use tiprub_model::{FeModel, Material, Mesh, Result};
 
+pub use gauge::{COMPONENTS, Gauge, equivalent};
 pub use march::{History, Steps};
+pub use pushed::PushedBlade;
 pub use tip::Part;
 
 /// The full model of a blade.
@@ -44,6 +50,39 @@ impl Blade {
     /// Degrees of freedom that move.
     pub fn order(&self) -> usize {
         self.mass.order()
+    }
+
+    /// Stress at the gauges under forces at rest, six components of each (Pa): node, force along x, y, z (N).
+    ///
+    /// # Errors
+    /// A blade that is not held.
+    pub fn at_rest(&self, forces: &[(usize, [f64; 3])], gauges: &[Gauge]) -> Result<Vec<f64>> {
+        let moved = self.moved(forces)?;
+        Ok(gauges.iter().flat_map(|gauge| gauge.read(|node| moved[node])).collect())
+    }
+
+    /// Displacements of all nodes along x, y, z under forces at rest (m): node, force along x, y, z (N).
+    ///
+    /// # Errors
+    /// A blade that is not held.
+    pub fn moved(&self, forces: &[(usize, [f64; 3])]) -> Result<Vec<[f64; 3]>> {
+        let factor = self.stiffness.factor("K of the blade", "Clamp it, and mesh it soundly")?;
+        let mut load = Mat::zeros(self.order(), 1);
+        for (node, force) in forces {
+            if let Some(first) = self.rows[*node] {
+                (0..3).for_each(|i| load[(first + i, 0)] += force[i]);
+            }
+        }
+        let moved = factor.solve(load);
+        let node =
+            |first: &Option<usize>| first.map_or([0.0; 3], |first| [0, 1, 2].map(|axis| moved[(first + axis, 0)]));
+        Ok(self.rows.iter().map(node).collect())
+    }
+
+    /// Stress at the gauges.
+    fn stress(&self, gauges: &[Gauge], u: &[f64]) -> Vec<f64> {
+        let moved = |node: usize| self.rows[node].map_or([0.0; 3], |first| [u[first], u[first + 1], u[first + 2]]);
+        gauges.iter().flat_map(|gauge| gauge.read(moved)).collect()
     }
 
     /// M x.
@@ -119,14 +158,14 @@ mod tests {
         let steps = Steps { interval: 1e-5, division: 4, samples: 40 };
         let run = |clearance: f64| {
             let obstacle = Obstacle { clearance, speed: 1800.0, friction: 0.0, bumps: [4e-4, 0.15, 1e-4] };
-            full.march(&parts, &obstacle, steps, &tip[..1]).unwrap()
+            full.march(&parts, &obstacle, steps, (&tip[..1], &[])).unwrap()
         };
         let far = run(1e-3);
         assert!(far.displacements.iter().flatten().all(|u| *u == 0.0) && far.pushed == 0);
         let near = run(3.5e-4);
         let turned = Part::points(&blade.mesh, tip, 1).into_iter().map(|part| part.turned(1.0)).collect::<Vec<_>>();
         let obstacle = Obstacle { clearance: 3.5e-4, speed: 1800.0, friction: 0.15, bumps: [4e-4, 0.15, 1e-4] };
-        let rubbed = full.march(&turned, &obstacle, steps, &tip[..1]).unwrap();
+        let rubbed = full.march(&turned, &obstacle, steps, (&tip[..1], &[])).unwrap();
         assert!(rubbed.pushed > 0 && rubbed.residual < 1e-8 && near.residual < 1e-8, "{near:?} {rubbed:?}");
         assert!(rubbed.displacements.iter().any(|u| u[0] < -1e-6) && rubbed.friction_work[39] > 0.01);
         assert!(rubbed.impulses.iter().all(|impulse| *impulse >= 0.0));

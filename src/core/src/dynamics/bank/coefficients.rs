@@ -1,6 +1,7 @@
 //! What depends on step size, scheme, damping and speed, and the state carried from one of them to the next.
 
 use super::{LaneCoefficients, ModalBank};
+use crate::dynamics::modal::fill_ratios;
 use crate::schemes::{Velocity, resample};
 use crate::settings::Scheme;
 
@@ -40,7 +41,8 @@ impl ModalBank {
     pub(super) fn refresh_coupling(&mut self) {
         if let Some(coupling) = &mut self.coupling {
             let dynamic = self.model.dynamic_modes(self.scheme);
-            coupling.refresh(self.state.speed, self.step, dynamic, &self.coefficients);
+            let state = [self.state.speed, self.state.temperature];
+            coupling.refresh(state, self.step, dynamic, &self.coefficients);
         }
         for set in 0..self.flexibility.len() {
             self.fill_flexibility(set);
@@ -83,22 +85,23 @@ impl ModalBank {
         self.coupling = Some(coupling);
     }
 
-    /// Follow the speed of the rotor (rad/s) where modes are coupled by it; only between steps. Returns the change of
-    /// strain energy (J), which is work of the shaft.
-    pub fn set_speed(&mut self, speed: f64) -> f64 {
+    /// Follow the speed of the rotor (rad/s) and its temperature (K) where modes are coupled by them; only between steps. Returns
+    /// the change of strain energy (J), which is work of the shaft and of heat.
+    pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         let Some(coupling) = &self.coupling else { return 0.0 };
-        if coupling.speed().to_bits() == speed.to_bits() {
+        let same = |one: f64, other: f64| one.to_bits() == other.to_bits();
+        if same(coupling.speed(), speed) && same(coupling.temperature(), temperature) {
             return 0.0;
         }
         let before = self.energies().1;
-        self.state.speed = speed;
+        (self.state.speed, self.state.temperature) = (speed, temperature);
         self.refresh_coupling();
         self.energies().1 - before
     }
 
-    /// Modal damping ratio of all modes (takes effect with the next [`ModalBank::set_step`]).
-    pub fn set_damping_ratio(&mut self, damping_ratio: f64) {
-        self.model.damping_ratios.fill(damping_ratio);
+    /// Modal damping ratio of all modes but the first, which have their `own` (takes effect with the next [`ModalBank::set_step`]).
+    pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
+        fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);
     }
 
     /// Modal forces on one sector that last over the step: of contact (`forces[row · lanes + sector]`, N; none for an empty
@@ -112,6 +115,9 @@ impl ModalBank {
             let contact: f64 =
                 if touched { shapes.iter().enumerate().map(|(row, shape)| shape * of_row(row)).sum() } else { 0.0 };
             self.modal_force[mode] = contact + self.state.modal_load_before.get(mode).copied().unwrap_or(0.0);
+            if let Some(loads) = &self.excitation {
+                self.modal_force[mode] += loads.load[mode] * loads.before[sector];
+            }
         }
         self.add_coupling_force(sector);
     }

@@ -1,6 +1,6 @@
-//! Modes coupled by spin: Coriolis force, and the stiffness of a speed other than that of the modes.
+//! Modes coupled by spin and heat: Coriolis force, and the stiffness of a speed and a temperature other than those of the modes.
 //!
-//! With G the Coriolis matrix and ΔK = (Ω² − Ω₀²)K₁ + (Ω⁴ − Ω₀⁴)K₂ in modal coordinates, the step
+//! With G the Coriolis matrix and ΔK = (Ω² − Ω₀²)K₁ + (Ω⁴ − Ω₀⁴)K₂ − s(T − T₀)K in modal coordinates, the step
 //!
 //! ```text
 //! m̃(q⁺ − 2q + q⁻)/h² + (d̃ + 2ΩG)(q⁺ − q⁻)/2h + (ω² + ΔK) q = f
@@ -19,6 +19,7 @@ pub struct Coupling {
     stiffening: bool,
     coriolis: bool,
     speed: f64,
+    temperature: f64,
     /// ΔK, row by row.
     stiffness: Vec<f64>,
     /// (Ω/h) G, row by row.
@@ -36,9 +37,10 @@ impl Coupling {
         let square = |on: bool| vec![0.0; if on { modes * modes } else { 0 }];
         Self {
             speed: spin.reference_speed,
-            stiffening,
+            temperature: spin.reference_temperature,
+            stiffening: stiffening || spin.softening.is_some(),
             coriolis,
-            stiffness: square(stiffening),
+            stiffness: square(stiffening || spin.softening.is_some()),
             gyroscopic: square(coriolis),
             transforms: vec![square(coriolis); sets],
             work: vec![0.0; 2 * modes * modes],
@@ -52,19 +54,37 @@ impl Coupling {
         self.speed
     }
 
+    /// Temperature in use (K).
+    pub fn temperature(&self) -> f64 {
+        self.temperature
+    }
+
     /// Whether anything couples the modes at the speed in use.
     pub fn is_active(&self) -> bool {
         (self.coriolis && self.speed != 0.0) || self.is_stiffened()
     }
 
     fn is_stiffened(&self) -> bool {
-        self.stiffening && self.speed.abs().to_bits() != self.spin.reference_speed.abs().to_bits()
+        self.stiffening
+            && (self.speed.abs().to_bits() != self.spin.reference_speed.abs().to_bits() || self.heated() != 0.0)
     }
 
-    /// Use the speed Ω (rad/s) with the coefficients of a step size h (s), one slice per set.
-    pub fn refresh(&mut self, speed: f64, step: f64, dynamic: usize, coefficients: &[ModeCoefficients]) {
+    /// Kelvin above the temperature of the modes, where these soften.
+    fn heated(&self) -> f64 {
+        if self.spin.softening.is_some() { self.temperature - self.spin.reference_temperature } else { 0.0 }
+    }
+
+    /// Use the speed Ω (rad/s) and the temperature (K) with the coefficients of a step size h (s), one slice per set.
+    pub fn refresh(
+        &mut self,
+        [speed, temperature]: [f64; 2],
+        step: f64,
+        dynamic: usize,
+        coefficients: &[ModeCoefficients],
+    ) {
         let modes = self.result.len();
-        self.speed = speed;
+        (self.speed, self.temperature) = (speed, temperature);
+        let heated = self.heated();
         // Modes without inertia, and those that the step does not resolve, keep the stiffness of the reference speed: ΔK
         // is explicit, and at ωh ≈ π the least of it would make them grow.
         let dynamic = dynamic.min(resolved(step, modes, coefficients));
@@ -78,6 +98,9 @@ impl Coupling {
                     let both = row < dynamic && column < dynamic;
                     self.stiffness[row * modes + column] =
                         if both { second * entries.0 + fourth * entries.1 } else { 0.0 };
+                    if let Some(softening) = self.spin.softening.as_ref().filter(|_| both) {
+                        self.stiffness[row * modes + column] += heated * softening[(row, column)];
+                    }
                 }
             }
         }

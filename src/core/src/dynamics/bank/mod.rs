@@ -8,12 +8,14 @@
 mod coefficients;
 mod correction;
 mod coupling;
+mod excited;
 mod predict;
 mod span;
 
 use nalgebra::DMatrix;
 
 use super::dispatch::InstructionSet;
+use super::excitation::{Excitation, SectorLoads};
 use super::modal::{ModalModel, ModalSpin};
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::schemes::{ModeCoefficients, Velocity, free_increment};
@@ -41,13 +43,15 @@ pub struct BankOptions {
     pub loads: bool,
     /// Spin in modal coordinates, with what of it couples the modes: (stiffening, coriolis).
     pub coupling: Option<(ModalSpin, bool, bool)>,
+    /// Loads of an engine order.
+    pub excitation: Option<Excitation>,
     /// Keep G = Φ diag(c) Φᵀ; a slave with many contact rows goes through its modes instead.
     pub flexibility: bool,
 }
 
 impl Default for BankOptions {
     fn default() -> Self {
-        Self { frequency_factors: Vec::new(), loads: false, coupling: None, flexibility: true }
+        Self { frequency_factors: Vec::new(), loads: false, coupling: None, excitation: None, flexibility: true }
     }
 }
 
@@ -68,9 +72,20 @@ struct BankState {
     modal_load_before: Vec<f64>,
     /// Speed of the coupling (rad/s).
     speed: f64,
+    /// Its temperature (K).
+    temperature: f64,
 }
 
-persist_fields!(BankState { position, increment, displacement, displacement_before, loss, modal_load_before, speed });
+persist_fields!(BankState {
+    position,
+    increment,
+    displacement,
+    displacement_before,
+    loss,
+    modal_load_before,
+    speed,
+    temperature
+});
 
 /// What the special pass needs per mode and lane.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -104,6 +119,7 @@ pub struct ModalBank {
     /// G per set: displacement of the contact rows per unit force held for one step (m/N), rows × rows.
     flexibility: Vec<DMatrix<f64>>,
     coupling: Option<Coupling>,
+    excitation: Option<SectorLoads>,
     scheme: Scheme,
     step: f64,
     state: BankState,
@@ -161,6 +177,7 @@ impl ModalBank {
                 loss: vec![0.0; lanes],
                 modal_load_before: vec![0.0; if options.loads { modes } else { 0 }],
                 speed: coupling.as_ref().map_or(0.0, Coupling::speed),
+                temperature: coupling.as_ref().map_or(0.0, Coupling::temperature),
             },
             modal_load: vec![0.0; if special { modes } else { 0 }],
             increment_before: vec![0.0; state_len],
@@ -169,6 +186,7 @@ impl ModalBank {
             moved: vec![0.0; rows],
             gathered: [vec![0.0; modes], vec![0.0; modes]],
             coupling,
+            excitation: options.excitation.map(|excitation| SectorLoads::new(excitation, model, sectors)),
             options,
             model: model.clone(),
         }
@@ -317,6 +335,10 @@ impl ModalBank {
         }
         if let Some((spin, ..)) = &self.options.coupling {
             self.state.speed = spin.reference_speed;
+            self.state.temperature = spin.reference_temperature;
+        }
+        if let Some(loads) = &mut self.excitation {
+            loads.rest();
         }
     }
 
@@ -342,6 +364,9 @@ impl ModalBank {
         }
         if self.coupling.as_ref().is_some_and(Coupling::is_active) {
             self.couple(with_loss);
+        }
+        if self.excitation.is_some() {
+            self.act_excited(with_loss);
         }
     }
 
@@ -430,16 +455,25 @@ impl ModalBank {
     /// Save the state (not the step size).
     pub fn save(&self, writer: &mut Writer) {
         self.state.save(writer);
+        if let Some(loads) = &self.excitation {
+            loads.before.save(writer);
+        }
     }
 
     /// Pass over a saved state and refuse what is none.
     pub fn check(&self, reader: &mut Reader) {
         self.state.check(reader);
+        if let Some(loads) = &self.excitation {
+            loads.before.check(reader);
+        }
     }
 
     /// Restore a saved state, after [`ModalBank::set_step`].
     pub fn restore(&mut self, reader: &mut Reader) {
         self.state.restore(reader);
+        if let Some(loads) = &mut self.excitation {
+            loads.before.restore(reader);
+        }
         if self.coupling.is_some() && self.step > 0.0 {
             self.refresh_coupling();
         }
@@ -528,6 +562,8 @@ mod tests {
         let model = small(0.01);
         let spin = ModalSpin {
             reference_speed: 0.0,
+            reference_temperature: 0.0,
+            softening: None,
             stiffness_speed2: DMatrix::identity(4, 4) * 3.0,
             stiffness_speed4: DMatrix::zeros(4, 4),
             coriolis: DMatrix::zeros(4, 4),
@@ -542,7 +578,7 @@ mod tests {
             let options = BankOptions { loads: true, coupling: coupling.clone(), ..BankOptions::default() };
             let mut bank = ModalBank::with_options(&model, sectors, options);
             bank.set_step(scheme, 2e-5);
-            bank.set_speed(500.0);
+            bank.set_speed(500.0, 0.0);
             for _ in 0..5 {
                 bank.loads_mut().copy_from_slice(&[1.0, -2.0, 30.0, 4e3]);
                 bank.predict(true);

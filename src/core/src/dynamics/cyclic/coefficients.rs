@@ -67,9 +67,10 @@ impl CyclicBank {
         }
     }
 
-    /// Modal damping ratio of all modes (takes effect with the next [`CyclicBank::set_step`]).
-    pub fn set_damping_ratio(&mut self, damping_ratio: f64) {
-        self.model.set_damping_ratio(damping_ratio);
+    /// Modal damping ratio of all modes but the first of each nodal diameter, which have their `own` (takes effect with the next
+    /// [`CyclicBank::set_step`]).
+    pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
+        self.model.set_damping_ratio(damping_ratio, own);
     }
 
     /// Carry the state from the step size in use to `new_step` under the last contact forces (`forces[row · lanes +
@@ -114,6 +115,10 @@ impl CyclicBank {
         let mut force = modal_force(&self.asked_nodes, shapes, force).map(|part| part[lane]);
         if nodal_diameter == 0 {
             force[0] += self.state.modal_load_before.get(mode).copied().unwrap_or(0.0);
+        }
+        if let Some(loads) = self.excitation.as_ref().filter(|loads| loads.diameter == nodal_diameter) {
+            let excited = loads.of_mode_before(mode);
+            force.iter_mut().zip(excited).for_each(|(force, excited)| *force += excited);
         }
         force
     }

@@ -9,6 +9,7 @@
 mod coefficients;
 mod contact;
 mod energy;
+mod excited;
 mod fourier;
 mod model;
 mod pass;
@@ -18,6 +19,7 @@ mod tests;
 
 use super::bank::{FLUSH_BELOW, LANES, lanes};
 use super::dispatch::InstructionSet;
+use super::excitation::DiskLoads;
 use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::schemes::{ModeCoefficients, Velocity, free_increment};
 use crate::settings::Scheme;
@@ -97,6 +99,7 @@ pub struct CyclicBank {
     scheme: Scheme,
     step: f64,
     loads: bool,
+    excitation: Option<DiskLoads>,
     state: CyclicState,
     /// Modal loads of nodal diameter 0 for the step under way.
     modal_load: Vec<f64>,
@@ -168,6 +171,7 @@ impl CyclicBank {
             modes,
             shapes,
             loads,
+            excitation: None,
         }
     }
 
@@ -279,6 +283,9 @@ impl CyclicBank {
         }
         state.touched.fill(false);
         (state.unapplied, state.acting, state.loss_due) = (false, false, false);
+        if let Some(loads) = &mut self.excitation {
+            loads.rest();
+        }
     }
 
     /// Modal loads of nodal diameter 0 for the next step, to be set before [`CyclicBank::predict`].
@@ -303,6 +310,7 @@ impl CyclicBank {
             (true, true, false) => self.pass::<true, true, false, true>(),
             (true, true, true) => self.pass::<true, true, true, true>(),
         }
+        self.act_excited();
         std::mem::swap(&mut self.state.increment, &mut self.state.older);
         std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
         (self.state.unapplied, self.state.acting, self.state.loss_due) = (false, false, with_loss);
@@ -381,15 +389,24 @@ impl CyclicBank {
     /// Save the state (not the step size).
     pub fn save(&self, writer: &mut Writer) {
         self.state.save(writer);
+        if let Some(loads) = &self.excitation {
+            loads.before.save(writer);
+        }
     }
 
     /// Pass over a saved state and refuse what is none.
     pub fn check(&self, reader: &mut Reader) {
         self.state.check(reader);
+        if let Some(loads) = &self.excitation {
+            loads.before.check(reader);
+        }
     }
 
     /// Restore a saved state, after [`CyclicBank::set_step`].
     pub fn restore(&mut self, reader: &mut Reader) {
         self.state.restore(reader);
+        if let Some(loads) = &mut self.excitation {
+            loads.before.restore(reader);
+        }
     }
 }

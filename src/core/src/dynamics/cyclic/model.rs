@@ -8,7 +8,7 @@
 
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
-use crate::dynamics::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, real_modes};
+use crate::dynamics::modal::{ModalModel, RIGID_FRACTION, check_semidefinite, fill_ratios, real_modes};
 use crate::rom::{Harmonic, cholesky};
 use crate::schemes::ModeCoefficients;
 use crate::settings::Scheme;
@@ -166,9 +166,11 @@ impl CyclicModel {
         nodal_diameter == 0 || 2 * nodal_diameter == self.sectors
     }
 
-    /// Give all modes one damping ratio.
-    pub fn set_damping_ratio(&mut self, damping_ratio: f64) {
-        self.diameters.iter_mut().for_each(|diameter| diameter.damping_ratios.fill(damping_ratio));
+    /// Give all modes one damping ratio, but the first of each nodal diameter their `own`.
+    pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
+        for diameter in &mut self.diameters {
+            fill_ratios(&mut diameter.damping_ratios, damping_ratio, own, 1);
+        }
     }
 
     /// Largest undamped angular frequency (rad/s).

@@ -28,7 +28,7 @@ pub(super) fn model(sectors: usize, nodes: usize) -> CyclicModel {
 #[test]
 fn the_energy_of_the_instant_is_that_of_the_motion() {
     let mut undamped = model(11, 2);
-    undamped.set_damping_ratio(0.0);
+    undamped.set_damping_ratio(0.0, &[]);
     let mut bank = CyclicBank::new(&undamped, false);
     bank.set_step(Scheme::ModalExact, 2e-5);
     let mut expected = 0.0;
@@ -78,7 +78,7 @@ fn at_rest_nothing_of_the_run_before_acts() {
 #[test]
 fn quasi_static_modes_have_no_motion_to_start_with() {
     let mut undamped = model(8, 1);
-    undamped.set_damping_ratio(0.0);
+    undamped.set_damping_ratio(0.0, &[]);
     let mut bank = CyclicBank::new(&undamped, false);
     bank.set_step(Scheme::MasslessBoundary, 1e-6);
     let mut expected = 0.0;

@@ -35,6 +35,11 @@ pub(super) const WHIRL: Fact = fact("structure.whirl", "", |at| at.structure().w
 pub(super) const AXIAL_SHIFT: Fact = fact("structure.axial_shift", "", |at| at.structure().axial_shift);
 pub(super) const THERMAL: Fact = fact("structure.thermal", "", |at| at.structure().thermal);
 pub(super) const LOAD: Fact = fact("structure.load", "", |at| at.structure().load.is_some());
+pub(super) const SOFTENING: Fact = fact("structure.softening", "", |at| at.structure().softening != 0.0);
+pub(super) const EXCITATION: Fact = fact("structure.excitation", "", |at| at.structure().excitation.is_some());
+pub(super) const INITIAL: Fact = fact("structure.initial", "", |at| !at.structure().initial.is_empty());
+pub(super) const INITIAL_SECTOR: Fact =
+    fact("structure.initial.sector", "", |at| at.structure().initial.iter().any(|one| one.sector.is_some()));
 pub(super) const ROM_AROUND: Fact =
     fact("structure.rom", "around an axis", |at| at.meets(|motion| motion != Motion::Free));
 pub(super) const ROM_FREE: Fact =

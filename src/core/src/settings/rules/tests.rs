@@ -97,12 +97,38 @@ fn couple(rom: &mut Rom) {
         vec![Harmonic { mass: matrix.clone(), stiffness: matrix.clone(), contact_map: matrix.rows(0, 3).into() }];
 }
 
+fn excitation() -> ExcitationSettings {
+    ExcitationSettings { order: 2, mode: Some(1), node: None, direction: None, amplitude: 1.0, phase: 0.0 }
+}
+
 type Change = fn(&mut Scene);
 
 /// What breaks a row in a scene with a rotor, and how the refusal begins.
 const OF_ROTORS: &[(&str, Change)] = &[
     ("structure[2].whirl: needs `motion = \"rotating\"`", |scene| scene.settings.structures[1].whirl = true),
-    ("structure[1].thermal: needs `motion = \"still\"`", |scene| scene.settings.structures[0].thermal = true),
+    ("structure[1].load: needs `motion = \"still\"`", |scene| {
+        scene.settings.structures[0].load = Some(LoadSettings { order: 2, amplitude: 1.0, phase: 0.0 });
+    }),
+    ("structure[1].softening: needs `structure.thermal`", |scene| scene.settings.structures[0].softening = 1e-4),
+    ("structure[2].excitation: needs `motion = \"rotating\"`", |scene| {
+        scene.settings.structures[1].excitation = Some(excitation());
+    }),
+    ("time.scheme: `galerkin` excludes `structure.thermal` of a rotor", |scene| {
+        galerkin(&mut scene.settings);
+        scene.settings.structures[0].excitation = Some(excitation());
+    }),
+    ("structure[1].initial.sector: excludes a ROM whose sectors", |scene| {
+        let one = InitialSettings {
+            mode: 1,
+            sector: Some(1),
+            nodal_diameter: None,
+            phase: 0.0,
+            displacement: 1e-6,
+            velocity: 0.0,
+        };
+        scene.settings.structures[0].initial = vec![one];
+        couple(&mut scene.roms[0]);
+    }),
     ("structure[2].velocity: needs `motion = \"free\"`", |scene| {
         scene.settings.structures[1].velocity = [0.0, 1.0, 0.0];
     }),
@@ -226,6 +252,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
 
 /// The same of a scene with a free master.
 const OF_FREE_MASTERS: &[(&str, Change)] = &[
+    ("structure[1].thermal: excludes `motion = \"free\"`", |scene| scene.settings.structures[0].thermal = true),
     ("surface[1].moving: excludes a free master", |scene| scene.settings.surfaces[0].moving = true),
     ("contact[1].gap: excludes a free master", |scene| scene.settings.contacts[0].gap = 1e-3),
     ("contact[1].master: a free structure needs `surface.structure`", |scene| {

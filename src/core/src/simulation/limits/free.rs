@@ -10,6 +10,7 @@ use nalgebra::DMatrix;
 
 use super::{BodyLimits, Closing, Parameters, Sense};
 use crate::dynamics::modal::ModalModel;
+use crate::dynamics::modal::fill_ratios;
 use crate::gaps::open::{OpenGap, tangent};
 use crate::gaps::{GapLaw, Geometry, dot};
 use crate::settings::{Scheme, Solver};
@@ -146,13 +147,14 @@ impl Flight<'_> {
         carriers: &[Option<(usize, ModalModel)>],
         step: f64,
     ) -> Result<f64> {
-        let Parameters { scheme, damping_ratios, .. } = self.parameters;
+        let Parameters { scheme, damping_ratios, mode_damping, .. } = self.parameters;
         let mut model = self.compiled.bodies[self.body].model.with_nodes(&met.nodes);
-        model.damping_ratios.fill(damping_ratios[self.body]);
+        fill_ratios(&mut model.damping_ratios, damping_ratios[self.body], &mode_damping[self.body], 1);
         let mut matrix = stability::delassus(&model, *scheme, step, friction, &met.directions);
         for carrier in self.compiled.carriers_of(self.body) {
             let Some(mut seen) = seen_by(carrier, met, laws, carriers) else { continue };
-            seen.damping_ratios.fill(damping_ratios[self.compiled.bodies.len() + carrier]);
+            let place = self.compiled.bodies.len() + carrier;
+            fill_ratios(&mut seen.damping_ratios, damping_ratios[place], &mode_damping[place], 1);
             matrix += stability::delassus(&seen, *scheme, step, friction, &met.directions);
         }
         let diagonal = matrix.diagonal();

@@ -150,9 +150,10 @@ impl Builder {
     }
 
     /// A modal damping ratio.
-    pub fn damping(&mut self, quantity: Quantity, name: &str, start: f64, text: &str) {
+    pub fn damping(&mut self, quantity: Quantity, name: &str, start: f64, text: &str) -> &mut Variable {
         let row = self.parameter(quantity, name, None, start, text);
         (row.min, row.max) = (Some(0.0), Some(DAMPING));
+        row
     }
 
     /// Internal step, how many there may be, scheme and solver.

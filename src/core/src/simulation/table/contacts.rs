@@ -62,7 +62,7 @@ pub fn totals(table: &mut Builder, friction: bool) {
 type Energy = (&'static str, Span, Quantity, &'static str, fn(&View) -> f64);
 
 /// All rows of the ledger; what has no text is told in other words of rotors and of free bodies.
-const ENERGIES: [Energy; 18] = [
+const ENERGIES: [Energy; 19] = [
     ("kinetic_energy", Span::Point, Quantity::KineticEnergy, "", |view| view.energies.0),
     ("strain_energy", Span::Point, Quantity::StrainEnergy, "", |view| view.energies.1),
     (
@@ -100,6 +100,13 @@ const ENERGIES: [Energy; 18] = [
         Quantity::Output,
         "Work of centrifugal, thermal and nodal-diameter loads since the start",
         |view| view.ledger().load_work.value(),
+    ),
+    (
+        "excitation_work",
+        Span::Total,
+        Quantity::Output,
+        "Work of the excitation of the blades since the start",
+        |view| view.ledger().excitation_work.value(),
     ),
     (
         "external_work",
@@ -164,6 +171,7 @@ pub fn energies(table: &mut Builder, parts: &Parts) {
     let mut words = words(parts).into_iter();
     for (name, span, quantity, text, read) in ENERGIES.into_iter().filter(|row| exists(parts, row.0)) {
         let text = if text.is_empty() { words.next().unwrap_or_default() } else { text };
+        let text = if name == "stiffening_work" && softens(parts) { SOFTENED } else { text };
         table.output(name, span, Some((&ENERGY, 1.0)), text, scalar(read)).quantity = quantity;
     }
     let relative = table.output(
@@ -174,6 +182,14 @@ pub fn energies(table: &mut Builder, parts: &Parts) {
         scalar(|view| view.relative_residual()),
     );
     relative.quantity = Quantity::EnergyResidualRelative;
+}
+
+/// Stiffening where heat softens too.
+const SOFTENED: &str =
+    "Strain energy that changes of speed and temperature add by stiffening and softening since the start";
+
+fn softens(parts: &Parts) -> bool {
+    parts.bodies().iter().any(|body| body.structure.softening != 0.0)
 }
 
 /// Of kinetic energy, strain energy and impacts.
@@ -200,10 +216,11 @@ fn exists(parts: &Parts, name: &str) -> bool {
         "wear_work" => pairs.iter().any(|pair| pair.contact.coating.is_some()),
         "cutting_work" => parts.is_cut(),
         "load_work" => features::is_loaded(parts),
+        "excitation_work" => bodies.iter().any(|body| body.structure.excitation.is_some()),
         // What flies freely has no inputs that could work.
         "external_work" => bodies.iter().any(|body| !body.free),
         "shaft_work" => bodies.iter().any(turns),
-        "stiffening_work" => bodies.iter().any(|body| body.structure.spin.stiffening),
+        "stiffening_work" => bodies.iter().any(|body| body.structure.spin.stiffening) || softens(parts),
         "whirl_work" => bodies.iter().any(|body| body.structure.whirl),
         "shift_work" => bodies.iter().any(|body| body.structure.axial_shift),
         "casing_motion_work" => pairs.iter().any(|pair| pair.surface.moving),

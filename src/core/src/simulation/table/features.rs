@@ -1,5 +1,6 @@
 //! Rows of what only some scenes ask for.
 
+use super::blades;
 use super::builder::Builder;
 use super::parts::{AXES, Body, Carrier, Pair, Parts, largest_length};
 use crate::laws::coating::Coating;
@@ -10,28 +11,30 @@ use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, T
 use crate::variables::{Kind, Quantity, Span, Start, Variability};
 
 /// Temperatures beyond this are not what a linear expansion describes (K).
-const LARGEST_TEMPERATURE: f64 = 3000.0;
+pub const LARGEST_TEMPERATURE: f64 = 3000.0;
 
 /// Whether centrifugal, thermal or nodal-diameter loads act.
 pub fn is_loaded(parts: &Parts) -> bool {
     let loaded = |carrier: &Carrier| carrier.structure.thermal || carrier.structure.load.is_some();
-    parts.bodies().iter().any(|body| body.structure.spin.growth) || parts.carriers().iter().any(loaded)
+    let heated = |body: &Body| body.structure.spin.growth || body.structure.thermal;
+    parts.bodies().iter().any(heated) || parts.carriers().iter().any(loaded)
 }
 
 /// Whether inputs move or load something; growth and stiffening follow the speed as such an input.
 pub fn has_moving_inputs(parts: &Parts) -> bool {
     let moves = |body: &Body| {
-        let StructureSettings { whirl, axial_shift, spin, .. } = body.structure;
-        *whirl || *axial_shift || spin.stiffening || spin.coriolis
+        let StructureSettings { whirl, axial_shift, spin, excitation, .. } = body.structure;
+        *whirl || *axial_shift || spin.stiffening || spin.coriolis || excitation.is_some()
     };
     parts.pairs().iter().any(|pair| pair.surface.moving) || parts.bodies().iter().any(moves) || is_loaded(parts)
 }
 
-/// Whirl, axial shift, temperatures, nodal-diameter load.
+/// Whirl, axial shift, excitation, temperatures, nodal-diameter load.
 pub fn inputs(table: &mut Builder, parts: &Parts) {
     for body in &parts.bodies() {
         table.belongs(body.index, parts.of_body(body));
         shaft(table, body);
+        blades::inputs(table, parts, body);
     }
     for carrier in &parts.carriers() {
         table.belongs(carrier.index, parts.of_carrier(carrier));
@@ -88,6 +91,7 @@ pub fn damping(table: &mut Builder, carrier: &Carrier, prefix: String, name: &st
     let ratio = carrier.structure.damping_ratio.unwrap_or(carrier.rom.damping_ratio);
     let row = if carrier.open { "damping_ratio" } else { "casing_damping_ratio" };
     table.damping(Quantity::CarrierDampingRatio, row, ratio, &format!("Modal damping ratio of {name}"));
+    blades::mode_damping(table, Quantity::CarrierModeDamping, &format!("{row}s"), carrier.structure, name);
 }
 
 /// Damping of casings, share of the friction heat.

@@ -3,6 +3,7 @@
 //! Names of a scene with one rotor are plain. Where several structures touch, what belongs to one starts with its name; of several
 //! pairs, what belongs to one starts with the name of its surface.
 
+mod blades;
 mod builder;
 mod contacts;
 mod features;
@@ -99,6 +100,9 @@ fn parameters(table: &mut Builder, parts: &Parts) {
         let rigid = if body.free { "; its rigid modes are not damped" } else { "" };
         let text = format!("Modal damping ratio of {}{rigid}", parts.rotor(body));
         table.damping(Quantity::DampingRatio, "damping_ratio", ratio, &text);
+        let name = parts.rotor(body);
+        blades::mode_damping(table, Quantity::ModeDamping, "damping_ratios", body.structure, &name);
+        blades::parameters(table, body);
     }
     for carrier in parts.carriers().iter().filter(|carrier| carrier.open) {
         features::damping(table, carrier, format!("{}.", carrier.structure.name), &carrier.structure.name);

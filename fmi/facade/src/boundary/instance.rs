@@ -1,0 +1,201 @@
+//! Instances as the importer holds them, and the guard around every call on one.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::{Mutex, TryLockError};
+
+use super::float_environment::StandardFloats;
+use super::log::{Log, Sink};
+use super::{Environment, IntermediateUpdate, Text, panics};
+use crate::slave::order::{self, Rule};
+use crate::slave::{Dialect, Phase, Refusal, Result, Slave, Status};
+use crate::unit::Load;
+
+/// FMI 3.0 callbacks and flags that belong to stepping.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Callbacks {
+    /// `intermediateUpdate`, may be NULL.
+    pub update: Option<IntermediateUpdate>,
+    /// `earlyReturnAllowed`.
+    pub early_return_allowed: bool,
+    /// `instanceEnvironment`.
+    pub environment: Environment,
+}
+
+/// What a handle points to. The mutex costs some twenty nanoseconds a call and buys two answers that the standard leaves
+/// open: a call on an instance that another thread is using is refused, and a panic inside the slave poisons it for good.
+#[derive(Debug)]
+pub(crate) struct Instance {
+    dialect: Dialect,
+    slave: Mutex<Slave>,
+    /// Messages go out after the lock is released, so that a logger may call functions on the instance.
+    pub(super) log: Log,
+    /// Set at instantiation.
+    pub callbacks: Option<Callbacks>,
+}
+
+/// `fmi2Component`, `fmi3Instance`: NULL, or what [`instantiate`] returned and [`release`] has not yet taken back.
+#[derive(Debug, Clone, Copy)]
+#[repr(transparent)]
+pub struct Handle(*mut Instance);
+
+impl Handle {
+    const NULL: Self = Self(std::ptr::null_mut());
+
+    fn instance(&self) -> Option<&Instance> {
+        // SAFETY: null is handled by `as_ref`; otherwise the importer passes what `instantiate` returned and `release` has
+        // not taken back (the contract of both standards). Only shared borrows of an instance are ever made, so that calls
+        // from callbacks are sound; the mutex inside gives exclusive access to the slave.
+        unsafe { Some(self.0).filter(|pointer| pointer.is_aligned())?.as_ref() }
+    }
+}
+
+/// Arguments of the instantiation functions.
+pub(crate) struct Instantiation<'a> {
+    /// Version of the standard, and with it how to read the location.
+    pub dialect: Dialect,
+    /// Exported function, for messages.
+    pub function: &'static str,
+    /// `instanceName`.
+    pub name: Text,
+    /// `fmuGUID`, `instantiationToken`.
+    pub token: Text,
+    /// `fmuResourceLocation`, `resourcePath`.
+    pub location: Text,
+    /// Makes the unit.
+    pub load: Load,
+    /// Reads the location.
+    pub locate: fn(&str) -> Result<PathBuf, String>,
+    /// Where messages go.
+    pub sink: Sink,
+    /// `loggingOn`.
+    pub logging_on: bool,
+    /// FMI 3.0 only.
+    pub callbacks: Option<Callbacks>,
+    /// Further checks by the version's own rules.
+    pub check: &'a dyn Fn(&Slave) -> Result<()>,
+}
+
+/// Make an instance; NULL with a message if that is not possible.
+pub(crate) fn instantiate(request: Instantiation<'_>) -> Handle {
+    panics::silence();
+    let function = request.function;
+    let log = Log::new(request.sink, request.logging_on);
+    let built = catch_unwind(AssertUnwindSafe(|| {
+        let _floats = StandardFloats::enter();
+        let name = request.name.required("instanceName")?;
+        if name.trim().is_empty() {
+            return Err(Refusal::error("instanceName is empty. Pass a name with at least one visible character"));
+        }
+        let (token, location) = match request.dialect {
+            Dialect::Fmi2 => ("fmuGUID", "fmuResourceLocation"),
+            Dialect::Fmi3 => ("instantiationToken", "resourcePath"),
+        };
+        let token = request.token.required(token)?;
+        let unlocated =
+            || format!("{location} is NULL, but this FMU reads its model from there. Pass the unpacked resources");
+        let location = request.location.read(location)?.ok_or_else(|| Refusal::error(unlocated()))?;
+        let directory = (request.locate)(location).map_err(Refusal::error)?;
+        let slave = Slave::new(request.dialect, &directory, token, request.load)?;
+        (request.check)(&slave)?;
+        Ok(slave)
+    }));
+    match built.unwrap_or_else(|payload| Err(Refusal::error(panics::describe(&*payload)))) {
+        Ok(slave) => {
+            log.emit(Status::Ok, &format!("{function}: instantiated from its resources, waiting for start values"));
+            let instance =
+                Instance { dialect: request.dialect, slave: Mutex::new(slave), log, callbacks: request.callbacks };
+            Handle(Box::into_raw(Box::new(instance)))
+        }
+        Err(refusal) => {
+            log.emit(Status::Error, &format!("{function}: {refusal}"));
+            Handle::NULL
+        }
+    }
+}
+
+/// Refuse to instantiate; the message goes to the importer.
+pub(crate) fn refuse_instantiation(sink: Sink, function: &str, reason: &str) -> Handle {
+    Log::new(sink, false).emit(Status::Error, &format!("{function}: {reason}"));
+    Handle::NULL
+}
+
+/// Free an instance. NULL is legal. A free from within an intermediate update is refused: the step under way needs it.
+pub(crate) fn release(handle: Handle, rule: &Rule) {
+    let Some(instance) = handle.instance() else { return };
+    if instance.dialect != rule.dialect() {
+        return instance.log.emit(Status::Error, &format!("{}: {}", rule.name, other_version(instance)));
+    }
+    let under_way = match instance.slave.try_lock() {
+        Ok(slave) => matches!(slave.phase(), Phase::Updating { .. }),
+        Err(TryLockError::Poisoned(_)) => false,
+        Err(TryLockError::WouldBlock) => true,
+    };
+    if under_way {
+        let message = "a step is under way, the instance is not freed. Free it after the step has returned";
+        return instance.log.emit(Status::Error, &format!("{}: {message}", rule.name));
+    }
+    // SAFETY: the handle came from `Box::into_raw` in `instantiate`, and by the contract of both standards this is the last
+    // use of it; no borrow is alive, for the shared one above is not used any more and no call is under way.
+    let instance = unsafe { Box::from_raw(handle.0) };
+    // A destructor that panics must not reach the importer; there is no state left to save then.
+    let _ = catch_unwind(AssertUnwindSafe(|| drop(instance)));
+}
+
+fn other_version(instance: &Instance) -> String {
+    format!("the instance was made by the functions of {:?}. Call the functions of that version", instance.dialect)
+}
+
+/// The guard: every call on an instance goes through here. It checks the instance, that it is not faulted, that the call
+/// is allowed now; it puts the caller's floating-point environment aside (callbacks have it again), catches panics, hands
+/// messages to the importer and gives the status. `None` if not carried out.
+pub(crate) fn enter<T>(
+    handle: Handle,
+    rule: &Rule,
+    action: impl FnOnce(&mut Slave, &Instance) -> Result<(Status, T)>,
+) -> (Status, Option<T>) {
+    let Some(instance) = handle.instance() else { return (Status::Error, None) };
+    let call = catch_unwind(AssertUnwindSafe(|| {
+        let _floats = StandardFloats::enter();
+        let mut slave = instance.slave.try_lock().map_err(|error| {
+            Refusal::error(match error {
+                TryLockError::Poisoned(_) => "the instance is out of order after an internal error. Free it",
+                TryLockError::WouldBlock => {
+                    "another call on this instance is under way. Use an instance from one thread"
+                }
+            })
+        })?;
+        if instance.dialect != rule.dialect() {
+            return Err(Refusal::error(other_version(instance)));
+        }
+        let outcome = rule.check(slave.phase()).and_then(|()| action(&mut slave, instance));
+        Ok((outcome, slave.take_notes(), slave.time()))
+    }));
+    let (outcome, notes, at) = match call {
+        Ok(Ok((outcome, notes, time))) => (outcome, notes, format!(" (t = {time} s)")),
+        Ok(Err(refusal)) => (Err(refusal), Vec::new(), String::new()),
+        Err(payload) => (Err(Refusal::error(panics::describe(&*payload))), Vec::new(), String::new()),
+    };
+    for (status, message) in notes {
+        instance.log.emit(status, &format!("{}{at}: {message}", rule.name));
+    }
+    match outcome {
+        Ok((status, value)) => (status, Some(value)),
+        Err(refusal) => {
+            instance.log.emit(refusal.status, &format!("{}{at}: {refusal}", rule.name));
+            (refusal.status, None)
+        }
+    }
+}
+
+/// The guard for calls whose only result is their status.
+pub(crate) fn guard(handle: Handle, rule: &Rule, action: impl FnOnce(&mut Slave) -> Result<Status>) -> Status {
+    enter(handle, rule, |slave, _| Ok((action(slave)?, ()))).0
+}
+
+/// Answer of a function whose capability this FMU does not have.
+pub(crate) fn unsupported(handle: Handle, name: &'static str, capability: &str) -> Status {
+    guard(handle, &order::unsupported(name), |_| {
+        Err(Refusal::error(format!("this FMU has no {capability}, as its modelDescription.xml says. Do not call it")))
+    })
+}

@@ -1,0 +1,129 @@
+//! Messages to the importer's logger.
+
+use std::ffi::{CStr, CString, c_char};
+use std::fmt;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use super::Environment;
+use crate::slave::Status;
+
+/// `fmi2CallbackLogger`: variadic, with a printf format.
+pub type Fmi2Logger = unsafe extern "C" fn(Environment, *const c_char, Status, *const c_char, *const c_char, ...);
+
+/// `fmi3LogMessageCallback`.
+pub type Fmi3Logger = unsafe extern "C" fn(Environment, Status, *const c_char, *const c_char);
+
+/// Categories as `modelDescription.xml` lists them; the last one stands for everything.
+const CATEGORIES: [&CStr; 5] =
+    [c"logStatusWarning", c"logStatusDiscard", c"logStatusError", c"logStatusFatal", c"logAll"];
+
+/// Bit of `logAll`.
+const ALL: u8 = 1 << 4;
+/// Bits of the messages that explain an answer other than OK.
+const EXPLANATIONS: u8 = ALL - 1;
+
+/// Where messages go.
+pub(crate) enum Sink {
+    /// FMI 2.0.
+    Fmi2 {
+        /// May be NULL.
+        logger: Option<Fmi2Logger>,
+        /// Goes back to the importer.
+        environment: Environment,
+        /// Instance name, copied.
+        name: CString,
+    },
+    /// FMI 3.0.
+    Fmi3 {
+        /// May be NULL.
+        logger: Option<Fmi3Logger>,
+        /// Goes back to the importer.
+        environment: Environment,
+    },
+}
+
+impl fmt::Debug for Sink {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Fmi2 { .. } => "Fmi2",
+            Self::Fmi3 { .. } => "Fmi3",
+        })
+    }
+}
+
+/// The importer's logger with the categories it wants.
+///
+/// Messages that explain an answer other than OK are given with `loggingOn` false too: an importer that gets an error
+/// must be able to say why. Only a choice of categories silences them.
+#[derive(Debug)]
+pub(crate) struct Log {
+    sink: Sink,
+    wanted: AtomicU8,
+}
+
+impl Log {
+    /// A log as at instantiation.
+    pub(super) fn new(sink: Sink, logging_on: bool) -> Self {
+        let log = Self { sink, wanted: AtomicU8::new(EXPLANATIONS) };
+        log.choose(logging_on, &[]).unwrap_or_default();
+        log
+    }
+
+    /// `fmi2SetDebugLogging`, `fmi3SetDebugLogging`: no categories means all.
+    ///
+    /// # Errors
+    /// A category that does not exist; nothing is changed then.
+    pub(super) fn choose(&self, logging_on: bool, categories: &[&str]) -> Result<(), String> {
+        let mut wanted = 0;
+        for category in categories {
+            let known = CATEGORIES.iter().position(|known| known.to_bytes() == category.as_bytes());
+            wanted |= 1
+                << known.ok_or_else(|| {
+                    let names = CATEGORIES.map(|name| name.to_string_lossy().into_owned()).join(", ");
+                    format!("log category \"{category}\" does not exist. Categories: {names}")
+                })?;
+        }
+        let wanted = match (logging_on, categories) {
+            (false, _) => EXPLANATIONS,
+            (true, []) => EXPLANATIONS | ALL,
+            (true, _) => wanted,
+        };
+        self.wanted.store(wanted, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Hand a message to the importer, if it wants its category.
+    pub(crate) fn emit(&self, status: Status, message: &str) {
+        let category = match status {
+            Status::Ok => 4,
+            Status::Warning => 0,
+            Status::Discard => 1,
+            Status::Error => 2,
+        };
+        if self.wanted.load(Ordering::Relaxed) & (1 << category | ALL) == 0 {
+            return;
+        }
+        // In messages "#" begins a value reference (FMI 2.0.4, section 2.1.5); text is free of NUL after the replacement.
+        let text = CString::new(message.replace('#', "##").replace('\0', " ")).unwrap_or_default();
+        self.sink.send(status, CATEGORIES[category], &text);
+    }
+}
+
+impl Sink {
+    fn send(&self, status: Status, category: &CStr, text: &CStr) {
+        match self {
+            Self::Fmi2 { logger: Some(logger), environment, name } => {
+                // SAFETY: the importer's own function, called as the standard says; the texts outlive the call. The format
+                // consumes exactly the one argument that follows it.
+                unsafe {
+                    logger(*environment, name.as_ptr(), status, category.as_ptr(), c"%s".as_ptr(), text.as_ptr());
+                }
+            }
+            Self::Fmi3 { logger: Some(logger), environment } => {
+                // SAFETY: the importer's own function, called as the standard says; the texts outlive the call.
+                unsafe { logger(*environment, status, category.as_ptr(), text.as_ptr()) }
+            }
+            _ => {}
+        }
+    }
+}

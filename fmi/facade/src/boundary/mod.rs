@@ -1,0 +1,70 @@
+//! The only unsafe code of the library: C pointers to Rust values and back, callbacks, and the guard around every call.
+
+mod calls;
+mod derivatives;
+mod float_environment;
+mod instance;
+mod log;
+mod panics;
+mod pointers;
+
+pub(crate) use calls::{StateHandle, set_debug_logging, strings};
+pub(crate) use calls::{get, set, state};
+pub(crate) use derivatives::{ADJOINT, DIRECTIONAL, derivatives};
+pub use instance::Handle;
+pub(crate) use instance::{Callbacks, Instantiation, enter, instantiate, release};
+pub(crate) use instance::{guard, refuse_instantiation, unsupported};
+pub(crate) use log::Sink;
+pub use log::{Fmi2Logger, Fmi3Logger};
+pub(crate) use pointers::Out;
+pub use pointers::{Environment, In, Text};
+
+/// `fmi3IntermediateUpdateCallback`.
+pub type IntermediateUpdate = unsafe extern "C" fn(
+    environment: Environment,
+    intermediate_update_time: f64,
+    set_requested: u8,
+    get_allowed: u8,
+    step_finished: u8,
+    can_return_early: u8,
+    early_return_requested: *mut u8,
+    early_return_time: *mut f64,
+);
+
+/// Call the importer's intermediate update; the time at which it wants the step to end early, if it does.
+pub(crate) fn intermediate_update(
+    callback: IntermediateUpdate,
+    environment: Environment,
+    time: f64,
+    set_requested: bool,
+    can_return_early: bool,
+) -> Option<f64> {
+    let (mut requested, mut at) = (0u8, time);
+    // SAFETY: the importer gave this function at instantiation for exactly this use (FMI 3.0.2, section 4.2.2), the two
+    // pointers are to locals that outlive the call, and no borrow of the instance is held, so that the callback may call
+    // get and set functions on it.
+    unsafe {
+        callback(
+            environment,
+            time,
+            u8::from(set_requested),
+            1,
+            1,
+            u8::from(can_return_early),
+            &raw mut requested,
+            &raw mut at,
+        );
+    }
+    (requested != 0).then_some(at)
+}
+
+/// Exported functions with their arguments after the instance, and the capability they belong to.
+macro_rules! refused {
+    ($($name:ident ($($argument:ident: $type:ty),*) $capability:expr;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub(crate) extern "C" fn $name(instance: $crate::boundary::Handle $(, $argument: $type)*) -> $crate::slave::Status {
+            $crate::boundary::unsupported(instance, stringify!($name), $capability)
+        }
+    )*};
+}
+pub(crate) use refused;

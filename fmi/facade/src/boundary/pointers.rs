@@ -1,0 +1,151 @@
+//! Pointers as C passes them. Each type is a bare pointer in the ABI; what the standard promises about it (valid for as
+//! many elements as the accompanying count says, for the duration of the call) is used here and nowhere else.
+
+use std::ffi::{CStr, c_char, c_void};
+use std::mem::size_of;
+
+use crate::slave::{Refusal, Result};
+
+/// The importer's pointer that goes back to it with every callback, never followed.
+pub type Environment = *mut c_void;
+
+/// Array or single value to read from.
+#[derive(Debug, Clone, Copy)]
+#[repr(transparent)]
+pub struct In<T>(*const T);
+
+/// Array or single value to write to.
+#[derive(Debug, Clone, Copy)]
+#[repr(transparent)]
+pub(crate) struct Out<T>(*mut T);
+
+/// NUL-terminated text.
+#[derive(Debug, Clone, Copy)]
+#[repr(transparent)]
+pub struct Text(*const c_char);
+
+/// A checked place for a known number of values.
+#[derive(Debug)]
+pub(crate) struct Window<T> {
+    pointer: *mut T,
+    length: usize,
+}
+
+fn check<T>(pointer: *const T, count: usize, name: &str) -> Result<()> {
+    if pointer.is_null() {
+        return Err(Refusal::error(format!(
+            "argument {name} is NULL with {count} elements. Pass an array of that length"
+        )));
+    }
+    if !pointer.is_aligned() {
+        return Err(Refusal::error(format!("argument {name} is not aligned for its type. Pass a proper array")));
+    }
+    if count > isize::MAX.unsigned_abs() / size_of::<T>().max(1) {
+        return Err(Refusal::error(format!(
+            "argument {name}: {count} elements do not fit into memory. Pass the real count"
+        )));
+    }
+    Ok(())
+}
+
+impl<T> In<T> {
+    /// The array; empty without touching the pointer if `count` is zero.
+    ///
+    /// # Errors
+    /// NULL, misaligned, or more than `limit` elements.
+    pub(crate) fn array(&self, count: usize, limit: usize, name: &str) -> Result<&[T]> {
+        if count == 0 {
+            return Ok(&[]);
+        }
+        if count > limit {
+            return Err(Refusal::error(format!(
+                "{count} elements of {name} are more than this FMU can mean. Pass the real count"
+            )));
+        }
+        check(self.0, count, name)?;
+        // SAFETY: not null, aligned, and by the standard's contract an array of `count` initialised elements that nobody
+        // changes during the call; the borrow ends with the argument, which lives for the call.
+        Ok(unsafe { std::slice::from_raw_parts(self.0, count) })
+    }
+
+    /// The single value; `None` if the pointer is NULL.
+    pub(crate) fn single(&self) -> Option<&T> {
+        // SAFETY: null is handled by `as_ref`, misalignment by the filter, and by the standard's contract the pointer is to
+        // an initialised value for the duration of the call.
+        unsafe { Some(self.0).filter(|pointer| pointer.is_aligned())?.as_ref() }
+    }
+}
+
+impl<T: Copy> Out<T> {
+    /// ClosestPoint for `count` values; nothing is touched if that is zero.
+    ///
+    /// # Errors
+    /// NULL or misaligned.
+    pub(crate) fn window(&self, count: usize, name: &str) -> Result<Window<T>> {
+        if count > 0 {
+            check(self.0.cast_const(), count, name)?;
+        }
+        Ok(Window { pointer: self.0, length: count })
+    }
+
+    /// ClosestPoint for one value.
+    ///
+    /// # Errors
+    /// NULL or misaligned.
+    pub(crate) fn single(&self, name: &str) -> Result<Window<T>> {
+        self.window(1, name)
+    }
+
+    /// Write one value if there is a place for it.
+    pub(crate) fn offer(&self, value: T) {
+        if let Ok(window) = self.single("") {
+            window.fill(&[value]);
+        }
+    }
+
+    /// Whether the pointer is NULL.
+    pub(crate) fn is_null(&self) -> bool {
+        self.0.is_null()
+    }
+}
+
+impl<T: Copy> Window<T> {
+    /// Write the values. Their number must be that of the window; with any other nothing is written.
+    pub(crate) fn fill(self, values: &[T]) {
+        if values.len() == self.length && self.length > 0 {
+            // SAFETY: checked not null and aligned, by the standard's contract valid for `length` elements; `copy` allows
+            // the importer's array to be anywhere.
+            unsafe { std::ptr::copy(values.as_ptr(), self.pointer, self.length) };
+        }
+    }
+
+    /// The value in the first place, which by the standard is initialised for in-out arguments.
+    pub(crate) fn current(&self) -> Option<T> {
+        // SAFETY: checked not null and aligned; in-out arguments are initialised by the importer.
+        (self.length > 0).then(|| unsafe { self.pointer.read() })
+    }
+}
+
+impl Text {
+    /// The text; `None` if the pointer is NULL.
+    ///
+    /// # Errors
+    /// Not UTF-8.
+    pub(crate) fn read(&self, name: &str) -> Result<Option<&str>> {
+        if self.0.is_null() {
+            return Ok(None);
+        }
+        // SAFETY: not null, and by the standard's contract NUL-terminated and unchanged during the call.
+        let text = unsafe { CStr::from_ptr(self.0) };
+        let text = text.to_str().map_err(|_| Refusal::error(format!("argument {name} is not UTF-8. Pass UTF-8 text")));
+        text.map(Some)
+    }
+
+    /// The text.
+    ///
+    /// # Errors
+    /// NULL or not UTF-8.
+    pub(crate) fn required(&self, name: &str) -> Result<&str> {
+        self.read(name)?.ok_or_else(|| Refusal::error(format!("argument {name} is NULL. Pass a text")))
+    }
+}

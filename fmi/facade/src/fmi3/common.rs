@@ -1,0 +1,197 @@
+//! Life of an instance, saved states, logging.
+
+use std::ffi::c_char;
+
+use super::Boolean;
+use crate::boundary::{
+    self, Callbacks, Environment, Fmi3Logger, Handle, In, Instantiation, IntermediateUpdate, Out, Sink, StateHandle,
+    Text, guard, instantiate, refuse_instantiation, release, state,
+};
+use crate::location;
+use crate::slave::order::fmi3 as order;
+use crate::slave::{Dialect, Experiment, Refusal, Status};
+use crate::unit::Load;
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3GetVersion() -> *const c_char {
+    c"3.0".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3SetDebugLogging(
+    instance: Handle,
+    loggingOn: Boolean,
+    nCategories: usize,
+    categories: In<Text>,
+) -> Status {
+    boundary::set_debug_logging(instance, &order::SET_DEBUG_LOGGING, loggingOn != 0, (categories, nCategories))
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3InstantiateModelExchange(
+    _instanceName: Text,
+    _instantiationToken: Text,
+    _resourcePath: Text,
+    _visible: Boolean,
+    _loggingOn: Boolean,
+    instanceEnvironment: Environment,
+    logMessage: Option<Fmi3Logger>,
+) -> Handle {
+    refuse_instantiation(
+        Sink::Fmi3 { logger: logMessage, environment: instanceEnvironment },
+        "fmi3InstantiateModelExchange",
+        "this FMU has no Model Exchange interface. Call fmi3InstantiateCoSimulation",
+    )
+}
+
+/// `fmi3InstantiateCoSimulation` of a library: makes its unit by `load`. The library exports it, see [`crate::library`].
+pub fn instantiate_unit(
+    load: Load,
+    instanceName: Text,
+    instantiationToken: Text,
+    resourcePath: Text,
+    loggingOn: Boolean,
+    eventModeUsed: Boolean,
+    earlyReturnAllowed: Boolean,
+    requiredIntermediateVariables: In<u32>,
+    nRequiredIntermediateVariables: usize,
+    instanceEnvironment: Environment,
+    logMessage: Option<Fmi3Logger>,
+    intermediateUpdate: Option<IntermediateUpdate>,
+) -> Handle {
+    instantiate(Instantiation {
+        dialect: Dialect::Fmi3,
+        load,
+        function: "fmi3InstantiateCoSimulation",
+        name: instanceName,
+        token: instantiationToken,
+        location: resourcePath,
+        locate: location::from_native,
+        sink: Sink::Fmi3 { logger: logMessage, environment: instanceEnvironment },
+        logging_on: loggingOn != 0,
+        callbacks: Some(Callbacks {
+            update: intermediateUpdate,
+            early_return_allowed: earlyReturnAllowed != 0,
+            environment: instanceEnvironment,
+        }),
+        check: &|slave| {
+            if eventModeUsed != 0 {
+                return Err(Refusal::error(
+                    "eventModeUsed is true, but this FMU has no Event Mode (hasEventMode is false). Pass fmi3False",
+                ));
+            }
+            let (count, limit) = (nRequiredIntermediateVariables, slave.reference_limit());
+            slave.check_intermediate_variables(requiredIntermediateVariables.array(
+                count,
+                limit,
+                "requiredIntermediateVariables",
+            )?)
+        },
+    })
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3InstantiateScheduledExecution(
+    _instanceName: Text,
+    _instantiationToken: Text,
+    _resourcePath: Text,
+    _visible: Boolean,
+    _loggingOn: Boolean,
+    instanceEnvironment: Environment,
+    logMessage: Option<Fmi3Logger>,
+    _clockUpdate: Option<unsafe extern "C" fn(Environment)>,
+    _lockPreemption: Option<unsafe extern "C" fn()>,
+    _unlockPreemption: Option<unsafe extern "C" fn()>,
+) -> Handle {
+    refuse_instantiation(
+        Sink::Fmi3 { logger: logMessage, environment: instanceEnvironment },
+        "fmi3InstantiateScheduledExecution",
+        "this FMU has no Scheduled Execution interface. Call fmi3InstantiateCoSimulation",
+    )
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3FreeInstance(instance: Handle) {
+    release(instance, &order::FREE_INSTANCE);
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3EnterInitializationMode(
+    instance: Handle,
+    _toleranceDefined: Boolean,
+    _tolerance: f64,
+    startTime: f64,
+    stopTimeDefined: Boolean,
+    stopTime: f64,
+) -> Status {
+    guard(instance, &order::ENTER_INITIALIZATION_MODE, |slave| {
+        let experiment = Experiment::new(startTime, (stopTimeDefined != 0).then_some(stopTime))?;
+        slave.enter_initialisation(Some(experiment));
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3ExitInitializationMode(instance: Handle) -> Status {
+    guard(instance, &order::EXIT_INITIALIZATION_MODE, |slave| slave.exit_initialisation())
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3Terminate(instance: Handle) -> Status {
+    guard(instance, &order::TERMINATE, |slave| {
+        slave.terminate();
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3Reset(instance: Handle) -> Status {
+    guard(instance, &order::RESET, |slave| {
+        slave.reset();
+        Ok(Status::Ok)
+    })
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3GetFMUState(instance: Handle, FMUState: Out<StateHandle>) -> Status {
+    state::save(instance, &order::GET_FMU_STATE, FMUState)
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3SetFMUState(instance: Handle, FMUState: StateHandle) -> Status {
+    state::restore(instance, &order::SET_FMU_STATE, FMUState)
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3FreeFMUState(instance: Handle, FMUState: Out<StateHandle>) -> Status {
+    state::free(instance, &order::FREE_FMU_STATE, FMUState)
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3SerializedFMUStateSize(
+    instance: Handle,
+    FMUState: StateHandle,
+    size: Out<usize>,
+) -> Status {
+    state::size(instance, &order::SERIALIZED_FMU_STATE_SIZE, FMUState, size)
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3SerializeFMUState(
+    instance: Handle,
+    FMUState: StateHandle,
+    serializedState: Out<u8>,
+    size: usize,
+) -> Status {
+    state::serialise(instance, &order::SERIALIZE_FMU_STATE, FMUState, serializedState, size)
+}
+
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn fmi3DeserializeFMUState(
+    instance: Handle,
+    serializedState: In<u8>,
+    size: usize,
+    FMUState: Out<StateHandle>,
+) -> Status {
+    state::deserialise(instance, &order::DESERIALIZE_FMU_STATE, serializedState, size, FMUState)
+}

@@ -1,0 +1,104 @@
+//! The C ABIs of FMI 2.0 (44 functions) and FMI 3.0 (75 functions) over one neutral slave, for any [`Unit`].
+//!
+//! ```text
+//! fmi2/  fmi3/     one expression per exported function, no unsafe block
+//!      \  /
+//!    boundary/     the only unsafe code: pointers to slices and back, callbacks, the guard around every call
+//!       |
+//!     slave/       safe: phase of life, call order, variable access, stepping, saved states
+//!       |
+//!     unit         what a simulation offers to be driven so
+//! ```
+//!
+//! A shared library is a crate that implements [`Unit`] and says how to load it with [`library`]. The functions of the
+//! standards are exported from there: this crate holds all of them but the two that make an instance, since only these have to
+//! know the unit. Several such libraries live in one process without knowing of each other.
+//!
+//! Invariants, written as what is absent: no unsafe code outside `boundary` (the `no_mangle` attributes of the façades
+//! apart), no global mutable state (but the silent panic hook of this library's own copy of the standard library), no
+//! thread, no output, no panic across the ABI, no value handed out by a call that did not succeed.
+#![warn(unreachable_pub)]
+#![deny(unsafe_op_in_unsafe_fn)]
+
+mod boundary;
+mod fmi2;
+mod fmi3;
+#[forbid(unsafe_code)]
+mod location;
+#[forbid(unsafe_code)]
+mod slave;
+#[forbid(unsafe_code)]
+mod unit;
+
+pub use unit::{Load, Loaded, Unit};
+
+/// Types of the two functions that a library exports itself, for [`library`] alone.
+#[doc(hidden)]
+pub mod abi {
+    pub use crate::boundary::{Environment, Fmi2Logger, Fmi3Logger, Handle, In, IntermediateUpdate, Text};
+    pub use crate::fmi2::Boolean as Boolean2;
+    pub use crate::fmi2::common::{CallbackFunctions, instantiate_unit as fmi2_instantiate};
+    pub use crate::fmi3::Boolean as Boolean3;
+    pub use crate::fmi3::common::instantiate_unit as fmi3_instantiate;
+    pub use crate::slave::Status;
+}
+
+/// Make the crate a library of FMI: exports what makes an instance, by a function of type [`Load`].
+#[macro_export]
+macro_rules! library {
+    ($load:expr) => {
+        #[unsafe(no_mangle)]
+        #[allow(non_snake_case, clippy::too_many_arguments, reason = "the standard's")]
+        extern "C" fn fmi2Instantiate(
+            instanceName: $crate::abi::Text,
+            fmuType: i32,
+            fmuGUID: $crate::abi::Text,
+            fmuResourceLocation: $crate::abi::Text,
+            functions: $crate::abi::In<$crate::abi::CallbackFunctions>,
+            _visible: $crate::abi::Boolean2,
+            loggingOn: $crate::abi::Boolean2,
+        ) -> $crate::abi::Handle {
+            $crate::abi::fmi2_instantiate(
+                $load,
+                instanceName,
+                fmuType,
+                fmuGUID,
+                fmuResourceLocation,
+                functions,
+                loggingOn,
+            )
+        }
+
+        #[unsafe(no_mangle)]
+        #[allow(non_snake_case, clippy::too_many_arguments, reason = "the standard's")]
+        extern "C" fn fmi3InstantiateCoSimulation(
+            instanceName: $crate::abi::Text,
+            instantiationToken: $crate::abi::Text,
+            resourcePath: $crate::abi::Text,
+            _visible: $crate::abi::Boolean3,
+            loggingOn: $crate::abi::Boolean3,
+            eventModeUsed: $crate::abi::Boolean3,
+            earlyReturnAllowed: $crate::abi::Boolean3,
+            requiredIntermediateVariables: $crate::abi::In<u32>,
+            nRequiredIntermediateVariables: usize,
+            instanceEnvironment: $crate::abi::Environment,
+            logMessage: Option<$crate::abi::Fmi3Logger>,
+            intermediateUpdate: Option<$crate::abi::IntermediateUpdate>,
+        ) -> $crate::abi::Handle {
+            $crate::abi::fmi3_instantiate(
+                $load,
+                instanceName,
+                instantiationToken,
+                resourcePath,
+                loggingOn,
+                eventModeUsed,
+                earlyReturnAllowed,
+                requiredIntermediateVariables,
+                nRequiredIntermediateVariables,
+                instanceEnvironment,
+                logMessage,
+                intermediateUpdate,
+            )
+        }
+    };
+}

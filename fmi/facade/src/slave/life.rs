@@ -1,0 +1,122 @@
+//! From instantiated to terminated and back: initialisation, termination, reset.
+
+use tiprub_core::variables::Causality;
+
+use super::{Experiment, Phase, Refusal, Result, Slave, Status};
+
+impl Experiment {
+    /// Check start and stop time as an importer gives them.
+    ///
+    /// # Errors
+    /// Non-finite times, stop before start.
+    pub(crate) fn new(start: f64, stop: Option<f64>) -> Result<Self> {
+        if !start.is_finite() {
+            return Err(Refusal::error(format!("startTime = {start} is not finite. Give a start time in seconds")));
+        }
+        match stop {
+            Some(stop) if !(stop.is_finite() && stop >= start) => Err(Refusal::error(format!(
+                "stopTime = {stop} is not a finite time at or after startTime = {start}. Give a later stop time, or \
+                 stopTimeDefined = false"
+            ))),
+            _ => Ok(Self { start, stop }),
+        }
+    }
+}
+
+impl Slave {
+    /// `fmi2SetupExperiment`; may be called again, the last call counts.
+    pub(crate) fn set_experiment(&mut self, experiment: Experiment) {
+        if let Phase::Instantiated { experiment: current } = &mut self.phase {
+            *current = experiment;
+        }
+    }
+
+    /// Enter Initialization Mode, with the experiment given here (FMI 3.0) or before (FMI 2.0).
+    ///
+    /// Nothing is computed yet: parameters may still be set one after the other.
+    pub(crate) fn enter_initialisation(&mut self, given: Option<Experiment>) {
+        if let Phase::Instantiated { experiment } = self.phase {
+            self.phase = Phase::Initialising { experiment: given.unwrap_or(experiment), before: None };
+        }
+    }
+
+    /// Bring outputs up to date: in Initialization Mode and between internal steps they are computed when asked for.
+    ///
+    /// # Errors
+    /// The core's refusal to initialise; other parameters can then be set and the call repeated.
+    pub(super) fn refresh(&mut self) -> Result<()> {
+        match &mut self.phase {
+            Phase::Initialising { experiment, before: before @ None } => {
+                let mut state = vec![0; self.unit.state_size()];
+                self.unit.save_state(&mut state)?;
+                if let Err(error) = self.unit.initialise(experiment.start) {
+                    self.unit.restore_state(&state)?;
+                    return Err(error.into());
+                }
+                *before = Some(state);
+            }
+            Phase::Updating { fresh: fresh @ false, reached, .. } => {
+                self.unit.update_outputs(*reached)?;
+                *fresh = true;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A value is about to be set: in Initialization Mode go back to before the outputs were computed.
+    pub(super) fn invalidate(&mut self) -> Result<()> {
+        if let Phase::Initialising { before, .. } = &mut self.phase
+            && let Some(state) = before.take()
+        {
+            self.unit.restore_state(&state)?;
+        }
+        Ok(())
+    }
+
+    /// Exit Initialization Mode. `Warning` if the core has something to say about the parameters.
+    ///
+    /// # Errors
+    /// The core's refusal; the instance stays in Initialization Mode and can be given other parameters.
+    pub(crate) fn exit_initialisation(&mut self) -> Result<Status> {
+        self.refresh()?;
+        if let Phase::Initialising { experiment, .. } = self.phase {
+            self.phase = Phase::Stepping { stop: experiment.stop };
+        }
+        let warnings: Vec<_> = self.unit.warnings().iter().map(|text| (Status::Warning, text.clone())).collect();
+        let status = if warnings.is_empty() { Status::Ok } else { Status::Warning };
+        self.notes.extend(warnings);
+        Ok(status)
+    }
+
+    /// Terminate; values can still be read afterwards.
+    pub(crate) fn terminate(&mut self) {
+        self.phase = Phase::Terminated { time: self.time() };
+    }
+
+    /// Back to the state after instantiation. Saved states stay valid.
+    pub(crate) fn reset(&mut self) {
+        self.unit.reset();
+        self.strings.clear();
+        self.phase = Phase::Instantiated { experiment: Experiment::default() };
+    }
+
+    /// FMI 3.0: the inputs and outputs which the importer means to access during intermediate updates.
+    ///
+    /// # Errors
+    /// A reference that does not exist, or is no input, output or time.
+    pub(crate) fn check_intermediate_variables(&self, references: &[u32]) -> Result<()> {
+        for &reference in references {
+            let (variable, index) = self.unit.table().locate(reference)?;
+            let accessible = [Causality::Input, Causality::Output, Causality::Independent];
+            if !accessible.contains(&variable.causality) {
+                return Err(Refusal::error(format!(
+                    "requiredIntermediateVariables names {} (value reference {reference}), which is neither input nor \
+                     output. Leave it out",
+                    variable.element_name(index)
+                )));
+            }
+        }
+        Ok(())
+    }
+}

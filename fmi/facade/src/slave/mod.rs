@@ -1,0 +1,175 @@
+//! The neutral slave: what an FMU instance is, whichever version of the standard it is driven through.
+
+mod access;
+mod life;
+pub(crate) mod order;
+mod phase;
+mod snapshot;
+mod stepping;
+mod tangent;
+
+use std::ffi::CString;
+use std::fmt;
+use std::path::Path;
+
+use crate::unit::{Load, Unit};
+
+pub(crate) use access::{Request, Value};
+pub(crate) use phase::{Experiment, Phase};
+
+/// Answer of a call. The numbers are those of `fmi2Status` and `fmi3Status`; `Fatal` (4) is never answered, because in
+/// FMI 2.0 it would condemn all instances of the process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(i32)]
+pub enum Status {
+    /// All well.
+    Ok = 0,
+    /// Done, and the message logged deserves attention.
+    Warning = 1,
+    /// Nothing done, the simulation can go on.
+    Discard = 2,
+    /// Refused or failed, the message logged says why.
+    Error = 3,
+}
+
+/// Which version of the standard an instance was made by: names of types and arguments differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Dialect {
+    /// FMI 2.0.
+    Fmi2,
+    /// FMI 3.0.
+    Fmi3,
+}
+
+/// A call that was not carried out, and the message that explains it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Refusal {
+    /// `Error` or `Discard`.
+    pub status: Status,
+    /// What, where, and the remedy.
+    pub message: String,
+}
+
+impl Refusal {
+    /// A refusal that answers `Error`.
+    pub(crate) fn error(message: impl Into<String>) -> Self {
+        Self { status: Status::Error, message: message.into() }
+    }
+
+    /// A refusal that answers `Discard`.
+    pub(crate) fn discard(message: impl Into<String>) -> Self {
+        Self { status: Status::Discard, message: message.into() }
+    }
+}
+
+impl From<tiprub_core::Error> for Refusal {
+    fn from(error: tiprub_core::Error) -> Self {
+        match error {
+            // Nothing is lost: the importer may go on.
+            tiprub_core::Error::Exhausted { .. } => Self::discard(error.to_string()),
+            _ => Self::error(error.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.message)
+    }
+}
+
+/// Result of the slave's own calls.
+pub(crate) type Result<T, E = Refusal> = std::result::Result<T, E>;
+
+/// One FMU instance without its callbacks.
+#[derive(Debug)]
+pub(crate) struct Slave {
+    dialect: Dialect,
+    unit: Box<dyn Unit>,
+    token: String,
+    arrays: bool,
+    phase: Phase,
+    /// Saved states handed out: the importer holds the address of a box as an opaque handle, which is only ever
+    /// compared, never followed. They are freed with the instance at the latest.
+    ///
+    /// The box is needed: its address is the handle, and must not move when the list grows.
+    #[expect(clippy::vec_box)]
+    snapshots: Vec<Box<snapshot::Snapshot>>,
+    /// Texts handed out by the last call that returned texts.
+    strings: Vec<CString>,
+    /// Messages for the importer that do not come with a refusal.
+    notes: Vec<(Status, String)>,
+}
+
+impl Slave {
+    /// Load the unit from the FMU's resources directory.
+    ///
+    /// # Errors
+    /// Unreadable or damaged resources, a token that does not belong to them, a model that the unit refuses.
+    pub(crate) fn new(dialect: Dialect, resources: &Path, token: &str, load: Load) -> Result<Self> {
+        let loaded = load(resources).map_err(Refusal::error)?;
+        if loaded.token != token {
+            let (name, file) = match dialect {
+                Dialect::Fmi2 => ("fmuGUID", "attribute guid"),
+                Dialect::Fmi3 => ("instantiationToken", "attribute instantiationToken"),
+            };
+            return Err(Refusal::error(format!(
+                "{name} \"{token}\" does not belong to the resources in {}, whose token is \"{}\". Pass the {file} of \
+                 modelDescription.xml of the same FMU, and unpack the FMU completely",
+                resources.display(),
+                loaded.token
+            )));
+        }
+        Ok(Self {
+            dialect,
+            unit: (loaded.unit)()?,
+            token: loaded.token,
+            arrays: loaded.fmi3_arrays && dialect == Dialect::Fmi3,
+            phase: Phase::Instantiated { experiment: Experiment::default() },
+            snapshots: Vec::new(),
+            strings: Vec::new(),
+            notes: Vec::new(),
+        })
+    }
+
+    /// Version of the standard this instance was made by.
+    pub(crate) fn dialect(&self) -> Dialect {
+        self.dialect
+    }
+
+    /// Phase of life.
+    pub(crate) fn phase(&self) -> &Phase {
+        &self.phase
+    }
+
+    /// Time of the instance (s): what the importer would call the current time, in any phase.
+    pub(crate) fn time(&self) -> f64 {
+        match self.phase {
+            Phase::Instantiated { experiment } | Phase::Initialising { experiment, .. } => experiment.start,
+            Phase::Stepping { .. } => self.unit.time(),
+            Phase::Updating { reached, .. } => reached,
+            Phase::Failed { last_good: time } | Phase::Terminated { time } => time,
+        }
+    }
+
+    /// Keep texts that are handed out by pointer.
+    pub(crate) fn keep(&mut self, texts: Vec<CString>) -> &[CString] {
+        self.strings = texts;
+        &self.strings
+    }
+
+    /// Messages that do not come with a refusal, in order; the list is empty afterwards.
+    pub(crate) fn take_notes(&mut self) -> Vec<(Status, String)> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// Hand on what the unit has to say since it was last asked.
+    pub(super) fn hear(&mut self) {
+        self.notes.extend(self.unit.take_notes().into_iter().map(|text| (Status::Warning, text)));
+    }
+
+    /// Add a message to be handed to the importer after the call.
+    pub(crate) fn note(&mut self, status: Status, message: impl Into<String>) {
+        self.notes.push((status, message.into()));
+    }
+}

@@ -1,0 +1,232 @@
+//! Saved states: everything that determines the future of an instance, as bytes.
+//!
+//! Layout, little-endian: magic (8 bytes), version u32, length of the token u32, token, phase u8, stop defined u8, two
+//! zero bytes, time f64, stop time f64, length of the core's state u64, the core's state, FNV-1a 64 of all before. The
+//! length is the same for all states of an FMU.
+
+use super::{Experiment, Phase, Refusal, Result, Slave};
+
+const MAGIC: &[u8; 8] = b"tiprubST";
+const VERSION: u32 = 1;
+const CHECKSUM: usize = 8;
+
+/// One saved state.
+pub(super) type Snapshot = Vec<u8>;
+
+/// Opaque address by which the importer names a saved state.
+pub(crate) type Handle = *const Snapshot;
+
+fn damaged(problem: impl std::fmt::Display) -> Refusal {
+    Refusal::error(format!(
+        "the saved state cannot be used: {problem}. Use a state saved by this very FMU, with all its bytes unchanged"
+    ))
+}
+
+/// FNV-1a, 64 bit.
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// Takes fields off the front of a byte string.
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, count: usize) -> Result<&'a [u8]> {
+        let (front, rest) = self.0.split_at_checked(count).ok_or_else(|| damaged("it ends too early"))?;
+        self.0 = rest;
+        Ok(front)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N]> {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(self.take(N)?);
+        Ok(bytes)
+    }
+
+    fn length(&mut self) -> Result<usize> {
+        usize::try_from(u64::from_le_bytes(self.array()?)).map_err(damaged)
+    }
+}
+
+/// Fields of a phase as written: tag, time, stop.
+fn encode_phase(phase: &Phase, out: &mut Snapshot) {
+    let (tag, time, stop) = match *phase {
+        Phase::Instantiated { experiment } => (0, experiment.start, experiment.stop),
+        Phase::Initialising { experiment, .. } => (1, experiment.start, experiment.stop),
+        Phase::Stepping { stop } | Phase::Updating { stop, .. } => (2, 0.0, stop),
+        Phase::Failed { last_good } => (3, last_good, None),
+        Phase::Terminated { time } => (4, time, None),
+    };
+    out.extend([tag, u8::from(stop.is_some()), 0, 0]);
+    out.extend(time.to_le_bytes());
+    out.extend(stop.unwrap_or(0.0).to_le_bytes());
+}
+
+fn decode_phase(reader: &mut Reader<'_>) -> Result<Phase> {
+    let [tag, has_stop, unused @ ..] = reader.array::<4>()?;
+    let [time, stop] = [f64::from_le_bytes(reader.array()?), f64::from_le_bytes(reader.array()?)];
+    if has_stop > 1 || unused != [0; 2] || !time.is_finite() || !stop.is_finite() {
+        return Err(damaged("its times or flags are none"));
+    }
+    let stop = (has_stop == 1).then_some(stop);
+    let experiment = Experiment { start: time, stop };
+    match tag {
+        0 => Ok(Phase::Instantiated { experiment }),
+        1 => Ok(Phase::Initialising { experiment, before: None }),
+        2 => Ok(Phase::Stepping { stop }),
+        3 => Ok(Phase::Failed { last_good: time }),
+        4 => Ok(Phase::Terminated { time }),
+        _ => Err(damaged("it names a phase that does not exist")),
+    }
+}
+
+impl Slave {
+    /// Save the state and hand out a handle for it. `existing` is a handle of this instance whose state is replaced.
+    ///
+    /// # Errors
+    /// A handle that this instance did not hand out.
+    pub(crate) fn save(&mut self, existing: Option<Handle>) -> Result<Handle> {
+        let bytes = self.encode()?;
+        self.store(existing, bytes)
+    }
+
+    fn store(&mut self, existing: Option<Handle>, bytes: Snapshot) -> Result<Handle> {
+        if let Some(handle) = existing {
+            let index = self.index(handle)?;
+            *self.snapshots[index] = bytes;
+            return Ok(handle);
+        }
+        self.snapshots.push(Box::new(bytes));
+        Ok(self.snapshots.last().map_or(std::ptr::null(), |snapshot| std::ptr::from_ref(&**snapshot)))
+    }
+
+    fn index(&self, handle: Handle) -> Result<usize> {
+        let found = self.snapshots.iter().position(|snapshot| std::ptr::eq(&raw const **snapshot, handle));
+        found.ok_or_else(|| {
+            Refusal::error(
+                "FMUstate is no saved state of this instance: it was freed, or comes from elsewhere. To hand a state to \
+                 another instance, serialise and deserialise it",
+            )
+        })
+    }
+
+    /// Restore a saved state, with the phase of life it was saved in.
+    ///
+    /// # Errors
+    /// Not a state of this instance, or not one of this FMU; nothing is changed then.
+    pub(crate) fn restore(&mut self, handle: Handle) -> Result<()> {
+        let index = self.index(handle)?;
+        let snapshot = std::mem::take(&mut *self.snapshots[index]);
+        let outcome = self.decode(&snapshot).and_then(|(phase, state)| {
+            self.unit.restore_state(state)?;
+            Ok(phase)
+        });
+        *self.snapshots[index] = snapshot;
+        self.phase = outcome?;
+        Ok(())
+    }
+
+    /// Free a saved state.
+    ///
+    /// # Errors
+    /// Not a state of this instance.
+    pub(crate) fn free_snapshot(&mut self, handle: Handle) -> Result<()> {
+        let index = self.index(handle)?;
+        self.snapshots.swap_remove(index);
+        Ok(())
+    }
+
+    /// The bytes of a saved state.
+    ///
+    /// # Errors
+    /// Not a state of this instance.
+    pub(crate) fn serialised(&self, handle: Handle) -> Result<&[u8]> {
+        Ok(&self.snapshots[self.index(handle)?])
+    }
+
+    /// Length of every saved state of this FMU (bytes).
+    pub(crate) fn serialised_size(&self) -> usize {
+        MAGIC.len() + 4 + 4 + self.token.len() + 4 + 8 + 8 + 8 + self.unit.state_size() + CHECKSUM
+    }
+
+    /// Make a saved state of bytes that came from [`Slave::serialised`], perhaps in another process.
+    ///
+    /// # Errors
+    /// Wrong length, another FMU's state, damaged bytes.
+    pub(crate) fn deserialise(&mut self, bytes: &[u8], existing: Option<Handle>) -> Result<Handle> {
+        self.decode(bytes)?;
+        self.store(existing, bytes.to_vec())
+    }
+
+    fn encode(&self) -> Result<Snapshot> {
+        let size = self.serialised_size();
+        let mut out = Vec::with_capacity(size);
+        out.extend(MAGIC);
+        out.extend(VERSION.to_le_bytes());
+        out.extend(u32::try_from(self.token.len()).map_err(damaged)?.to_le_bytes());
+        out.extend(self.token.as_bytes());
+        encode_phase(&self.phase, &mut out);
+        let state = self.unit.state_size();
+        out.extend(u64::try_from(state).map_err(damaged)?.to_le_bytes());
+        let start = out.len();
+        out.resize(start + state, 0);
+        match &self.phase {
+            // Outputs computed in Initialization Mode are computed again when asked for.
+            Phase::Initialising { before: Some(before), .. } => out[start..].copy_from_slice(before),
+            _ => self.unit.save_state(&mut out[start..])?,
+        }
+        out.extend(checksum(&out).to_le_bytes());
+        Ok(out)
+    }
+
+    fn decode<'a>(&self, bytes: &'a [u8]) -> Result<(Phase, &'a [u8])> {
+        let mut reader = Reader(bytes);
+        if reader.take(MAGIC.len())? != MAGIC {
+            return Err(damaged("its first bytes are not those of a tiprub state"));
+        }
+        let version = u32::from_le_bytes(reader.array()?);
+        if version != VERSION {
+            return Err(damaged(format!("it has format version {version}, this FMU reads {VERSION}")));
+        }
+        let length = usize::try_from(u32::from_le_bytes(reader.array()?)).map_err(damaged)?;
+        let token = String::from_utf8_lossy(reader.take(length)?);
+        if token != self.token.as_str() {
+            return Err(damaged(format!("it belongs to token \"{token}\", this FMU is \"{}\"", self.token)));
+        }
+        if bytes.len() != self.serialised_size() {
+            return Err(damaged(format!("it has {} bytes instead of {}", bytes.len(), self.serialised_size())));
+        }
+        let (content, tail) = bytes.split_at(bytes.len() - CHECKSUM);
+        if checksum(content).to_le_bytes() != tail {
+            return Err(damaged("its checksum does not fit its content"));
+        }
+        let phase = decode_phase(&mut reader)?;
+        let state = reader.length()?;
+        Ok((phase, reader.take(state)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tag, flag of the stop time, two bytes of nothing, time, stop time.
+    fn bytes(head: [u8; 4], time: f64, stop: f64) -> Vec<u8> {
+        [&head[..], &time.to_le_bytes(), &stop.to_le_bytes()].concat()
+    }
+
+    #[test]
+    fn phases_that_were_never_written_are_refused() {
+        let read = |bytes: &[u8]| decode_phase(&mut Reader(bytes)).is_ok();
+        for tag in 0..5 {
+            assert!(read(&bytes([tag, 1, 0, 0], 0.25, 1.0)) && read(&bytes([tag, 0, 0, 0], 0.25, 0.0)), "{tag}");
+            for head in [[tag, 2, 0, 0], [tag, 0, 1, 0], [tag, 0, 0, 1], [tag + 5, 0, 0, 0]] {
+                assert!(!read(&bytes(head, 0.25, 0.0)), "{head:?}");
+            }
+            for wrong in [f64::NAN, f64::INFINITY] {
+                assert!(!read(&bytes([tag, 1, 0, 0], wrong, 1.0)) && !read(&bytes([tag, 1, 0, 0], 0.25, wrong)));
+            }
+        }
+        assert!(!read(&bytes([0; 4], 0.0, 0.0)[..19]));
+    }
+}

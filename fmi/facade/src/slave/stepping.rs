@@ -1,0 +1,133 @@
+//! Communication steps: whole, or internal step by internal step for FMI 3.0 intermediate updates.
+
+use tiprub_core::simulation::Progress;
+
+use super::{Phase, Refusal, Result, Slave, Status};
+
+/// How far beyond the stop time a step may end, as a fraction of the step: importers add up their communication points,
+/// and the sum of many steps misses the stop time by rounding.
+const STOP_TOLERANCE: f64 = 1e-3;
+/// The same as a fraction of the stop time, for runs of very many steps.
+const STOP_ROUNDING: f64 = 1e-9;
+
+/// With the feature `test-panic`, the communication step size that makes the step panic: an odd number that nobody uses.
+#[cfg(feature = "test-panic")]
+const PANIC_STEP_SIZE: f64 = 1.234_567_890_123e-5;
+
+impl Slave {
+    /// Begin a communication step, which may end early (`partial`) where the internal steps allowed are used up; the phase becomes
+    /// [`Phase::Updating`] until it is ended.
+    ///
+    /// # Errors
+    /// Wrong time, bad step size, a step beyond the stop time, too many internal steps; the state is as before.
+    pub(crate) fn begin_step(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
+        let Phase::Stepping { stop } = self.phase else {
+            return Err(Refusal::error("no step can begin in this phase"));
+        };
+        if let Some(stop) = stop {
+            let end = current_time + step_size;
+            let allowance = STOP_TOLERANCE * step_size + STOP_ROUNDING * stop.abs();
+            if end - stop > allowance {
+                return Err(Refusal::error(format!(
+                    "the step from t = {current_time} s by {step_size} s ends at {end} s, beyond the stop time {stop} s \
+                     given at initialisation. Step less far, or initialise without a stop time"
+                )));
+            }
+        }
+        self.unit.begin_step(current_time, step_size, partial)?;
+        self.hear();
+        #[cfg(feature = "test-panic")]
+        assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic asked for by the test of panics");
+        self.phase = Phase::Updating { stop, reached: self.unit.time(), fresh: false };
+        Ok(())
+    }
+
+    /// March one internal step. When it finishes the communication step, the phase is [`Phase::Stepping`] again.
+    ///
+    /// # Errors
+    /// The state became non-finite; the phase is [`Phase::Failed`] then. Or the internal steps allowed are used up: the phase is
+    /// [`Phase::Stepping`] as if the step had not begun, or [`Phase::Updating`] where it may end at the internal step reached.
+    pub(crate) fn advance(&mut self) -> Result<Progress> {
+        let last_good = self.unit.time();
+        let Phase::Updating { stop, .. } = self.phase else {
+            return Err(Refusal::error("no step is under way"));
+        };
+        let progress = match self.unit.advance() {
+            Ok(progress) => progress,
+            Err(error @ tiprub_core::Error::Exhausted { .. }) => {
+                match &mut self.phase {
+                    Phase::Updating { fresh, .. } if self.unit.is_stepping() => *fresh = false,
+                    phase => *phase = Phase::Stepping { stop },
+                }
+                return Err(error.into());
+            }
+            Err(error) => {
+                self.phase = Phase::Failed { last_good };
+                return Err(error.into());
+            }
+        };
+        self.phase = Phase::Updating { stop, reached: progress.time, fresh: progress.finished };
+        Ok(progress)
+    }
+
+    /// March one internal step; `None` where the internal steps allowed are used up, and the communication step has ended early.
+    ///
+    /// # Errors
+    /// As [`Slave::advance`] and [`Slave::end_step`].
+    pub(crate) fn advance_partially(&mut self) -> Result<Option<Progress>> {
+        match self.advance() {
+            Err(refusal) if refusal.status == Status::Discard && matches!(self.phase, Phase::Updating { .. }) => {
+                self.end_step(true)?;
+                let time = self.unit.time();
+                self.note(Status::Ok, format!("ended early at t = {time} s: {refusal}"));
+                Ok(None)
+            }
+            outcome => outcome.map(Some),
+        }
+    }
+
+    /// End the communication step: at its end, or at the internal step reached (early return).
+    ///
+    /// # Errors
+    /// Early: the state is not finite; the phase is [`Phase::Failed`] then.
+    pub(crate) fn end_step(&mut self, early: bool) -> Result<()> {
+        let last_good = self.unit.time();
+        if let Phase::Updating { stop, .. } = self.phase {
+            if early {
+                self.unit.end_step_early().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
+            }
+            self.phase = Phase::Stepping { stop };
+            self.hear();
+        }
+        Ok(())
+    }
+
+    /// A whole communication step.
+    ///
+    /// # Errors
+    /// As [`Slave::begin_step`] and [`Slave::advance`].
+    pub(crate) fn step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+        self.begin_step(current_time, step_size, false)?;
+        self.unit.fly_ahead();
+        while !self.advance()?.finished {}
+        self.end_step(false)
+    }
+
+    /// A communication step, or as much of it as the internal steps allowed are enough for; whether it ended early.
+    ///
+    /// # Errors
+    /// As [`Slave::step`]; where not even one internal step is allowed, [`Status::Discard`].
+    pub(crate) fn step_partially(&mut self, current_time: f64, step_size: f64) -> Result<bool> {
+        self.begin_step(current_time, step_size, true)?;
+        self.unit.fly_ahead();
+        loop {
+            match self.advance_partially()? {
+                None => return Ok(true),
+                Some(progress) if progress.finished => break,
+                Some(_) => {}
+            }
+        }
+        self.end_step(false)?;
+        Ok(false)
+    }
+}

@@ -1,0 +1,129 @@
+//! `tiprub thermal`: from a casing to the .fmu of its heat conduction.
+
+use std::fmt::Write as _;
+
+use serde_json::json;
+use tiprub_gallery::reduction;
+use tiprub_model::{
+    casing::CASING37,
+    conduction::{AMBIENT_FILM, Conduction, ConductionOptions, Conductor, GAS_FILM, MODES, reduce_ring_conduction},
+};
+use tiprub_shell::{
+    Failure, Result,
+    console::{Console, Outcome, shown_path},
+    places::{self, Named},
+};
+
+use crate::{
+    commands::package::{size, targets},
+    library::{self, Unit},
+    shared_arguments::MaterialChoice,
+    thermal_arguments::ThermalArguments,
+    thermal_fmu::ThermalPackage,
+};
+
+/// Reduce, check, find the library, zip.
+///
+/// # Errors
+/// A casing that cannot be, no library, or files that cannot be written.
+pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
+    let casing = arguments.ring.options();
+    let name = arguments.name.clone().unwrap_or_else(|| {
+        let shipped = casing == tiprub_model::CasingOptions::default();
+        format!("{}_thermal", if shipped { CASING37 } else { "casing" })
+    });
+    let targets = targets(arguments.fmi, &arguments.output, &name)?;
+    let files: Vec<Named> = targets.iter().map(|(_, path)| Named::new("--output", path)).collect();
+    let given = library::given(&arguments.libraries)?;
+    places::outputs(&given.iter().map(|path| Named::new("--library", path)).collect::<Vec<_>>(), &files)?;
+    let conductor = match arguments.ring.material {
+        None | Some(MaterialChoice::Steel) => Some(Conductor::steel()),
+        Some(MaterialChoice::Titanium) => Some(Conductor::titanium()),
+        Some(MaterialChoice::MaragingSteel) => None,
+    };
+    let property = |given: Option<f64>, known: Option<f64>, option: &str| {
+        given.or(known).ok_or_else(|| {
+            let problem = "how this material conducts heat is not known here";
+            Failure::usage("--material maraging-steel", problem, format!("Give --{option} too"))
+        })
+    };
+    let options = ConductionOptions {
+        name,
+        density: casing.material.density,
+        conductor: Conductor {
+            conductivity: property(arguments.conductivity, conductor.map(|known| known.conductivity), "conductivity")?,
+            specific_heat: property(
+                arguments.heat_capacity,
+                conductor.map(|known| known.specific_heat),
+                "heat-capacity",
+            )?,
+        },
+        films: [arguments.gas_film.unwrap_or(GAS_FILM), arguments.ambient_film.unwrap_or(AMBIENT_FILM)],
+        heated: arguments.heated.unwrap_or(casing.rings.axial),
+        modes: arguments.modes.unwrap_or(MODES),
+    };
+    let reduced = reduction::with_progress("Reducing the casing", console, &|listener| {
+        reduce_ring_conduction(&casing, &options, listener)
+    })?;
+    let libraries = library::load(Unit::Thermal, &arguments.libraries, console)?;
+    let package = ThermalPackage::new(&reduced.model, &libraries)?;
+    for (version, path) in &targets {
+        console.say(format_args!("Writing {}", path.display()));
+        package.write(path, *version, arguments.arrays)?;
+    }
+    let mut text = facts(&reduced);
+    for (version, path) in &targets {
+        let _ = write!(text, "\nFMI {}.0: {} ({} kB)", version.digit(), path.display(), size(path) / 1000);
+    }
+    let files: Vec<_> = targets
+        .iter()
+        .map(|(version, path)| json!({"fmi": version.digit().to_string(), "file": shown_path(path), "bytes": size(path)}))
+        .collect();
+    let platforms: Vec<&str> = libraries.iter().map(|library| library.platform.tuple()).collect();
+    Ok(Outcome { text, json: json!({"model": facts_json(&reduced), "fmus": files, "platforms": platforms}) })
+}
+
+/// For people.
+fn facts(reduced: &Conduction) -> String {
+    let Conduction { model, counts: [nodes, elements], areas: [gas, air, heated], time_constants, checks } = reduced;
+    let mut text = format!(
+        "{}: {nodes} nodes, {elements} elements, {} coordinates, {} patches\n  \
+         heat capacity {:.1} J/K; in the gas {:.4} m2, {:.2} W/K; in the air {:.4} m2, {:.2} W/K; heated {:.4} m2\n  \
+         slowest time constants of the full model: {} s\n  steady states against the full model, patches and heated surfaces:",
+        model.name,
+        model.order(),
+        model.patches.len(),
+        model.heat_capacity,
+        gas,
+        model.gas_conductance(),
+        air,
+        model.ambient_conductance(),
+        heated,
+        time_constants.iter().take(4).map(|time| format!("{time:.2}")).collect::<Vec<_>>().join(", "),
+    );
+    for check in checks {
+        let [gas, air] = check.factors;
+        let _ = write!(text, "\n    factors {gas} and {air}: {:.1e}, {:.1e}", check.patches, check.surfaces);
+    }
+    text
+}
+
+/// For programs.
+fn facts_json(reduced: &Conduction) -> serde_json::Value {
+    let model = &reduced.model;
+    json!({
+        "name": model.name,
+        "origin": model.origin,
+        "nodes": reduced.counts[0],
+        "elements": reduced.counts[1],
+        "coordinates": model.order(),
+        "patches": model.patches.len(),
+        "heat_capacity": model.heat_capacity,
+        "conductances": [model.gas_conductance(), model.ambient_conductance()],
+        "areas": reduced.areas,
+        "time_constants": reduced.time_constants,
+        "steady_states": reduced.checks.iter().map(|check| json!({
+            "factors": check.factors, "patches": check.patches, "surfaces": check.surfaces,
+        })).collect::<Vec<_>>(),
+    })
+}

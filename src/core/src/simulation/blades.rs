@@ -1,0 +1,340 @@
+//! What a scene asks of blades beside contact: excitation by an engine order, heat, motion at the start.
+
+use super::compile::Compiled;
+use super::{Quantity, Simulation};
+use crate::dynamics::bank::BankOptions;
+use crate::dynamics::excitation::{Excitation, most_moved};
+use crate::dynamics::modal::{ModalModel, ModalSpin};
+use crate::dynamics::sectors::Sectors;
+use crate::ranges::SOFTENED;
+use crate::settings::{InitialSettings, Scheme, StructureSettings};
+use crate::{Error, Result, Rom, shown};
+
+/// Modal load by the temperature of the blades, per kelvin; of coupled sectors on nodal diameter 0. Empty where a scene does not
+/// ask for it.
+pub fn heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
+    let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) else { return Vec::new() };
+    let whole: Vec<f64> = thermal.loads.row_iter().map(|row| row.iter().sum()).collect();
+    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+    let all = if rom.is_cyclic() { libm::sqrt(rom.sectors as f64) } else { 1.0 };
+    model.modal_load(&whole).into_iter().map(|load| all * load).collect()
+}
+
+/// Share of the elastic stiffness that is left at a temperature (K).
+pub fn softened(structure: &StructureSettings, temperature: f64) -> f64 {
+    1.0 - structure.softening * temperature
+}
+
+impl Compiled {
+    /// Modal loads of blades by growth and heat.
+    pub fn fill_loads(&self, body: usize, speed: f64, temperature: f64, loads: &mut [f64]) {
+        let (structure, parts) = (self.body(body).0, &self.bodies[body]);
+        if parts.centrifugal.is_empty() {
+            loads.fill(0.0);
+        } else {
+            super::loads::fill_centrifugal(&parts.centrifugal, speed, loads);
+        }
+        // What is softer pushes less: its free expansion stays.
+        let strength = temperature * softened(structure, temperature);
+        loads.iter_mut().zip(&parts.heat).for_each(|(load, heat)| *load += strength * heat);
+    }
+
+    /// Whether blades are loaded by growth or heat.
+    pub fn loads_blades(&self, body: usize) -> bool {
+        !self.bodies[body].centrifugal.is_empty() || !self.bodies[body].heat.is_empty()
+    }
+
+    /// The excitation of a structure, which acts on its ROM.
+    ///
+    /// # Errors
+    /// A mode or a contact node that it does not have.
+    pub fn excitation(&self, body: usize) -> Result<Option<Excitation>> {
+        let (structure, rom) = self.body(body);
+        let Some(asked) = &structure.excitation else { return Ok(None) };
+        let at = format!("structure[{}].excitation", self.plan.bodies[body] + 1);
+        if let Some(mode) = asked.mode {
+            self.check_mode(body, &format!("{at}.mode"), mode, self.fewest_modes(body, None))?;
+        }
+        let row = |(name, direction): (&String, crate::settings::Direction)| {
+            let node = rom.contact_nodes.iter().position(|node| node.name == *name);
+            let names: Vec<&str> = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
+            let unknown = || {
+                let problem = format!("`{name}` is no contact node of the ROM");
+                Error::invalid(format!("{at}.node"), problem, format!("Use one of: {}", names.join(", ")))
+            };
+            Ok(3 * node.ok_or_else(unknown)? + direction as usize)
+        };
+        let row = asked.node.as_ref().zip(asked.direction).map(row).transpose()?;
+        Ok(Some(Excitation { order: asked.order, mode: asked.mode.map(|mode| mode - 1), row }))
+    }
+
+    /// Modes of a structure, of the nodal diameter with the fewest; with inertia under a scheme where one is given.
+    fn fewest_modes(&self, body: usize, scheme: Option<Scheme>) -> usize {
+        let parts = &self.bodies[body];
+        let uncoupled = || scheme.map_or(parts.model.len(), |scheme| parts.model.dynamic_modes(scheme));
+        let of_disk = parts.disk.as_ref().and_then(|disk| {
+            let count = |one: &crate::dynamics::cyclic::DiameterModes| {
+                scheme.map_or(one.len(), |scheme| one.dynamic_modes(scheme))
+            };
+            disk.diameters.iter().map(count).min()
+        });
+        of_disk.unwrap_or_else(uncoupled)
+    }
+
+    fn check_mode(&self, body: usize, field: &str, mode: usize, most: usize) -> Result<()> {
+        if mode <= most {
+            return Ok(());
+        }
+        let problem = format!("mode {mode}, where `{}` has {most} that can be moved", self.body(body).0.name);
+        Err(Error::invalid(field, problem, "Use a lower mode, or a ROM with more of them"))
+    }
+
+    /// What cannot be looked at without the ROM: lists of modes, sectors and nodal diameters.
+    ///
+    /// # Errors
+    /// Naming the field.
+    pub fn check_blades(&self) -> Result<()> {
+        for (number, (structure, rom)) in self.scene.settings.structures.iter().zip(&self.scene.roms).enumerate() {
+            let (listed, most) = (structure.damping_ratios.len(), rom.order());
+            if listed > most {
+                let problem = format!("{listed} values, where the ROM has {most} modes");
+                let remedy = "Give at most as many as modes, the lowest first";
+                return Err(Error::invalid(format!("structure[{}].damping_ratios", number + 1), problem, remedy));
+            }
+        }
+        (0..self.bodies.len()).try_for_each(|body| {
+            self.excitation(body)?;
+            let (structure, rom) = self.body(body);
+            let check = |(index, one): (usize, &InitialSettings)| {
+                let at = format!("structure[{}].initial[{}]", self.plan.bodies[body] + 1, index + 1);
+                self.check_mode(body, &format!("{at}.mode"), one.mode, self.fewest_modes(body, None))?;
+                let remedy = "Use one that the ROM has";
+                if let Some(sector) = one.sector.filter(|sector| *sector > rom.sectors) {
+                    let problem = format!("sector {sector} of {}", rom.sectors);
+                    return Err(Error::invalid(format!("{at}.sector"), problem, remedy));
+                }
+                if let Some(n) = one.nodal_diameter.filter(|n| *n > rom.largest_nodal_diameter()) {
+                    let problem =
+                        format!("{n}, where {} sectors have up to {}", rom.sectors, rom.largest_nodal_diameter());
+                    return Err(Error::invalid(format!("{at}.nodal_diameter"), problem, remedy));
+                }
+                Ok(())
+            };
+            structure.initial.iter().enumerate().try_for_each(check)
+        })
+    }
+
+    /// Refuse temperatures (K) that leave no structure.
+    ///
+    /// # Errors
+    /// Naming the variable.
+    pub fn check_temperature(&self, body: usize, temperature: f64) -> Result<()> {
+        let structure = self.body(body).0;
+        let left = softened(structure, temperature);
+        if (SOFTENED[0]..=SOFTENED[1]).contains(&left) {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!("variable `{}rotor_temperature`", self.plan.body_prefix(&self.scene, body)),
+            format!(
+                "{} K with softening {} 1/K leaves {} times the stiffness, outside {} … {}",
+                shown(temperature),
+                shown(structure.softening),
+                shown(left),
+                shown(SOFTENED[0]),
+                shown(SOFTENED[1])
+            ),
+            "Use a lower temperature or less softening",
+        ))
+    }
+
+    /// What the modes of a structure that touches need beside contact.
+    pub fn bank_options(&self, body: usize, excitation: Option<Excitation>) -> BankOptions {
+        let ((structure, rom), parts) = (self.body(body), &self.bodies[body]);
+        let coupled = structure.spin.stiffening || structure.spin.coriolis;
+        let spin = rom.extras.spin.as_ref().filter(|_| coupled);
+        let modal = spin.map(|spin| ModalSpin::new(spin, &parts.model, parts.reference_speed));
+        let modal = if structure.softening == 0.0 {
+            modal
+        } else {
+            let modal = modal.unwrap_or_else(|| ModalSpin::without_spin(&parts.model));
+            let (share, temperature) = (structure.softening, parts.reference_temperature);
+            Some(modal.softened(&rom.stiffness, &parts.model, share, temperature))
+        };
+        let coupling = modal.map(|modal| (modal, structure.spin.stiffening, structure.spin.coriolis));
+        BankOptions {
+            frequency_factors: structure.frequency_factors.clone(),
+            loads: self.loads_blades(body),
+            coupling,
+            excitation,
+            ..BankOptions::default()
+        }
+    }
+
+    /// Speed (rad/s) and temperature (K) whose stiffness each structure that touches has.
+    pub fn references(&self) -> Vec<[f64; 2]> {
+        self.bodies.iter().map(|body| [body.reference_speed, body.reference_temperature]).collect()
+    }
+
+    /// Whether modes or loads of a structure depend on speed or temperature.
+    pub fn varies(&self, body: usize) -> bool {
+        self.spins(body) || self.softens(body)
+    }
+
+    /// Whether heat softens a structure.
+    pub fn softens(&self, body: usize) -> bool {
+        self.body(body).0.softening != 0.0
+    }
+}
+
+impl super::RotorInputs {
+    /// With the inputs that a structure has.
+    pub fn of(structure: &StructureSettings) -> Self {
+        let inputs = |count: usize| vec![super::Input::default(); count];
+        Self {
+            excitation: inputs(if structure.excitation.is_some() { 2 } else { 0 }),
+            temperature: inputs(usize::from(structure.thermal)),
+            ..Self::default()
+        }
+    }
+}
+
+impl Simulation {
+    /// Speed (rad/s) and temperature (K) of each structure that touches, as set.
+    pub(super) fn references(&self) -> Vec<[f64; 2]> {
+        let of =
+            |rotor: &super::RotorInputs| [rotor.speed.value, rotor.temperature.first().map_or(0.0, |one| one.value)];
+        self.inputs.rotors.iter().map(of).collect()
+    }
+
+    /// Damping ratios of the first modes of each structure that touches, then of those that carry surfaces.
+    pub(super) fn mode_damping(&self) -> Vec<Vec<f64>> {
+        let (bodies, carriers) = (self.compiled.bodies.len(), self.compiled.carriers.len());
+        let bodies = (0..bodies).map(|body| self.values_of(Quantity::ModeDamping, body));
+        bodies.chain((0..carriers).map(|carrier| self.values_of(Quantity::CarrierModeDamping, carrier))).collect()
+    }
+
+    /// All elements of a variable; empty where there is none.
+    fn values_of(&self, quantity: Quantity, of: usize) -> Vec<f64> {
+        let variable = self.table.with_quantity_of(quantity, of);
+        variable.map_or(Vec::new(), |row| self.values[row.reference as usize..][..row.len()].to_vec())
+    }
+
+    /// The engine orders of the parameters.
+    pub(super) fn follow_engine_orders(&mut self) {
+        for body in 0..self.compiled.bodies.len() {
+            if let Some(reference) = self.compiled.references.engine_orders[body] {
+                let order = self.values[reference];
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "of an integer from 0 to 1e6"
+                )]
+                self.system.structures_mut()[body].modes_mut().set_excitation_order(order as u32);
+            }
+        }
+    }
+
+    /// Engine order times angle of the rotor less phase at an offset (rad), and amplitude (N).
+    pub(super) fn excitation_at(&self, body: usize, offset: f64) -> Option<[f64; 2]> {
+        let rotor = &self.inputs.rotors[body];
+        let [amplitude, phase] = rotor.excitation.first_chunk::<2>()?;
+        let order = self.values[self.compiled.references.engine_orders[body]?];
+        // Whole turns, which the phase of the rotor leaves out, are whole turns of any order.
+        let angle = (order * self.rotors[body].phase(&rotor.speed, offset)) % std::f64::consts::TAU;
+        Some([amplitude.at(offset), angle - phase.at(offset)])
+    }
+
+    /// An excitation must not turn on too far within an internal step.
+    pub(super) fn check_excitation(&self, body: usize, step: f64, speeds: [f64; 2]) -> Result<()> {
+        let Some(reference) = self.compiled.references.engine_orders[body] else { return Ok(()) };
+        let order = self.values[reference];
+        let angle = speeds.into_iter().fold(0.0, |most: f64, speed| most.max((order * speed * step).abs()));
+        if angle <= crate::ranges::EXCITED_ANGLE {
+            return Ok(());
+        }
+        Err(Error::invalid(
+            format!("parameter `{}excitation_order`", self.compiled.plan.body_prefix(&self.compiled.scene, body)),
+            format!(
+                "the excitation of order {} turns by {angle:.3e} rad in one internal step of {step:.3e} s at t = {} s, beyond {}",
+                shown(order),
+                shown(self.time),
+                shown(crate::ranges::EXCITED_ANGLE)
+            ),
+            "Use a smaller internal_step_max, a lower order or a lower speed",
+        ))
+    }
+
+    /// Blades with a motion of their own at the start, on top of their static equilibrium; again for another length of the first
+    /// step.
+    pub(super) fn launch_blades(&mut self) {
+        for body in 0..self.compiled.bodies.len() {
+            let initial = &self.compiled.body(body).0.initial;
+            if initial.is_empty() {
+                continue;
+            }
+            let [displacements, velocities] =
+                [Quantity::InitialDisplacement, Quantity::InitialRate].map(|quantity| self.values_of(quantity, body));
+            let [speed, temperature] = self.references()[body];
+            let loaded = self.compiled.loads_blades(body).then(|| {
+                let mut load = vec![0.0; self.compiled.bodies[body].model.len()];
+                self.compiled.fill_loads(body, speed, temperature, &mut load);
+                load
+            });
+            let modes = self.system.structures_mut()[body].modes_mut();
+            match loaded {
+                Some(load) => modes.settle(&load),
+                None => modes.rest(),
+            }
+            for ((one, displacement), velocity) in initial.iter().zip(displacements).zip(velocities) {
+                launch(modes, one, displacement, velocity);
+            }
+            modes.recover();
+        }
+        if self.compiled.bodies.iter().enumerate().any(|(body, _)| !self.compiled.body(body).0.initial.is_empty()) {
+            self.system.renew_start();
+        }
+    }
+
+    /// Modes that are to move at the start must have inertia under the scheme, and move a contact node.
+    pub(super) fn check_launch(&self, scheme: Scheme) -> Result<()> {
+        (0..self.compiled.bodies.len()).try_for_each(|body| {
+            let most = self.compiled.fewest_modes(body, Some(scheme));
+            let of = |(index, one): (usize, &InitialSettings)| {
+                let field = format!("structure[{}].initial[{}].mode", self.compiled.plan.bodies[body] + 1, index + 1);
+                self.compiled.check_mode(body, &field, one.mode, most)
+            };
+            self.compiled.body(body).0.initial.iter().enumerate().try_for_each(of)
+        })
+    }
+}
+
+/// Add one motion to those of the modes.
+fn launch(modes: &mut Sectors, one: &InitialSettings, displacement: f64, velocity: f64) {
+    let mode = one.mode - 1;
+    let n = one.nodal_diameter.unwrap_or(0);
+    match modes {
+        Sectors::Uncoupled(bank) => {
+            let shape = |row: usize| bank.model().contact_modes[(row, mode)];
+            let most = shape(most_moved((0..bank.rows()).map(|row| shape(row).abs())));
+            let sectors = bank.sectors();
+            for sector in (0..sectors).filter(|sector| one.sector.is_none_or(|own| own == sector + 1)) {
+                #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+                let angle = std::f64::consts::TAU * ((n * sector % sectors) as f64 / sectors as f64);
+                let share = if one.sector.is_some() { 1.0 } else { libm::cos(angle - one.phase) } / most;
+                bank.add_modal_state(mode, sector, share * displacement, share * velocity);
+            }
+        }
+        Sectors::Coupled(bank) => {
+            let shapes = &bank.model().diameters[n].contact_modes;
+            let size = |row: usize| libm::hypot(shapes[(row, mode)].re, shapes[(row, mode)].im);
+            let most = shapes[(most_moved((0..shapes.nrows()).map(size)), mode)];
+            let square = most.re * most.re + most.im * most.im;
+            let (sine, cosine) = libm::sincos(one.phase);
+            // e^(−i phase)/Ψ.
+            let share = [(cosine * most.re - sine * most.im) / square, -(sine * most.re + cosine * most.im) / square];
+            let times = |value: f64| share.map(|part| part * value);
+            bank.add_modal_state(n, mode, times(displacement), times(velocity));
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Rows of what acts on blades beside contact: excitation, heat, motion at the start; and of damping by modes.
+
+use super::builder::Builder;
+use super::features::LARGEST_TEMPERATURE;
+use super::parts::{Body, Parts};
+use crate::ranges;
+use crate::settings::StructureSettings;
+use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINEAR_SPEED, TEMPERATURE};
+use crate::variables::{Kind, Quantity, Start};
+
+/// Excitation and temperature.
+pub fn inputs(table: &mut Builder, parts: &Parts, body: &Body) {
+    if let Some(excitation) = &body.structure.excitation {
+        let text = "Amplitude of the excitation of each blade by an engine order";
+        let (name, quantity) = ("excitation_amplitude", Quantity::Excitation(0));
+        let row = table.moving_input(quantity, name, Some(&FORCE), excitation.amplitude, text);
+        row.nominal = Some(1.0);
+        (row.min, row.max) = (Some(-ranges::EXCITATION), Some(ranges::EXCITATION));
+        let text =
+            "Phase of the excitation: blade j of N feels amplitude cos(order (rotor angle + 2 pi (j - 1)/N) - phase)";
+        let (name, quantity) = ("excitation_phase", Quantity::Excitation(1));
+        table.moving_input(quantity, name, Some(&ANGLE), excitation.phase, text).display = Some(0);
+    }
+    if body.structure.thermal {
+        let text = format!("Temperature of {} above the reference, at which it is undeformed", parts.rotor(body));
+        let row = table.moving_input(Quantity::RotorTemperature, "rotor_temperature", Some(&TEMPERATURE), 0.0, &text);
+        row.nominal = Some(100.0);
+        (row.min, row.max) = (Some(-LARGEST_TEMPERATURE), Some(LARGEST_TEMPERATURE));
+    }
+}
+
+/// Engine order, and motion at the start.
+pub fn parameters(table: &mut Builder, body: &Body) {
+    if let Some(excitation) = &body.structure.excitation {
+        let text = "Engine order of the excitation of the blades";
+        let row = table.parameter(Quantity::ExcitationOrder, "excitation_order", None, 0.0, text);
+        (row.kind, row.min, row.max) = (Kind::Integer, Some(0.0), Some(ranges::ENGINE_ORDER));
+        row.start = Some(Start::Integer(i32::try_from(excitation.order).unwrap_or(i32::MAX)));
+    }
+    let initial = &body.structure.initial;
+    if initial.is_empty() {
+        return;
+    }
+    let [displacements, velocities] =
+        [initial.iter().map(|one| one.displacement).collect(), initial.iter().map(|one| one.velocity).collect()];
+    let text = "Displacement of the blades at the start, of each [[structure.initial]]";
+    let (name, quantity) = ("initial_displacement", Quantity::InitialDisplacement);
+    let row = table.parameter(quantity, name, Some(&LENGTH), 0.0, text);
+    (row.dimension, row.start, row.nominal, row.display) =
+        (Some(initial.len()), Some(Start::Real(displacements)), Some(1e-4), Some(1));
+    (row.min, row.max) = (Some(-ranges::POSITION), Some(ranges::POSITION));
+    let text = "Velocity of the blades at the start, of each [[structure.initial]]";
+    let row = table.parameter(Quantity::InitialRate, "initial_velocity", Some(&LINEAR_SPEED), 0.0, text);
+    (row.dimension, row.start, row.nominal) = (Some(initial.len()), Some(Start::Real(velocities)), Some(1.0));
+    (row.min, row.max) = (Some(-ranges::VELOCITY), Some(ranges::VELOCITY));
+}
+
+/// Damping ratios of the first modes.
+pub fn mode_damping(table: &mut Builder, quantity: Quantity, name: &str, structure: &StructureSettings, told: &str) {
+    let ratios = &structure.damping_ratios;
+    if !ratios.is_empty() {
+        let row = table.damping(quantity, name, 0.0, &format!("Modal damping ratios of the first modes of {told}"));
+        (row.dimension, row.start) = (Some(ratios.len()), Some(Start::Real(ratios.clone())));
+    }
+}

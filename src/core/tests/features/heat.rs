@@ -1,0 +1,182 @@
+//! Blades that are warm: free expansion, softening, their work.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::DMatrix;
+use tiprub_core::dynamics::modal::ModalModel;
+use tiprub_core::rom::{Patch, Thermal};
+use tiprub_core::settings::{InitialSettings, InputInterpolation, Scheme};
+use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_test_models::{self as models, bits, disk::Disk, go, real, saved, set, started};
+
+const SOFTENING: f64 = 4e-4;
+
+/// With a load per kelvin.
+fn heated(mut rom: Rom) -> Rom {
+    let load = DMatrix::from_fn(rom.order(), 1, |row, _| 2.0 + 1.5 * (row as f64).sin());
+    let patches = vec![Patch { angle: [0.0, TAU], axial: [-1.0, 1.0] }];
+    rom.extras.thermal = Some(Thermal { loads: load, patches });
+    rom
+}
+
+fn scene(rom: Rom) -> Scene {
+    let mut scene = models::round(heated(rom));
+    scene.settings.structures[0].thermal = true;
+    scene.settings.contacts[0].gap = 5e-3;
+    scene
+}
+
+fn warm(scene: &Scene, temperature: f64) -> Simulation {
+    let mut run = Simulation::new(scene).unwrap();
+    set(&mut run, "rotor_temperature", temperature);
+    run.initialise(0.0).unwrap();
+    run
+}
+
+fn displacements(run: &Simulation) -> Vec<f64> {
+    run.system().bank().displacement().to_vec()
+}
+
+fn apart(found: &[f64], expected: &[f64]) -> f64 {
+    let size = expected.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    found.iter().zip(expected).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) / size
+}
+
+/// CΦω⁻²Φᵀf T, the free expansion: at the start, and once warmed up slowly; of coupled sectors all alike. Softening leaves it.
+#[test]
+fn warm_blades_rest_where_their_free_expansion_is() {
+    for rom in [models::blade(3), Disk::random(3, 1, 6, 0.2, 3).cyclic()] {
+        let stiffness = rom.stiffness.clone().cholesky().unwrap();
+        let load = heated(rom.clone()).extras.thermal.unwrap().loads;
+        let free = &rom.contact_map * stiffness.solve(&load) * 250.0;
+        let mut given = scene(rom.clone());
+        given.settings.structures[0].damping_ratio = Some(0.3);
+        for softening in if rom.is_cyclic() { vec![0.0] } else { vec![0.0, SOFTENING] } {
+            given.settings.structures[0].softening = softening;
+            let lanes = started(&given).system().bank().lanes();
+            let expected: Vec<f64> =
+                free.iter().flat_map(|row| (0..lanes).map(move |lane| if lane < 3 { *row } else { 0.0 })).collect();
+            let mut run = warm(&given, 250.0);
+            assert!(apart(&displacements(&run), &expected) < 1e-12);
+            go(&mut run, 1e-3);
+            assert!(apart(&displacements(&run), &expected) < 1e-9, "rest stays rest");
+            let mut run = started(&given);
+            for step in 1..=200 {
+                set(&mut run, "rotor_temperature", 2.5 * f64::from(step).min(100.0));
+                go(&mut run, 2e-4);
+            }
+            let left = apart(&displacements(&run), &expected);
+            assert!(left < 1e-7, "{left:e}");
+            assert!(real(&run, "energy_residual_relative").abs() < 1e-11);
+            assert!(real(&run, "load_work") > 0.0);
+        }
+    }
+}
+
+/// A softened blade rings at ω√(1 − sT): as it starts, and when it is warmed up on the way, where its energy changes by what heat takes.
+#[test]
+fn softened_blades_ring_lower_by_the_root_of_the_stiffness_left() {
+    let (temperature, first) = (300.0, ModalModel::from_rom(&models::blade(1), 0.0).unwrap().frequencies[0]);
+    let left = (1.0 - SOFTENING * temperature).sqrt();
+    for (starts_warm, hold, scheme) in [
+        (true, false, Scheme::ModalExact),
+        (false, false, Scheme::ModalExact),
+        (false, true, Scheme::ModalExact),
+        (false, false, Scheme::CentralDifference),
+        (false, false, Scheme::MasslessBoundary),
+    ] {
+        let mut given = scene(if scheme.is_massless() { models::rich_blade(1) } else { models::blade(1) });
+        // Nothing expands.
+        given.roms[0].extras.thermal.as_mut().unwrap().loads.fill(0.0);
+        let structure = &mut given.settings.structures[0];
+        (structure.softening, structure.damping_ratio) = (SOFTENING, Some(0.0));
+        let (mode, displacement) = (1, 1e-5);
+        structure.initial =
+            vec![InitialSettings { mode, sector: None, nodal_diameter: None, phase: 0.0, displacement, velocity: 0.0 }];
+        (given.settings.time.scheme, given.settings.time.step) = (scheme, 5e-7);
+        if hold {
+            given.settings.time.input_interpolation = InputInterpolation::Hold;
+        }
+        let mut run = warm(&given, if starts_warm { temperature } else { 0.0 });
+        for step in 1..=20 {
+            if !starts_warm {
+                set(&mut run, "rotor_temperature", temperature * f64::from(step) / 20.0);
+            }
+            go(&mut run, 1e-4);
+        }
+        // From the phase between two instants of one mode alone.
+        let q = |run: &Simulation| run.system().bank().modal_state(0, 0).0;
+        let third = TAU / first / 3.0;
+        let samples: Vec<f64> = (0..30)
+            .map(|_| {
+                go(&mut run, third);
+                q(&run)
+            })
+            .collect();
+        let (above, below) = samples.windows(3).fold((0.0, 0.0), |(above, below), three| {
+            (above + 0.5 * (three[0] + three[2]) * three[1], below + three[1] * three[1])
+        });
+        let found = (above / below).clamp(-1.0, 1.0).acos() / third;
+        let error = (found / (first * left) - 1.0).abs();
+        println!("{} {starts_warm} {hold}: {error:.1e}", scheme.name());
+        assert!(error < 1e-5, "{found} {}", first * left);
+        assert!(real(&run, "energy_residual_relative").abs() < 1e-11);
+        let work = real(&run, "stiffening_work");
+        assert!(if starts_warm { work == 0.0 } else { work < 0.0 }, "{work:e}");
+        // Slowly softened vibration keeps its action: energy falls as its frequency.
+        if !starts_warm {
+            let energy = real(&run, "kinetic_energy") + real(&run, "strain_energy");
+            let before = energy - work;
+            assert!((energy / before / left - 1.0).abs() < 0.02, "{}", energy / before);
+        }
+    }
+    assert!((left - (1.0_f64 - 0.12).sqrt()).abs() < 1e-15 && PI > 3.0);
+}
+
+/// Spin and heat at once: states go on with the same bits, and a start at speed and temperature is the same as K₀(1 − sT) + Ω²K₁ + Ω⁴K₂.
+#[test]
+fn speed_and_temperature_act_together() {
+    let mut given = scene(models::blade(2));
+    let order = given.roms[0].order();
+    given.roms[0].extras.spin = Some(models::spin(order));
+    let structure = &mut given.settings.structures[0];
+    (structure.spin.stiffening, structure.spin.growth, structure.softening) = (true, true, SOFTENING);
+    let mut run = warm(&given, 200.0);
+    let rom = &given.roms[0];
+    let (spin, speed) = (rom.extras.spin.as_ref().unwrap(), 1300.0_f64);
+    let square = speed * speed;
+    let stiffness = &rom.stiffness * (1.0 - SOFTENING * 200.0)
+        + &spin.stiffness_speed2 * square
+        + &spin.stiffness_speed4 * (square * square);
+    let softer = Rom { stiffness, ..rom.clone() };
+    let expected = ModalModel::from_rom(&softer, 0.0).unwrap().frequencies;
+    let found = &run.system().bank().uncoupled().unwrap().model().frequencies;
+    assert!(found.iter().zip(&expected).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{found:?} {expected:?}");
+    set(&mut run, "rotor_temperature", 260.0);
+    go(&mut run, 1e-3);
+    let state = saved(&run);
+    let mut other = Simulation::new(&given).unwrap();
+    other.restore_state(&state).unwrap();
+    for temperature in [300.0, 150.0] {
+        for run in [&mut run, &mut other] {
+            set(run, "rotor_temperature", temperature);
+            set(run, "speed", 1200.0);
+            go(run, 1e-3);
+        }
+    }
+    assert_eq!(bits(&run), bits(&other));
+    assert!(real(&run, "energy_residual_relative").abs() < 1e-11);
+}
+
+#[test]
+fn temperatures_beyond_all_stiffness_are_refused() {
+    let mut given = scene(models::blade(1));
+    given.settings.structures[0].softening = 1e-3;
+    let mut run = warm(&given, 100.0);
+    set(&mut run, "rotor_temperature", 950.0);
+    let error = run.do_step(0.0, 1e-3).unwrap_err().to_string();
+    assert!(error.starts_with("variable `rotor_temperature`: 950 K with softening"), "{error}");
+    let mut hot = Simulation::new(&given).unwrap();
+    set(&mut hot, "rotor_temperature", 950.0);
+    assert!(hot.initialise(0.0).is_err());
+}

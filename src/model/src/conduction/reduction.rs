@@ -1,0 +1,257 @@
+//! From the full model of conduction to coordinates.
+//!
+//! The basis holds the uniform temperature, so that heat is conserved; the slowest eigenmodes of K + H_g + H_a and C, for what lasts;
+//! and responses at rest to the heat of each patch and to gas and air, so that every steady state at the film coefficients given is
+//! exact. More such responses, with the gas standing still and with it four times as strong, make steady states at other factors
+//! good. Responses to heat that grows as exp(σt), at σ of ten, a hundred and a thousand times the slowest rate, make its beginning
+//! good: of what is local and young eigenmodes know little (a rational Krylov space). What is left is measured.
+
+use faer::Mat;
+use nalgebra::DMatrix;
+use tiprub_core::rom::Patch;
+use tiprub_thermal::Model;
+
+use super::{ConductionOptions, FullConduction};
+use crate::casing::{CasingOptions, supported_ring};
+use crate::eigen::{Modes, lowest_modes, positive_factor};
+use crate::mesh::Mesh;
+use crate::progress::{Listener, Stage, report};
+use crate::sparse::tall_product;
+use crate::thermal::equal_patches;
+use crate::{Error, Result};
+
+/// What is left of a vector, as a share of it, that depends on those before.
+const DEPENDENT: f64 = 1e-9;
+/// Rates of growth, as multiples of the slowest rate of decay, whose responses are in the basis.
+const GROWTHS: [f64; 3] = [10.0, 100.0, 1000.0];
+/// Factors of gas and air whose steady states are held against the full model.
+const CHECKED: [[f64; 2]; 6] = [[1.0, 1.0], [0.1, 1.0], [0.3, 1.0], [3.0, 1.0], [10.0, 1.0], [1.0, 10.0]];
+
+/// A steady state of the reduced model against that of the full one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteadyCheck {
+    /// Factors of gas and air.
+    pub factors: [f64; 2],
+    /// Largest deviation of a patch's mean temperature under heat of one patch, as a share of the largest.
+    pub patches: f64,
+    /// The same of the heated surfaces.
+    pub surfaces: f64,
+}
+
+/// What a reduction gives.
+#[derive(Debug, Clone)]
+pub struct Conduction {
+    /// The model.
+    pub model: Model,
+    /// Nodes and elements of the mesh.
+    pub counts: [usize; 2],
+    /// Areas in the gas, in the air, and heated (m²).
+    pub areas: [f64; 3],
+    /// 1/λ of the slowest eigenmodes of the full model (s).
+    pub time_constants: Vec<f64>,
+    /// Steady states.
+    pub checks: Vec<SteadyCheck>,
+}
+
+/// The casing that `reduce_ring` reduces, for its heat: same mesh, same patches, heated between its contact rings.
+///
+/// # Errors
+/// Those of [`supported_ring`] and [`reduce_conduction`].
+pub fn reduce_ring_conduction(
+    casing: &CasingOptions,
+    options: &ConductionOptions,
+    listener: Listener<'_>,
+) -> Result<Conduction> {
+    report(listener, Stage::Mesh, 0, 1);
+    let ring = supported_ring(casing)?;
+    let [around, along] = casing.patches;
+    let patches = equal_patches(around, along, casing.geometry.contour.axial());
+    report(listener, Stage::Mesh, 1, 1);
+    reduce_conduction(&ring.mesh, &patches, options, listener)
+}
+
+/// Reduce the conduction of a mesh around the z axis.
+///
+/// # Errors
+/// Those of [`FullConduction::new`], of the eigenvalue iteration, and of [`Model::validate`].
+pub fn reduce_conduction(
+    mesh: &Mesh,
+    patches: &[Patch],
+    options: &ConductionOptions,
+    listener: Listener<'_>,
+) -> Result<Conduction> {
+    // As for blades: the library's own threads would split sums by their number, and with it the bits of the model.
+    faer::set_global_parallelism(faer::Par::Seq);
+    report(listener, Stage::Assembly, 0, 1);
+    let full = FullConduction::new(mesh, patches, options)?;
+    report(listener, Stage::Assembly, 1, 1);
+    let nominal = full.operator([1.0; 2]);
+    let factor = positive_factor(&nominal, &full.capacity, "K + H (conduction and films)", NO_HOLD)?;
+    let modes = lowest_modes(&full.capacity, &factor, 0.0, options.modes, Stage::FullModes, listener)?;
+    let basis = basis(&full, &modes, options.films)?;
+    report(listener, Stage::Checks, 0, 1);
+    let model = project(mesh, &full, &basis, (patches, options))?;
+    model.validate()?;
+    let mut checks = Vec::new();
+    for factors in CHECKED {
+        // A side without a film has no factor.
+        if factors.iter().zip(options.films).all(|(factor, film)| film > 0.0 || *factor == 1.0) {
+            checks.push(check(&full, &model, factors)?);
+        }
+    }
+    report(listener, Stage::Checks, 1, 1);
+    Ok(Conduction {
+        model,
+        counts: [mesh.nodes.len(), mesh.elements.len()],
+        areas: full.areas,
+        time_constants: modes.eigenvalues.iter().map(|rate| 1.0 / rate).collect(),
+        checks,
+    })
+}
+
+const NO_HOLD: &str = "Check the mesh for parts that hang together with nothing";
+
+/// C-orthonormal vectors, the uniform temperature first; nodes × coordinates.
+fn basis(full: &FullConduction, modes: &Modes, films: [f64; 2]) -> Result<Mat<f64>> {
+    let nodes = full.capacity.order();
+    let mut vectors: Vec<Mat<f64>> = vec![Mat::from_fn(nodes, 1, |_, _| 1.0), modes.shapes.clone()];
+    // With the gas standing still, air alone must carry the heat away.
+    let still = [if films[1] > 0.0 { 0.0 } else { 0.05 }, 1.0];
+    for factors in [[1.0, 1.0], still, [4.0, 1.0]] {
+        vectors.push(response(full, factors, 0.0)?);
+    }
+    for growth in GROWTHS {
+        vectors.push(response(full, [1.0; 2], growth * modes.eigenvalues[0])?);
+    }
+    let mut basis = Mat::<f64>::zeros(nodes, vectors.iter().map(Mat::ncols).sum());
+    let mut size = 0;
+    for vector in vectors.iter().flat_map(|part| (0..part.ncols()).map(move |k| part.get(.., k..k + 1))) {
+        let mut column = vector.to_owned();
+        let first = norm(full, &column);
+        // The second pass takes away what the rounding of the first leaves.
+        for _pass in 0..2 {
+            let weighted = full.capacity.times(column.as_ref());
+            let before = basis.get(.., ..size);
+            let part = tall_product(before, weighted.as_ref());
+            column -= before * part;
+        }
+        let left = norm(full, &column);
+        if left > DEPENDENT * first {
+            basis.get_mut(.., size..size + 1).copy_from(&column);
+            basis.col_mut(size).iter_mut().for_each(|value| *value /= left);
+            size += 1;
+        }
+    }
+    Ok(basis.get(.., ..size).to_owned())
+}
+
+fn norm(full: &FullConduction, column: &Mat<f64>) -> f64 {
+    let weighted = full.capacity.times(column.as_ref());
+    (column.col(0).transpose() * weighted.col(0)).max(0.0).sqrt()
+}
+
+/// Responses to a watt of each patch, and a kelvin of the gas and of the air, that grow by the rate `growth` (1/s, 0 of steady states);
+/// nodes × (patches + 2).
+fn response(full: &FullConduction, factors: [f64; 2], growth: f64) -> Result<Mat<f64>> {
+    let (patches, films) = (full.heat.ncols(), full.film_loads());
+    let loads = Mat::from_fn(full.capacity.order(), patches + 2, |i, k| {
+        if k < patches { full.heat[(i, k)] } else { films[(i, k - patches)] }
+    });
+    let operator = full.operator(factors).plus_scaled(growth, &full.capacity);
+    Ok(operator.factor("K + H (conduction and films)", NO_HOLD)?.solve(loads))
+}
+
+fn project(
+    mesh: &Mesh,
+    full: &FullConduction,
+    basis: &Mat<f64>,
+    (patches, options): (&[Patch], &ConductionOptions),
+) -> Result<Model> {
+    let order = basis.ncols();
+    let product = |matrix: &crate::sparse::SparseMatrix| {
+        let product = tall_product(basis.as_ref(), matrix.times(basis.as_ref()).as_ref());
+        DMatrix::from_fn(order, order, |i, j| 0.5 * (product[(i, j)] + product[(j, i)]))
+    };
+    let means = |columns: &Mat<f64>| {
+        let product = tall_product(columns.as_ref(), basis.as_ref());
+        DMatrix::from_fn(columns.ncols(), order, |i, j| product[(i, j)])
+    };
+    let ones = Mat::from_fn(full.capacity.order(), 1, |_, _| 1.0);
+    let heat_capacity = ones.col(0).transpose() * full.capacity.times(ones.as_ref()).col(0);
+    let mut conduction = product(&full.conduction);
+    // Of a uniform temperature nothing is conducted: what is there is rounding.
+    conduction.row_mut(0).fill(0.0);
+    conduction.column_mut(0).fill(0.0);
+    let mut heat_loads = means(&full.heat).transpose();
+    heat_loads.row_mut(0).fill(1.0 / heat_capacity.sqrt());
+    let mut wetted_means = means(&full.wetted);
+    if full.areas[1] == 0.0 {
+        return Err(Error::invalid(
+            "thermal model",
+            "no face of the mesh is in the air outside",
+            "Check the mesh and its axis, z",
+        ));
+    }
+    let mut patch_means = means(&full.patch_means);
+    let mut places = DMatrix::from_fn(full.places.len(), order, |i, j| basis[(full.places[i], j)]);
+    for rows in [&mut wetted_means, &mut patch_means, &mut places] {
+        rows.column_mut(0).fill(1.0 / heat_capacity.sqrt());
+    }
+    Ok(Model {
+        name: options.name.clone(),
+        origin: origin(mesh, full, order, options),
+        heat_capacity,
+        conduction,
+        gas_convection: product(&full.films[0]),
+        ambient_convection: product(&full.films[1]),
+        heat_loads,
+        patch_means,
+        wetted_means,
+        places,
+        patches: patches.to_vec(),
+    })
+}
+
+fn origin(mesh: &Mesh, full: &FullConduction, order: usize, options: &ConductionOptions) -> String {
+    format!(
+        "{} nodes, {} elements; rho = {} kg/m3, c = {} J/(kg K), k = {} W/(m K); films of {} W/(m2 K) on {:.6} m2 inside and {} on {:.6} m2 \
+         outside; heated {:.6} m2 from z = {} m to {} m; {} modes and responses at rest, {order} coordinates",
+        mesh.nodes.len(),
+        mesh.elements.len(),
+        options.density,
+        options.conductor.specific_heat,
+        options.conductor.conductivity,
+        options.films[0],
+        full.areas[0],
+        options.films[1],
+        full.areas[1],
+        full.areas[2],
+        options.heated[0],
+        options.heated[1],
+        options.modes,
+    )
+}
+
+/// Steady states under a watt of each patch.
+fn check(full: &FullConduction, model: &Model, factors: [f64; 2]) -> Result<SteadyCheck> {
+    let patches = full.heat.ncols();
+    let exact = response(full, factors, 0.0)?;
+    let exact = exact.get(.., ..patches);
+    let matrix = &model.conduction + &model.gas_convection * factors[0] + &model.ambient_convection * factors[1];
+    let reduced = matrix
+        .cholesky()
+        .ok_or_else(|| Error::NotPositiveDefinite { matrix: "K + H (reduced)".into(), remedy: NO_HOLD.into() })?;
+    let reduced = reduced.solve(&model.heat_loads);
+    let deviation = |rows: &DMatrix<f64>, columns: &Mat<f64>| {
+        let exact = tall_product(columns.as_ref(), exact);
+        let found = rows * &reduced;
+        let pairs = || (0..patches).flat_map(|i| (0..patches).map(move |j| (i, j)));
+        let largest = pairs().map(|(i, j)| exact[(i, j)].abs()).fold(0.0, f64::max);
+        pairs().map(|(i, j)| (exact[(i, j)] - found[(i, j)]).abs()).fold(0.0, f64::max) / largest
+    };
+    Ok(SteadyCheck {
+        factors,
+        patches: deviation(&model.patch_means, &full.patch_means),
+        surfaces: deviation(&model.heat_loads.transpose(), &full.heat),
+    })
+}

@@ -1,0 +1,153 @@
+//! Hot running clearance against closed forms: a bar that turns in a ring, both warm.
+//!
+//! A bar from radius a to b of one section, clamped at a, without lateral contraction, grows at its tip by
+//! ρΩ²/E (b²(b − a)/2 − (b³ − a³)/6) as it turns and by αΔT(b − a) as it warms up; a free ring of inner radius R opens by αΔT R.
+
+use std::f64::consts::TAU;
+
+use tiprub_core::rom::Frame;
+use tiprub_core::settings::StructureSettings;
+use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_model::casing::{ContactRings, Contour, RingCounts, RingGeometry, Support};
+use tiprub_model::element::ElementKind;
+use tiprub_model::mesh::Mesh;
+use tiprub_model::progress::silent;
+use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions};
+use tiprub_model::stress::StressPlaces;
+use tiprub_model::{CasingOptions, FeModel, Material, reduce_model, reduce_ring};
+use tiprub_test_models as models;
+
+mod common;
+use common::{nodes_at, straight_box};
+
+const ROOT: f64 = 0.18;
+const TIP: f64 = 0.25;
+const GAP: f64 = 8e-4;
+const SPEED: f64 = 1800.0;
+
+fn metal() -> Material {
+    Material { young_modulus: 200e9, poisson_ratio: 0.0, expansion: 10e-6, ..Material::maraging_steel() }
+}
+
+/// The bar, `elements` along its length.
+fn bar(elements: usize, kind: ReductionKind) -> Rom {
+    let [length, wide, high] = [TIP - ROOT, 0.006, 0.006];
+    let mut mesh: Mesh = straight_box(ElementKind::Hex20, [elements, 2, 2], [length, wide, high]);
+    for x in &mut mesh.nodes {
+        *x = [x[0] + ROOT, x[1] - 0.5 * wide, x[2] - 0.5 * high];
+    }
+    let clamped = nodes_at(&mesh, 0, ROOT);
+    let middle = nodes_at(&mesh, 0, TIP);
+    let off_axis = |node: &usize| mesh.nodes[*node][1].hypot(mesh.nodes[*node][2]);
+    let tip = *middle.iter().min_by(|a, b| off_axis(a).total_cmp(&off_axis(b))).unwrap();
+    let options = ReductionOptions {
+        name: "bar".into(),
+        kind,
+        modes: 6,
+        checked_modes: 6,
+        sectors: 8,
+        frame: Frame::Cylindrical,
+        watched: Vec::new(),
+        stress: StressPlaces::default(),
+        damping_ratio: 0.01,
+    };
+    let model = FeModel::assembled(mesh, &metal(), String::new(), &silent).unwrap();
+    let contact = [ContactPoint::at("tip", tip, 0.0)];
+    reduce_model(model, &clamped, &contact, &options, Some(SPEED), &silent).unwrap().rom
+}
+
+fn ring() -> (Rom, f64) {
+    let radius = TIP + GAP;
+    let options = CasingOptions {
+        name: "ring".into(),
+        geometry: RingGeometry {
+            contour: Contour::new(&[[-0.02, radius], [0.02, radius]]).unwrap(),
+            thickness: 4e-3,
+            flanges: [None, None],
+        },
+        counts: RingCounts { around: 72, through: 1, along: 4, flange: 1 },
+        rings: ContactRings { around: 36, along: 3, axial: [-0.01, 0.01] },
+        patches: [4, 1],
+        fixed_interface_modes: 12,
+        modes: 30,
+        checked_modes: 10,
+        support: Support::Free,
+        ..CasingOptions::default()
+    };
+    (reduce_ring(&options, &silent).unwrap().rom, options.material.expansion)
+}
+
+/// The bar turns in the ring; growth and both temperatures are on.
+fn scene(blade: Rom, casing: Rom) -> Scene {
+    let mut scene = models::round(blade);
+    scene.settings.surfaces[0].moving = false;
+    models::on_ring(&mut scene, casing, 0.01);
+    let [rotor, ring] = &mut scene.settings.structures[..] else { unreachable!() };
+    (rotor.thermal, rotor.spin.growth, rotor.speed) = (true, true, 0.0);
+    *ring = StructureSettings { thermal: true, ..ring.clone() };
+    scene.settings.contacts[0].gap = GAP;
+    scene.settings.time.step = 5e-7;
+    scene.settings.outputs.watched_sectors = vec![1];
+    scene
+}
+
+/// Clearance at the tip (m) at rest at this speed (rad/s) and these temperatures (K) of rotor and casing.
+fn clearance(scene: &Scene, speed: f64, [rotor, casing]: [f64; 2]) -> f64 {
+    let mut run = Simulation::new(scene).unwrap();
+    models::set(&mut run, "speed", speed);
+    models::set(&mut run, "rotor_temperature", rotor);
+    (0..4).for_each(|patch| models::set_element(&mut run, "casing_temperature", patch, casing));
+    run.initialise(0.0).unwrap();
+    models::element(&run, "blade[1].clearance", 0)
+}
+
+#[test]
+fn the_hot_running_clearance_is_that_of_the_closed_forms() {
+    let (casing, casing_expansion) = ring();
+    let scene = scene(bar(12, ReductionKind::FixedInterface), casing);
+    let material = metal();
+    println!("| state | Ω (rad/s) | rotor (K) | casing (K) | closed form (mm) | found (mm) | error (nm) |");
+    println!("|---|---|---|---|---|---|---|");
+    for (state, speed, temperatures) in [
+        ("cold, at rest", 0.0, [0.0, 0.0]),
+        ("cold, running", SPEED, [0.0, 0.0]),
+        ("blades warm", 0.0, [400.0, 0.0]),
+        ("casing warm", 0.0, [0.0, 250.0]),
+        ("hot, running", SPEED, [400.0, 250.0]),
+        ("hot reslam", SPEED, [400.0, 60.0]),
+    ] {
+        let growth = material.density * speed * speed / material.young_modulus
+            * (0.5 * TIP * TIP * (TIP - ROOT) - (TIP.powi(3) - ROOT.powi(3)) / 6.0);
+        let expansion = material.expansion * temperatures[0] * (TIP - ROOT);
+        let opening = casing_expansion * temperatures[1] * (TIP + GAP);
+        let expected = GAP - growth - expansion + opening;
+        let found = clearance(&scene, speed, temperatures);
+        let (millimetres, error) = ([expected, found].map(|value| 1e3 * value), 1e9 * (found - expected));
+        println!(
+            "| {state} | {speed} | {} | {} | {:.4} | {:.4} | {error:.2} |",
+            temperatures[0], temperatures[1], millimetres[0], millimetres[1]
+        );
+        assert!(error.abs() < 1.0, "{state}: {error} nm");
+    }
+}
+
+/// Whatever modes a reduction keeps, free expansion at the contact nodes is that of the mesh, which comes to the closed form: static
+/// responses to forces there are among them.
+#[test]
+fn both_reductions_expand_as_the_mesh_does() {
+    let expected = metal().expansion * 100.0 * (TIP - ROOT);
+    for (elements, tolerance) in [(3, 1e-3), (12, 1e-6)] {
+        let kinds = [ReductionKind::FixedInterface, ReductionKind::FreeInterface];
+        let found = kinds.map(|kind| {
+            let rom = bar(elements, kind);
+            let thermal = rom.extras.thermal.as_ref().unwrap();
+            let patch = thermal.patches[0];
+            assert!(thermal.patches.len() == 1 && (patch.angle[1] - TAU).abs() < 1e-12);
+            let moved = &rom.contact_map * rom.stiffness.clone().cholesky().unwrap().solve(&thermal.loads) * 100.0;
+            assert!(moved[(1, 0)].abs() < 1e-8 * expected && moved[(2, 0)].abs() < 1e-8 * expected);
+            moved[(0, 0)] / expected - 1.0
+        });
+        println!("{elements} elements: {:.1e}, between the reductions {:.1e}", found[0], found[0] - found[1]);
+        assert!(found[0].abs() < tolerance && (found[0] - found[1]).abs() < 1e-8, "{elements}: {found:?}");
+    }
+}

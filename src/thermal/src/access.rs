@@ -1,0 +1,188 @@
+//! Reading and setting variables.
+
+use tiprub_core::variables::{Causality, Kind, Start, Variability, Variable};
+use tiprub_core::{Error, Result, shown};
+
+use crate::simulation::Simulation;
+use crate::state::CREATED;
+use crate::table::Item;
+
+impl Simulation {
+    /// Read one element of a real variable; inputs and parameters give back what was set.
+    ///
+    /// # Errors
+    /// Unknown reference, or not a real.
+    pub fn real(&self, reference: u32) -> Result<f64> {
+        self.of_kind(reference, "real", |kind| kind == Kind::Real)?;
+        Ok(self.values[reference as usize])
+    }
+
+    /// Read an item of an enumeration.
+    ///
+    /// # Errors
+    /// Unknown reference, or not an enumeration.
+    pub fn integer(&self, reference: u32) -> Result<i32> {
+        self.of_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
+        #[expect(clippy::cast_possible_truncation, reason = "stored as the i32 it was set from")]
+        Ok(self.values[reference as usize] as i32)
+    }
+
+    /// Read a boolean: there is none.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn boolean(&self, reference: u32) -> Result<bool> {
+        self.of_kind(reference, "boolean", |kind| kind == Kind::Boolean).map(|_| false)
+    }
+
+    /// Read a text.
+    ///
+    /// # Errors
+    /// Unknown reference, or not a text.
+    pub fn string(&self, reference: u32) -> Result<&str> {
+        let (variable, _) = self.of_kind(reference, "string", |kind| kind == Kind::String)?;
+        match &variable.start {
+            Some(Start::String(text)) => Ok(text),
+            _ => Ok(""),
+        }
+    }
+
+    fn of_kind(&self, reference: u32, wanted: &str, fits: impl Fn(Kind) -> bool) -> Result<(&Variable, usize)> {
+        let (variable, element) = self.table.locate(reference)?;
+        if fits(variable.kind) {
+            return Ok((variable, element));
+        }
+        let problem = format!("is of type {:?}, not {wanted}", variable.kind);
+        let remedy = "Call the function of the variable's type in modelDescription.xml";
+        Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy))
+    }
+
+    /// What a reference stands for, if it can be set now.
+    fn settable(&self, reference: u32) -> Result<(Item, usize, &Variable)> {
+        let (variable, element) = self.table.locate(reference)?;
+        let what = || format!("variable `{}`", variable.name);
+        if !variable.is_settable() {
+            return Err(Error::invalid(what(), "is computed and cannot be set", "Set inputs and parameters only"));
+        }
+        if variable.variability == Variability::Fixed && self.state.phase != CREATED {
+            let remedy = "Set it before initialisation ends, or reset the instance first";
+            return Err(Error::invalid(what(), "is fixed and cannot be set after initialisation", remedy));
+        }
+        Ok((self.item(variable), element, variable))
+    }
+
+    pub(crate) fn item(&self, variable: &Variable) -> Item {
+        let row = self.table.variables().iter().position(|other| other.reference == variable.reference);
+        row.map_or(Item::Constant, |row| self.items[row])
+    }
+
+    /// Set one element of a real input or parameter; a derivative given before is over.
+    ///
+    /// # Errors
+    /// Unknown reference, wrong kind, not settable, out of range; nothing is changed then.
+    pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
+        self.of_kind(reference, "real", |kind| kind == Kind::Real)?;
+        let (item, element, variable) = self.settable(reference)?;
+        let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
+        if !(low..=high).contains(&value) {
+            let problem = format!("{} is outside {} to {}", shown(value), shown(low), shown(high));
+            let remedy = "Give a value within min and max";
+            return Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy));
+        }
+        let state = &mut self.state;
+        match item {
+            Item::Heat => state.heat[element].set(value),
+            Item::Film(index) => state.films[index].set(value),
+            Item::Factor(index) => state.factors[index] = value,
+            Item::InitialTemperature => state.initial_temperature = value,
+            _ => {}
+        }
+        self.values[reference as usize] = value;
+        Ok(())
+    }
+
+    /// Set an item of an enumeration.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_real`].
+    pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
+        self.of_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
+        let (item, _, variable) = self.settable(reference)?;
+        if let Kind::Enumeration(choices) = variable.kind
+            && !usize::try_from(value).is_ok_and(|item| (1..=choices.items.len()).contains(&item))
+        {
+            let items = choices.items.iter().enumerate().map(|(index, (name, _))| format!("{} = {name}", index + 1));
+            let remedy = format!("Use one of: {}", items.collect::<Vec<_>>().join(", "));
+            let problem = format!("{value} is no item of {}", choices.name);
+            return Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy));
+        }
+        match item {
+            Item::InitialState => self.state.initial_state = value,
+            Item::Interpolation => self.state.interpolation = value,
+            _ => {}
+        }
+        self.values[reference as usize] = f64::from(value);
+        Ok(())
+    }
+
+    /// Set a boolean: there is none.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn set_boolean(&mut self, reference: u32, _value: bool) -> Result<()> {
+        self.of_kind(reference, "boolean", |kind| kind == Kind::Boolean).map(drop)
+    }
+
+    /// Set a text: none can be.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn set_string(&mut self, reference: u32, _value: &str) -> Result<()> {
+        self.of_kind(reference, "string", |kind| kind == Kind::String)?;
+        self.settable(reference).map(drop)
+    }
+
+    /// First time derivative of heat or of a temperature of gas or air, until it is set again.
+    ///
+    /// # Errors
+    /// Another variable, an order other than 1, not finite.
+    pub fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
+        let (variable, element) = self.table.locate(reference)?;
+        let what = format!("derivative of `{}`", variable.name);
+        let item = self.item(variable);
+        if order != 1 {
+            return Err(Error::invalid(what, format!("order {order}"), "Inputs are linear in time: give order 1"));
+        }
+        if !value.is_finite() {
+            return Err(Error::invalid(what, shown(value), "Give a finite number"));
+        }
+        match item {
+            Item::Heat => self.state.heat[element].set_slope(value),
+            Item::Film(index) => self.state.films[index].set_slope(value),
+            Item::Factor(_) if value == 0.0 => {}
+            _ => {
+                let problem = "only heat and the temperatures of gas and air may run over a step";
+                return Err(Error::invalid(what, problem, "Set its value at communication points"));
+            }
+        }
+        Ok(())
+    }
+
+    /// First time derivative of a continuous real output at the last communication point, under the inputs reached there; of means
+    /// over the step from their middle to there.
+    ///
+    /// # Errors
+    /// Another variable, an order other than 1.
+    pub fn output_derivative(&self, reference: u32, order: i32) -> Result<f64> {
+        let (variable, element) = self.table.locate(reference)?;
+        let what = format!("derivative of `{}`", variable.name);
+        if variable.causality != Causality::Output || variable.kind != Kind::Real {
+            let remedy = "Ask for derivatives of continuous real outputs only";
+            return Err(Error::invalid(what, "the variable is not a continuous real output", remedy));
+        }
+        if order != 1 {
+            return Err(Error::invalid(what, format!("order {order}"), "Only derivatives of order 1 are provided"));
+        }
+        Ok(self.rate(self.item(variable), element))
+    }
+}

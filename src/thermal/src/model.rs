@@ -1,0 +1,138 @@
+//! A reduced-order model of heat conduction, as plain data.
+
+use nalgebra::DMatrix;
+use tiprub_core::rom::Patch;
+use tiprub_core::{Error, Result, ranges, shown};
+
+/// Most coordinates: their eigenvalue problem is dense, and solved anew when a convection factor changes.
+pub const LARGEST_ORDER: usize = 1000;
+/// Matrices are symmetric, and conduction takes no heat of its own, up to this share of their largest entry.
+const ROUNDING: f64 = 1e-9;
+
+/// Coordinates x with T = V x at the nodes of a mesh and Vᵀ C V = I, C the heat capacity: ẋ + (K + s_g H_g + s_a H_a) x = loads.
+///
+/// The first coordinate is the uniform temperature, x₁ = √C T with the heat capacity C of the whole, so that heat is conserved
+/// whatever the other coordinates leave out: the heat stored is √C x₁.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// Name.
+    pub name: String,
+    /// Where it comes from, in words.
+    pub origin: String,
+    /// Heat capacity C (J/K).
+    pub heat_capacity: f64,
+    /// K, coordinates × coordinates (1/s); its first row and column are zero.
+    pub conduction: DMatrix<f64>,
+    /// H_g of the gas inside, coordinates × coordinates (1/s).
+    pub gas_convection: DMatrix<f64>,
+    /// H_a of the air outside, coordinates × coordinates (1/s).
+    pub ambient_convection: DMatrix<f64>,
+    /// What one watt into each patch does, coordinates × patches (√(K/J)). Spread evenly over the heated surface of a patch, it is
+    /// also the mean temperature there: transposed.
+    pub heat_loads: DMatrix<f64>,
+    /// Mean temperature of the volume of each patch, patches × coordinates (√(K/J)).
+    pub patch_means: DMatrix<f64>,
+    /// Mean temperatures of the surface in the gas and of that in the air, 2 × coordinates.
+    pub wetted_means: DMatrix<f64>,
+    /// Temperatures of places on the heated surface, places × coordinates.
+    pub places: DMatrix<f64>,
+    /// The patches, as those of the mechanical model.
+    pub patches: Vec<Patch>,
+}
+
+impl Model {
+    /// Number of coordinates.
+    pub fn order(&self) -> usize {
+        self.conduction.nrows()
+    }
+
+    /// h A of the gas at a factor of 1 (W/K): xᵀ H_g x of the uniform temperature of 1 K.
+    pub fn gas_conductance(&self) -> f64 {
+        self.heat_capacity * self.gas_convection[(0, 0)]
+    }
+
+    /// The same of the air.
+    pub fn ambient_conductance(&self) -> f64 {
+        self.heat_capacity * self.ambient_convection[(0, 0)]
+    }
+
+    /// Check sizes and what the simulation relies on.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the array.
+    pub fn validate(&self) -> Result<()> {
+        let (order, patches) = (self.order(), self.patches.len());
+        if order == 0 || order > LARGEST_ORDER {
+            return refuse("conduction", format!("{order} coordinates are outside 1 to {LARGEST_ORDER}"));
+        }
+        if patches == 0 || patches > ranges::PATCHES {
+            return refuse("patches", format!("{patches} are outside 1 to {}", ranges::PATCHES));
+        }
+        if !(self.heat_capacity.is_finite() && self.heat_capacity > 0.0) {
+            return refuse("heat_capacity", format!("{} J/K is not positive", shown(self.heat_capacity)));
+        }
+        for (name, array, shape) in [
+            ("conduction", &self.conduction, (order, order)),
+            ("gas_convection", &self.gas_convection, (order, order)),
+            ("ambient_convection", &self.ambient_convection, (order, order)),
+            ("heat_loads", &self.heat_loads, (order, patches)),
+            ("patch_means", &self.patch_means, (patches, order)),
+            ("wetted_means", &self.wetted_means, (2, order)),
+            ("places", &self.places, (self.places.nrows(), order)),
+        ] {
+            if array.shape() != shape {
+                return refuse(name, format!("shape {:?} found, {shape:?} expected", array.shape()));
+            }
+            if let Some(wrong) = array.iter().find(|value| !(value.abs() <= ranges::MATRIX)) {
+                return refuse(name, format!("it holds {wrong}"));
+            }
+        }
+        if self.places.nrows() == 0 {
+            return refuse("places", "there is none".into());
+        }
+        self.validate_physics()
+    }
+
+    /// Symmetry, signs, and that heat is conserved.
+    fn validate_physics(&self) -> Result<()> {
+        for (name, matrix) in [
+            ("conduction", &self.conduction),
+            ("gas_convection", &self.gas_convection),
+            ("ambient_convection", &self.ambient_convection),
+        ] {
+            let slack = ROUNDING * matrix.amax();
+            if (matrix - matrix.transpose()).amax() > slack {
+                return refuse(name, "it is not symmetric".into());
+            }
+            let lowest = matrix.symmetric_eigenvalues().min();
+            if lowest < -slack {
+                let problem =
+                    format!("it has the negative eigenvalue {}: heat would flow from cold to hot", shown(lowest));
+                return refuse(name, problem);
+            }
+        }
+        if self.conduction.row(0).amax() > 0.0 || self.conduction.column(0).amax() > 0.0 {
+            return refuse(
+                "conduction",
+                "its first row and column are not zero: a uniform temperature would not last".into(),
+            );
+        }
+        let share = 1.0 / self.heat_capacity.sqrt();
+        if self.heat_loads.row(0).iter().any(|load| (load - share).abs() > ROUNDING * share) {
+            return refuse("heat_loads", "a watt does not heat the whole by a watt (first row)".into());
+        }
+        let uniform = [&self.patch_means, &self.wetted_means, &self.places];
+        if uniform
+            .iter()
+            .flat_map(|rows| rows.column(0).iter().copied().collect::<Vec<_>>())
+            .any(|value| (value - share).abs() > ROUNDING * share)
+        {
+            return refuse("patch_means", "a uniform temperature is not its own mean (first column)".into());
+        }
+        Ok(())
+    }
+}
+
+fn refuse(name: &str, problem: String) -> Result<()> {
+    Err(Error::invalid(format!("thermal model, `{name}`"), problem, "Write the model again with `tiprub thermal`"))
+}

@@ -1,0 +1,67 @@
+//! The model in the eigenvectors of its conduction and convection, for given convection factors.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::exponential::Phi;
+use crate::model::Model;
+
+/// ż = −λ z + loads, z = Eᵀ x.
+#[derive(Debug, Clone)]
+pub(crate) struct Operator {
+    /// Factors of the gas and of the air that it was made for.
+    pub(crate) factors: [f64; 2],
+    /// λ (1/s), ascending.
+    pub(crate) rates: Vec<f64>,
+    /// E, coordinates × coordinates.
+    pub(crate) vectors: DMatrix<f64>,
+    /// Loads of a watt in each patch, coordinates × patches.
+    pub(crate) heat: DMatrix<f64>,
+    /// Loads per kelvin of the gas and of the air, their factors included; transposed, what flows back at a temperature.
+    pub(crate) films: [DVector<f64>; 2],
+    /// What these are for a uniform temperature, s h A (W/K).
+    pub(crate) conductances: [f64; 2],
+    /// Rows of outputs, see [`crate::outputs::rows`].
+    pub(crate) rows: DMatrix<f64>,
+    /// The heat stored (J) by coordinates.
+    pub(crate) stored: DVector<f64>,
+}
+
+impl Operator {
+    /// Of a model with `rows` of outputs.
+    pub(crate) fn new(model: &Model, rows: &DMatrix<f64>, factors: [f64; 2]) -> Self {
+        let films = [&model.gas_convection, &model.ambient_convection];
+        let matrix = &model.conduction + films[0] * factors[0] + films[1] * factors[1];
+        let eigen = matrix.symmetric_eigen();
+        let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        let vectors = DMatrix::from_fn(order.len(), order.len(), |i, k| eigen.eigenvectors[(i, order[k])]);
+        let root = model.heat_capacity.sqrt();
+        // H of the uniform temperature of 1 K, whose coordinates are √C and zeros.
+        let film = |index: usize| vectors.tr_mul(&(films[index].column(0) * (root * factors[index])));
+        Self {
+            factors,
+            // Without convection the uniform temperature has a rate of rounding, of either sign.
+            rates: order.iter().map(|&k| eigen.eigenvalues[k].max(0.0)).collect(),
+            heat: vectors.tr_mul(&model.heat_loads),
+            films: [film(0), film(1)],
+            conductances: [model.gas_conductance() * factors[0], model.ambient_conductance() * factors[1]],
+            rows: rows * &vectors,
+            stored: vectors.row(0).transpose() * root,
+            vectors,
+        }
+    }
+
+    /// φ functions of all coordinates for a step of `length` (s).
+    pub(crate) fn fill_phi(&self, length: f64, phi: &mut [Phi]) {
+        for (phi, rate) in phi.iter_mut().zip(&self.rates) {
+            *phi = Phi::new(-rate * length);
+        }
+    }
+
+    /// Load of `heat` (W) and of the temperatures of gas and air (K) on one coordinate.
+    pub(crate) fn load(&self, coordinate: usize, heat: &[f64], films: [f64; 2]) -> f64 {
+        let patches = self.heat.row(coordinate);
+        let heated: f64 = patches.iter().zip(heat).map(|(load, heat)| load * heat).sum();
+        heated + self.films[0][coordinate] * films[0] + self.films[1][coordinate] * films[1]
+    }
+}

@@ -1,0 +1,94 @@
+//! Outputs, from coordinates.
+
+use nalgebra::DMatrix;
+
+use crate::model::Model;
+use crate::operator::Operator;
+use crate::simulation::Simulation;
+use crate::state::State;
+use crate::table::Item;
+
+/// Rows of temperatures by coordinates x: of patches, of their heated surfaces, of the whole, of the surfaces in gas and air, of
+/// places.
+pub(crate) fn rows(model: &Model) -> DMatrix<f64> {
+    let parts = [&model.patch_means, &model.heat_loads.transpose(), &mean(model), &model.wetted_means, &model.places];
+    let count = parts.iter().map(|part| part.nrows()).sum();
+    let mut rows = DMatrix::zeros(count, model.order());
+    let mut first = 0;
+    for part in parts {
+        rows.rows_mut(first, part.nrows()).copy_from(part);
+        first += part.nrows();
+    }
+    rows
+}
+
+/// Of the whole: the first coordinate alone.
+fn mean(model: &Model) -> DMatrix<f64> {
+    let mut row = DMatrix::zeros(1, model.order());
+    row[(0, 0)] = 1.0 / model.heat_capacity.sqrt();
+    row
+}
+
+/// A row of the operator times coordinates.
+pub(crate) fn row_times(operator: &Operator, row: usize, coordinates: &[f64]) -> f64 {
+    operator.rows.row(row).iter().zip(coordinates).map(|(a, b)| a * b).sum()
+}
+
+/// Heat stored (J).
+pub(crate) fn stored(operator: &Operator, coordinates: &[f64]) -> f64 {
+    operator.stored.iter().zip(coordinates).map(|(a, b)| a * b).sum()
+}
+
+impl Simulation {
+    /// First row of the places.
+    pub(crate) fn first_place(&self) -> usize {
+        2 * self.model.patches.len() + 3
+    }
+
+    /// The hottest of the places.
+    pub(crate) fn hottest(&self) -> usize {
+        let value = |row: usize| row_times(&self.operator, row, &self.state.coordinates);
+        let rows = self.first_place()..self.operator.rows.nrows();
+        let best = rows.map(|row| (row, value(row))).max_by(|a, b| a.1.total_cmp(&b.1));
+        best.map_or(0, |(row, _)| row)
+    }
+
+    /// Fill the values of all outputs.
+    pub(crate) fn compute_outputs(&mut self) {
+        for row in 0..self.items.len() {
+            let variable = &self.table.variables()[row];
+            let (first, count) = (variable.reference as usize, variable.len());
+            for element in 0..count {
+                if let Some(value) = self.output(self.items[row], element) {
+                    self.values[first + element] = value;
+                }
+            }
+        }
+    }
+
+    /// One output; `None` of what is none.
+    fn output(&self, item: Item, element: usize) -> Option<f64> {
+        let (state, operator) = (&self.state, &self.operator);
+        let State { coordinates, totals, powers, .. } = state;
+        Some(match item {
+            Item::Time => state.time,
+            Item::Rows(first) => row_times(operator, first + element, coordinates),
+            Item::Hottest => row_times(operator, self.hottest(), coordinates),
+            Item::Power(film) => powers[film],
+            Item::Stored => stored(operator, coordinates),
+            Item::Total(index) => totals[index].value(),
+            Item::Residual => self.residual(),
+            Item::RelativeResidual => {
+                let size = state.exchanged + state.initial_heat.abs();
+                if size > 0.0 { self.residual() / size } else { 0.0 }
+            }
+            _ => return None,
+        })
+    }
+
+    /// What the balance of heat leaves (J).
+    fn residual(&self) -> f64 {
+        let came: f64 = self.state.totals.iter().map(tiprub_core::Sum::value).sum();
+        stored(&self.operator, &self.state.coordinates) - self.state.initial_heat - came
+    }
+}

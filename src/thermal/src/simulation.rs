@@ -1,0 +1,325 @@
+//! A model with its state: what an FMU instance and the tests drive.
+
+use tiprub_core::simulation::Progress;
+use tiprub_core::variables::{Start, VariableTable};
+use tiprub_core::{Error, Result, Sum, ranges, shown};
+
+use crate::course::Course;
+use crate::exponential::Phi;
+use crate::model::Model;
+use crate::operator::Operator;
+use crate::outputs::{rows, stored};
+use crate::state::{CREATED, FAILED, READY, State, fingerprint_of};
+use crate::table::{self, HEAT, Item, TEMPERATURES};
+
+/// Communication points may differ from the simulation's own time by this fraction of H, as in the contact unit.
+const TIME_TOLERANCE: f64 = 1e-3;
+/// Rates below this share of the largest are those of a casing that nothing cools: it has no steady state.
+const UNCOOLED: f64 = 1e-13;
+
+/// A reduced model of conduction and its state.
+///
+/// Life: [`Simulation::new`] → set parameters and inputs → [`Simulation::initialise`] → any number of steps → ([`Simulation::reset`]
+/// and again). A communication step is one internal step, and exact.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    pub(crate) model: Model,
+    pub(crate) table: VariableTable,
+    pub(crate) items: Vec<Item>,
+    pub(crate) fingerprint: u64,
+    /// Of the model's outputs, in its own coordinates.
+    pub(crate) model_rows: nalgebra::DMatrix<f64>,
+    pub(crate) operator: Operator,
+    pub(crate) state: State,
+    /// Values of all references; of inputs and parameters as set.
+    pub(crate) values: Vec<f64>,
+    /// Step that was begun: time at its end and length (s).
+    under_way: Option<[f64; 2]>,
+    phi: Vec<Phi>,
+    /// Heat of the patches at the beginning and at the end of a step (W).
+    heat: [Vec<f64>; 2],
+}
+
+impl Simulation {
+    /// Start values are in place, nothing is computed yet.
+    ///
+    /// # Errors
+    /// Those of [`Model::validate`].
+    pub fn new(model: Model) -> Result<Self> {
+        model.validate()?;
+        let (table, items) = table::build(&model)?;
+        let (order, patches) = (model.order(), model.patches.len());
+        let model_rows = rows(&model);
+        let operator = Operator::new(&model, &model_rows, [1.0; 2]);
+        let arrays =
+            [&model.conduction, &model.gas_convection, &model.ambient_convection, &model.heat_loads, &model_rows];
+        let fingerprint = fingerprint_of(arrays.iter().map(|array| array.as_slice()));
+        let mut simulation = Self {
+            values: vec![0.0; table.references()],
+            table,
+            items,
+            fingerprint,
+            model_rows,
+            operator,
+            state: State::new(patches, order),
+            under_way: None,
+            phi: vec![Phi::default(); order],
+            heat: [vec![0.0; patches], vec![0.0; patches]],
+            model,
+        };
+        simulation.reset();
+        Ok(simulation)
+    }
+
+    /// The variable table.
+    pub fn table(&self) -> &VariableTable {
+        &self.table
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Time of the last communication point (s).
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+
+    /// 1/λ of all coordinates (s), the slowest first, at the convection factors of the last step; infinite of what lasts for ever.
+    pub fn time_constants(&self) -> Vec<f64> {
+        self.operator.rates.iter().map(|rate| 1.0 / rate).collect()
+    }
+
+    /// Back to the start values.
+    pub fn reset(&mut self) {
+        self.state = State::new(self.model.patches.len(), self.model.order());
+        self.under_way = None;
+        self.values.fill(0.0);
+        for variable in self.table.variables() {
+            let first = variable.reference as usize;
+            match &variable.start {
+                Some(Start::Real(values)) => self.values[first..first + values.len()].copy_from_slice(values),
+                Some(Start::Integer(value)) => self.values[first] = f64::from(*value),
+                _ => {}
+            }
+        }
+        self.follow_factors();
+    }
+
+    /// Set the temperatures to the start.
+    ///
+    /// # Errors
+    /// A start time out of range; a steady start without any cooling.
+    pub fn initialise(&mut self, start_time: f64) -> Result<()> {
+        ranges::at_most("start time", start_time, ranges::TIME)?;
+        let state = &mut self.state;
+        state.phase = CREATED;
+        state.factors_used = state.factors;
+        state.heat.iter_mut().chain(&mut state.films).for_each(Course::start);
+        self.follow_factors();
+        if self.state.initial_state == 2 {
+            self.start_steady()?;
+        } else {
+            // The uniform temperature is the first coordinate of the model.
+            let first = self.model.heat_capacity.sqrt() * self.state.initial_temperature;
+            let row = self.operator.vectors.row(0);
+            self.state.coordinates.iter_mut().zip(row.iter()).for_each(|(z, share)| *z = share * first);
+        }
+        let state = &mut self.state;
+        (state.time, state.last_length, state.last_ramped) = (start_time, 0.0, false);
+        (state.powers, state.totals, state.exchanged) = ([0.0; 2], [Sum::default(); 3], 0.0);
+        state.initial_heat = stored(&self.operator, &state.coordinates);
+        state.phase = READY;
+        self.compute_outputs();
+        Ok(())
+    }
+
+    /// λ z = load.
+    fn start_steady(&mut self) -> Result<()> {
+        let rates = &self.operator.rates;
+        let (slowest, fastest) = (rates[0], rates[rates.len() - 1]);
+        if slowest <= UNCOOLED * fastest || slowest == 0.0 {
+            return Err(Error::invalid(
+                "initial_state = steady",
+                "nothing cools the casing: both convection factors, or all film coefficients, are 0",
+                "Set a convection factor above 0, or start with a uniform temperature",
+            ));
+        }
+        let heat: Vec<f64> = self.state.heat.iter().map(|course| course.value).collect();
+        let films = self.state.films.map(|course| course.value);
+        for (coordinate, z) in self.state.coordinates.iter_mut().enumerate() {
+            *z = self.operator.load(coordinate, &heat, films) / self.operator.rates[coordinate];
+        }
+        Ok(())
+    }
+
+    /// Eigenvectors of the factors that the state says it uses.
+    fn follow_factors(&mut self) {
+        let used = self.state.factors_used;
+        if used.map(f64::to_bits) != self.operator.factors.map(f64::to_bits) {
+            self.operator = Operator::new(&self.model, &self.model_rows, used);
+        }
+    }
+
+    /// Go over to the factors set, with the same temperatures.
+    fn change_factors(&mut self) {
+        if self.state.factors.map(f64::to_bits) == self.operator.factors.map(f64::to_bits) {
+            return;
+        }
+        let model = &self.operator.vectors * nalgebra::DVector::from_column_slice(&self.state.coordinates);
+        self.state.factors_used = self.state.factors;
+        self.follow_factors();
+        self.state.coordinates.copy_from_slice(self.operator.vectors.tr_mul(&model).as_slice());
+    }
+
+    /// Take over a state whose content has been checked.
+    pub(crate) fn adopt(&mut self, state: State) {
+        self.state = state;
+        self.under_way = None;
+        self.follow_factors();
+        self.write_back();
+        self.compute_outputs();
+    }
+
+    /// Values of inputs and parameters from the state.
+    fn write_back(&mut self) {
+        let state = &self.state;
+        for (variable, item) in self.table.variables().iter().zip(&self.items) {
+            let first = variable.reference as usize;
+            match item {
+                Item::Heat => {
+                    let values = self.values[first..].iter_mut();
+                    values.zip(&state.heat).for_each(|(value, course)| *value = course.value);
+                }
+                Item::Film(index) => self.values[first] = state.films[*index].value,
+                Item::Factor(index) => self.values[first] = state.factors[*index],
+                Item::InitialTemperature => self.values[first] = state.initial_temperature,
+                Item::InitialState => self.values[first] = f64::from(state.initial_state),
+                Item::Interpolation => self.values[first] = f64::from(state.interpolation),
+                _ => {}
+            }
+        }
+    }
+
+    /// Begin a communication step of length `step_size` (s) from `current_time` (s).
+    ///
+    /// # Errors
+    /// Not at a communication point, another time than the simulation's, a length out of range, or inputs that leave their range
+    /// within it.
+    pub fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+        if self.state.phase != READY {
+            let remedy = "Initialise, reset or restore the instance";
+            return Err(Error::invalid("step", "the simulation is not at a communication point", remedy));
+        }
+        ranges::within("communication step", step_size, ranges::SHORTEST_STEP, ranges::TIME)?;
+        ranges::at_most("end of the communication step", current_time + step_size, ranges::TIME)?;
+        let time = self.state.time;
+        // Written so that a NaN is refused.
+        if !((current_time - time).abs() <= TIME_TOLERANCE * step_size) {
+            let problem = format!("{} s, but the simulation is at {} s", shown(current_time), shown(time));
+            return Err(Error::invalid("start of the communication step", problem, "Step on from there"));
+        }
+        let heat = self.state.heat.iter().map(|course| (course, &HEAT, false));
+        let films = self.state.films.iter().map(|course| (course, &TEMPERATURES, true));
+        for (course, range, ramp) in heat.chain(films) {
+            let [_, end] = course.over(step_size, ramp);
+            if !range.contains(&end) {
+                let problem = format!("its derivative leads to {} by the end of the step", shown(end));
+                let remedy = "Set its value or its derivative anew";
+                return Err(Error::invalid("input", problem, remedy));
+            }
+        }
+        self.under_way = Some([current_time + step_size, step_size]);
+        Ok(())
+    }
+
+    /// Solve the communication step that was begun.
+    ///
+    /// # Errors
+    /// None was begun; the state is not finite any more.
+    pub fn advance(&mut self) -> Result<Progress> {
+        let Some([end, length]) = self.under_way.take() else {
+            return Err(Error::invalid("step", "none was begun", "Begin a step first"));
+        };
+        self.change_factors();
+        let ramp = self.state.interpolation == 1;
+        let [heat_start, heat_end] = &mut self.heat;
+        for ((course, start), end) in self.state.heat.iter().zip(heat_start).zip(heat_end) {
+            [*start, *end] = course.over(length, false);
+        }
+        let films = self.state.films.map(|course| course.over(length, ramp));
+        self.operator.fill_phi(length, &mut self.phi);
+        let flows = self.march(length, films);
+        let supplied: f64 = self.heat[0].iter().zip(&self.heat[1]).map(|(a, b)| 0.5 * (a + b) * length).sum();
+        let state = &mut self.state;
+        for (total, heat) in state.totals.iter_mut().zip([supplied, flows[0], flows[1]]) {
+            total.add(heat);
+            state.exchanged += heat.abs();
+        }
+        state.powers = flows.map(|heat| heat / length);
+        state.heat.iter_mut().chain(&mut state.films).for_each(|course| course.shift(length));
+        (state.time, state.last_length, state.last_ramped) = (end, length, ramp);
+        self.compute_outputs();
+        if let Some(wrong) = self.values.iter().position(|value| !value.is_finite()) {
+            self.state.phase = FAILED;
+            let remedy = format!("Value reference {wrong} was the first: look at heat and convection factors");
+            return Err(Error::NonFinite { last_good_time: end - length, time: end, remedy });
+        }
+        Ok(Progress { time: end, finished: true })
+    }
+
+    /// All coordinates over a step; heat from gas and air (J).
+    fn march(&mut self, length: f64, films: [[f64; 2]; 2]) -> [f64; 2] {
+        let operator = &self.operator;
+        let mean = films.map(|[start, end]| 0.5 * (start + end) * length);
+        let mut flows = [0, 1].map(|film| operator.conductances[film] * mean[film]);
+        for (coordinate, z) in self.state.coordinates.iter_mut().enumerate() {
+            let start = operator.load(coordinate, &self.heat[0], films.map(|film| film[0]));
+            let end = operator.load(coordinate, &self.heat[1], films.map(|film| film[1]));
+            let [next, integral] = self.phi[coordinate].step(length, *z, start, end - start);
+            *z = next;
+            for (flow, film) in flows.iter_mut().zip(&operator.films) {
+                *flow -= film[coordinate] * integral;
+            }
+        }
+        flows
+    }
+
+    /// A whole communication step.
+    ///
+    /// # Errors
+    /// As [`Simulation::begin_step`] and [`Simulation::advance`].
+    pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
+        self.begin_step(current_time, step_size)?;
+        self.advance().map(drop)
+    }
+
+    /// Whether a step was begun and not solved.
+    pub fn is_stepping(&self) -> bool {
+        self.under_way.is_some()
+    }
+}
+
+impl State {
+    fn new(patches: usize, order: usize) -> Self {
+        Self {
+            phase: CREATED,
+            time: 0.0,
+            initial_temperature: 0.0,
+            initial_state: 1,
+            interpolation: 1,
+            heat: vec![Course::default(); patches],
+            films: [Course::default(); 2],
+            factors: [1.0; 2],
+            factors_used: [1.0; 2],
+            coordinates: vec![0.0; order],
+            last_length: 0.0,
+            last_ramped: false,
+            powers: [0.0; 2],
+            totals: [Sum::default(); 3],
+            exchanged: 0.0,
+            initial_heat: 0.0,
+        }
+    }
+}

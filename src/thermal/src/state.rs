@@ -1,0 +1,154 @@
+//! Everything that determines the future of a simulation, and its bytes.
+
+use tiprub_core::persist::{Persist, Reader, Writer, fingerprint};
+use tiprub_core::{Error, Result, Sum, persist_fields};
+
+use crate::course::Course;
+use crate::simulation::Simulation;
+
+/// Bytes of the fingerprint of the model, before the state.
+const FINGERPRINT_BYTES: usize = 8;
+/// No number of a state is larger (J of a year of the largest heats).
+const LARGEST: f64 = 1e30;
+
+/// Where in its life a simulation is.
+pub(crate) const CREATED: u64 = 0;
+/// At a communication point.
+pub(crate) const READY: u64 = 1;
+/// A step failed.
+pub(crate) const FAILED: u64 = 2;
+
+/// The state.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct State {
+    pub(crate) phase: u64,
+    /// s.
+    pub(crate) time: f64,
+    /// Parameters in the order of [`crate::table`]: initial temperature (K), item of the initial state, item of the interpolation.
+    pub(crate) initial_temperature: f64,
+    pub(crate) initial_state: i32,
+    pub(crate) interpolation: i32,
+    /// Heat of the patches (W).
+    pub(crate) heat: Vec<Course>,
+    /// Temperatures of gas and air (K).
+    pub(crate) films: [Course; 2],
+    /// Convection factors as set.
+    pub(crate) factors: [f64; 2],
+    /// Those of the last step, in whose eigenvectors the coordinates are.
+    pub(crate) factors_used: [f64; 2],
+    /// z.
+    pub(crate) coordinates: Vec<f64>,
+    /// Length of the last step (s), 0 before there was one; whether its films were ramps.
+    pub(crate) last_length: f64,
+    pub(crate) last_ramped: bool,
+    /// Mean heat flows from gas and air over the last step (W).
+    pub(crate) powers: [f64; 2],
+    /// Heat supplied, from the gas, from the air since the start (J).
+    pub(crate) totals: [Sum; 3],
+    /// Sum of the sizes of all of these (J).
+    pub(crate) exchanged: f64,
+    /// Heat stored at the start (J).
+    pub(crate) initial_heat: f64,
+}
+
+persist_fields!(State {
+    phase,
+    time,
+    initial_temperature,
+    initial_state,
+    interpolation,
+    heat,
+    films,
+    factors,
+    factors_used,
+    coordinates,
+    last_length,
+    last_ramped,
+    powers,
+    totals,
+    exchanged,
+    initial_heat,
+});
+
+/// All inputs over time at one instant.
+#[derive(Debug, Clone)]
+pub struct Courses {
+    heat: Vec<Course>,
+    films: [Course; 2],
+}
+
+impl Simulation {
+    /// What the inputs do, derivatives included.
+    pub fn courses(&self) -> Courses {
+        Courses { heat: self.state.heat.clone(), films: self.state.films }
+    }
+
+    /// Back to what the inputs did at the same instant.
+    pub fn restore_courses(&mut self, courses: Courses) {
+        (self.state.heat, self.state.films) = (courses.heat, courses.films);
+    }
+
+    /// Size of a saved state (bytes).
+    pub fn state_size(&self) -> usize {
+        let mut writer = Writer::new(&mut []);
+        self.state.save(&mut writer);
+        FINGERPRINT_BYTES + writer.written()
+    }
+
+    /// Save the state into exactly [`Simulation::state_size`] bytes.
+    ///
+    /// # Errors
+    /// Another length.
+    pub fn save_state(&self, buffer: &mut [u8]) -> Result<()> {
+        self.check_size(buffer.len())?;
+        let (head, body) = buffer.split_at_mut(FINGERPRINT_BYTES);
+        head.copy_from_slice(&self.fingerprint.to_le_bytes());
+        self.state.save(&mut Writer::new(body));
+        Ok(())
+    }
+
+    /// Restore a saved state; nothing is changed on an error.
+    ///
+    /// # Errors
+    /// Another length, another model, or content that no state has.
+    pub fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {
+        self.check_size(buffer.len())?;
+        let (head, body) = buffer.split_at(FINGERPRINT_BYTES);
+        if head != self.fingerprint.to_le_bytes() {
+            return damaged("it belongs to another model");
+        }
+        let mut reader = Reader::new(body);
+        reader.up_to(LARGEST);
+        self.state.check(&mut reader);
+        if let Some(fault) = reader.fault() {
+            return damaged(fault);
+        }
+        let mut state = self.state.clone();
+        state.restore(&mut Reader::new(body));
+        let items = [state.initial_state, state.interpolation].iter().all(|item| (1..=2).contains(item));
+        let factors =
+            state.factors.iter().chain(&state.factors_used).all(|factor| crate::table::FACTORS.contains(factor));
+        if reader.infinite() > 0 || state.phase > FAILED || !items || !factors || state.last_length < 0.0 {
+            return damaged("it holds values that no state holds");
+        }
+        self.adopt(state);
+        Ok(())
+    }
+
+    fn check_size(&self, found: usize) -> Result<()> {
+        let expected = self.state_size();
+        if found == expected {
+            return Ok(());
+        }
+        Err(Error::State { problem: format!("it has {found} bytes where this model needs {expected}") })
+    }
+}
+
+fn damaged<T>(problem: &str) -> Result<T> {
+    Err(Error::State { problem: problem.to_owned() })
+}
+
+/// Of a model's numbers.
+pub(crate) fn fingerprint_of<'a>(arrays: impl Iterator<Item = &'a [f64]>) -> u64 {
+    arrays.flatten().fold(0, |seed, value| fingerprint(&value.to_bits().to_le_bytes(), seed))
+}

@@ -1,0 +1,230 @@
+//! The variable table of the unit.
+
+use std::ops::RangeInclusive;
+
+use tiprub_core::Result;
+use tiprub_core::variables::{
+    Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
+};
+
+use crate::model::Model;
+
+/// Temperatures above the reference (K), as those of the contact unit.
+pub(crate) const TEMPERATURES: RangeInclusive<f64> = -3000.0..=3000.0;
+/// Heat into a patch (W): beyond any engine's.
+pub(crate) const HEAT: RangeInclusive<f64> = -1e9..=1e9;
+/// Factors on film coefficients.
+pub(crate) const FACTORS: RangeInclusive<f64> = 0.0..=1e3;
+
+static KELVIN: Unit = Unit { name: "K", quantity: "TemperatureDifference", exponents: [0, 0, 0, 0, 1], display: &[] };
+static WATT: Unit = Unit { name: "W", quantity: "Power", exponents: [1, 2, -3, 0, 0], display: &[("kW", 1e-3)] };
+static JOULE: Unit = Unit { name: "J", quantity: "Energy", exponents: [1, 2, -2, 0, 0], display: &[("kJ", 1e-3)] };
+static CAPACITY: Unit = Unit { name: "J/K", quantity: "HeatCapacity", exponents: [1, 2, -2, 0, -1], display: &[] };
+static CONDUCTANCE: Unit =
+    Unit { name: "W/K", quantity: "ThermalConductance", exponents: [1, 2, -3, 0, -1], display: &[] };
+static SECOND: Unit = Unit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[("min", 1.0 / 60.0)] };
+
+static INITIAL_STATES: Enumeration = Enumeration {
+    name: "InitialState",
+    description: "Temperatures at the start",
+    items: &[
+        ("uniform", "Everywhere initial_temperature"),
+        ("steady", "Those that the inputs at the start would lead to in the end"),
+    ],
+};
+
+static INTERPOLATIONS: Enumeration = Enumeration {
+    name: "InputInterpolation",
+    description: "Temperatures of gas and air between communication points",
+    items: &[
+        ("ramp", "From the value reached to the one set, which is reached at the end of the step"),
+        ("hold", "The value set acts at once"),
+    ],
+};
+
+/// What a variable stands for; an item for each row, in the order of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Item {
+    Time,
+    Heat,
+    /// Temperature of the gas (0) or the air (1).
+    Film(usize),
+    Factor(usize),
+    InitialTemperature,
+    InitialState,
+    Interpolation,
+    Constant,
+    /// Rows of [`crate::outputs::rows`] from this one on, in K.
+    Rows(usize),
+    Hottest,
+    Power(usize),
+    Stored,
+    /// Supplied, from the gas, from the air.
+    Total(usize),
+    Residual,
+    RelativeResidual,
+}
+
+/// The table with its items.
+#[derive(Default)]
+struct Builder {
+    variables: Vec<Variable>,
+    items: Vec<Item>,
+    next: u32,
+}
+
+impl Builder {
+    fn push(&mut self, item: Item, name: &str, unit: Option<&'static Unit>, text: &str) -> &mut Variable {
+        self.close();
+        self.items.push(item);
+        self.variables.push(Variable {
+            name: name.into(),
+            reference: self.next,
+            dimension: None,
+            kind: Kind::Real,
+            causality: Causality::Output,
+            variability: Variability::Continuous,
+            span: Span::Point,
+            unit,
+            display: None,
+            min: None,
+            max: None,
+            nominal: None,
+            start: None,
+            description: text.into(),
+            quantity: Quantity::Output,
+            of: 0,
+        });
+        self.variables.last_mut().expect("just pushed")
+    }
+
+    /// References of the last row are known once it is whole.
+    fn close(&mut self) {
+        if let Some(last) = self.variables.last() {
+            self.next = last.reference + u32::try_from(last.len()).unwrap_or(u32::MAX);
+        }
+    }
+
+    fn input(&mut self, item: Item, name: &str, unit: Option<&'static Unit>, value: f64, text: &str) -> &mut Variable {
+        let variable = self.push(item, name, unit, text);
+        variable.causality = Causality::Input;
+        variable.start = Some(Start::Real(vec![value]));
+        variable
+    }
+
+    fn choice(&mut self, item: Item, name: &str, kind: &'static Enumeration, text: &str) {
+        let variable = self.push(item, name, None, text);
+        (variable.kind, variable.start) = (Kind::Enumeration(kind), Some(Start::Integer(1)));
+        (variable.causality, variable.variability) = (Causality::Parameter, Variability::Fixed);
+    }
+
+    fn constant(&mut self, name: &str, unit: &'static Unit, value: f64, text: &str) {
+        let variable = self.push(Item::Constant, name, Some(unit), text);
+        variable.start = Some(Start::Real(vec![value]));
+        (variable.causality, variable.variability) = (Causality::Local, Variability::Constant);
+    }
+
+    fn output(&mut self, item: Item, name: &str, unit: &'static Unit, span: Span, text: &str) -> &mut Variable {
+        let variable = self.push(item, name, Some(unit), text);
+        variable.span = span;
+        variable
+    }
+}
+
+fn limit(variable: &mut Variable, range: &RangeInclusive<f64>) {
+    (variable.min, variable.max) = (Some(*range.start()), Some(*range.end()));
+}
+
+/// The table of a model, with what its rows stand for.
+pub(crate) fn build(model: &Model) -> Result<(VariableTable, Vec<Item>)> {
+    let (mut table, patches) = (Builder::default(), model.patches.len());
+    let time = table.push(Item::Time, "time", Some(&SECOND), "Simulated time");
+    (time.causality, time.quantity) = (Causality::Independent, Quantity::Time);
+    inputs(&mut table, patches);
+    parameters(&mut table, model);
+    temperatures(&mut table, patches);
+    heat(&mut table);
+    Ok((VariableTable::new(table.variables)?, table.items))
+}
+
+fn inputs(table: &mut Builder, patches: usize) {
+    let text = "Heat into each patch, spread over its heated surface; held over the step, or linear with a derivative";
+    let heat = table.input(Item::Heat, "casing_heat", Some(&WATT), 0.0, text);
+    (heat.dimension, heat.start, heat.nominal) = (Some(patches), Some(Start::Real(vec![0.0; patches])), Some(100.0));
+    limit(heat, &HEAT);
+    for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
+        let text = format!(
+            "Temperature of the {what} above the reference; reached at the end of the step (input_interpolation)"
+        );
+        let film = table.input(Item::Film(index), &format!("{name}_temperature"), Some(&KELVIN), 0.0, &text);
+        film.nominal = Some(100.0);
+        limit(film, &TEMPERATURES);
+    }
+    for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
+        let text = format!("Factor on the film coefficient of the {what}; held over the step, 0 is none");
+        let factor = table.input(Item::Factor(index), &format!("{name}_convection_factor"), None, 1.0, &text);
+        limit(factor, &FACTORS);
+    }
+}
+
+fn parameters(table: &mut Builder, model: &Model) {
+    let text = "Temperature at the start above the reference, where the start is uniform";
+    let initial = table.input(Item::InitialTemperature, "initial_temperature", Some(&KELVIN), 0.0, text);
+    (initial.causality, initial.variability) = (Causality::Parameter, Variability::Fixed);
+    limit(initial, &TEMPERATURES);
+    table.choice(Item::InitialState, "initial_state", &INITIAL_STATES, "Temperatures at the start");
+    let text = "Temperatures of gas and air between communication points";
+    table.choice(Item::Interpolation, "input_interpolation", &INTERPOLATIONS, text);
+    let name = table.push(Item::Constant, "model_name", None, "Name of the model");
+    (name.kind, name.start) = (Kind::String, Some(Start::String(model.name.clone())));
+    (name.causality, name.variability) = (Causality::Local, Variability::Constant);
+    table.constant("heat_capacity", &CAPACITY, model.heat_capacity, "Heat capacity of the whole");
+    let text = "Film coefficient times area of the gas inside, at a factor of 1";
+    table.constant("gas_conductance", &CONDUCTANCE, model.gas_conductance(), text);
+    let text = "Film coefficient times area of the air outside, at a factor of 1";
+    table.constant("ambient_conductance", &CONDUCTANCE, model.ambient_conductance(), text);
+}
+
+fn temperatures(table: &mut Builder, patches: usize) {
+    let kelvin = |table: &mut Builder, item, name: &str, text: &str| {
+        table.output(item, name, &KELVIN, Span::Point, text).nominal = Some(100.0);
+    };
+    let mut row = 0;
+    for (name, text) in [
+        ("casing_temperature", "Mean temperature of each patch above the reference, over its volume"),
+        ("surface_temperature", "Mean temperature of the heated surface of each patch above the reference"),
+    ] {
+        kelvin(table, Item::Rows(row), name, text);
+        table.variables.last_mut().expect("just pushed").dimension = Some(patches);
+        row += patches;
+    }
+    kelvin(table, Item::Rows(row), "temperature_mean", "Mean temperature above the reference, over the volume");
+    let text = "Largest temperature of the heated surface above the reference, of the corners of its elements";
+    kelvin(table, Item::Hottest, "temperature_max", text);
+    for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
+        let text = format!("Mean temperature of the surface in the {what} above the reference");
+        kelvin(table, Item::Rows(row + 1 + index), &format!("{name}_surface_temperature"), &text);
+    }
+}
+
+fn heat(table: &mut Builder) {
+    for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
+        let text = format!("Heat flow from the {what} into the casing, mean over the communication step");
+        table.output(Item::Power(index), &format!("{name}_power"), &WATT, Span::Mean, &text);
+    }
+    table.output(Item::Stored, "stored_heat", &JOULE, Span::Point, "Heat stored above the reference");
+    for (index, (name, what)) in
+        [("supplied", "into the patches"), ("gas", "from the gas inside"), ("ambient", "from the air outside")]
+            .into_iter()
+            .enumerate()
+    {
+        let text = format!("Heat {what} since the start");
+        table.output(Item::Total(index), &format!("{name}_heat"), &JOULE, Span::Total, &text);
+    }
+    let text = "Heat stored less heat stored at the start and all heat that came since: rounding";
+    table.output(Item::Residual, "energy_residual", &JOULE, Span::Total, text);
+    let text =
+        "The same as a share of the heat at the start and all exchanged since, each communication step by its size";
+    let residual = table.push(Item::RelativeResidual, "energy_residual_relative", None, text);
+    residual.span = Span::Total;
+}

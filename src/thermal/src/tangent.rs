@@ -1,0 +1,121 @@
+//! Derivatives: of outputs by time at a communication point, and of outputs at the end of the last step by inputs over it.
+
+use tiprub_core::variables::Variable;
+use tiprub_core::{Error, Result};
+
+use crate::exponential::Phi;
+use crate::operator::Operator;
+use crate::outputs::{row_times, stored};
+use crate::simulation::Simulation;
+use crate::table::Item;
+
+/// How coordinates, their integrals over the step and heats change.
+struct Change {
+    coordinates: Vec<f64>,
+    /// Supplied, from the gas, from the air (J).
+    heats: [f64; 3],
+}
+
+impl Simulation {
+    /// Rate of an output at the communication point.
+    pub(crate) fn rate(&self, item: Item, element: usize) -> f64 {
+        let (state, operator) = (&self.state, &self.operator);
+        let heat: Vec<f64> = state.heat.iter().map(|course| course.reached).collect();
+        let films = state.films.map(|course| course.reached);
+        let rate = |coordinate: usize| {
+            operator.load(coordinate, &heat, films) - operator.rates[coordinate] * state.coordinates[coordinate]
+        };
+        let rates: Vec<f64> = (0..operator.rates.len()).map(rate).collect();
+        let flow = |film: usize| {
+            let back: f64 = operator.films[film].iter().zip(&state.coordinates).map(|(a, b)| a * b).sum();
+            operator.conductances[film] * films[film] - back
+        };
+        match item {
+            Item::Rows(first) => row_times(operator, first + element, &rates),
+            Item::Hottest => row_times(operator, self.hottest(), &rates),
+            Item::Stored => stored(operator, &rates),
+            Item::Total(0) => heat.iter().sum(),
+            Item::Total(index) => flow(index - 1),
+            Item::Power(film) if state.last_length > 0.0 => {
+                (flow(film) - state.powers[film]) / (0.5 * state.last_length)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Derivatives of outputs at the end of the last step by inputs over it, in the direction `seed`: of heat held over the step, of
+    /// temperatures as they ran. Exact.
+    ///
+    /// # Errors
+    /// No step was done since initialisation; other variables than real outputs and inputs that act linearly; a seed that is not finite.
+    pub fn step_derivative(
+        &self,
+        outputs: &[u32],
+        inputs: &[u32],
+        seed: &[f64],
+        sensitivity: &mut [f64],
+    ) -> Result<()> {
+        let length = self.state.last_length;
+        if length <= 0.0 {
+            let remedy = "Ask after a step";
+            return Err(Error::invalid("derivatives", "no communication step was done", remedy));
+        }
+        let mut heat = vec![0.0; self.model.patches.len()];
+        let mut films = [0.0; 2];
+        for (&input, &seed) in inputs.iter().zip(seed) {
+            let (variable, element) = self.table.locate(input)?;
+            if !seed.is_finite() {
+                return Err(refused(variable, "its seed is not finite"));
+            }
+            match self.item(variable) {
+                Item::Heat => heat[element] += seed,
+                Item::Film(index) => films[index] += seed,
+                _ => {
+                    return Err(refused(
+                        variable,
+                        "it is no heat and no temperature of gas or air, which act linearly",
+                    ));
+                }
+            }
+        }
+        let change = self.change(length, &heat, films);
+        for (&output, sensitivity) in outputs.iter().zip(sensitivity) {
+            let (variable, element) = self.table.locate(output)?;
+            *sensitivity = match self.item(variable) {
+                Item::Rows(first) => row_times(&self.operator, first + element, &change.coordinates),
+                Item::Hottest => row_times(&self.operator, self.hottest(), &change.coordinates),
+                Item::Stored => stored(&self.operator, &change.coordinates),
+                Item::Total(index) => change.heats[index],
+                Item::Power(film) => change.heats[1 + film] / length,
+                Item::Residual | Item::RelativeResidual => 0.0,
+                _ => return Err(refused(variable, "it is no output")),
+            };
+        }
+        Ok(())
+    }
+
+    fn change(&self, length: f64, heat: &[f64], films: [f64; 2]) -> Change {
+        let operator: &Operator = &self.operator;
+        // A ramp begins where the step before ended, whatever is set.
+        let ramped = self.state.last_ramped;
+        let begin = if ramped { [0.0; 2] } else { films };
+        let share = if ramped { 0.5 } else { 1.0 };
+        let flows = [0, 1].map(|film| operator.conductances[film] * films[film] * share * length);
+        let mut change =
+            Change { coordinates: Vec::new(), heats: [heat.iter().sum::<f64>() * length, flows[0], flows[1]] };
+        for (coordinate, rate) in operator.rates.iter().enumerate() {
+            let start = operator.load(coordinate, heat, begin);
+            let end = operator.load(coordinate, heat, films);
+            let [next, integral] = Phi::new(-rate * length).step(length, 0.0, start, end - start);
+            change.coordinates.push(next);
+            for film in 0..2 {
+                change.heats[1 + film] -= operator.films[film][coordinate] * integral;
+            }
+        }
+        change
+    }
+}
+
+fn refused(variable: &Variable, problem: &str) -> Error {
+    Error::invalid(format!("derivative with `{}`", variable.name), problem, "Leave it out")
+}

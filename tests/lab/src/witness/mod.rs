@@ -1,0 +1,554 @@
+//! Reduced blades against the full finite-element model, which nothing was reduced of, stepped and touched by other code than the
+//! product's.
+
+mod stress;
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use serde_json::{Value, json};
+use tiprub_core::{
+    Rom, Scene,
+    rom::{ContactNode, Frame},
+    settings::{Scheme, Shape, Solver},
+};
+use tiprub_figure::plots::{Plot, Series};
+use tiprub_gallery::{reduction::failure, scene_source};
+use tiprub_model::{
+    FeModel, Material, Rotor37Options,
+    patches::tip_patches,
+    progress::silent,
+    reduce::{ContactPoint, ReductionKind, ReductionOptions, reduce_model},
+    rotor37::{BladeMesh, MeshCounts, blade_mesh},
+    stress::StressPlaces,
+};
+use tiprub_reference::{
+    blade::{Blade, Gauge, History, Part, Steps},
+    reduced::rub::Obstacle,
+};
+use tiprub_shell::{Failure, Result, console::Console, sweep};
+use tiprub_study::{
+    Figure, Picture, Sheet, Statement, Study,
+    arguments::StudyCommon,
+    convergence::march::{Marched, march},
+};
+
+pub(crate) use stress::study as stress;
+
+/// Time between samples (s).
+const INTERVAL: f64 = 4e-6;
+/// From the middle of the tip at the start to that of the first bump (rad).
+const AHEAD: f64 = 0.5;
+/// How big it is.
+struct Size {
+    mesh: MeshCounts,
+    /// Samples: two touches, or one.
+    samples: usize,
+    /// Steps of the witness in a sample, ascending.
+    divisions: [u32; 3],
+    /// Patches of the default and of the refined model.
+    patches: [usize; 2],
+    /// Modes of the default model, then of the refined one.
+    modes: [usize; 2],
+    /// Rows of patches across the thickness at most.
+    rows: usize,
+}
+
+const FULL: Size = Size {
+    mesh: MeshCounts { chord: 12, thickness: 2, span: 20 },
+    samples: 575,
+    divisions: [4, 8, 16],
+    patches: [9, 17],
+    modes: [80, 400],
+    rows: 3,
+};
+const QUICK: Size = Size {
+    mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
+    samples: 125,
+    divisions: [2, 4, 8],
+    patches: [3, 5],
+    modes: [16, 50],
+    rows: 2,
+};
+
+/// What of the tip touches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Touching {
+    Nodes(usize),
+    /// So many along the chord, in so many rows across the thickness.
+    Patches(usize, usize),
+    /// Gauss's points of its faces, so many along either direction of a face.
+    Points(usize),
+    /// The nodes of its outline: a tip with sharp sides.
+    Sides,
+}
+
+impl Touching {
+    fn name(self) -> String {
+        match self {
+            Self::Nodes(count) => format!("{count} nodes"),
+            Self::Patches(count, 1) => format!("{count} patches"),
+            Self::Patches(count, rows) => format!("{count} × {rows} patches"),
+            Self::Points(each) => format!("{each} × {each} points of every face"),
+            Self::Sides => "nodes of the sides".to_owned(),
+        }
+    }
+}
+
+/// A reduced model and how the product steps it.
+struct Reduced {
+    name: &'static str,
+    touching: Touching,
+    modes: usize,
+    method: (Scheme, Solver),
+    /// Steps in a sample.
+    division: u32,
+}
+
+/// A run of the product, or why it was refused.
+type Reached = std::result::Result<Marched, String>;
+
+/// Default method and step; short steps, that the model alone is judged; and the paper's.
+const DEFAULT: ((Scheme, Solver), u32) = ((Scheme::ModalExact, Solver::Lcp), 8);
+const FINE: ((Scheme, Solver), u32) = ((Scheme::ModalExact, Solver::Lcp), 64);
+const MASSLESS: ((Scheme, Solver), u32) = ((Scheme::MasslessBoundary, Solver::Lcp), 8);
+/// Its steps are as long as its tolerance lets them.
+const GALERKIN: ((Scheme, Solver), u32) = ((Scheme::Galerkin, Solver::Lcp), 1);
+const PAPER: ((Scheme, Solver), u32) = ((Scheme::CentralDifference, Solver::Film), 4);
+
+impl Size {
+    fn of(quick: bool) -> &'static Self {
+        if quick { &QUICK } else { &FULL }
+    }
+
+    fn reduced(&self) -> Vec<Reduced> {
+        let ([few, many], [own, most]) = (self.patches, self.modes);
+        let one = |name, touching, modes, (method, division)| Reduced { name, touching, modes, method, division };
+        let patches = Touching::Patches;
+        let all = [
+            one("the paper's", Touching::Nodes(3), 20, PAPER),
+            one("default", patches(few, 1), own, DEFAULT),
+            one("short steps", patches(few, 1), own, FINE),
+            one("more modes", patches(few, 1), most, FINE),
+            one("more patches", patches(many, 1), most, FINE),
+            one("two rows", patches(few, 2), own, DEFAULT),
+            one("two rows, short steps", patches(few, 2), own, FINE),
+            one("two rows, massless", patches(few, 2), own, MASSLESS),
+            one("two rows, by a tolerance", patches(few, 2), own, GALERKIN),
+            one("two rows, more modes", patches(few, 2), most, FINE),
+            one("three rows, more modes", patches(few, 3), most, FINE),
+            one("two rows, more patches", patches(many, 2), most, FINE),
+        ];
+        // Each asks at its start whether closed contact grows, which takes longer than the run.
+        let quick = ["the paper's", "default", "more modes", "two rows, more modes"];
+        all.into_iter().filter(|one| self.rows > 2 || quick.contains(&one.name)).collect()
+    }
+
+    /// Runs of the witness: what touches, steps in a sample. Of each contact the last has the shortest steps.
+    fn witnesses(&self) -> Vec<(Touching, u32)> {
+        let ([few, many], finest) = (self.patches, self.divisions[2]);
+        let refined = self.divisions.iter().map(|division| (Touching::Patches(few, 1), *division));
+        let sides = self.divisions[1..].iter().map(|division| (Touching::Sides, *division));
+        let points = (2..=self.rows).map(|each| (Touching::Points(each), self.divisions[1]));
+        let rows = (2..=self.rows).map(|rows| (few, rows));
+        let more = [(many, 1), (many, 2)].into_iter().filter(|(_, rows)| self.rows > *rows);
+        let others = rows.chain(more).map(|(count, rows)| (Touching::Patches(count, rows), finest));
+        refined.chain(sides).chain(points).chain(others).chain([(Touching::Nodes(3), self.divisions[1])]).collect()
+    }
+}
+
+/// The scene: that of rotor 37, one blade without damping that meets the first bump soon.
+struct Setting {
+    size: &'static Size,
+    material: Material,
+    blade: BladeMesh,
+    full: Blade,
+    /// Angle of the middle of the tip (rad).
+    middle: f64,
+}
+
+impl Setting {
+    fn new(quick: bool) -> Result<Self> {
+        let size = Size::of(quick);
+        let told = |error| failure("the full blade", error);
+        let material = Rotor37Options::default().material;
+        let blade = blade_mesh(size.mesh).map_err(told)?;
+        let clamped = blade.mesh.set("hub").map_err(told)?;
+        let full = Blade::new(&blade.mesh, &material, clamped).map_err(told)?;
+        let mut setting = Self { size, material, full, middle: 0.0, blade };
+        setting.middle = setting.parts(Touching::Patches(3, 1))?[1].angle();
+        Ok(setting)
+    }
+
+    /// Phase of the bumps (rad): one is ahead of the tip.
+    fn phase(&self) -> f64 {
+        self.middle + AHEAD - FRAC_PI_2
+    }
+
+    /// Contact of a reduced model.
+    fn contact(&self, touching: Touching) -> Result<Vec<ContactPoint>> {
+        let mesh = &self.blade.mesh;
+        let found = match touching {
+            Touching::Nodes(count) => self.blade.contact_points(count),
+            Touching::Patches(count, rows) => {
+                let name = |index: usize| format!("patch_{}", index + 1);
+                mesh.set("tip").and_then(|tip| tip_patches(mesh, tip, [count, rows], name))
+            }
+            Touching::Points(_) | Touching::Sides => {
+                return Err(Failure::new("study witness", "no model is reduced to points or sides", ""));
+            }
+        };
+        found.map_err(|error| failure("the tip of the blade", error))
+    }
+
+    fn parts(&self, touching: Touching) -> Result<Vec<Part>> {
+        let mesh = &self.blade.mesh;
+        let tip = mesh.set("tip").map_err(|error| failure("the tip of the blade", error))?;
+        match touching {
+            Touching::Points(each) => return Ok(Part::points(mesh, tip, each)),
+            Touching::Sides => return Ok(Part::outline(mesh, tip)),
+            Touching::Nodes(_) | Touching::Patches(..) => {}
+        }
+        let part = |point: &ContactPoint| Part::mean(&mesh.nodes, point.weights(), point.meridional_slope);
+        Ok(self.contact(touching)?.iter().map(part).collect())
+    }
+
+    fn rom(&self, reduced: &Reduced) -> Result<Rom> {
+        self.rom_with(reduced, StressPlaces::default())
+    }
+
+    fn rom_with(&self, reduced: &Reduced, stress: StressPlaces) -> Result<Rom> {
+        let told = |error| failure("reducing the blade", error);
+        let options = ReductionOptions {
+            name: "rotor37".into(),
+            kind: match reduced.touching {
+                Touching::Nodes(_) => ReductionKind::FixedInterface,
+                _ => ReductionKind::FreeInterface,
+            },
+            modes: reduced.modes,
+            checked_modes: 10,
+            sectors: 1,
+            frame: Frame::Cylindrical,
+            watched: self.blade.contact_points(3).map_err(told)?,
+            stress,
+            damping_ratio: 0.0,
+        };
+        let (mesh, contact) = (self.blade.mesh.clone(), self.contact(reduced.touching)?);
+        let clamped = self.blade.mesh.set("hub").map_err(told)?;
+        let model = FeModel::assembled(mesh, &self.material, String::new(), &silent).map_err(told)?;
+        Ok(reduce_model(model, clamped, &contact, &options, None, &silent).map_err(told)?.rom)
+    }
+
+    /// The scene around a reduced model.
+    fn scene(&self, reduced: &Reduced) -> Result<Scene> {
+        self.scene_of(reduced, self.rom(reduced)?)
+    }
+
+    fn scene_of(&self, reduced: &Reduced, rom: Rom) -> Result<Scene> {
+        let mut settings = scene_source::settings("builtin:rotor37-one-row")?;
+        let surface = &mut settings.surfaces[0];
+        surface.ramp_time = 0.0;
+        if let Shape::TwoLobe { phase, .. } = &mut surface.shape {
+            *phase = self.phase();
+        }
+        settings.structures[0].damping_ratio = Some(0.0);
+        settings.experiment.communication_step = INTERVAL;
+        settings.time.step = INTERVAL / f64::from(reduced.division);
+        (settings.time.scheme, settings.contacts[0].solver) = reduced.method;
+        Ok(Scene { settings, roms: vec![rom] })
+    }
+
+    /// A run, or why it is refused.
+    fn run_reduced(&self, reduced: &Reduced) -> Result<Reached> {
+        Ok(march(&self.scene(reduced)?, &[], reduced.division, self.size.samples))
+    }
+
+    /// The full model, with stress at gauges.
+    fn run_full(&self, touching: Touching, division: u32, gauges: &[Gauge]) -> Result<History> {
+        let told = |error| failure("the full blade", error);
+        let settings = scene_source::settings("builtin:rotor37-one-row")?;
+        let Shape::TwoLobe { depth, width, .. } = settings.surfaces[0].shape else {
+            return Err(Failure::new("study witness", "the scene has no bumps", ""));
+        };
+        let contact = &settings.contacts[0];
+        let obstacle = Obstacle {
+            clearance: contact.gap,
+            speed: settings.structures[0].speed,
+            friction: contact.friction,
+            bumps: [2.0 * contact.gap * depth, width, 0.0],
+        };
+        let parts: Vec<Part> = self.parts(touching)?.into_iter().map(|part| part.turned(-self.phase())).collect();
+        let steps = Steps { interval: INTERVAL, division, samples: self.size.samples };
+        self.full.march(&parts, &obstacle, steps, (&self.watched()?, gauges)).map_err(told)
+    }
+
+    /// Nodes whose displacements are compared.
+    fn watched(&self) -> Result<Vec<usize>> {
+        let points = self.blade.contact_points(3).map_err(|error| failure("the full blade", error))?;
+        Ok(points.iter().map(|point| point.node).collect())
+    }
+
+    /// The full model; energy that its steps lose or make beside what contact supplies.
+    fn run_witness(&self, touching: Touching, division: u32) -> Result<(Marched, f64)> {
+        let found = self.run_full(touching, division, &[])?;
+        let place = |node: &usize| {
+            let [x, y, z] = self.blade.mesh.nodes[*node];
+            ContactNode { position: [x.hypot(y), y.atan2(x), z], ..ContactNode::default() }
+        };
+        let marched = Marched {
+            points: self.watched()?.iter().map(place).collect(),
+            impulse: found.impulses.iter().sum(),
+            friction_work: found.friction_work.last().copied().unwrap_or_default(),
+            peak_force: found.impulses.iter().fold(0.0, |most: f64, impulse| most.max(impulse / INTERVAL)),
+            strain_energy: found.strain.iter().sum::<f64>() / found.strain.len() as f64,
+            displacements: found.displacements,
+        };
+        Ok((marched, found.residual))
+    }
+}
+
+/// All runs.
+struct Runs {
+    witnesses: Vec<((Touching, u32), Marched)>,
+    reduced: Vec<(Reduced, Reached)>,
+    /// Largest residual of energy of a witness.
+    residual: f64,
+}
+
+impl Runs {
+    /// The witness with this contact and the shortest steps.
+    fn witness(&self, touching: Touching) -> Result<&Marched> {
+        let missing = || Failure::new("study witness", format!("no witness with {}", touching.name()), "");
+        self.witnesses.iter().rev().find(|((other, _), _)| *other == touching).map(|(_, run)| run).ok_or_else(missing)
+    }
+
+    fn row(&self, name: String, run: &Marched, touching: Touching) -> Result<Row> {
+        Ok(Row {
+            name,
+            impulse: run.impulse,
+            friction_work: run.friction_work,
+            own: run.changes(self.witness(touching)?),
+            sides: run.changes(self.witness(Touching::Sides)?),
+            finest: true,
+        })
+    }
+
+    fn rows(&self) -> Result<Vec<Row>> {
+        let witnesses = self.witnesses.iter().map(|((touching, division), run)| {
+            let step = 1e6 * INTERVAL / f64::from(*division);
+            let row = self.row(format!("full model, {}, {step} µs", touching.name()), run, *touching)?;
+            Ok(Row { finest: std::ptr::eq(self.witness(*touching)?, run), ..row })
+        });
+        let reduced = self.reduced.iter().map(|(model, run)| {
+            let step = 1e6 * INTERVAL / f64::from(model.division);
+            let Reduced { name, touching, modes, .. } = model;
+            let name = format!("{name}: {}, {modes} modes, {step} µs", touching.name());
+            match run {
+                Ok(run) => self.row(name, run, *touching),
+                Err(_) => Ok(Row { name: format!("{name}: refused"), finest: true, ..Row::default() }),
+            }
+        });
+        witnesses.chain(reduced).collect()
+    }
+}
+
+/// One run against the full model with the same contact and with contact at its sides: displacements, impulse, friction work, peak force,
+/// strain energy.
+#[derive(Default)]
+struct Row {
+    name: String,
+    /// N·s.
+    impulse: f64,
+    /// J.
+    friction_work: f64,
+    own: [Option<f64>; 5],
+    sides: [Option<f64>; 5],
+    /// Not the full model with longer steps than another run of it has.
+    finest: bool,
+}
+
+impl Row {
+    fn displacement(&self) -> f64 {
+        self.own[0].unwrap_or(f64::NAN)
+    }
+}
+
+fn shown(value: &Option<f64>) -> String {
+    match value {
+        Some(0.0) | None => "–".to_owned(),
+        Some(value) => format!("{:.2} %", 100.0 * value),
+    }
+}
+
+/// Every run against the full model with the same contact, then each contact against that at the nodes of the outline: the full model with its
+/// shortest steps, and the reduced ones.
+fn tables(rows: &[Row]) -> String {
+    let mut text = String::from(
+        "| run | impulse (N·s) | friction work (J) | same contact: displacements | impulse | friction work |\n|---|---|---|---|---|---|\n",
+    );
+    for Row { name, impulse, friction_work, own, .. } in rows {
+        let cells: Vec<String> = own[..3].iter().map(shown).collect();
+        text.push_str(&format!("| {name} | {impulse:.4} | {friction_work:.2} | {} |\n", cells.join(" | ")));
+    }
+    text.push_str(
+        "\n| contact | impulse (N·s) | friction work (J) | sides: displacements | impulse | friction work |\n|---|---|---|---|---|---|\n",
+    );
+    for Row { name, impulse, friction_work, sides, .. } in rows.iter().filter(|row| row.finest) {
+        let cells: Vec<String> = sides[..3].iter().map(shown).collect();
+        text.push_str(&format!("| {name} | {impulse:.4} | {friction_work:.2} | {} |\n", cells.join(" | ")));
+    }
+    text
+}
+
+fn figure(runs: &Runs, size: &Size) -> Result<Figure> {
+    let witness = runs.witness(Touching::Patches(size.patches[0], 1))?;
+    let sides = runs.witness(Touching::Sides)?;
+    let named =
+        |name: &str| runs.reduced.iter().find(|(model, _)| model.name == name).and_then(|(_, run)| run.as_ref().ok());
+    let shown = [
+        ("full model, patches", Some(witness)),
+        ("full model, sides", Some(sides)),
+        ("default", named("default")),
+        ("two rows", named("two rows, more modes")),
+        ("the paper's", named("the paper's")),
+    ];
+    let time = |sample: usize| 1e3 * (sample + 1) as f64 * INTERVAL;
+    // Radial displacement of the trailing edge, the third node.
+    let line = |run: &Marched| {
+        run.displacements.iter().enumerate().map(|(sample, all)| (time(sample), 1e6 * all[6])).collect::<Vec<_>>()
+    };
+    let all: Vec<(&str, Vec<(f64, f64)>)> =
+        shown.into_iter().filter_map(|(name, run)| Some((name, line(run?)))).collect();
+    let series = all.iter().map(|(name, points)| Series::line(*name, points.clone())).collect();
+    let plot = Plot::new("time (ms)", "radial displacement of the trailing edge (µm)", series);
+    let mut sheet = Sheet::new(["time (ms)"]);
+    sheet.columns.extend(all.iter().map(|(name, _)| format!("{name} (µm)")));
+    for sample in 0..size.samples {
+        let values = all.iter().map(|(_, points)| points[sample].1);
+        sheet.rows.push([time(sample)].into_iter().chain(values).collect());
+    }
+    Ok(Figure {
+        name: "trailing-edge",
+        caption: "The blade passes the bumps: full finite elements, the default reduction, and the paper's.".into(),
+        picture: Picture::plot(&plot)?,
+        sheet,
+    })
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.2} %", 100.0 * share)
+}
+
+fn statements(rows: &[Row], runs: &Runs) -> Result<Vec<Statement>> {
+    let find = |start: &str| {
+        let missing = || Failure::new("study witness", format!("no run `{start}`"), "");
+        rows.iter().find(|row| row.name.starts_with(start)).ok_or_else(missing)
+    };
+    let (coarse, fine) = (&rows[0], &rows[1]);
+    let (default, more, paper) = (find("default:")?, find("more modes:")?, find("the paper's:")?);
+    let full = find("full model, 9 × 2").or_else(|_| find("full model, 3 × 2"))?;
+    let two = find("two rows, more modes:")?;
+    let [of, left] = [0, 1].map(|which| move |row: &Row| row.sides[which].unwrap_or(f64::NAN));
+    Ok(vec![
+        Statement::tested(
+            "The witness balances its energy to rounding that grows through the steps, 1e-6",
+            runs.residual < 1e-6,
+            format!("{:.0e} of the largest energy", runs.residual),
+        ),
+        Statement::tested(
+            "Shorter steps bring the witness nearer to its own limit",
+            fine.displacement() < 0.75 * coarse.displacement(),
+            format!(
+                "displacements change by {} from four times its step, by {} from twice",
+                percent(coarse.displacement()),
+                percent(fine.displacement())
+            ),
+        ),
+        Statement::tested(
+            "More modes bring the reduced model to the full one with the same patches, as near as the witness knows itself",
+            more.displacement() < default.displacement() && more.displacement() < 1.5 * fine.displacement(),
+            format!("displacements {} away, {} before", percent(more.displacement()), percent(default.displacement())),
+        ),
+        Statement::tested(
+            "Two rows of patches, which stand at the sides of the tip, are contact at its sides: the impulse is three times as near as with one, or more",
+            3.0 * left(two) < left(default) && 3.0 * left(full) < left(default) && of(two) < of(default),
+            format!(
+                "impulse {} away with one row, {} with two, the full model with two {}; displacements {} and {}",
+                percent(left(default)),
+                percent(left(two)),
+                percent(left(full)),
+                percent(of(default)),
+                percent(of(two))
+            ),
+        ),
+        Statement::tested(
+            "The default model is nearer to the full one with contact at the sides than the paper's",
+            of(default) < of(paper),
+            format!(
+                "displacements {}, impulse {}, friction work {}; the paper's displacements {}",
+                percent(of(default)),
+                percent(default.sides[1].unwrap_or(f64::NAN)),
+                percent(default.sides[2].unwrap_or(f64::NAN)),
+                percent(of(paper))
+            ),
+        ),
+    ])
+}
+
+fn results(rows: &[Row], runs: &Runs) -> Value {
+    let names = ["displacements", "impulse", "friction_work", "peak_force", "strain_energy"];
+    let of = |values: &[Option<f64>; 5]| -> serde_json::Map<String, Value> {
+        names.iter().zip(values).map(|(name, value)| ((*name).to_owned(), json!(value))).collect()
+    };
+    let row = |row: &Row| {
+        json!({
+            "run": row.name, "impulse": row.impulse, "friction_work": row.friction_work, "same_contact": of(&row.own),
+            "sides": of(&row.sides),
+        })
+    };
+    let refused =
+        runs.reduced.iter().filter_map(|(model, run)| Some(json!({ "run": model.name, "why": run.as_ref().err()? })));
+    json!({ "runs": rows.iter().map(row).collect::<Vec<_>>(), "refused": refused.collect::<Vec<_>>() })
+}
+
+/// The study.
+///
+/// # Errors
+/// A model that cannot be reduced, a run that fails, a plot that cannot be drawn.
+pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
+    let setting = Setting::new(arguments.quick)?;
+    let size = setting.size;
+    let task = console.task("The full blade rubs", Some(size.witnesses().len() as u64));
+    // The longest first.
+    let mut asked = size.witnesses();
+    asked.sort_by_key(|(_, division)| std::cmp::Reverse(*division));
+    let run = |(touching, division): &(Touching, u32)| setting.run_witness(*touching, *division);
+    let found = sweep::sweep(&asked, sweep::processors(), run, |done| task.at(done as u64))?;
+    let residual = found.iter().map(|(_, residual)| *residual).fold(0.0, f64::max);
+    let mut witnesses: Vec<_> = asked.into_iter().zip(found).map(|(what, (run, _))| (what, run)).collect();
+    let order = size.witnesses();
+    witnesses.sort_by_key(|(what, _)| order.iter().position(|other| other == what));
+    let marched = |reduced: Reduced| setting.run_reduced(&reduced).map(|run| (reduced, run));
+    let reduced = size.reduced().into_iter().map(marched).collect::<Result<_>>()?;
+    let runs = Runs { witnesses, reduced, residual };
+    let rows = runs.rows()?;
+    let MeshCounts { chord, thickness, span } = size.mesh;
+    Ok(Study {
+        name: "witness",
+        title: "Reduced blades against full finite elements".into(),
+        summary: format!(
+            "One blade of rotor 37, without damping, passes bumps of its casing. The witness is the whole finite-element model, {} \
+             degrees of freedom, without any reduction, stepped implicitly with contact of its own.{}",
+            setting.full.order(),
+            if arguments.quick { " Quick form: a coarse mesh and one touch." } else { "" }
+        ),
+        facts: vec![
+            ("mesh".into(), format!("{chord} × {thickness} × {span} quadratic bricks")),
+            ("window".into(), format!("{:.2} ms", 1e3 * INTERVAL * size.samples as f64)),
+            ("turned by".into(), format!("{:.2} turns", 1800.0 * INTERVAL * size.samples as f64 / TAU)),
+        ],
+        statements: statements(&rows, &runs)?,
+        figures: vec![figure(&runs, size)?],
+        results: results(&rows, &runs),
+        files: vec![("witness.md".into(), "the tables of the guide".into(), tables(&rows).into_bytes())],
+    })
+}

@@ -1,0 +1,433 @@
+//! Stress that reduced blades recover in a rub, against that of the full finite-element model, by the number of modes.
+
+use nalgebra::{DMatrix, DVector};
+use serde_json::{Value, json};
+use tiprub_core::{
+    Rom, Simulation,
+    rom::{STRESSES, von_mises},
+};
+use tiprub_figure::plots::{Plot, Series};
+use tiprub_gallery::reduction::failure;
+use tiprub_model::{craig_bampton::dense_modes, stress::StressPlaces};
+use tiprub_reference::blade::{Gauge, History, equivalent};
+use tiprub_shell::{Failure, Result, console::Console, sweep};
+use tiprub_study::{Figure, Picture, Sheet, Statement, Study, arguments::StudyCommon, error::measure::parts_apart};
+
+use super::{FINE, GALERKIN, INTERVAL, Reduced, Setting, Touching, percent};
+
+/// Modes whose places of largest stress are looked at.
+const PLACES: usize = 6;
+
+/// What a run tells, sample by sample.
+struct Told {
+    /// Of the watched points (m).
+    displacements: Vec<Vec<f64>>,
+    /// Six components of every place (Pa).
+    stresses: Vec<Vec<f64>>,
+    /// Von Mises of every place (Pa).
+    equivalents: Vec<Vec<f64>>,
+}
+
+impl Told {
+    /// Of the full model.
+    fn full(history: History) -> (Self, Vec<Vec<f64>>) {
+        let each = |sample: &Vec<f64>| places(sample).map(equivalent).collect();
+        let equivalents = history.stresses.iter().map(each).collect();
+        (Self { displacements: history.displacements, stresses: history.stresses, equivalents }, history.forces)
+    }
+
+    /// Stress at one place beside that of another run (L2).
+    fn apart_at(&self, other: &Self, place: usize) -> f64 {
+        let at = |all: &Vec<f64>| all[STRESSES * place..STRESSES * (place + 1)].to_vec();
+        let of = |told: &Self| told.stresses.iter().map(at).collect::<Vec<_>>();
+        parts_apart(&of(self), &of(other), &[STRESSES])
+    }
+
+    /// Largest von Mises of every place (Pa).
+    fn largest(&self) -> Vec<f64> {
+        let count = self.equivalents.first().map_or(0, Vec::len);
+        let of = |place: usize| self.equivalents.iter().fold(0.0, |most: f64, sample| most.max(sample[place]));
+        (0..count).map(of).collect()
+    }
+
+    /// How far it is from another.
+    fn apart(&self, other: &Self) -> Apart {
+        let of = |a: &[Vec<f64>], b: &[Vec<f64>]| parts_apart(a, b, &[b.first().map_or(0, Vec::len)]);
+        let (own, others) = (self.largest(), other.largest());
+        let most = (0..others.len()).max_by(|a, b| others[*a].total_cmp(&others[*b])).unwrap_or_default();
+        let largest = |place: usize| (own[place] / others[place] - 1.0).abs();
+        Apart {
+            displacements: of(&self.displacements, &other.displacements),
+            stresses: of(&self.stresses, &other.stresses),
+            most: largest(most),
+            worst: (0..others.len()).map(largest).fold(0.0, f64::max),
+        }
+    }
+}
+
+/// Six components of every place.
+fn places(sample: &[f64]) -> impl Iterator<Item = [f64; STRESSES]> {
+    sample.chunks_exact(STRESSES).map(|all| std::array::from_fn(|component| all[component]))
+}
+
+/// Relative distances: of histories (L2), of the largest von Mises at the place that has most, and at the place where that is farthest off.
+#[derive(Debug, Clone, Copy)]
+struct Apart {
+    displacements: f64,
+    stresses: f64,
+    most: f64,
+    worst: f64,
+}
+
+impl Apart {
+    fn cells(self) -> String {
+        [self.displacements, self.stresses, self.most, self.worst].map(percent).join(" | ")
+    }
+
+    fn json(self) -> Value {
+        let Self { displacements, stresses, most, worst } = self;
+        json!({ "displacements": displacements, "stress": stresses, "largest": most, "worst_place": worst })
+    }
+}
+
+/// Numbers of modes, ascending.
+fn counts(quick: bool) -> &'static [usize] {
+    if quick { &[4, 20, 120] } else { &[5, 10, 20, 40, 80, 160, 400] }
+}
+
+/// Steps of the full model in a sample, ascending.
+fn divisions(quick: bool) -> &'static [u32] {
+    if quick { &[4, 8, 16] } else { &[8, 16, 32] }
+}
+
+impl Setting {
+    fn stressed_rom(&self, reduced: &Reduced) -> Result<Rom> {
+        self.rom_with(reduced, StressPlaces { modes: PLACES, ..StressPlaces::default() })
+    }
+
+    /// Names of the places, and the full model's gauges there.
+    fn gauges(&self, rom: &Rom) -> Result<(Vec<String>, Vec<Gauge>)> {
+        let missing = || Failure::new("lab stress", "the reduced model has no places of stress", "");
+        let mesh = &self.blade.mesh;
+        let mut gauges = Vec::new();
+        let points = &rom.extras.stress.as_ref().ok_or_else(missing)?.points;
+        for point in points {
+            let [radius, angle, axial] = point.position;
+            let place = [radius * angle.cos(), radius * angle.sin(), axial];
+            let off = |node: &[f64; 3]| (0..3).map(|i| (node[i] - place[i]).powi(2)).sum::<f64>();
+            let all = mesh.nodes.iter().enumerate();
+            let node = all.min_by(|a, b| off(a.1).total_cmp(&off(b.1))).map_or(0, |(node, _)| node);
+            gauges.push(Gauge::at(mesh, &self.material, node).map_err(|error| failure("a gauge of the blade", error))?);
+        }
+        Ok((points.iter().map(|point| point.name.clone()).collect(), gauges))
+    }
+
+    /// Where the places of a ROM are between hub (0) and tip (1), at the mean radii of either.
+    fn heights(&self, rom: &Rom) -> Vec<f64> {
+        let mesh = &self.blade.mesh;
+        let mean = |set: &str| {
+            let nodes = mesh.sets.get(set).map_or(&[][..], Vec::as_slice);
+            nodes.iter().map(|node| mesh.nodes[*node][0].hypot(mesh.nodes[*node][1])).sum::<f64>() / nodes.len() as f64
+        };
+        let (hub, tip) = (mean("hub"), mean("tip"));
+        let points = rom.extras.stress.iter().flat_map(|stress| &stress.points);
+        points.map(|point| (point.position[0] - hub) / (tip - hub)).collect()
+    }
+
+    /// The product's run, as an importer sees it; or why it is refused.
+    fn told_by(&self, reduced: &Reduced, rom: Rom) -> Result<std::result::Result<Told, String>> {
+        let mut scene = self.scene_of(reduced, rom)?;
+        scene.settings.outputs.watched_sectors = vec![1];
+        scene.settings.outputs.stress = true;
+        Ok(run(&scene, self.size.samples).map_err(|error| error.to_string()))
+    }
+
+    /// Stress of the same forces at rest, ROM against full model: difference beside the largest.
+    fn at_rest(&self, rom: &Rom, gauges: &[Gauge], touching: Touching) -> Result<f64> {
+        let told = |error| failure("the blade at rest", error);
+        let solve = || rom.stiffness.clone().cholesky();
+        let held = solve().ok_or_else(|| Failure::new("lab stress", "the reduced model is not held", ""))?;
+        let stress = rom.extras.stress.as_ref().map(|stress| stress.map.clone()).unwrap_or_default();
+        let (mut off, mut largest) = (0.0_f64, 0.0_f64);
+        for (index, point) in self.contact(touching)?.iter().enumerate() {
+            // Inwards and back along the circumference, as a rub does.
+            let push = [-1000.0, -150.0, 0.0];
+            let mut force = DVector::zeros(rom.contact_map.nrows());
+            force.rows_mut(3 * index, 3).copy_from_slice(&push);
+            let found = &stress * held.solve(&(rom.contact_map.transpose() * force));
+            let loads: Vec<_> = point
+                .weights()
+                .map(|(node, weight)| {
+                    let [x, y, _] = self.blade.mesh.nodes[node];
+                    let (sine, cosine) = y.atan2(x).sin_cos();
+                    let [radial, tangential, axial] = push;
+                    let force = [radial * cosine - tangential * sine, radial * sine + tangential * cosine, axial];
+                    (node, force.map(|one| weight * one))
+                })
+                .collect();
+            for (found, full) in found.iter().zip(self.full.at_rest(&loads, gauges).map_err(told)?) {
+                off = off.max((found - full).abs());
+                largest = largest.max(full.abs());
+            }
+        }
+        Ok(off / largest)
+    }
+}
+
+/// Displacements and stress at the communication points.
+fn run(scene: &tiprub_core::Scene, samples: usize) -> tiprub_core::Result<Told> {
+    let mut simulation = Simulation::new(scene)?;
+    simulation.initialise(0.0)?;
+    let names = ["radial", "tangential", "axial", "radial_tangential", "tangential_axial", "axial_radial", "von_mises"];
+    let rows = names.map(|name| simulation.table().find(&format!("blade[1].{name}_stress")));
+    let count = rows[0].map_or(0, tiprub_core::variables::Variable::len);
+    let rows = rows.map(|row| row.map_or(0, |row| row.reference));
+    let mut told = Told { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
+    for sample in 0..samples {
+        simulation.do_step(sample as f64 * INTERVAL, INTERVAL)?;
+        let read = |row: u32, place: usize| simulation.real(row + u32::try_from(place).unwrap_or_default());
+        let mut stresses = Vec::with_capacity(STRESSES * count);
+        for place in 0..count {
+            for row in &rows[..STRESSES] {
+                stresses.push(read(*row, place)?);
+            }
+        }
+        let equivalents = (0..count).map(|place| read(rows[STRESSES], place)).collect::<Result<_, _>>()?;
+        told.displacements.push(simulation.watched_displacements());
+        told.stresses.push(stresses);
+        told.equivalents.push(equivalents);
+    }
+    Ok(told)
+}
+
+/// The reduced model under forces of every step, by the steps that the full model took: what the missing modes alone do.
+fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<Told> {
+    let (squares, shapes) = dense_modes(&rom.stiffness, &rom.mass).map_err(|error| failure("modes", error))?;
+    let loads = (&rom.contact_map * &shapes).transpose();
+    let seen = |map: Option<&DMatrix<f64>>| map.map_or_else(|| DMatrix::zeros(0, shapes.ncols()), |map| map * &shapes);
+    let watched = seen(rom.extras.watched.as_ref().map(|watched| &watched.map));
+    let stressed = seen(rom.extras.stress.as_ref().map(|stress| &stress.map));
+    let h = INTERVAL / f64::from(division);
+    let (mut u, mut v) = (DVector::zeros(squares.len()), DVector::<f64>::zeros(squares.len()));
+    let mut told = Told { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
+    for (step, force) in forces.iter().enumerate() {
+        let push = &loads * DVector::from_column_slice(force);
+        for (mode, square) in squares.iter().enumerate() {
+            let quarter = 0.25 * h * h * square;
+            let next = ((1.0 - quarter) * v[mode] + h * (push[mode] - square * u[mode])) / (1.0 + quarter);
+            u[mode] += 0.5 * h * (v[mode] + next);
+            v[mode] = next;
+        }
+        if (step + 1) % division as usize == 0 {
+            let stresses = (&stressed * &u).as_slice().to_vec();
+            told.displacements.push((&watched * &u).as_slice().to_vec());
+            told.equivalents.push(places(&stresses).map(von_mises).collect());
+            told.stresses.push(stresses);
+        }
+    }
+    Ok(told)
+}
+
+/// Everything that is found.
+struct Found {
+    names: Vec<String>,
+    /// Radii of the places as shares of the way from hub to tip.
+    heights: Vec<f64>,
+    /// The full model with steps in a sample, ascending, and the mean forces of its shortest steps.
+    full: Vec<(u32, Told)>,
+    /// By the number of modes: under the full model's forces, and in a rub of its own or why that is refused.
+    reduced: Vec<(usize, Told, std::result::Result<Told, String>)>,
+    /// As it ships, by a tolerance: its modes, and its rub.
+    ships: (usize, Told),
+    /// Difference of stress at rest with the fewest modes.
+    rest: f64,
+}
+
+impl Found {
+    /// The full model with its shortest steps.
+    fn witness(&self) -> &Told {
+        &self.full[self.full.len() - 1].1
+    }
+
+    /// Rows: name, distance under the same forces and in the same rub.
+    fn rows(&self) -> Vec<(String, Option<Apart>, Option<Apart>)> {
+        let witness = self.witness();
+        let own = self.full[..self.full.len() - 1].iter().map(|(division, told)| {
+            (
+                format!("full model, steps of {} µs", 1e6 * INTERVAL / f64::from(*division)),
+                None,
+                Some(told.apart(witness)),
+            )
+        });
+        let reduced = self.reduced.iter().map(|(modes, forced, rubbed)| {
+            let rubbed = rubbed.as_ref().ok().map(|told| told.apart(witness));
+            (format!("{modes} modes"), Some(forced.apart(witness)), rubbed)
+        });
+        let (modes, told) = &self.ships;
+        let ships = (format!("{modes} modes, by the tolerance that ships"), None, Some(told.apart(witness)));
+        own.chain(reduced).chain([ships]).collect()
+    }
+}
+
+fn find(setting: &Setting, quick: bool, console: &Console) -> Result<Found> {
+    let size = setting.size;
+    let touching = Touching::Patches(size.patches[0], 2);
+    let model = |modes: usize, (method, division)| Reduced { name: "", touching, modes, method, division };
+    let roms: Vec<Rom> =
+        counts(quick).iter().map(|modes| setting.stressed_rom(&model(*modes, FINE))).collect::<Result<_>>()?;
+    let (names, gauges) = setting.gauges(&roms[0])?;
+    let heights = setting.heights(&roms[0]);
+    let rest = setting.at_rest(&roms[0], &gauges, touching)?;
+    let divisions = divisions(quick);
+    let task = console.task("The full blade rubs", Some(divisions.len() as u64));
+    let march = |division: &u32| setting.run_full(touching, *division, &gauges).map(Told::full);
+    let mut full = sweep::sweep(divisions, sweep::processors(), march, |done| task.at(done as u64))?;
+    let forces = full.last_mut().map(|(_, forces)| std::mem::take(forces)).unwrap_or_default();
+    let full = divisions.iter().copied().zip(full.into_iter().map(|(told, _)| told)).collect();
+    let finest = divisions[divisions.len() - 1];
+    let task = console.task("Reduced blades rub", Some(roms.len() as u64));
+    let all: Vec<(usize, Rom)> = counts(quick).iter().copied().zip(roms).collect();
+    let rub = |(modes, rom): &(usize, Rom)| {
+        let forced = pushed(rom, &forces, finest)?;
+        Ok((*modes, forced, setting.told_by(&model(*modes, FINE), rom.clone())?))
+    };
+    let reduced = sweep::sweep(&all, sweep::processors(), rub, |done| task.at(done as u64))?;
+    let by_tolerance = model(size.modes[0], GALERKIN);
+    let ships = setting.told_by(&by_tolerance, setting.stressed_rom(&by_tolerance)?)?;
+    let ships = ships.map_err(|why| Failure::new("lab stress", why, ""))?;
+    Ok(Found { names, heights, full, reduced, ships: (by_tolerance.modes, ships), rest })
+}
+
+fn tables(found: &Found) -> String {
+    let rows = found.rows();
+    let head = "displacements | stress | largest von Mises | at the worst place |\n|---|---|---|---|---|\n";
+    let mut text = format!("| the full model's forces | {head}");
+    for (name, forced, _) in rows.iter().filter(|row| row.1.is_some()) {
+        text.push_str(&format!("| {name} | {} |\n", forced.map(Apart::cells).unwrap_or_default()));
+    }
+    text.push_str(&format!("\n| a rub of its own | {head}"));
+    for (name, forced, rubbed) in &rows {
+        match rubbed {
+            Some(apart) => text.push_str(&format!("| {name} | {} |\n", apart.cells())),
+            None if forced.is_some() => text.push_str(&format!("| {name}: refused |  |  |  |  |\n")),
+            None => {}
+        }
+    }
+    text.push_str(
+        "\n| place | height | largest von Mises: full model (MPa) | what ships (MPa) | stress: what ships | halving the full model's steps |\n\
+         |---|---|---|---|---|---|\n",
+    );
+    let (full, ships) = (found.witness().largest(), found.ships.1.largest());
+    let coarser = &found.full[found.full.len() - 2].1;
+    for (place, name) in found.names.iter().enumerate() {
+        let apart = |told: &Told| percent(told.apart_at(found.witness(), place));
+        text.push_str(&format!(
+            "| `{name}` | {:.0} % | {:.1} | {:.1} | {} | {} |\n",
+            100.0 * found.heights[place],
+            1e-6 * full[place],
+            1e-6 * ships[place],
+            apart(&found.ships.1),
+            apart(coarser)
+        ));
+    }
+    text
+}
+
+fn figure(found: &Found) -> Result<Figure> {
+    let largest = found.witness().largest();
+    let most = (0..largest.len()).max_by(|a, b| largest[*a].total_cmp(&largest[*b])).unwrap_or_default();
+    let few = found.reduced.iter().find_map(|(modes, _, rubbed)| Some((*modes, rubbed.as_ref().ok()?)));
+    let mut shown = vec![("full model".to_owned(), found.witness()), ("what ships".to_owned(), &found.ships.1)];
+    shown.extend(few.map(|(modes, told)| (format!("{modes} modes"), told)));
+    let time = |sample: usize| 1e3 * (sample + 1) as f64 * INTERVAL;
+    let line = |told: &Told| -> Vec<(f64, f64)> {
+        told.equivalents.iter().enumerate().map(|(sample, all)| (time(sample), 1e-6 * all[most])).collect()
+    };
+    let series = shown.iter().map(|(name, told)| Series::line(name.as_str(), line(told))).collect();
+    let mut sheet = Sheet::new(["time (ms)"]);
+    sheet.columns.extend(shown.iter().map(|(name, _)| format!("{name} (MPa)")));
+    for sample in 0..found.ships.1.equivalents.len() {
+        let values = shown.iter().map(|(_, told)| 1e-6 * told.equivalents[sample][most]);
+        sheet.rows.push([time(sample)].into_iter().chain(values).collect());
+    }
+    Ok(Figure {
+        name: "von-mises",
+        caption: format!(
+            "Von Mises at `{}`, the place that has most, while the blade passes the bumps.",
+            found.names[most]
+        ),
+        picture: Picture::plot(&Plot::new("time (ms)", "von Mises (MPa)", series))?,
+        sheet,
+    })
+}
+
+fn statements(found: &Found) -> Vec<Statement> {
+    let witness = found.witness();
+    let apart: Vec<Apart> = found.reduced.iter().map(|(_, forced, _)| forced.apart(witness)).collect();
+    let (first, last) = (apart[0], apart[apart.len() - 1]);
+    let coarser = found.full[found.full.len() - 2].1.apart(witness);
+    let ships = found.ships.1.apart(witness);
+    let most = found.reduced.last().and_then(|(_, _, rubbed)| rubbed.as_ref().ok()).map(|told| told.apart(witness));
+    vec![
+        Statement::tested(
+            "Stress of forces at rest is the full model's with the fewest modes, to 1e-6",
+            found.rest < 1e-6,
+            format!("{:.0e} of the largest with {} modes", found.rest, found.reduced[0].0),
+        ),
+        Statement::tested(
+            "Under the full model's contact forces stress converges with the number of modes: to an eighth of what the fewest leave",
+            last.stresses < 0.125 * first.stresses && apart.windows(2).all(|pair| pair[1].stresses < pair[0].stresses),
+            apart.iter().map(|one| percent(one.stresses)).collect::<Vec<_>>().join(", "),
+        ),
+        Statement::tested(
+            "In a rub of its own the model with most modes is as near as the witness knows itself, twice what halving its steps changes",
+            most.is_some_and(|most| most.stresses < 2.0 * coarser.stresses),
+            format!(
+                "stress {}, halving changes {}",
+                most.map_or_else(|| "refused".to_owned(), |most| percent(most.stresses)),
+                percent(coarser.stresses)
+            ),
+        ),
+        Statement::tested(
+            "What ships tells the largest von Mises of the rub within 5 %",
+            ships.most < 0.05,
+            format!("{} at the place that has most, {} at the worst", percent(ships.most), percent(ships.worst)),
+        ),
+    ]
+}
+
+/// The study.
+///
+/// # Errors
+/// A model that cannot be reduced, a run of the full model or of what ships that fails, a plot that cannot be drawn.
+pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
+    let setting = Setting::new(arguments.quick)?;
+    let found = find(&setting, arguments.quick, console)?;
+    let rows = found.rows().into_iter().map(|(name, forced, rubbed)| {
+        json!({ "run": name, "same_forces": forced.map(Apart::json), "same_rub": rubbed.map(Apart::json) })
+    });
+    let refused = found
+        .reduced
+        .iter()
+        .filter_map(|(modes, _, rubbed)| Some(json!({ "modes": modes, "why": rubbed.as_ref().err()? })));
+    let largest = json!({ "full": found.witness().largest(), "ships": found.ships.1.largest() });
+    Ok(Study {
+        name: "stress",
+        title: "Stress of reduced blades against full finite elements".into(),
+        summary: format!(
+            "One blade of rotor 37, without damping, passes bumps of its casing with its tip in two rows of patches. The witness is the whole \
+             finite-element model, {} degrees of freedom, with steps, contact and stress of its own. Compared where six modes have their \
+             largest stress.{}",
+            setting.full.order(),
+            if arguments.quick { " Quick form: a coarse mesh and one touch." } else { "" }
+        ),
+        facts: vec![("places".into(), found.names.join(", "))],
+        statements: statements(&found),
+        figures: vec![figure(&found)?],
+        results: json!({
+            "runs": rows.collect::<Vec<_>>(), "refused": refused.collect::<Vec<_>>(), "rest": found.rest,
+            "largest_von_mises": largest,
+        }),
+        files: vec![("stress.md".into(), "the tables of the guide".into(), tables(&found).into_bytes())],
+    })
+}
