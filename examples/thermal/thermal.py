@@ -35,7 +35,7 @@ REVOLUTION = 2.0 * math.pi / SPEED
 STEP, CYCLE = REVOLUTION / 10, 10
 ROTOR = ["--contact-patches", "5", "--modes", "12", "--mesh", "16x2x20"]
 # Revolutions of `couplings`, `choice` and `step`; seconds of `jump`, of `long`; tolerances (K).
-FULL = {"couplings": 10, "choice": 16, "step": 24, "jump": 1.5, "long": 10.0, "tolerances": (2.0, 0.5, 0.2, 0.1), "tolerance": 0.25}
+FULL = {"couplings": 10, "choice": 8, "step": 24, "jump": 1.0, "long": 10.0, "tolerances": (2.0, 0.5, 0.2, 0.1), "tolerance": 0.25}
 QUICK = {"couplings": 3, "choice": 2, "step": 4, "jump": 0.12, "long": 0.3, "tolerances": (0.5, 0.1), "tolerance": 0.5}
 
 
@@ -300,7 +300,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--into", type=Path, default=Path("thermal"), help="directory for units, figures and tables [default: thermal]")
     parser.add_argument("--quick", action="store_true", help="a few revolutions of each: does it work?")
-    parser.add_argument("--seconds", type=float, help="thermal time of `jump` and `long`, in place of 1.5 s and 10 s (quick: 0.12 s and 0.3 s)")
+    parser.add_argument("--seconds", type=float, help="thermal time of `jump` and `long`, in place of 1 s and 10 s (quick: 0.12 s and 0.3 s)")
     parser.add_argument("--casing", choices=("unit", "python"), default="unit", help="partner of the rub: the thermal unit that ships, or the one by PythonFMU [default: unit]")
     parser.add_argument("--only", choices=PARTS, action="append", help="this part only; may be given several times")
     arguments = parser.parse_args()
