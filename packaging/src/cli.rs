@@ -74,7 +74,7 @@ pub enum Command {
                             tiprub thermal --material titanium --modes 60 --name fan_case\n\n\
                             Its casing_heat takes casing_friction_power of the scene's FMU, which takes casing_temperature back."
     )]
-    Thermal(ThermalArguments),
+    Thermal(Box<ThermalArguments>),
     /// Run a scene natively, without FMI; one row per communication point.
     #[command(after_help = "Examples:\n  tiprub run scene.toml --csv rub.csv\n  \
                             tiprub run builtin:rotor37 --stop 0.002 --set speed=1700 --csv - | head\n\n\

@@ -83,7 +83,7 @@ impl Model {
             if array.shape() != shape {
                 return refuse(name, format!("shape {:?} found, {shape:?} expected", array.shape()));
             }
-            if let Some(wrong) = array.iter().find(|value| !(value.abs() <= ranges::MATRIX)) {
+            if let Some(wrong) = array.iter().find(|value| value.is_nan() || value.abs() > ranges::MATRIX) {
                 return refuse(name, format!("it holds {wrong}"));
             }
         }

@@ -216,7 +216,8 @@ impl Simulation {
         ranges::at_most("end of the communication step", current_time + step_size, ranges::TIME)?;
         let time = self.state.time;
         // Written so that a NaN is refused.
-        if !((current_time - time).abs() <= TIME_TOLERANCE * step_size) {
+        let off = (current_time - time).abs();
+        if off.is_nan() || off > TIME_TOLERANCE * step_size {
             let problem = format!("{} s, but the simulation is at {} s", shown(current_time), shown(time));
             return Err(Error::invalid("start of the communication step", problem, "Step on from there"));
         }

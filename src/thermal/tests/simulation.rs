@@ -199,9 +199,7 @@ fn a_derivative_given_is_a_ramp_whatever_the_interpolation() {
 fn heat_from_gas_and_air_is_what_their_films_let_through() {
     let (model, mut simulation) = (model(), warm());
     let flow = |simulation: &Simulation| {
-        let rates = ["gas_heat", "ambient_heat"]
-            .map(|name| simulation.output_derivative(reference(simulation, name), 1).unwrap());
-        rates
+        ["gas_heat", "ambient_heat"].map(|name| simulation.output_derivative(reference(simulation, name), 1).unwrap())
     };
     // At the start the temperature is uniform: h A (T_gas − T), by numbers of the model alone.
     let expected = [model.gas_conductance() * (200.0 - 30.0), model.ambient_conductance() * (15.0 - 30.0)];

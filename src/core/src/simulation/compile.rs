@@ -367,7 +367,7 @@ impl Compiled {
             let uncoupled = SectorModel::Uncoupled(&self.bodies[body].model, self.body(body).1.sectors);
             let model = self.bodies[body].disk.as_ref().map_or(uncoupled, SectorModel::Coupled);
             let excitation = excitations[body];
-            StructureParts::Touching(model, self.bank_options(body, excitation))
+            StructureParts::Touching(model, Box::new(self.bank_options(body, excitation)))
         });
         let carrying = self.carriers.iter().zip(&control);
         let carrying = carrying.map(|(carrier, model)| StructureParts::Carrying(model, carrier.loads.are_there()));

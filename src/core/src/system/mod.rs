@@ -47,7 +47,7 @@ pub use structure::Structure;
 #[derive(Debug, Clone)]
 pub enum StructureParts<'a> {
     /// Its contact nodes touch surfaces.
-    Touching(SectorModel<'a>, BankOptions),
+    Touching(SectorModel<'a>, Box<BankOptions>),
     /// It carries surfaces, whose control points have three contact rows each; whether it is loaded beside contact.
     Carrying(&'a ModalModel, bool),
 }
@@ -113,7 +113,7 @@ impl System {
         settings: SystemSettings,
     ) -> Self {
         let pair = PairParts { structure: 0, gap, carrier: None, friction, cutting: 0.0 };
-        Self::of(vec![StructureParts::Touching(model, options)], vec![pair], Vec::new(), settings)
+        Self::of(vec![StructureParts::Touching(model, Box::new(options))], vec![pair], Vec::new(), settings)
     }
 
     /// Any number of structures and pairs; `coatings` are those of pairs.
@@ -353,7 +353,7 @@ fn sum_of(mut energies: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
 fn made(part: StructureParts, index: usize, pairs: &[PairParts]) -> Structure {
     let (model, options) = match part {
         StructureParts::Carrying(model, loads) => return Structure::carrying(model, loads),
-        StructureParts::Touching(model, options) => (model, options),
+        StructureParts::Touching(model, options) => (model, *options),
     };
     let own = || pairs.iter().enumerate().filter(|(_, pair)| pair.structure == index);
     let nodes = own().map(|(_, pair)| pair.gap.nodes()).max().unwrap_or(0);

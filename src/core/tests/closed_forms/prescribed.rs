@@ -339,7 +339,7 @@ fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
     let plane = masses(&[(SWING, 0, 1.0)], 48, 0);
     let positions = vec![[0.0, 0.0, -DEPTH], [0.1, 0.0, 0.0]];
     let gap = GapLaw::Open(Box::new(OpenGap::new(positions, vec![0], OpenSurface::new(surface))));
-    let touching = StructureParts::Touching(SectorModel::Uncoupled(&model, 1), BankOptions::default());
+    let touching = StructureParts::Touching(SectorModel::Uncoupled(&model, 1), Box::default());
     let carrier = Some(Carrier { structure: 1, first_row: 0 });
     let pair = PairParts { structure: 0, gap, carrier, friction, cutting: 0.0 };
     System::of(vec![touching, StructureParts::Carrying(&plane, false)], vec![pair], Vec::new(), settings)

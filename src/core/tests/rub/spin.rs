@@ -29,6 +29,8 @@ fn bank(scheme: Scheme, stiffening: bool, coriolis: bool) -> ModalBank {
     };
     let spin = ModalSpin {
         reference_speed: 0.0,
+        reference_temperature: 0.0,
+        softening: None,
         stiffness_speed2: DMatrix::identity(2, 2) * STIFFENING,
         stiffness_speed4: DMatrix::zeros(2, 2),
         coriolis: DMatrix::from_row_slice(2, 2, &[0.0, -SKEW, SKEW, 0.0]),

@@ -86,7 +86,9 @@ impl ConductionOptions {
                 return Err(Error::invalid(format!("thermal model, {what}"), problem, "Give SI units"));
             }
         }
-        if self.films.iter().any(|film| !(film.is_finite() && *film >= 0.0)) || self.films == [0.0; 2] {
+        if self.films.iter().any(|film| !(film.is_finite() && *film >= 0.0))
+            || self.films.iter().all(|film| *film <= 0.0)
+        {
             let problem = format!("{} inside and {} outside", shown(self.films[0]), shown(self.films[1]));
             let remedy = "Give none below 0 and one above: without any film there is no steady state. The unit's inputs \
                           gas_convection_factor and ambient_convection_factor switch films off";

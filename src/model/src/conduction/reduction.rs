@@ -95,7 +95,7 @@ pub fn reduce_conduction(
     let mut checks = Vec::new();
     for factors in CHECKED {
         // A side without a film has no factor.
-        if factors.iter().zip(options.films).all(|(factor, film)| film > 0.0 || *factor == 1.0) {
+        if factors.iter().zip(options.films).all(|(factor, film)| film > 0.0 || (*factor - 1.0).abs() < f64::EPSILON) {
             checks.push(check(&full, &model, factors)?);
         }
     }

@@ -79,7 +79,7 @@ fn verdict(table: &Table, directory: &std::path::Path) -> Option<Failure> {
 fn package(arguments: &StabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
     let chosen =
         LibraryArguments { library: arguments.library.iter().cloned().collect(), ..LibraryArguments::default() };
-    let libraries = library::load(&chosen, console)?;
+    let libraries = library::load(library::Unit::Scene, &chosen, console)?;
     let directory = tempfile::tempdir()
         .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
     for name in values::SCENES {

@@ -59,9 +59,6 @@ impl CyclicBank {
         let dynamic = diameter.dynamic_modes(self.scheme);
         for mode in 0..diameter.len() {
             let force = if mode < dynamic { loads.of_mode(mode) } else { loads.of_mode_before(mode) };
-            if force == [0.0; 2] {
-                continue;
-            }
             let (_, increment) = self.modal_state(n, mode);
             let older = &self.state.older[n / LANES * self.modes + mode];
             for part in 0..2 {

@@ -134,7 +134,7 @@ impl Coating {
             let edge = cutting.edges[way.blade * self.rows.len() + index];
             let mut append = |place: usize, share: f64, faced: bool| {
                 let cell = index * self.around + place;
-                let known = edge.cell == cell as u64 + 1 && edge.sense == sense(slid);
+                let known = edge.cell == cell as u64 + 1 && edge.sense.total_cmp(&sense(slid)).is_eq();
                 problem.append_contact(CellContact {
                     cell,
                     nodes: [first + a, first + b],
