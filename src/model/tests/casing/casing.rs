@@ -254,56 +254,6 @@ fn thermal_size(patch: usize) -> f64 {
     (0..loads.nrows()).map(|dof| loads[(dof, patch)].abs()).sum()
 }
 
-/// In a mode of the full model the support accelerates all of its mass: force and moment are those of M ü over all nodes. Of double
-/// modes any mixture is one; the sum of their squares is the same.
-#[test]
-fn a_support_gives_a_vibrating_casing_its_momentum() {
-    let options = CasingOptions { checked_modes: 34, ..coarse(Support::Low) };
-    let reduction = reduce_ring(&options, &silent).unwrap();
-    let rom = &reduction.rom;
-    let ring = supported_ring(&options).unwrap();
-    let mass = assemble(&ring.mesh, &options.material, &silent).unwrap().mass;
-    let ones = Mat::from_fn(mass.order(), 1, |dof, _| if dof % 3 == 0 { 1.0 } else { 0.0 });
-    let whole = mass.times(ones.as_ref()).col(0).iter().sum::<f64>().sqrt();
-    let rows = rom.extras.support.as_ref().unwrap();
-    let momentum = |index: usize| {
-        let shape = &reduction.modes[index].shape;
-        let carried = mass.times(Mat::from_fn(mass.order(), 1, |dof, _| shape[dof / 3][dof % 3]).as_ref());
-        let mut sum = DVector::zeros(6);
-        for (node, [x, y, z]) in ring.mesh.nodes.iter().enumerate() {
-            let [fx, fy, fz] = [0, 1, 2].map(|i| carried[(3 * node + i, 0)]);
-            sum += DVector::from_row_slice(&[fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx]);
-        }
-        sum / whole
-    };
-    let (mut seen, mut worst, mut index) = (0, 0.0_f64, 0);
-    while index < 32 {
-        let alike =
-            |other: &usize| (reduction.modes[*other].frequency / reduction.modes[index].frequency - 1.0).abs() < 1e-4;
-        let pair: Vec<usize> = (index..34).take_while(alike).collect();
-        let (mut expected, mut found) = (DMatrix::zeros(6, 6), DMatrix::zeros(6, 6));
-        for &mode in &pair {
-            let (moved, square) = (momentum(mode), rom.stiffness[(mode, mode)]);
-            let felt = (rows.stiffness.column(mode) / -square + rows.mass.column(mode)) / whole;
-            expected += &moved * moved.transpose();
-            found += &felt * felt.transpose();
-        }
-        // Nodal diameters from 2 on have no momentum.
-        if expected.amax() > 1e-4 {
-            let off = (&found - &expected).amax() / expected.amax();
-            println!(
-                "{:.1} Hz, {} alike: {:.3} of the mass, off by {off:.1e}",
-                reduction.modes[index].frequency,
-                pair.len(),
-                expected.amax().sqrt()
-            );
-            (seen, worst) = (seen + 1, worst.max(off));
-        }
-        index += pair.len();
-    }
-    assert!(seen > 0 && worst < 5e-2, "{seen} {worst:e}");
-}
-
 fn box_pencil() -> (Mesh, SparseMatrix, SparseMatrix) {
     let mesh = distorted_box(ElementKind::Hex8, [4, 2, 2], [0.3, 0.04, 0.05], wobble(0.1));
     let assembled = assemble(&mesh, &Material::steel(), &silent).unwrap();
