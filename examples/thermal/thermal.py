@@ -11,6 +11,7 @@ Figures (SVG) and tables (CSV) go into a directory.
 """
 
 import argparse
+import csv
 import math
 import os
 import re
@@ -114,9 +115,8 @@ class Files:
 
     def table(self, name, header, rows, show=True):
         """A CSV file, and the same as a table on stdout."""
-        with (self.into / f"{name}.csv").open("w", encoding="utf-8") as file:
-            for row in [header, *rows]:
-                file.write(",".join("" if value != value else str(value) for value in row) + "\n")
+        with (self.into / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file).writerows([header, *(["" if value != value else value for value in row] for row in rows)])
         if not show:
             return
         shown = [["" if value != value else f"{value:.3g}" if isinstance(value, float) else str(value) for value in row] for row in rows]

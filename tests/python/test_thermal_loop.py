@@ -244,7 +244,7 @@ def test_finite_volumes_stand_beside_the_finite_elements(casings):
     """Two discretisations of one casing that share no line: heat in two patches, a second long and ten."""
     heat = numpy.zeros(12)
     heat[2], heat[3], heat[8] = 5e3, 1e3, 4e3
-    model = Conduction(around=144, along=2.5e-3)
+    model = Conduction(around=144, along=2.5e-3, layers=8)
     with Unit(casings[2]) as unit:
         casing = Casing(unit)
         for length in (1.0, 9.0):
