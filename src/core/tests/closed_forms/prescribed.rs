@@ -4,7 +4,6 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::gaps::open::{OpenGap, OpenSurface};

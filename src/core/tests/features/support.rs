@@ -63,7 +63,10 @@ fn forces_on_a_casing_are_its_momentum() {
         places.push(place(&run));
         let force = ["x", "y"].map(|axis| {
             let contact = real(&run, &format!("casing_force_{axis}"));
-            assert!((contact + real(&run, &format!("force_{axis}"))).abs() < f64::MIN_POSITIVE, "opposite to the rotor");
+            assert!(
+                (contact + real(&run, &format!("force_{axis}"))).abs() < f64::MIN_POSITIVE,
+                "opposite to the rotor"
+            );
             contact + real(&run, &format!("support_force_{axis}"))
         });
         if index >= 1 {
