@@ -74,6 +74,10 @@ class Importer:
         return values[0] if len(names) == 1 else values
 
 
+# Callbacks of all instances.
+ALIVE = []
+
+
 class Two(Importer):
     """FMI 2.0."""
 
@@ -85,8 +89,9 @@ class Two(Importer):
         logger = fmi2CallbackLoggerTYPE(self.collect)
         allocate, free = fmi2CallbackAllocateMemoryTYPE(0), fmi2CallbackFreeMemoryTYPE(0)
         self.callbacks = fmi2CallbackFunctions(logger, allocate, free, fmi2StepFinishedTYPE(0), None)
-        self.alive = logger
-        # FMPy's own C function, which formats the variadic message before it comes here.
+        # FMPy's own C function, which formats the variadic message before it comes here. It keeps one address for the
+        # whole process, and messages of whoever logs later go there: what is behind it must stay.
+        ALIVE.append(self.callbacks)
         addLoggerProxy(byref(self.callbacks))
         try:
             self.fmu.instantiate(callbacks=self.callbacks, loggingOn=False)

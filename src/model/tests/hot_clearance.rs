@@ -5,6 +5,7 @@
 
 use std::f64::consts::TAU;
 
+use guide::told;
 use tiprub_core::rom::Frame;
 use tiprub_core::settings::StructureSettings;
 use tiprub_core::{Rom, Scene, Simulation};
@@ -18,6 +19,8 @@ use tiprub_model::{CasingOptions, FeModel, Material, reduce_model, reduce_ring};
 use tiprub_test_models as models;
 
 mod common;
+#[path = "../../../tests/guide.rs"]
+mod guide;
 use common::{nodes_at, straight_box};
 
 const ROOT: f64 = 0.18;
@@ -106,8 +109,6 @@ fn the_hot_running_clearance_is_that_of_the_closed_forms() {
     let (casing, casing_expansion) = ring();
     let scene = scene(bar(12, ReductionKind::FixedInterface), casing);
     let material = metal();
-    println!("| state | Ω (rad/s) | rotor (K) | casing (K) | closed form (mm) | found (mm) | error (nm) |");
-    println!("|---|---|---|---|---|---|---|");
     for (state, speed, temperatures) in [
         ("cold, at rest", 0.0, [0.0, 0.0]),
         ("cold, running", SPEED, [0.0, 0.0]),
@@ -123,12 +124,16 @@ fn the_hot_running_clearance_is_that_of_the_closed_forms() {
         let expected = GAP - growth - expansion + opening;
         let found = clearance(&scene, speed, temperatures);
         let (millimetres, error) = ([expected, found].map(|value| 1e3 * value), 1e9 * (found - expected));
-        println!(
+        told!(
             "| {state} | {speed} | {} | {} | {:.4} | {:.4} | {error:.2} |",
-            temperatures[0], temperatures[1], millimetres[0], millimetres[1]
+            temperatures[0],
+            temperatures[1],
+            millimetres[0],
+            millimetres[1]
         );
         assert!(error.abs() < 1.0, "{state}: {error} nm");
     }
+    guide::hold("cargo test -p tiprub-model --test hot_clearance");
 }
 
 /// Whatever modes a reduction keeps, free expansion at the contact nodes is that of the mesh, which comes to the closed form: static

@@ -143,20 +143,13 @@ fn a_structure_that_stands_still_does_not_spin() {
 }
 
 #[test]
-fn a_rotating_structure_carries_no_load_heat_or_surface() {
+fn a_rotating_structure_carries_no_load_or_surface() {
     let rotate = |scene: &mut SceneSettings| {
         scene.surfaces[0].structure = None;
         scene.structures[1].motion = Motion::Rotating;
     };
     let remedy = "set motion = \"still\"";
-    refused(|scene| rotate(scene), &["structure[2].thermal: needs `motion = \"still\"`", remedy]);
-    refused(
-        |scene| {
-            rotate(scene);
-            scene.structures[1].thermal = false;
-        },
-        &["structure[2].load: needs `motion = \"still\"`", remedy],
-    );
+    refused(rotate, &["structure[2].load: needs `motion = \"still\"`", remedy]);
     let parts =
         ["surface[1].structure: needs a structure with `motion = \"still\"`", "Name a structure that stands still"];
     refused(|scene| scene.surfaces[0].structure = Some("rotor".into()), &parts);
