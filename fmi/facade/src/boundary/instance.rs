@@ -34,7 +34,7 @@ pub(crate) struct Instance {
     pub callbacks: Option<Callbacks>,
 }
 
-/// `fmi2Component`, `fmi3Instance`: NULL, or what [`instantiate`] returned and [`release`] has not yet taken back.
+/// `fmi2Component`, `fmi3Instance`: NULL, or what `instantiate` returned and `release` has not yet taken back.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
 pub struct Handle(*mut Instance);
