@@ -245,11 +245,11 @@ impl Simulation {
         Some([amplitude.at(offset), angle - phase.at(offset)])
     }
 
-    /// An excitation must not turn on too far within an internal step.
-    pub(super) fn check_excitation(&self, body: usize, step: f64, speeds: [f64; 2]) -> Result<()> {
+    /// An excitation must not turn on too far within an internal step, by the speed and by its phase (rad/s) together.
+    pub(super) fn check_excitation(&self, body: usize, step: f64, speeds: [f64; 2], phase: f64) -> Result<()> {
         let Some(reference) = self.compiled.references.engine_orders[body] else { return Ok(()) };
         let order = self.values[reference];
-        let angle = speeds.into_iter().fold(0.0, |most: f64, speed| most.max((order * speed * step).abs()));
+        let angle = speeds.into_iter().fold(0.0, |most: f64, speed| most.max(((order * speed - phase) * step).abs()));
         if angle <= crate::ranges::EXCITED_ANGLE {
             return Ok(());
         }
@@ -261,7 +261,7 @@ impl Simulation {
                 shown(self.time),
                 shown(crate::ranges::EXCITED_ANGLE)
             ),
-            "Use a smaller internal_step_max, a lower order or a lower speed",
+            "Use a smaller internal_step_max, a lower order, a lower speed or a phase that changes more slowly",
         ))
     }
 

@@ -109,7 +109,14 @@ impl Simulation {
                 self.compiled.check_temperature(body, until)?;
             }
             self.check_step_size(body, step, [first, last, rotor.spin.at(0.0)], reached.min(until))?;
-            self.check_excitation(body, step, [first, last])?;
+            let phase = rotor.excitation.get(1).map_or(0.0, |phase| {
+                let mut phase = *phase;
+                if !self.holds() {
+                    phase.aim(0.0, self.inputs.reach(step_size));
+                }
+                phase.rate()
+            });
+            self.check_excitation(body, step, [first, last], phase)?;
             if self.compiled.spins(body) {
                 self.compiled.check_speed(body, if first.abs() > last.abs() { first } else { last })?;
             }

@@ -294,3 +294,22 @@ fn an_excitation_that_cannot_be_is_refused() {
     let error = started(&scene).do_step(0.0, 1e-6).unwrap_err().to_string();
     assert!(error.contains("`excitation_order`") && error.contains("2.000e0 rad"), "{error}");
 }
+
+/// The pattern turns by the speed and by its phase: what the phase adds counts, either way round.
+#[test]
+fn an_excitation_that_its_phase_turns_too_far_in_a_step_is_refused() {
+    let mut scene = scene(models::blade(3), Scheme::ModalExact, 2, 500.0);
+    scene.settings.time.step = 1e-6;
+    for (turn, refused) in [(9.0, false), (10.1, true), (-9.8, false), (-10.1, true)] {
+        let mut run = started(&scene);
+        set(&mut run, "excitation_phase", PHASE + turn);
+        let done = run.do_step(0.0, 1e-5);
+        assert_eq!(done.is_err(), refused, "{turn}: {done:?}");
+        // The same phase at once is no turning.
+        let mut scene = scene.clone();
+        scene.settings.time.input_interpolation = InputInterpolation::Hold;
+        let mut run = started(&scene);
+        set(&mut run, "excitation_phase", PHASE + turn);
+        run.do_step(0.0, 1e-5).unwrap();
+    }
+}

@@ -215,11 +215,17 @@ impl<'a> Checking<'a> {
         };
         let both = [1.0, -1.0].into_iter().filter_map(growth);
         let (rate, frequency) = both.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let kilohertz = 1e-3 * frequency / std::f64::consts::TAU;
+        // What grows without turning round within its growth is no vibration.
+        let motion = if frequency < 1e-3 * rate {
+            "bending one way".to_owned()
+        } else {
+            format!("vibration at {kilohertz:.4} kHz")
+        };
         Some(format!(
-            "cutting is physically unstable: with all contact nodes of a blade in fresh coating vibration at {:.4} kHz grows by \
-             {rate:.2e} 1/s. It is in the equations, and no shorter step helps. Use a larger `normal_ratio`, a smaller \
-             `specific_energy` or more damping, or see to it that blades leave the coating sooner than that",
-            1e-3 * frequency / std::f64::consts::TAU
+            "cutting is physically unstable: with all contact nodes of a blade in fresh coating {motion} grows by {rate:.2e} \
+             1/s. It is in the equations, and no shorter step helps. Use a larger `normal_ratio`, a smaller \
+             `specific_energy` or more damping, or see to it that blades leave the coating sooner than that"
         ))
     }
 
