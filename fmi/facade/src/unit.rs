@@ -1,7 +1,6 @@
 //! What the façade drives: a simulation with a table of variables.
 
 use std::any::Any;
-use std::fmt::Debug;
 use std::path::Path;
 
 use tiprub_core::variables::VariableTable;
@@ -10,9 +9,11 @@ use tiprub_core::{Result, simulation::Progress};
 /// A unit of co-simulation: variables by reference, communication steps marched internal step by internal step, its state as
 /// bytes. Which calls are legal when is the façade's business.
 ///
+/// It asks for no `Debug`: texts of a whole simulation that nobody reads would be a tenth of a library.
+///
 /// Life: made by a [`Load`], then parameters and inputs → [`Unit::initialise`] → any number of communication steps
 /// → ([`Unit::reset`] and again).
-pub trait Unit: Debug + Send {
+pub trait Unit: Send {
     /// All variables.
     fn table(&self) -> &VariableTable;
 

@@ -1,15 +1,12 @@
 //! Conduction of a casing as a unit.
 
-use std::any::Any;
 use std::path::Path;
 
-use tiprub_core::simulation::Progress;
-use tiprub_core::{Result, VariableTable};
+use tiprub_core::Result;
 use tiprub_fmi_facade::{Loaded, Unit};
 use tiprub_thermal::{Courses, Simulation};
 
 /// A reduced model and its state.
-#[derive(Debug)]
 struct Conduction(Simulation);
 
 /// The model of the resources.
@@ -21,71 +18,7 @@ pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
 }
 
 impl Unit for Conduction {
-    fn table(&self) -> &VariableTable {
-        self.0.table()
-    }
-
-    fn real(&self, reference: u32) -> Result<f64> {
-        self.0.real(reference)
-    }
-
-    fn integer(&self, reference: u32) -> Result<i32> {
-        self.0.integer(reference)
-    }
-
-    fn boolean(&self, reference: u32) -> Result<bool> {
-        self.0.boolean(reference)
-    }
-
-    fn string(&self, reference: u32) -> Result<&str> {
-        self.0.string(reference)
-    }
-
-    fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
-        self.0.set_real(reference, value)
-    }
-
-    fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
-        self.0.set_integer(reference, value)
-    }
-
-    fn set_boolean(&mut self, reference: u32, value: bool) -> Result<()> {
-        self.0.set_boolean(reference, value)
-    }
-
-    fn set_string(&mut self, reference: u32, value: &str) -> Result<()> {
-        self.0.set_string(reference, value)
-    }
-
-    fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
-        self.0.set_input_derivative(reference, order, value)
-    }
-
-    fn output_derivative(&self, reference: u32, order: i32) -> Result<f64> {
-        self.0.output_derivative(reference, order)
-    }
-
-    fn courses(&self) -> Box<dyn Any> {
-        Box::new(self.0.courses())
-    }
-
-    fn restore_courses(&mut self, courses: Box<dyn Any>) {
-        if let Ok(courses) = courses.downcast::<Courses>() {
-            self.0.restore_courses(*courses);
-        }
-    }
-
-    fn initialise(&mut self, start_time: f64) -> Result<()> {
-        self.0.initialise(start_time)
-    }
-
-    fn reset(&mut self) {
-        self.0.reset();
-    }
-
-    fn time(&self) -> f64 {
-        self.0.time()
-    }
+    tiprub_fmi_facade::delegate!(Courses);
 
     fn warnings(&self) -> &[String] {
         &[]
@@ -99,14 +32,6 @@ impl Unit for Conduction {
         self.0.begin_step(current_time, step_size)
     }
 
-    fn advance(&mut self) -> Result<Progress> {
-        self.0.advance()
-    }
-
-    fn is_stepping(&self) -> bool {
-        self.0.is_stepping()
-    }
-
     /// A communication step is one internal step: there is no time between to end at.
     fn end_step_early(&mut self) -> Result<()> {
         Ok(())
@@ -117,29 +42,7 @@ impl Unit for Conduction {
         Ok(())
     }
 
-    fn state_size(&self) -> usize {
-        self.0.state_size()
-    }
-
-    fn save_state(&self, buffer: &mut [u8]) -> Result<()> {
-        self.0.save_state(buffer)
-    }
-
-    fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {
-        self.0.restore_state(buffer)
-    }
-
     fn no_derivatives(&self) -> Option<&'static str> {
         None
-    }
-
-    fn step_derivative(
-        &mut self,
-        outputs: &[u32],
-        inputs: &[u32],
-        seed: &[f64],
-        sensitivity: &mut [f64],
-    ) -> Result<()> {
-        self.0.step_derivative(outputs, inputs, seed, sensitivity)
     }
 }

@@ -24,7 +24,6 @@ pub(crate) struct Callbacks {
 
 /// What a handle points to. The mutex costs some twenty nanoseconds a call and buys two answers that the standard leaves
 /// open: a call on an instance that another thread is using is refused, and a panic inside the slave poisons it for good.
-#[derive(Debug)]
 pub(crate) struct Instance {
     dialect: Dialect,
     slave: Mutex<Slave>,

@@ -82,7 +82,6 @@ impl fmt::Display for Refusal {
 pub(crate) type Result<T, E = Refusal> = std::result::Result<T, E>;
 
 /// One FMU instance without its callbacks.
-#[derive(Debug)]
 pub(crate) struct Slave {
     dialect: Dialect,
     unit: Box<dyn Unit>,
