@@ -251,6 +251,13 @@ impl Compiled {
         if lowest.is_finite() { gap * lowest / radius } else { 0.0 }
     }
 
+    /// Whether tips of a structure cut a coating.
+    pub fn cuts(&self, body: usize) -> bool {
+        self.plan
+            .pairs_of(body)
+            .any(|(pair, _)| self.contact(pair).coating.is_some_and(|coating| coating.cutting.is_some()))
+    }
+
     /// Whether modes or loads of a structure depend on the speed.
     pub fn spins(&self, body: usize) -> bool {
         let spin = self.body(body).0.spin;

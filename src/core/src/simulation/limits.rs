@@ -72,6 +72,8 @@ struct BodyLimits {
     casing: Vec<(f64, Option<String>)>,
     /// Smallest step of modal-exact that passes over what contact acts on; infinite for other schemes.
     unresolved: f64,
+    /// What grows while blades cut.
+    cutting: Option<String>,
 }
 
 /// Senses of slip of a speed or of its sign: both where it is 0.
@@ -269,6 +271,7 @@ impl Compiled {
                 massless: MasslessLimit::NONE,
                 casing: Vec::new(),
                 unresolved: f64::INFINITY,
+                cutting: None,
             };
         }
         let casing = at.casing(expected);
@@ -292,8 +295,8 @@ impl Compiled {
                 senses[sense] = Some(at.sense(sense, expected));
             }
         }
-        let closing = Closing::new(self, body);
-        BodyLimits { outcome, senses, closing, massless, casing, unresolved }
+        let (closing, cutting) = (Closing::new(self, body), at.cutting());
+        BodyLimits { outcome, senses, closing, massless, casing, unresolved, cutting }
     }
 
     /// Smallest step of modal-exact that passes over what contact acts on: of what touches, and of carriers.
@@ -330,6 +333,9 @@ impl Limits {
 
     /// What of a structure that turns at a speed of this sign grows by itself.
     pub fn grows(&self, body: usize, speed: f64) -> Option<&str> {
+        if let Some(cutting) = &self.bodies[body].cutting {
+            return Some(cutting);
+        }
         senses_of(speed).find_map(|sense| self.bodies[body].senses[sense].as_ref()?.grows.as_deref())
     }
 }
@@ -338,6 +344,7 @@ impl BodyLimits {
     /// Warnings for the step expected at this speed (rad/s).
     fn warnings(&self, speed: f64) -> Result<Vec<String>> {
         let mut warnings = self.outcome.clone()?;
+        warnings.extend(self.cutting.clone());
         let closed = self.closing.time(speed);
         let found =
             senses_of(speed).filter_map(|sense| self.senses[sense].as_ref()).map(|sense| sense.warnings(closed));
@@ -360,6 +367,7 @@ impl BodyLimits {
             other => other,
         };
         self.outcome = self.outcome.map(texts).map_err(refusal);
+        self.cutting = self.cutting.map(|text| format!("{name}: {text}"));
         self.senses.iter_mut().flatten().for_each(|sense| sense.name(name));
         for (_, text) in &mut self.casing {
             *text = text.take().map(|text| format!("{name}: {text}"));

@@ -329,7 +329,7 @@ impl Simulation {
             let slow = self.compiled.slow_sliding(body);
             if self.compiled.bodies[body].translations.is_some()
                 || parameters.solver == Solver::Coulomb
-                || parameters.friction_of(&self.compiled, body) == 0.0
+                || (parameters.friction_of(&self.compiled, body) == 0.0 && !self.compiled.cuts(body))
                 || speed.slope != 0.0
                 || speed.value.abs() >= slow
             {
@@ -337,10 +337,11 @@ impl Simulation {
             }
             let rotor = self.compiled.rotor_name(body);
             self.warnings.push(format!(
-                "{rotor} starts at speed {} rad/s with friction: the sliding law does not model sticking; results are \
-                 meaningful once the tips slide faster than they vibrate, which they do not below some {slow:.1e} rad/s (the \
-                 solver coulomb models it)",
-                shown(speed.value)
+                "{rotor} starts at speed {} rad/s with {}: the sliding law does not model sticking; results are \
+                 meaningful once the tips slide faster than they vibrate, which they do not below some {slow:.1e} rad/s{}",
+                shown(speed.value),
+                if self.compiled.cuts(body) { "a coating that is cut" } else { "friction" },
+                if self.compiled.cuts(body) { "" } else { " (the solver coulomb models it)" }
             ));
         }
     }

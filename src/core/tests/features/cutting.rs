@@ -179,6 +179,29 @@ fn cutting_keeps_to_states_and_asks_for_no_memory() {
     crate::checks::ledger_closes("cutting", start(), 1e-11);
 }
 
+/// A normal mode that bends along the way, into the coating in one sense of it: what ends the run is called what it is.
+#[test]
+fn what_grows_under_the_cut_is_told_where_it_ends_a_run_and_a_cut_at_rest_before_it() {
+    let mut scene = scene([200, 2], 1e-6);
+    let rom = &mut scene.roms[0];
+    for node in 0..2 {
+        // Each node's radial mode moves it along the way too.
+        rom.contact_map[(3 * node + 1, node)] = -3.0 * rom.contact_map[(3 * node, node)];
+    }
+    let cutting = &mut scene.settings.contacts[0].coating.as_mut().unwrap().cutting;
+    *cutting = Some(CuttingSettings { specific_energy: 1e12, normal_ratio: 0.5 });
+    for speed in [SPEED, -SPEED, 0.0] {
+        scene.settings.structures[0].speed = speed;
+        let mut run = started(&scene);
+        let told = |part: &str| run.warnings().iter().any(|warning| warning.contains(part));
+        assert!(told("cutting is physically unstable") && !told("0.0000 kHz"), "{:?}", run.warnings());
+        assert_eq!(told("with a coating that is cut: the sliding law"), speed.abs() < 1.0, "{:?}", run.warnings());
+        move_on(&mut run, "casing_radius_change", 0.0, -0.5);
+        let ended = (0..400).find_map(|_| run.do_step(run.time(), 1e-5).err()).unwrap().to_string();
+        assert!(ended.contains("cutting is physically unstable") && ended.contains("bending one way"), "{ended}");
+    }
+}
+
 #[test]
 fn what_does_not_go_with_cutting_is_refused_by_name() {
     let refused = |change: &dyn Fn(&mut Scene), parts: &[&str]| {

@@ -171,7 +171,6 @@ impl<'a> Checking<'a> {
         let mut warnings: Vec<String> =
             stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
         warnings.extend(self.not_looked_at());
-        warnings.extend(self.cutting());
         let senses: Vec<Vec<ContactDirections>> =
             self.models.iter().map(|model| [1.0, -1.0].map(|sense| self.directions(model, sense)).into()).collect();
         if self.disk().is_some() {
@@ -199,7 +198,7 @@ impl<'a> Checking<'a> {
     }
 
     /// Vibration that grows while all contact nodes of a blade cut, sliding in either sense.
-    fn cutting(&self) -> Option<String> {
+    pub(super) fn cutting(&self) -> Option<String> {
         let (pair, _) = self.compiled.plan.pairs_of(self.body).next()?;
         let coating = self.system.coating(pair)?;
         let own = coating.cut_stiffness()?;

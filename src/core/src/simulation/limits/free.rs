@@ -57,6 +57,7 @@ impl Compiled {
             massless: MasslessLimit::NONE,
             casing: Vec::new(),
             unresolved: if parameters.scheme == Scheme::Galerkin { f64::INFINITY } else { unresolved },
+            cutting: None,
         }
     }
 }
