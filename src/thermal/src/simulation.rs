@@ -139,11 +139,11 @@ impl Simulation {
     fn start_steady(&mut self) -> Result<()> {
         let rates = &self.operator.rates;
         let (slowest, fastest) = (rates[0], rates[rates.len() - 1]);
-        if slowest <= UNCOOLED * fastest || slowest == 0.0 {
+        if slowest <= UNCOOLED * fastest {
             return Err(Error::invalid(
                 "initial_state = steady",
-                "nothing cools the casing: both convection factors, or all film coefficients, are 0",
-                "Set a convection factor above 0, or start with a uniform temperature",
+                "nothing cools the casing to speak of: convection factors times film coefficients are 0, or too small for a number",
+                "Set larger convection factors, or start with a uniform temperature",
             ));
         }
         let heat: Vec<f64> = self.state.heat.iter().map(|course| course.value).collect();
