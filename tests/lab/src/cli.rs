@@ -15,7 +15,7 @@ use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
     bases, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, refinement, scatter,
-    stability, stage, tolerance, witness,
+    stability, stage, tolerance, wear, witness,
 };
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
@@ -79,6 +79,8 @@ pub enum Command {
     Witness(StudyCommon),
     /// Stress that reduced blades recover in a rub, against that of the full finite-element model, by the number of modes.
     Stress(StudyCommon),
+    /// One blade in a coating that closes on it: lobes of the wear beside what the blade vibrates per revolution.
+    Wear(StudyCommon),
 }
 
 /// Arguments of `lab estimates`.
@@ -240,6 +242,7 @@ impl Cli {
             Command::Scatter(common) => ("scatter", common),
             Command::Witness(common) => ("witness", common),
             Command::Stress(common) => ("stress", common),
+            Command::Wear(common) => ("wear", common),
         };
         let directory = commands::study::directory(name, common);
         output_file::try_directory(&directory)?;
@@ -271,6 +274,7 @@ impl Cli {
             Command::Scatter(common) => scatter::study(common, console),
             Command::Witness(common) => witness::study(common, console),
             Command::Stress(common) => witness::stress(common, console),
+            Command::Wear(common) => wear::study(common, console),
             Command::Stability(_) => unreachable!("`run` has answered it"),
         }
     }

@@ -7,7 +7,8 @@
 //! - `witness`: reduced blades against full finite elements; `bases`: what a blade is reduced to;
 //! - `tolerance`: steps by a tolerance beside steps of one length; `scatter`: the same on random rubs and sectors;
 //! - `conjugacy`: forces, moments and work on both sides of contacts; `inputs`: what the communication step does;
-//! - `coupling`: a rub and a shaft stepped by turns, with and without derivatives over the step.
+//! - `coupling`: a rub and a shaft stepped by turns, with and without derivatives over the step;
+//! - `wear`: one blade in a coating, lobes of the wear beside its vibrations.
 
 #![warn(unreachable_pub)]
 mod bases;
@@ -26,4 +27,5 @@ mod scatter;
 mod stability;
 mod stage;
 mod tolerance;
+mod wear;
 mod witness;

@@ -1,0 +1,95 @@
+//! Hot running clearance of rotor 37 against CalculiX: the blade turns, warms up and softens, and the gap at its tip closes.
+
+use guide::told;
+use tiprub_core::rom::ContactNode;
+use tiprub_core::settings::{Meridian, SpinSettings};
+use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_model::progress::silent;
+use tiprub_model::reduce::ReductionKind::{self, FixedInterface, FreeInterface};
+use tiprub_model::rotor37::{DESIGN_SPEED, Tip};
+use tiprub_model::{Rotor37Options, reduce_rotor37};
+use tiprub_test_models as models;
+
+#[path = "../../../tests/guide.rs"]
+mod guide;
+
+const GAP: f64 = 8e-4;
+const WARM: f64 = 200.0;
+/// Of the state `soft` (1/K).
+const SOFTENING: f64 = 2.5e-4;
+/// Contact nodes, which are the nodes of the reference.
+const NODES: usize = 9;
+
+/// Analyses of CalculiX and what the scene asks for beside growth.
+const ANALYSES: [(&str, bool); 2] = [("linear", false), ("nlgeom", true)];
+/// States, their speeds (rad/s), temperatures (K) and softening (1/K).
+const STATES: [(&str, [f64; 3]); 4] = [
+    ("spin", [DESIGN_SPEED, 0.0, 0.0]),
+    ("warm", [0.0, WARM, 0.0]),
+    ("hot", [DESIGN_SPEED, WARM, 0.0]),
+    ("soft", [DESIGN_SPEED, WARM, SOFTENING]),
+];
+
+/// Displacements x, y, z (m) of the nodes along the tip.
+fn reference(analysis: &str, state: &str) -> Vec<[f64; 3]> {
+    let lines = include_str!("data/rotor37_hot_calculix.csv").lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let own = lines.filter(|words| words[0] == analysis && words[1] == state);
+    own.map(|words| [3, 4, 5].map(|i| words[i].parse().unwrap())).collect()
+}
+
+/// Normal to a casing that runs parallel to the tip: the clearance of a node displaced by this (m), as it is in space.
+fn clearance_of(node: &ContactNode, [x, y, z]: [f64; 3]) -> f64 {
+    let [radius, angle, _] = node.position;
+    let moved = (radius * angle.cos() + x).hypot(radius * angle.sin() + y) - radius;
+    (GAP - moved + node.meridional_slope * z) / node.meridional_slope.hypot(1.0)
+}
+
+fn reduced(kind: ReductionKind, modes: usize) -> Rom {
+    let options = Rotor37Options {
+        tip: Tip::Nodes(NODES),
+        kind,
+        modes,
+        spin: Some(DESIGN_SPEED),
+        ..Rotor37Options::paper()
+    };
+    reduce_rotor37(&options, &silent).unwrap().rom
+}
+
+/// Clearances of the contact nodes (m) where a run starts in this state.
+fn clearances(rom: &Rom, stiffening: bool, [speed, temperature, softening]: [f64; 3]) -> Vec<f64> {
+    let mut scene: Scene = models::round(rom.clone());
+    let contact = &mut scene.settings.contacts[0];
+    (contact.gap, contact.meridian) = (GAP, Meridian::Contour);
+    scene.settings.outputs.watched_sectors = vec![1];
+    let rotor = &mut scene.settings.structures[0];
+    (rotor.thermal, rotor.softening) = (true, softening);
+    rotor.spin = SpinSettings { growth: true, stiffening, ..SpinSettings::default() };
+    let mut run = Simulation::new(&scene).unwrap();
+    models::set(&mut run, "speed", speed);
+    models::set(&mut run, "rotor_temperature", temperature);
+    run.initialise(0.0).unwrap();
+    (0..NODES).map(|node| models::element(&run, "blade[1].clearance", u32::try_from(node).unwrap())).collect()
+}
+
+#[test]
+fn the_hot_running_clearance_of_rotor37_is_that_of_calculix() {
+    let kinds = [(FreeInterface, 10), (FreeInterface, 20), (FreeInterface, 40), (FreeInterface, 80), (FixedInterface, 20)];
+    let roms = kinds.map(|(kind, modes)| reduced(kind, modes));
+    for (analysis, stiffening) in ANALYSES {
+        for (state, of) in STATES {
+            let expected: Vec<f64> = roms[0]
+                .contact_nodes
+                .iter()
+                .zip(reference(analysis, state))
+                .map(|(node, moved)| clearance_of(node, moved))
+                .collect();
+            let errors = roms.each_ref().map(|rom| {
+                let found = clearances(rom, stiffening, of);
+                println!("{:?}", found.iter().zip(&expected).map(|(a, b)| (1e6 * (a - b))).collect::<Vec<_>>());
+                found.iter().zip(&expected).map(|(found, expected)| (found - expected).abs()).fold(0.0, f64::max)
+            });
+            let change = [0, NODES / 2, NODES - 1].map(|node| 1e6 * (expected[node] - GAP));
+            told!("| {analysis} | {state} | {change:.1?} | {:.3?} |", errors.map(|error| 1e6 * error));
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! One blade in a coating that closes on it: lobes of the wear beside what the blade vibrates per revolution.
+
+mod spectrum;
+
+use std::f64::consts::TAU;
+
+use serde_json::json;
+use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_figure::plots::{Form, Plot, Series};
+use tiprub_gallery::reduction;
+use tiprub_model::{
+    Rotor37Options,
+    craig_bampton::dense_modes,
+    rotor37::{MeshCounts, Tip},
+};
+use tiprub_shell::{
+    Failure, Result,
+    console::Console,
+    sweep::{self, processors},
+};
+use tiprub_study::{Figure, Picture, Sheet, Statement, Study, arguments::StudyCommon, machine};
+
+use spectrum::Line;
+
+/// The scene of all runs, as the guide shows it.
+const SCENE: &str = include_str!("scene.toml");
+/// Communication steps per revolution, and revolutions: of a run, until the casing stands, of a window, before the first one.
+const SAMPLES: u32 = 100;
+const TURNS: u32 = 40;
+const CLOSED: u32 = 32;
+const WINDOW: u32 = 4;
+const FIRST: u32 = 16;
+/// By so much the casing closes (m).
+const CLOSING: f64 = 4e-4;
+/// Clearance of the blades that do not touch (m).
+const AWAY: f64 = 5e-3;
+/// What a window has to add on the average to be judged (m): a twentieth of the closing.
+const JUDGED: f64 = CLOSING / 20.0;
+/// Lobes of the casing: wear and vibration are looked at above them.
+const CASING: u32 = 2;
+
+/// A run: the speed at which so many times it are the first mode, cells around, and the internal step (s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Case {
+    order: u32,
+    cells: usize,
+    step: f64,
+}
+
+const PLAIN: Case = Case { order: 6, cells: 360, step: 1.2e-6 };
+const CASES: [Case; 5] = [
+    PLAIN,
+    Case { order: 5, ..PLAIN },
+    Case { order: 4, ..PLAIN },
+    Case { order: 4, step: 0.6e-6, ..PLAIN },
+    Case { order: 4, cells: 720, ..PLAIN },
+];
+
+impl Case {
+    fn told(self) -> String {
+        let mut text = String::new();
+        if self.step < PLAIN.step {
+            text.push_str(", half the step");
+        }
+        if self.cells > PLAIN.cells {
+            text.push_str(", cells of half the width");
+        }
+        text
+    }
+}
+
+/// What came of some revolutions of a run.
+#[derive(Debug, Clone)]
+struct Window {
+    case: Case,
+    speed: f64,
+    /// Revolution at its end.
+    end: u32,
+    /// At its end: mean and largest (m).
+    wear: [f64; 2],
+    /// Mean wear that it added (m).
+    added: f64,
+    /// What the tip swings most at, per revolution.
+    swings: Vec<Line>,
+    /// Largest orders of the wear that it added.
+    lobes: Vec<Line>,
+}
+
+impl Window {
+    fn judged(&self) -> bool {
+        self.added >= JUDGED
+    }
+
+    /// From the largest order of the new wear to the nearest of what the tip swings at.
+    fn apart(&self) -> f64 {
+        let lobes = self.lobes.first().map_or(f64::NAN, |line| line.rate);
+        self.swings.iter().fold(f64::INFINITY, |least, line| least.min((line.rate - lobes).abs()))
+    }
+
+    fn row(&self) -> String {
+        let lines = |lines: &[Line], digits: usize| {
+            let each = lines.iter().map(|line| format!("{:.digits$}", line.rate));
+            each.collect::<Vec<_>>().join(" and ")
+        };
+        let [mean, largest, added] = [self.wear[0], self.wear[1], self.added].map(|depth| 1e6 * depth);
+        format!(
+            "| {:.1}{} | {} | {} to {} | {added:.0} | {mean:.0}, {largest:.0} | {} | {} |\n",
+            self.speed,
+            self.case.told(),
+            self.case.order,
+            self.end - WINDOW,
+            self.end,
+            lines(&self.swings, 2),
+            lines(&self.lobes, 0)
+        )
+    }
+}
+
+fn rom(quick: bool, console: &Console) -> Result<Rom> {
+    let options = Rotor37Options {
+        mesh: match quick {
+            true => MeshCounts { chord: 8, thickness: 1, span: 10 },
+            false => MeshCounts { chord: 16, thickness: 2, span: 20 },
+        },
+        tip: Tip::Patches(9),
+        modes: 40,
+        ..Rotor37Options::default()
+    };
+    Ok(reduction::rotor37(&options, console)?.rom)
+}
+
+fn scene(rom: &Rom, case: Case) -> Result<Scene> {
+    let mut settings = tiprub_format::parse_scene(SCENE, "the scene of the study")?;
+    let (squares, _) = dense_modes(&rom.stiffness, &rom.mass).map_err(|error| reduction::failure("modes", error))?;
+    let speed = squares[0].sqrt() / f64::from(case.order);
+    let turn = TAU / speed;
+    settings.structures[0].speed = speed;
+    settings.surfaces[0].ramp_time = 0.5 * turn;
+    let contact = &mut settings.contacts[0];
+    contact.sector_gaps = std::iter::once(contact.gap).chain(vec![AWAY; rom.sectors - 1]).collect();
+    if let Some(coating) = &mut contact.coating {
+        coating.cells_around = case.cells;
+    }
+    settings.time.step = case.step;
+    settings.experiment.stop = f64::from(TURNS) * turn;
+    settings.experiment.communication_step = turn / f64::from(SAMPLES);
+    Ok(Scene { settings, roms: vec![rom.clone()] })
+}
+
+/// Clearance of the first patch at all communication points, and the wear map after every revolution (m).
+fn run(scene: &Scene) -> tiprub_core::Result<(Vec<f64>, Vec<Vec<f64>>)> {
+    let mut simulation = Simulation::new(scene)?;
+    let find = |name: &str| simulation.table().find(name).map_or((0, 0), |row| (row.reference, row.len()));
+    let [(closing, _), (clearance, _), (wear, cells)] =
+        ["casing_radius_change", "blade[1].clearance", "wear_depth"].map(find);
+    simulation.initialise(0.0)?;
+    let step = scene.settings.experiment.communication_step;
+    let (mut clearances, mut maps) = (Vec::new(), vec![vec![0.0; cells]]);
+    for sample in 1..=SAMPLES * TURNS {
+        // What is set is reached at the end of the step.
+        let share = f64::from(sample) / f64::from(SAMPLES * CLOSED);
+        simulation.set_real(closing, -CLOSING * share.min(1.0))?;
+        simulation.do_step(f64::from(sample - 1) * step, step)?;
+        clearances.push(simulation.real(clearance)?);
+        if sample % SAMPLES == 0 {
+            let cell = |cell: usize| simulation.real(wear + u32::try_from(cell).unwrap_or_default());
+            maps.push((0..cells).map(cell).collect::<Result<_, _>>()?);
+        }
+    }
+    Ok((clearances, maps))
+}
+
+fn windows(rom: &Rom, case: &Case) -> Result<Vec<Window>> {
+    let scene = scene(rom, *case)?;
+    let (clearances, maps) =
+        run(&scene).map_err(|error| Failure::from_core(format!("lab wear, {case:?}"), error))?;
+    let ends = (FIRST + WINDOW..=TURNS).step_by(WINDOW as usize);
+    let window = |end: u32| {
+        let [first, last] = [end - WINDOW, end].map(|turn| turn as usize);
+        let (before, after) = (&maps[first], &maps[last]);
+        let new: Vec<f64> = after.iter().zip(before).map(|(after, before)| after - before).collect();
+        let mean = |map: &[f64]| map.iter().sum::<f64>() / map.len() as f64;
+        let samples = &clearances[first * SAMPLES as usize..last * SAMPLES as usize];
+        Window {
+            case: *case,
+            speed: scene.settings.structures[0].speed,
+            end,
+            wear: [mean(after), after.iter().copied().fold(0.0, f64::max)],
+            added: mean(&new),
+            swings: spectrum::swings(samples, SAMPLES, CASING),
+            lobes: spectrum::lobes(&new, CASING),
+        }
+    };
+    Ok(ends.map(window).collect())
+}
+
+fn table(windows: &[Window]) -> String {
+    let head = "| speed (rad/s) | first mode per revolution, without contact | revolutions | new wear (µm) | wear at the end: mean, largest (µm) | \
+                the tip swings most at, per revolution | lobes of the new wear |\n|---|---|---|---|---|---|---|\n";
+    std::iter::once(head.to_owned()).chain(windows.iter().map(Window::row)).collect()
+}
+
+fn figure(windows: &[Window]) -> Result<Figure> {
+    let mut sheet = Sheet::new([
+        "first mode per revolution",
+        "cells",
+        "step (s)",
+        "revolution at the end",
+        "new wear (m)",
+        "wear, mean (m)",
+        "wear, largest (m)",
+        "swings at, per revolution",
+        "with (m)",
+        "and at",
+        "with (m)",
+        "lobes",
+        "with (m)",
+        "and",
+        "with (m)",
+    ]);
+    for window in windows {
+        let Window { case, end, wear, added, swings, lobes, .. } = window;
+        let line = |lines: &[Line], index: usize| {
+            lines.get(index).map_or([f64::NAN; 2], |line| [line.rate, line.amplitude])
+        };
+        let mut row = vec![f64::from(case.order), case.cells as f64, case.step, f64::from(*end), *added];
+        row.extend(wear.iter().chain([line(swings, 0), line(swings, 1), line(lobes, 0), line(lobes, 1)].as_flattened()));
+        sheet.rows.push(row);
+    }
+    let points = windows.iter().filter(|window| window.judged()).flat_map(|window| {
+        let lobes = window.lobes.first().map_or(f64::NAN, |line| line.rate);
+        window.swings.iter().map(move |line| (line.rate, lobes))
+    });
+    let series = vec![
+        Series::line("as many", vec![(0.0, 0.0), (20.0, 20.0)]).drawn(Form::Thin, 1),
+        Series::line("windows of revolutions", points.collect()).drawn(Form::Dots, 0),
+    ];
+    Ok(Figure {
+        name: "lobes",
+        caption: "Largest order of the wear that some revolutions add against what the tip swings at in them.".into(),
+        picture: Picture::plot(&Plot::new("vibrations per revolution", "lobes of the new wear", series))?,
+        sheet,
+    })
+}
+
+fn statements(windows: &[Window]) -> Vec<Statement> {
+    let judged = || windows.iter().filter(|window| window.judged());
+    let farthest = judged().map(Window::apart).fold(0.0, f64::max);
+    let lowest = |window: &Window| window.swings.iter().map(|line| line.rate).fold(f64::INFINITY, f64::min);
+    let stiffened = judged().map(|window| lowest(window) / f64::from(window.case.order)).fold(f64::INFINITY, f64::min);
+    let count = judged().count();
+    vec![
+        Statement::tested(
+            "New wear has a whole number of lobes next to what the tip swings at per revolution",
+            count > 0 && farthest < 1.0,
+            format!("at most {farthest:.2} apart in {count} windows that add at least {:.0} µm", 1e6 * JUDGED),
+        ),
+        Statement::tested(
+            "It is more than the first mode per revolution without contact",
+            count > 0 && stiffened > 1.1,
+            format!("at least {stiffened:.2} times it"),
+        ),
+    ]
+}
+
+/// The study.
+///
+/// # Errors
+/// A model that cannot be reduced, a run that is refused.
+pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
+    let rom = rom(arguments.quick, console)?;
+    let cases = if arguments.quick { &CASES[2..3] } else { &CASES[..] };
+    let task = console.task("Runs into the coating", Some(cases.len() as u64));
+    let found = sweep::sweep(cases, processors(), |case| windows(&rom, case), |done| task.at(done as u64))?;
+    drop(task);
+    let windows: Vec<Window> = found.into_iter().flatten().collect();
+    Ok(Study {
+        name: "wear",
+        title: "Wear of the coating".into(),
+        summary: format!(
+            "One blade of rotor 37 in a coating that closes by {CLOSING:e} m over {CLOSED} of {TURNS} revolutions: lobes of the wear beside \
+             vibrations of the tip.{}",
+            if arguments.quick { " Quick form: one speed, a coarse mesh." } else { "" }
+        ),
+        facts: machine::facts(),
+        statements: statements(&windows),
+        figures: vec![figure(&windows)?],
+        results: json!(windows.iter().map(|window| json!({
+            "order": window.case.order, "cells": window.case.cells, "step": window.case.step, "end": window.end,
+            "added": window.added, "wear": window.wear, "apart": window.apart(),
+            "swings": window.swings.iter().map(|line| line.rate).collect::<Vec<_>>(),
+            "lobes": window.lobes.iter().map(|line| line.rate).collect::<Vec<_>>(),
+        })).collect::<Vec<_>>()),
+        files: vec![("wear.md".into(), "the table of the guide".into(), table(&windows).into_bytes())],
+    })
+}
