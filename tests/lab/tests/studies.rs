@@ -214,6 +214,25 @@ fn the_quick_study_of_coupling_needs_derivatives_where_the_shaft_has_no_mass() {
     assert!(solved.iter().zip(&errors).all(|(solved, once)| *solved < 0.8 * once), "{solved:?} {errors:?}");
 }
 
+/// The blade dips into the coating, which wears; statements hold, and depths are of the size of the closing.
+#[test]
+fn the_quick_study_of_wear_counts_lobes_beside_vibrations() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), "wear", &[]);
+    only_no(&json, &[]);
+    let rows = json["results"].as_array().unwrap();
+    assert_eq!(rows.len(), 6);
+    let mean = |row: &Value| row["wear"][0].as_f64().unwrap();
+    assert!(rows.windows(2).all(|pair| mean(&pair[1]) > mean(&pair[0])), "{rows:#?}");
+    let added: f64 = rows[1..].iter().map(|row| row["added"].as_f64().unwrap()).sum();
+    assert!((mean(&rows[5]) - mean(&rows[0]) - added).abs() < 1e-12, "{rows:#?}");
+    assert!(
+        (1e-4..4e-4).contains(&mean(&rows[5])) && rows.iter().all(|row| row["end"].as_u64() >= Some(20)),
+        "{rows:#?}"
+    );
+    assert_eq!(fs::read_to_string(root.path().join("out/wear.md")).unwrap().lines().count(), 2 + 6);
+}
+
 /// Told at once: nothing is reduced for it, and no directory stays.
 #[test]
 fn what_a_study_cannot_do_is_told_before_the_work() {
@@ -241,6 +260,7 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         "bases",
         "tolerance",
         "scatter",
+        "wear",
     ] {
         let told = refuse(&[name, "--quick", "--out", "file/out"], 1);
         assert!(told.contains("file/out: cannot create the directory"), "{told}");

@@ -1,5 +1,7 @@
 //! What a scene asks of blades beside contact: excitation by an engine order, heat, motion at the start.
 
+use nalgebra::DVector;
+
 use super::compile::Compiled;
 use super::{Quantity, Simulation};
 use crate::dynamics::bank::BankOptions;
@@ -10,14 +12,26 @@ use crate::ranges::SOFTENED;
 use crate::settings::{InitialSettings, Scheme, StructureSettings};
 use crate::{Error, Result, Rom, shown};
 
-/// Modal load by the temperature of the blades, per kelvin; of coupled sectors on nodal diameter 0. Empty where a scene does not
-/// ask for it.
-pub fn heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
+/// Modal loads by the temperature of the blades, per kelvin: what softens with the blade, and what Ω² and Ω⁴ add to it with
+/// stiffening; of coupled sectors on nodal diameter 0. Empty where a scene does not ask for it.
+///
+/// Expansion strains nothing but what is held, so that a blade that turns expands as it does at rest: the load at speed is that
+/// which K(Ω) takes to the free expansion K⁻¹f. The load f of the shape at rest would bend the stretched blade.
+pub fn heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<[f64; 3]> {
     let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) else { return Vec::new() };
     let whole: Vec<f64> = thermal.loads.row_iter().map(|row| row.iter().sum()).collect();
     #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
     let all = if rom.is_cyclic() { libm::sqrt(rom.sectors as f64) } else { 1.0 };
-    model.modal_load(&whole).into_iter().map(|load| all * load).collect()
+    let mut loads: Vec<[f64; 3]> = model.modal_load(&whole).into_iter().map(|load| [all * load, 0.0, 0.0]).collect();
+    let spin = rom.extras.spin.as_ref().filter(|_| structure.spin.stiffening);
+    if let Some((spin, held)) = spin.zip(rom.stiffness.clone().cholesky()) {
+        let expansion = held.solve(&DVector::from_vec(whole));
+        for (power, stiffness) in [(1, &spin.stiffness_speed2), (2, &spin.stiffness_speed4)] {
+            let added = model.modal_load((stiffness * &expansion).as_slice());
+            loads.iter_mut().zip(added).for_each(|(load, added)| load[power] = added);
+        }
+    }
+    loads
 }
 
 /// Share of the elastic stiffness that is left at a temperature (K).
@@ -36,7 +50,13 @@ impl Compiled {
         }
         // What is softer pushes less: its free expansion stays.
         let strength = temperature * softened(structure, temperature);
-        loads.iter_mut().zip(&parts.heat).for_each(|(load, heat)| *load += strength * heat);
+        if structure.spin.stiffening {
+            let square = speed * speed;
+            for (load, [_, second, fourth]) in loads.iter_mut().zip(&parts.heat) {
+                *load += temperature * square * (second + square * fourth);
+            }
+        }
+        loads.iter_mut().zip(&parts.heat).for_each(|(load, [heat, ..])| *load += strength * heat);
     }
 
     /// Whether blades are loaded by growth or heat.

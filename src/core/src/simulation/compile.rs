@@ -55,8 +55,8 @@ pub struct Body {
     pub stiffness_range: Option<[[f64; 2]; 2]>,
     /// Modal load by growth, per Ω² and, with stiffening, per Ω⁴; empty without.
     pub centrifugal: Vec<[f64; 2]>,
-    /// Modal load per kelvin; empty without.
-    pub heat: Vec<f64>,
+    /// Modal load per kelvin, and what Ω² and Ω⁴ add to it with stiffening; empty without.
+    pub heat: Vec<[f64; 3]>,
     /// Displacement of watched points per unit of each mode, 3·points × modes; empty without.
     pub watched: DMatrix<f64>,
     /// Stress at places per unit of each mode, 6·places × modes (Pa); empty where the scene does not ask for it.

@@ -36,36 +36,38 @@ const CLOSING: f64 = 4e-4;
 const AWAY: f64 = 5e-3;
 /// What a window has to add on the average to be judged (m): a twentieth of the closing.
 const JUDGED: f64 = CLOSING / 20.0;
+/// Multiples of what the tip swings at that lobes may stand next to.
+const MULTIPLES: u32 = 3;
 /// Lobes of the casing: wear and vibration are looked at above them.
 const CASING: u32 = 2;
 
-/// A run: the speed at which so many times it are the first mode, cells around, and the internal step (s).
+/// A run: the speed at which so many times it are the first mode, modes, the internal step (s), and cells around.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Case {
     order: u32,
-    cells: usize,
+    modes: usize,
     step: f64,
+    cells: usize,
 }
 
-const PLAIN: Case = Case { order: 6, cells: 360, step: 1.2e-6 };
-const CASES: [Case; 5] = [
+const PLAIN: Case = Case { order: 6, modes: 40, step: 1.2e-6, cells: 360 };
+const CASES: [Case; 6] = [
     PLAIN,
     Case { order: 5, ..PLAIN },
     Case { order: 4, ..PLAIN },
     Case { order: 4, step: 0.6e-6, ..PLAIN },
+    Case { order: 4, modes: 80, ..PLAIN },
     Case { order: 4, cells: 720, ..PLAIN },
 ];
 
 impl Case {
     fn told(self) -> String {
-        let mut text = String::new();
-        if self.step < PLAIN.step {
-            text.push_str(", half the step");
-        }
-        if self.cells > PLAIN.cells {
-            text.push_str(", cells of half the width");
-        }
-        text
+        let other = [
+            (self.modes > PLAIN.modes, ", twice the modes"),
+            (self.step < PLAIN.step, ", half the step"),
+            (self.cells > PLAIN.cells, ", cells of half the width"),
+        ];
+        other.iter().filter(|(so, _)| *so).map(|(_, text)| *text).collect()
     }
 }
 
@@ -74,6 +76,8 @@ impl Case {
 struct Window {
     case: Case,
     speed: f64,
+    /// Second mode without contact, per revolution.
+    second: f64,
     /// Revolution at its end.
     end: u32,
     /// At its end: mean and largest (m).
@@ -87,14 +91,26 @@ struct Window {
 }
 
 impl Window {
+    /// While the casing closes, where there is new wear to speak of.
     fn judged(&self) -> bool {
-        self.added >= JUDGED
+        self.end <= CLOSED && self.added >= JUDGED
     }
 
-    /// From the largest order of the new wear to the nearest of what the tip swings at.
-    fn apart(&self) -> f64 {
-        let lobes = self.lobes.first().map_or(f64::NAN, |line| line.rate);
-        self.swings.iter().fold(f64::INFINITY, |least, line| least.min((line.rate - lobes).abs()))
+    /// Largest order of the new wear.
+    fn order(&self) -> f64 {
+        self.lobes.first().map_or(f64::NAN, |line| line.rate)
+    }
+
+    /// From there to the nearest of this multiple of what the tip swings at.
+    fn apart(&self, multiple: u32) -> f64 {
+        let apart = |line: &Line| (f64::from(multiple) * line.rate - self.order()).abs();
+        self.swings.iter().map(apart).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The nearest of the second mode's.
+    fn swings_over_second(&self) -> f64 {
+        let ratios = self.swings.iter().map(|line| line.rate / self.second);
+        ratios.min_by(|a, b| (a - 1.0).abs().total_cmp(&(b - 1.0).abs())).unwrap_or(f64::NAN)
     }
 
     fn row(&self) -> String {
@@ -116,20 +132,21 @@ impl Window {
     }
 }
 
-fn rom(quick: bool, console: &Console) -> Result<Rom> {
+fn rom(quick: bool, modes: usize, console: &Console) -> Result<Rom> {
     let options = Rotor37Options {
         mesh: match quick {
             true => MeshCounts { chord: 8, thickness: 1, span: 10 },
             false => MeshCounts { chord: 16, thickness: 2, span: 20 },
         },
         tip: Tip::Patches(9),
-        modes: 40,
+        modes,
         ..Rotor37Options::default()
     };
     Ok(reduction::rotor37(&options, console)?.rom)
 }
 
-fn scene(rom: &Rom, case: Case) -> Result<Scene> {
+/// The scene, and the second mode per revolution.
+fn scene(rom: &Rom, case: Case) -> Result<(Scene, f64)> {
     let mut settings = tiprub_format::parse_scene(SCENE, "the scene of the study")?;
     let (squares, _) = dense_modes(&rom.stiffness, &rom.mass).map_err(|error| reduction::failure("modes", error))?;
     let speed = squares[0].sqrt() / f64::from(case.order);
@@ -144,7 +161,7 @@ fn scene(rom: &Rom, case: Case) -> Result<Scene> {
     settings.time.step = case.step;
     settings.experiment.stop = f64::from(TURNS) * turn;
     settings.experiment.communication_step = turn / f64::from(SAMPLES);
-    Ok(Scene { settings, roms: vec![rom.clone()] })
+    Ok((Scene { settings, roms: vec![rom.clone()] }, squares[1].sqrt() / speed))
 }
 
 /// Clearance of the first patch at all communication points, and the wear map after every revolution (m).
@@ -170,10 +187,10 @@ fn run(scene: &Scene) -> tiprub_core::Result<(Vec<f64>, Vec<Vec<f64>>)> {
     Ok((clearances, maps))
 }
 
-fn windows(rom: &Rom, case: &Case) -> Result<Vec<Window>> {
-    let scene = scene(rom, *case)?;
-    let (clearances, maps) =
-        run(&scene).map_err(|error| Failure::from_core(format!("lab wear, {case:?}"), error))?;
+fn windows(roms: &[(usize, Rom)], case: &Case) -> Result<Vec<Window>> {
+    let rom = roms.iter().find(|(modes, _)| *modes == case.modes).unwrap_or(&roms[0]);
+    let (scene, second) = scene(&rom.1, *case)?;
+    let (clearances, maps) = run(&scene).map_err(|error| Failure::from_core(format!("lab wear, {case:?}"), error))?;
     let ends = (FIRST + WINDOW..=TURNS).step_by(WINDOW as usize);
     let window = |end: u32| {
         let [first, last] = [end - WINDOW, end].map(|turn| turn as usize);
@@ -184,6 +201,7 @@ fn windows(rom: &Rom, case: &Case) -> Result<Vec<Window>> {
         Window {
             case: *case,
             speed: scene.settings.structures[0].speed,
+            second,
             end,
             wear: [mean(after), after.iter().copied().fold(0.0, f64::max)],
             added: mean(&new),
@@ -203,6 +221,8 @@ fn table(windows: &[Window]) -> String {
 fn figure(windows: &[Window]) -> Result<Figure> {
     let mut sheet = Sheet::new([
         "first mode per revolution",
+        "second",
+        "modes",
         "cells",
         "step (s)",
         "revolution at the end",
@@ -219,46 +239,60 @@ fn figure(windows: &[Window]) -> Result<Figure> {
         "with (m)",
     ]);
     for window in windows {
-        let Window { case, end, wear, added, swings, lobes, .. } = window;
-        let line = |lines: &[Line], index: usize| {
-            lines.get(index).map_or([f64::NAN; 2], |line| [line.rate, line.amplitude])
-        };
-        let mut row = vec![f64::from(case.order), case.cells as f64, case.step, f64::from(*end), *added];
-        row.extend(wear.iter().chain([line(swings, 0), line(swings, 1), line(lobes, 0), line(lobes, 1)].as_flattened()));
+        let Window { case, second, end, wear, added, swings, lobes, .. } = window;
+        let line =
+            |lines: &[Line], index: usize| lines.get(index).map_or([f64::NAN; 2], |line| [line.rate, line.amplitude]);
+        let [modes, cells] = [case.modes, case.cells].map(|count| count as f64);
+        let mut row = vec![f64::from(case.order), *second, modes, cells, case.step, f64::from(*end), *added];
+        row.extend(
+            wear.iter().chain([line(swings, 0), line(swings, 1), line(lobes, 0), line(lobes, 1)].as_flattened()),
+        );
         sheet.rows.push(row);
     }
-    let points = windows.iter().filter(|window| window.judged()).flat_map(|window| {
-        let lobes = window.lobes.first().map_or(f64::NAN, |line| line.rate);
-        window.swings.iter().map(move |line| (line.rate, lobes))
-    });
+    let points = windows
+        .iter()
+        .filter(|window| window.judged())
+        .flat_map(|window| window.swings.iter().map(|line| (line.rate, window.order())));
     let series = vec![
         Series::line("as many", vec![(0.0, 0.0), (20.0, 20.0)]).drawn(Form::Thin, 1),
         Series::line("windows of revolutions", points.collect()).drawn(Form::Dots, 0),
     ];
     Ok(Figure {
         name: "lobes",
-        caption: "Largest order of the wear that some revolutions add against what the tip swings at in them.".into(),
+        caption: "Largest order of the wear that some revolutions add against what the tip swings at in them, while the casing closes.".into(),
         picture: Picture::plot(&Plot::new("vibrations per revolution", "lobes of the new wear", series))?,
         sheet,
     })
 }
 
 fn statements(windows: &[Window]) -> Vec<Statement> {
-    let judged = || windows.iter().filter(|window| window.judged());
-    let farthest = judged().map(Window::apart).fold(0.0, f64::max);
+    let judged: Vec<&Window> = windows.iter().filter(|window| window.judged()).collect();
+    let nearest = |window: &Window| (1..=MULTIPLES).map(|of| window.apart(of)).fold(f64::INFINITY, f64::min);
+    let farthest = judged.iter().map(|window| nearest(window)).fold(0.0, f64::max);
+    let once = judged.iter().filter(|window| window.apart(1) < 1.0).count();
     let lowest = |window: &Window| window.swings.iter().map(|line| line.rate).fold(f64::INFINITY, f64::min);
-    let stiffened = judged().map(|window| lowest(window) / f64::from(window.case.order)).fold(f64::INFINITY, f64::min);
-    let count = judged().count();
+    let ratios = judged.iter().map(|window| lowest(window) / f64::from(window.case.order));
+    let stiffened = ratios.fold(f64::INFINITY, f64::min);
+    let last = windows.iter().filter(|window| window.end == TURNS);
     vec![
         Statement::tested(
-            "New wear has a whole number of lobes next to what the tip swings at per revolution",
-            count > 0 && farthest < 1.0,
-            format!("at most {farthest:.2} apart in {count} windows that add at least {:.0} µm", 1e6 * JUDGED),
+            "While the casing closes, lobes of new wear are a whole number next to what the tip swings at per revolution, or next to twice or \
+             three times it",
+            !judged.is_empty() && farthest < 1.0,
+            format!(
+                "at most {farthest:.2} apart in {} windows that add at least {:.0} µm; in {once} of them next to what it swings at",
+                judged.len(),
+                1e6 * JUDGED
+            ),
         ),
         Statement::tested(
             "It is more than the first mode per revolution without contact",
-            count > 0 && stiffened > 1.1,
+            !judged.is_empty() && stiffened > 1.1,
             format!("at least {stiffened:.2} times it"),
+        ),
+        Statement::remark(
+            "What the tip swings at last, nearest to the second mode without contact",
+            last.map(|window| format!("{:.3} times it", window.swings_over_second())).collect::<Vec<_>>().join(", "),
         ),
     ]
 }
@@ -268,10 +302,12 @@ fn statements(windows: &[Window]) -> Vec<Statement> {
 /// # Errors
 /// A model that cannot be reduced, a run that is refused.
 pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
-    let rom = rom(arguments.quick, console)?;
+    let roms = [PLAIN.modes, 2 * PLAIN.modes].into_iter().take(if arguments.quick { 1 } else { 2 });
+    let roms: Vec<(usize, Rom)> =
+        roms.map(|modes| Ok((modes, rom(arguments.quick, modes, console)?))).collect::<Result<_>>()?;
     let cases = if arguments.quick { &CASES[2..3] } else { &CASES[..] };
     let task = console.task("Runs into the coating", Some(cases.len() as u64));
-    let found = sweep::sweep(cases, processors(), |case| windows(&rom, case), |done| task.at(done as u64))?;
+    let found = sweep::sweep(cases, processors(), |case| windows(&roms, case), |done| task.at(done as u64))?;
     drop(task);
     let windows: Vec<Window> = found.into_iter().flatten().collect();
     Ok(Study {
@@ -286,8 +322,8 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         statements: statements(&windows),
         figures: vec![figure(&windows)?],
         results: json!(windows.iter().map(|window| json!({
-            "order": window.case.order, "cells": window.case.cells, "step": window.case.step, "end": window.end,
-            "added": window.added, "wear": window.wear, "apart": window.apart(),
+            "order": window.case.order, "modes": window.case.modes, "cells": window.case.cells, "step": window.case.step,
+            "end": window.end, "added": window.added, "wear": window.wear, "apart": window.apart(1), "second": window.second,
             "swings": window.swings.iter().map(|line| line.rate).collect::<Vec<_>>(),
             "lobes": window.lobes.iter().map(|line| line.rate).collect::<Vec<_>>(),
         })).collect::<Vec<_>>()),
