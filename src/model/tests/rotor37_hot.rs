@@ -45,8 +45,13 @@ fn clearance_of(node: &ContactNode, [x, y, z]: [f64; 3]) -> f64 {
 }
 
 fn reduced(modes: usize) -> Rom {
-    let options =
-        Rotor37Options { tip: Tip::Nodes(NODES), kind, modes, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
+    let options = Rotor37Options {
+        tip: Tip::Nodes(NODES),
+        kind: ReductionKind::FreeInterface,
+        modes,
+        spin: Some(DESIGN_SPEED),
+        ..Rotor37Options::paper()
+    };
     reduce_rotor37(&options, &silent).unwrap().rom
 }
 
@@ -69,7 +74,6 @@ fn clearances(rom: &Rom, stiffening: bool, [speed, temperature, softening]: [f64
 #[test]
 fn the_hot_running_clearance_of_rotor37_is_that_of_calculix() {
     let roms = [10, 80].map(reduced);
-    let mut errors = Vec::new();
     for (analysis, stiffening) in ANALYSES {
         for (state, of) in STATES {
             let nodes = &roms[0].contact_nodes;
@@ -90,7 +94,9 @@ fn the_hot_running_clearance_of_rotor37_is_that_of_calculix() {
                 off[0],
                 off[1]
             );
-            errors.push(off);
+            // Directions of the linear growth are those of the fit at speed; what heat and speed do together is left out.
+            let most = if state == "warm" || (stiffening && state == "spin") { 0.12 } else { 2.0 };
+            assert!(off.iter().all(|off| *off < most), "{analysis} {state}: {off:?} µm");
         }
     }
     guide::hold("cargo test --release -p tiprub-model --test rotor37_hot");
