@@ -36,8 +36,8 @@ for platform in "$@"; do
     for unit in tiprub-fmi:tiprub_fmi:tiprub: tiprub-fmi-thermal:tiprub_thermal_fmi:tiprub_thermal:thermal-; do
         IFS=: read -r crate file identifier named <<< "$unit"
         flags=$library_flags
-        # A name that does not tell where it was built.
-        [ $extension != dylib ] || flags=$flags$separator-Clink-arg=-Wl,-install_name,@rpath/$identifier.dylib
+        # A name that does not tell where it was built, and an identifier (LC_UUID) made of what is left without symbols, which do.
+        [ $extension != dylib ] || flags=$flags$separator-Clink-arg=-Wl,-install_name,@rpath/$identifier.dylib$separator-Clink-arg=-Wl,-S
         CARGO_ENCODED_RUSTFLAGS=$flags PATH=$bin:$PATH \
             cargo zigbuild --quiet -p "$crate" --profile fmu --target "$triple$glibc"
         library=$out/$named$platform.$extension
