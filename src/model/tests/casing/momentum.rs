@@ -1,0 +1,193 @@
+//! Reaction of a support in motion, against the momentum of the whole finite-element mesh: integrated beside the core with the full
+//! matrices of all nodes, under the contact force that the core tells. No basis, no reduced row is shared.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use tiprub_core::settings::Scheme;
+use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_model::assembly::{assemble, free_dofs};
+use tiprub_model::casing::{
+    CLAMPED, ContactRings, Contour, RingCounts, RingGeometry, RingMesh, Support, supported_ring,
+};
+use tiprub_model::element::ElementKind;
+use tiprub_model::progress::silent;
+use tiprub_model::thermal::{equal_patches, patch_loads};
+use tiprub_model::{CasingOptions, reduce_ring};
+use tiprub_test_models::{self as models, element, go, move_on, real, set_element};
+
+use crate::common::dense;
+
+/// Step of both (s).
+const STEP: f64 = 2e-7;
+/// Clearance (m).
+const GAP: f64 = 1e-5;
+const AROUND: usize = 12;
+const ALONG: usize = 2;
+/// Patches around.
+const PATCHES: usize = 3;
+
+/// A thick ring of 216 degrees of freedom held at one end face, reduced with so many fixed-interface modes, and modes.
+fn ring(fixed_interface_modes: usize, modes: usize) -> CasingOptions {
+    CasingOptions {
+        geometry: RingGeometry {
+            contour: Contour::new(&[[0.0, models::RADIUS], [0.06, models::RADIUS]]).unwrap(),
+            thickness: 1e-2,
+            flanges: [None, None],
+        },
+        counts: RingCounts { around: AROUND, through: 1, along: 3, flange: 1 },
+        kind: ElementKind::Hex8,
+        rings: ContactRings { around: AROUND, along: ALONG, axial: [0.02, 0.04] },
+        support: Support::Low,
+        patches: [PATCHES, 1],
+        fixed_interface_modes,
+        modes,
+        checked_modes: 10,
+        damping_ratio: 0.0,
+        ..CasingOptions::default()
+    }
+}
+
+/// The whole mesh, and how its free nodes move.
+struct Mesh {
+    ring: RingMesh,
+    /// Of the free nodes.
+    stiffness: DMatrix<f64>,
+    mass: Cholesky<f64, Dyn>,
+    /// Momentum and moment of momentum about the origin of the whole mesh per velocity of its free nodes, 6 × free.
+    momentum: DMatrix<f64>,
+    free: Vec<usize>,
+    /// Per kelvin of each patch.
+    heat: DMatrix<f64>,
+    /// Displacement of the free nodes now and one step ago.
+    now: DVector<f64>,
+    before: DVector<f64>,
+}
+
+impl Mesh {
+    fn new(options: &CasingOptions) -> Self {
+        let ring = supported_ring(options).unwrap();
+        let nodes = &ring.mesh.nodes;
+        let full = assemble(&ring.mesh, &options.material, &silent).unwrap();
+        let free = free_dofs(nodes.len(), ring.mesh.set(CLAMPED).unwrap());
+        let (stiffness, mass) = (dense(&full.stiffness), dense(&full.mass));
+        let part = |matrix: &DMatrix<f64>| DMatrix::from_fn(free.len(), free.len(), |i, j| matrix[(free[i], free[j])]);
+        // Rigid motions of all nodes.
+        let motion = DMatrix::from_fn(6, 3 * nodes.len(), |row, dof| rigid(nodes[dof / 3], dof % 3)[row]);
+        let momentum = (motion * &mass).select_columns(&free);
+        let patches = equal_patches(PATCHES, 1, options.geometry.contour.axial());
+        let heat = patch_loads(&ring.mesh, &options.material, &patches).unwrap();
+        let heat = DMatrix::from_fn(free.len(), PATCHES, |i, k| heat[(free[i], k)]);
+        let zero = DVector::zeros(free.len());
+        Self {
+            stiffness: part(&stiffness),
+            mass: part(&mass).cholesky().unwrap(),
+            momentum,
+            heat,
+            now: zero.clone(),
+            before: zero,
+            free,
+            ring,
+        }
+    }
+
+    /// At rest in the heat (K).
+    fn rest(&mut self, temperatures: &[f64; PATCHES]) {
+        let load = &self.heat * DVector::from_column_slice(temperatures);
+        self.now = self.stiffness.clone().cholesky().unwrap().solve(&load);
+        self.before = self.now.clone();
+    }
+
+    /// One step of central differences under a force on a contact node (N); returns the rate of momentum.
+    fn go(&mut self, node: usize, force: [f64; 3], temperatures: &[f64; PATCHES]) -> DVector<f64> {
+        let mut load = &self.heat * DVector::from_column_slice(temperatures) - &self.stiffness * &self.now;
+        let first = self.free.binary_search(&(3 * self.ring.grid.nodes[node])).unwrap();
+        force.iter().enumerate().for_each(|(axis, force)| load[first + axis] += force);
+        self.mass.solve_mut(&mut load);
+        let next = 2.0 * &self.now - &self.before + STEP * STEP * &load;
+        self.before = std::mem::replace(&mut self.now, next);
+        &self.momentum * load
+    }
+
+    /// Radial displacement of a contact node (m).
+    fn radial(&self, node: usize) -> f64 {
+        let node = self.ring.grid.nodes[node];
+        let [x, y, _] = self.ring.mesh.nodes[node];
+        let first = self.free.binary_search(&(3 * node)).unwrap();
+        (x * self.now[first] + y * self.now[first + 1]) / x.hypot(y)
+    }
+}
+
+/// What force and moment about the origin a unit force along an axis has.
+fn rigid([x, y, z]: [f64; 3], axis: usize) -> [f64; 6] {
+    match axis {
+        0 => [1.0, 0.0, 0.0, 0.0, z, -y],
+        1 => [0.0, 1.0, 0.0, -z, 0.0, x],
+        _ => [0.0, 0.0, 1.0, y, -x, 0.0],
+    }
+}
+
+/// A pin on a spring that stands before the first node of the second ring, and is tapped against it by the shaft.
+fn scene(casing: Rom, scheme: Scheme) -> Scene {
+    let pin = vec![models::node("pin", [models::RADIUS, 0.0, 0.04], 0.0)];
+    let shape = |row: usize, _: usize| if row == 0 { 3.0 } else { 0.0 };
+    let mut scene = models::round(models::modal("pin", &[2000.0], shape, pin));
+    models::on_ring(&mut scene, casing, 0.0);
+    let settings = &mut scene.settings;
+    settings.surfaces[0].moving = false;
+    settings.structures[0].speed = 1e-4;
+    settings.structures[0].whirl = true;
+    settings.structures[1].thermal = true;
+    settings.contacts[0].gap = GAP;
+    settings.contacts[0].friction = 0.4;
+    (settings.time.scheme, settings.time.step) = (scheme, STEP);
+    settings.outputs.casing_forces = true;
+    settings.outputs.support_reaction = true;
+    settings.outputs.slave_displacement = true;
+    scene
+}
+
+const ROWS: [&str; 6] = ["force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"];
+
+fn start(scene: &Scene, temperatures: &[f64; PATCHES]) -> Simulation {
+    let mut run = Simulation::new(scene).unwrap();
+    for row in run.table().variables() {
+        println!("{} {}", row.name, row.len());
+    }
+    for (patch, value) in (0..).zip(temperatures) {
+        set_element(&mut run, "casing_temperature", patch, *value);
+    }
+    run.initialise(0.0).unwrap();
+    run
+}
+
+#[test]
+fn a_support_in_motion_takes_what_changes_the_momentum_of_the_mesh() {
+    let temperatures = [0.02, 0.0, -0.01];
+    let options = ring(144, 216);
+    let mut mesh = Mesh::new(&options);
+    let casing = reduce_ring(&options, &silent).unwrap().rom;
+    println!("order {} free {}", casing.order(), mesh.free.len());
+    let mut run = start(&scene(casing, Scheme::CentralDifference), &temperatures);
+    mesh.rest(&temperatures);
+    let place = mesh.ring.mesh.nodes[mesh.ring.grid.nodes[AROUND]];
+    let (mut worst, mut largest, mut moved, mut apart) = ([0.0_f64; 6], [0.0_f64; 6], 0.0_f64, 0.0_f64);
+    for index in 1..=3000 {
+        let time = STEP * f64::from(index);
+        let push = GAP + 3e-8 * (1.0 - (std::f64::consts::TAU * 1e4 * time).cos());
+        move_on(&mut run, "whirl_x", push, 0.0);
+        go(&mut run, STEP);
+        let force = ["x", "y", "z"].map(|axis| real(&run, &format!("casing_force_{axis}")));
+        let rate = mesh.go(AROUND, force, &temperatures);
+        for row in 0..6 {
+            let acting: f64 = (0..3).map(|axis| rigid(place, axis)[row] * force[axis]).sum();
+            let reaction = real(&run, &format!("support_{}", ROWS[row]));
+            worst[row] = worst[row].max((acting + reaction - rate[row]).abs());
+            largest[row] = largest[row].max(reaction.abs());
+        }
+        for node in 0..AROUND * ALONG {
+            let told = element(&run, "casing_displacement", u32::try_from(node).unwrap());
+            moved = moved.max(told.abs());
+            apart = apart.max((told - mesh.radial(node)).abs());
+        }
+    }
+    println!("reaction off by {worst:?} of {largest:?}; displacement {apart:e} of {moved:e}");
+}
