@@ -124,15 +124,33 @@ fn rigid([x, y, z]: [f64; 3], axis: usize) -> [f64; 6] {
     }
 }
 
-/// A pin on a spring that stands before the first node of the second ring, and is tapped against it by the shaft.
-fn scene(casing: Rom, scheme: Scheme, step: f64) -> Scene {
+/// What moves the casing.
+#[derive(Clone, Copy)]
+struct Drive {
+    /// Amplitude (m) and frequency (Hz) of the shaft, which presses a pin against the casing.
+    push: [f64; 2],
+    /// Frequency of the pin on its spring (Hz).
+    pin: f64,
+    /// At which it slides along (rad/s).
+    speed: f64,
+    /// Temperatures of the patches (K).
+    heat: [f64; PATCHES],
+}
+
+/// Blows that ring in all modes, on a casing that is warm.
+const BLOWS: Drive = Drive { push: [3e-8, 1e4], pin: 2000.0, speed: 1e-5, heat: [0.02, 0.0, -0.01] };
+/// One soft push.
+const PUSH: Drive = Drive { push: [3e-8, 2e3], pin: 2e4, speed: 0.05, heat: [0.0; PATCHES] };
+
+/// A pin on a spring that stands before the first node of the second ring, and is pressed against it by the shaft.
+fn scene(casing: Rom, drive: Drive, scheme: Scheme, step: f64) -> Scene {
     let pin = vec![models::node("pin", [models::RADIUS, 0.0, 0.04], 0.0)];
     let shape = |row: usize, _: usize| if row == 0 { 3.0 } else { 0.0 };
-    let mut scene = models::round(models::modal("pin", &[2000.0], shape, pin));
+    let mut scene = models::round(models::modal("pin", &[drive.pin], shape, pin));
     models::on_ring(&mut scene, casing, 0.0);
     let settings = &mut scene.settings;
     settings.surfaces[0].moving = false;
-    settings.structures[0].speed = 1e-5;
+    settings.structures[0].speed = drive.speed;
     settings.structures[0].whirl = true;
     settings.structures[1].thermal = true;
     settings.contacts[0].gap = GAP;
@@ -145,16 +163,14 @@ fn scene(casing: Rom, scheme: Scheme, step: f64) -> Scene {
 }
 
 const ROWS: [&str; 6] = ["force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"];
-/// Of the patches (K).
-const HEAT: [f64; PATCHES] = [0.02, 0.0, -0.01];
 /// How long it is looked at, and the length of means (s).
 const LENGTH: f64 = 4e-4;
 const MEAN: f64 = 2e-5;
 
-fn start(scene: &Scene) -> Simulation {
+fn start(scene: &Scene, heat: &[f64; PATCHES]) -> Simulation {
     let mut run = Simulation::new(scene).unwrap();
-    for (patch, value) in (0..).zip(HEAT) {
-        set_element(&mut run, "casing_temperature", patch, value);
+    for (patch, value) in (0..).zip(heat) {
+        set_element(&mut run, "casing_temperature", patch, *value);
     }
     run.initialise(0.0).unwrap();
     run
@@ -182,21 +198,22 @@ impl std::fmt::Display for Off {
 }
 
 /// Of a run of the core beside the mesh; `change` the rows of the support.
-fn compare(options: &CasingOptions, scheme: Scheme, step: f64, change: impl Fn(&mut Rows)) -> Off {
+fn compare(options: &CasingOptions, drive: Drive, scheme: Scheme, step: f64, change: impl Fn(&mut Rows)) -> Off {
     let (mut mesh, mut casing) = (Mesh::new(options), reduce_ring(options, &silent).unwrap().rom);
     change(casing.extras.support.as_mut().unwrap());
-    let mut run = start(&scene(casing, scheme, step));
-    mesh.rest(&HEAT);
+    let mut run = start(&scene(casing, drive, scheme, step), &drive.heat);
+    mesh.rest(&drive.heat);
     let place = mesh.ring.mesh.nodes[mesh.ring.grid.nodes[AROUND]];
     let window = (MEAN / step).round() as u32;
     let (mut off, mut largest) = ([[0.0_f64; 6]; 2], [[0.0_f64; 6]; 2]);
     let (mut sums, mut moved) = ([[0.0_f64; 6]; 2], [0.0_f64; 2]);
     for index in 1..=(LENGTH / step).round() as u32 {
-        let push = GAP + 3e-8 * (1.0 - (std::f64::consts::TAU * 1e4 * step * f64::from(index)).cos());
+        let phase = std::f64::consts::TAU * drive.push[1] * step * f64::from(index);
+        let push = GAP + drive.push[0] * (1.0 - phase.cos());
         move_on(&mut run, "whirl_x", push, 0.0);
         go(&mut run, step);
         let force = ["x", "y", "z"].map(|axis| real(&run, &format!("casing_force_{axis}")));
-        let rate = mesh.go(step, AROUND, force, &HEAT);
+        let rate = mesh.go(step, AROUND, force, &drive.heat);
         for row in 0..6 {
             let acting: f64 = (0..3).map(|axis| rigid(place, axis)[row] * force[axis]).sum();
             let reaction = real(&run, &format!("support_{}", ROWS[row]));
@@ -216,7 +233,7 @@ fn compare(options: &CasingOptions, scheme: Scheme, step: f64, change: impl Fn(&
     }
     let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     let share = |of: usize, rows: std::ops::Range<usize>| most(&off[of][rows.clone()]) / most(&largest[of][rows]);
-    assert!(largest[1][0] > 0.1 && largest[1][5] > 1e-3, "{largest:?}");
+    assert!(largest[1][0] > 1e6 * drive.push[0] && largest[1][5] > 1e4 * drive.push[0], "{largest:?}");
     Off {
         force: share(0, 0..3),
         moment: share(0, 3..6),
@@ -231,30 +248,45 @@ fn compare(options: &CasingOptions, scheme: Scheme, step: f64, change: impl Fn(&
 #[test]
 fn a_support_in_motion_takes_what_changes_the_momentum_of_the_mesh() {
     let options = ring(144, 1000);
-    let off = |change: &dyn Fn(&mut Rows)| compare(&options, Scheme::CentralDifference, 2e-7, change);
-    let found = off(&|_| ());
-    println!("all modes, every step: {found}");
-    let without =
-        [off(&|rows| rows.mass.fill(0.0)), off(&|rows| rows.stiffness.fill(0.0)), off(&|rows| rows.thermal.fill(0.0))];
+    let off = |size: f64, change: &dyn Fn(&mut Rows)| {
+        let drive =
+            Drive { push: [size * BLOWS.push[0], BLOWS.push[1]], heat: BLOWS.heat.map(|one| size * one), ..BLOWS };
+        compare(&options, drive, Scheme::CentralDifference, 2e-7, change)
+    };
+    let [found, smaller] = [1.0, 0.1].map(|size| off(size, &|_| ()));
+    println!("all modes, every step: {found}\na tenth of the motion: {smaller}");
+    let without = [
+        off(1.0, &|rows| rows.mass.fill(0.0)),
+        off(1.0, &|rows| rows.stiffness.fill(0.0)),
+        off(1.0, &|rows| rows.thermal.fill(0.0)),
+    ];
     println!("without S_M: {}\nwithout S_K: {}\nwithout S_T: {}", without[0], without[1], without[2]);
-    assert!([found.force, found.moment, found.moved].iter().all(|off| *off < 1e-6), "{found:?}");
+    assert!([found.force, found.moment, found.moved].iter().all(|off| *off < 1e-6), "{found}");
     for off in &without {
-        assert!(off.moved < 1e-6 && off.force > 1e-2 && off.moment > 1e-2, "{off:?}");
+        assert!(off.moved < 1e-6 && off.force > 0.2 && off.moment > 0.2, "{off}");
     }
 }
 
-/// With fewer modes the free nodes hold their equation in the space of the modes alone.
+/// With fewer modes the equation of the free nodes holds in the space of the modes alone: momentum is missed by what they leave of a
+/// soft push, and by the step where steps are not the mesh's own.
 #[test]
 fn with_fewer_modes_the_momentum_is_that_of_the_mesh_in_the_limit() {
-    for (fixed, modes) in
-        [(6, 1000), (12, 1000), (24, 1000), (48, 1000), (96, 1000), (144, 1000), (144, 12), (144, 36), (144, 96)]
-    {
-        let options = ring(fixed, modes);
-        let found = compare(&options, Scheme::CentralDifference, 2e-7, |_| ());
+    let of_modes = |fixed: usize, modes: usize, change: &dyn Fn(&mut Rows)| {
+        let found = compare(&ring(fixed, modes), PUSH, Scheme::CentralDifference, 2e-7, change);
         println!("{fixed} fixed-interface modes, {modes} modes: {found}");
+        found
+    };
+    for modes in [[6, 24, 96].map(|fixed| [fixed, 1000]), [6, 24, 96].map(|modes| [144, modes])] {
+        let found = modes.map(|[fixed, modes]| of_modes(fixed, modes, &|_| ()));
+        let means = found.each_ref().map(|off| off.mean_force.max(off.mean_moment));
+        assert!(means.array_windows().all(|[few, more]| *more < 0.35 * few) && means[2] < 5e-4, "{means:?}");
     }
-    for step in [4e-7, 2e-7, 1e-7, 5e-8] {
-        let found = compare(&ring(144, 1000), Scheme::ModalExact, step, |_| ());
-        println!("exact modes, step {step}: {found}");
-    }
+    let without = of_modes(96, 1000, &|rows| rows.mass.fill(0.0));
+    assert!(without.mean_force > 1e-3 && without.mean_moment > 1e-3, "{without}");
+    let steps = [2e-7, 1e-7].map(|step| {
+        let found = compare(&ring(144, 1000), PUSH, Scheme::ModalExact, step, |_| ());
+        println!("all modes, modal-exact, step {step}: {found}");
+        found.force
+    });
+    assert!(steps[0] < 3e-4 && steps[0] / steps[1] > 3.0, "{steps:?}");
 }
