@@ -27,6 +27,8 @@ pub const SPEED: f64 = 1e6;
 pub const VELOCITY: f64 = 1e5;
 /// Largest angle (rad) of a phase: beyond, too few digits are left for its rest.
 pub const ANGLE: f64 = 1e6;
+/// Largest angle (rad) of an input that may turn for hours: an angle of that size is rounded to 1e-4 rad.
+pub const TURNED: f64 = 1e12;
 /// Largest line load (N/m): a thousand times the strength of any casing.
 pub const LINE_LOAD: f64 = 1e12;
 /// Smallest and largest depth factor of bumps (-), whose heights are held against the radius.

@@ -1,7 +1,7 @@
 //! Rows of the variable table, and those that every scene has.
 
 use crate::laws::SOLVERS;
-use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP};
+use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP, TURNED};
 use crate::schemes::SCHEMES;
 use crate::settings::{ContactSettings, SceneSettings, TOLERANCE};
 use crate::simulation::outputs::Reader;
@@ -87,6 +87,9 @@ impl Builder {
         variable.causality = Causality::Input;
         variable.unit = unit;
         variable.start = Some(Start::Real(vec![start]));
+        if unit == Some(&ANGLE) {
+            (variable.min, variable.max) = (Some(-TURNED), Some(TURNED));
+        }
         variable
     }
 
