@@ -279,7 +279,7 @@ fn with_fewer_modes_the_momentum_is_that_of_the_mesh_in_the_limit() {
     for modes in [[6, 24, 96].map(|fixed| [fixed, 1000]), [6, 24, 96].map(|modes| [144, modes])] {
         let found = modes.map(|[fixed, modes]| of_modes(fixed, modes, &|_| ()));
         let means = found.each_ref().map(|off| off.mean_force.max(off.mean_moment));
-        assert!(means.array_windows().all(|[few, more]| *more < 0.35 * few) && means[2] < 5e-4, "{means:?}");
+        assert!(means.array_windows().all(|[few, more]| *more < 0.5 * few) && means[2] < 5e-4, "{means:?}");
     }
     let without = of_modes(96, 1000, &|rows| rows.mass.fill(0.0));
     assert!(without.mean_force > 1e-3 && without.mean_moment > 1e-3, "{without}");
