@@ -198,6 +198,7 @@ impl std::fmt::Display for Off {
 }
 
 /// Of a run of the core beside the mesh; `change` the rows of the support.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most thousands of steps")]
 fn compare(options: &CasingOptions, drive: Drive, scheme: Scheme, step: f64, change: impl Fn(&mut Rows)) -> Off {
     let (mut mesh, mut casing) = (Mesh::new(options), reduce_ring(options, &silent).unwrap().rom);
     change(casing.extras.support.as_mut().unwrap());
