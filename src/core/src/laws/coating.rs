@@ -151,7 +151,7 @@ impl Coating {
         let first = problem.append_nodes(self.nodes);
         for (index, row) in self.rows.iter().enumerate() {
             let [a, b] = row.nodes;
-            let cell = index * self.around + place(row.angle(angles), self.around);
+            let cell = index * self.around + place(row.angle(angles), self.around).0;
             problem.append_contact(CellContact {
                 cell,
                 nodes: [first + a, first + b],
@@ -314,13 +314,15 @@ fn neighbours(axial: &[f64], order: &[usize], position: f64) -> ([usize; 2], [f6
     ([a, b], [1.0 - share, share])
 }
 
-/// Which of `around` equal parts of the circumference holds an angle (rad).
-fn place(angle: f64, around: usize) -> usize {
+/// Which of `around` equal parts of the circumference holds an angle (rad), and how far within it the angle is (-, 0 to 1). Both come of
+/// one number: at a border, where rounding decides, they agree.
+fn place(angle: f64, around: usize) -> (usize, f64) {
     let turns = angle / TAU;
+    let places = (turns - turns.floor()) * number(around);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ cells around")]
-    let index = ((turns - turns.floor()) * number(around)) as usize;
     // The fraction of a tiny negative angle rounds to 1.
-    index.min(around - 1)
+    let index = (places as usize).min(around - 1);
+    (index, places - number(index))
 }
 
 /// A count as a factor.

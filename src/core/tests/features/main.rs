@@ -5,6 +5,7 @@ mod counting;
 
 mod apart;
 mod casing;
+mod chatter;
 mod checks;
 mod coating;
 mod cutting;

@@ -7,4 +7,5 @@ mod guide;
 
 mod casing;
 mod closed_rings;
+mod momentum;
 mod ring;

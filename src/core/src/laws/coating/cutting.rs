@@ -147,7 +147,8 @@ impl Coating {
                     faced,
                 });
             };
-            let (here, behind) = (place(angle, self.around), self.behind(angle, slid, row.radius));
+            let (here, within) = place(angle, self.around);
+            let behind = self.behind(within, slid, row.radius);
             append(here, 1.0 - behind, true);
             if behind > 0.0 {
                 let back = if slid > 0.0 { here + self.around - 1 } else { here + 1 };
@@ -156,14 +157,12 @@ impl Coating {
         }
     }
 
-    /// Share of the way (m, to an angle, on a radius) that lies behind the border of the cell it ends in.
-    fn behind(&self, angle: f64, slid: f64, radius: f64) -> f64 {
+    /// Share of the way (m, on a radius) that lies behind the border of the cell it ends in, so far `within` it (-).
+    fn behind(&self, within: f64, slid: f64, radius: f64) -> f64 {
         let turned = slid / radius;
         if turned == 0.0 {
             return 0.0;
         }
-        let places = angle / self.width();
-        let within = places - places.floor();
         let since = if turned > 0.0 { within } else { 1.0 - within };
         (1.0 - since * self.width() / turned.abs()).clamp(0.0, 1.0)
     }
