@@ -58,7 +58,7 @@ fn fastest(cutting: f64, delay: f64) -> C {
 /// Blades with a rigid tip and one radial mode.
 fn rotor(blades: usize) -> Rom {
     let size = OMEGA / STIFFNESS.sqrt();
-    let shape = move |row: usize, _: usize| if row % 3 == 0 { size } else { 0.0 };
+    let shape = move |row: usize, _: usize| if row.is_multiple_of(3) { size } else { 0.0 };
     let nodes = ["low", "high"].into_iter().zip([0.0, LENGTH]);
     let nodes = nodes.map(|(name, z)| models::node(name, [models::RADIUS, 0.0, z], 0.0)).collect();
     Rom { sectors: blades, damping_ratio: DAMPING, ..models::modal("cutter", &[OMEGA / TAU], shape, nodes) }

@@ -221,7 +221,7 @@ fn compare(options: &CasingOptions, drive: Drive, scheme: Scheme, step: f64, cha
             let left = acting + reaction - rate[row];
             (off[0][row], largest[0][row]) = (off[0][row].max(left.abs()), largest[0][row].max(reaction.abs()));
             (sums[0][row], sums[1][row]) = (sums[0][row] + left, sums[1][row] + reaction);
-            if index % window == 0 {
+            if index.is_multiple_of(window) {
                 let [left, reaction] = [sums[0][row], sums[1][row]].map(|sum| (sum / f64::from(window)).abs());
                 (off[1][row], largest[1][row]) = (off[1][row].max(left), largest[1][row].max(reaction));
                 (sums[0][row], sums[1][row]) = (0.0, 0.0);
