@@ -17,6 +17,8 @@ const GAP: f64 = 8e-4;
 const WARM: f64 = 200.0;
 /// Of the state `soft` (1/K).
 const SOFTENING: f64 = 2.5e-4;
+/// With 80 nothing comes nearer: the modes carry the responses to forces at the contact nodes.
+const MODES: usize = 10;
 /// Contact nodes, which are the nodes of the reference.
 const NODES: usize = 9;
 
@@ -44,11 +46,11 @@ fn clearance_of(node: &ContactNode, [x, y, z]: [f64; 3]) -> f64 {
     (GAP - moved + node.meridional_slope * z) / node.meridional_slope.hypot(1.0)
 }
 
-fn reduced(modes: usize) -> Rom {
+fn reduced() -> Rom {
     let options = Rotor37Options {
         tip: Tip::Nodes(NODES),
         kind: ReductionKind::FreeInterface,
-        modes,
+        modes: MODES,
         spin: Some(DESIGN_SPEED),
         ..Rotor37Options::paper()
     };
@@ -73,31 +75,23 @@ fn clearances(rom: &Rom, stiffening: bool, [speed, temperature, softening]: [f64
 
 #[test]
 fn the_hot_running_clearance_of_rotor37_is_that_of_calculix() {
-    let roms = [10, 80].map(reduced);
+    let rom = reduced();
     for (analysis, stiffening) in ANALYSES {
         for (state, of) in STATES {
-            let nodes = &roms[0].contact_nodes;
+            let nodes = &rom.contact_nodes;
             let cold: Vec<f64> = nodes.iter().map(|node| clearance_of(node, [0.0; 3])).collect();
             let expected: Vec<f64> =
                 nodes.iter().zip(reference(analysis, state)).map(|(node, moved)| clearance_of(node, moved)).collect();
-            let off = roms.each_ref().map(|rom| {
-                let found = clearances(rom, stiffening, of);
-                let off = found.iter().zip(&expected).map(|(found, expected)| (found - expected).abs());
-                1e6 * off.fold(0.0, f64::max)
-            });
+            let found = clearances(&rom, stiffening, of);
+            let off =
+                found.iter().zip(&expected).map(|(found, expected)| 1e6 * (found - expected).abs()).fold(0.0, f64::max);
             let change = [0, NODES / 2, NODES - 1].map(|node| 1e6 * (expected[node] - cold[node]));
-            told!(
-                "| {analysis} | {state} | {:.1} | {:.1} | {:.1} | {:.2} | {:.2} |",
-                change[0],
-                change[1],
-                change[2],
-                off[0],
-                off[1]
-            );
+            let [leading, middle, trailing] = change;
+            told!("| {analysis} | {state} | {leading:.1} | {middle:.1} | {trailing:.1} | {off:.2} |");
             // Directions of the linear growth are those of the fit at speed; what heat and speed do together is left out.
             let most = if state == "warm" || (stiffening && state == "spin") { 0.12 } else { 2.0 };
-            assert!(off.iter().all(|off| *off < most), "{analysis} {state}: {off:?} µm");
+            assert!(off < most, "{analysis} {state}: {off} µm");
         }
     }
-    guide::hold("cargo test --release -p tiprub-model --test rotor37_hot");
+    guide::hold("cargo test -p tiprub-model --test rotor37_hot");
 }
