@@ -39,7 +39,7 @@ pub struct RingArguments {
     /// 10 % of its length from its ends].
     #[arg(long, value_name = "FROM:TO", value_parser = axial, allow_hyphen_values = true)]
     pub contact_axial: Option<[f64; 2]>,
-    /// Thermal patches around and along; 0x0 leaves heat out [default: 12x1].
+    /// Thermal patches around and along; in `reduce casing` 0x0 leaves heat out [default: 12x1].
     #[arg(long, value_name = "AxL", value_parser = pair)]
     pub patches: Option<[usize; 2]>,
     /// Elements around, through the thickness and along the axis [default: 72x1x12].

@@ -187,7 +187,12 @@ fn find(unit: Unit, arguments: &LibraryArguments, console: &Console) -> Result<V
     if installed.is_empty() {
         return Err(Failure::new(
             "FMU library",
-            format!("none beside {} or in ../lib/tiprub from there", executable.display()),
+            format!(
+                "none beside {} or in ../lib/tiprub from there, by a name such as {}{}",
+                executable.display(),
+                unit.prefix(),
+                Platform::X86_64Linux.file_name()
+            ),
             "Give it with --library FILE, or run tiprub from its source workspace with `cargo run --release`",
         ));
     }
