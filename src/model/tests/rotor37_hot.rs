@@ -17,7 +17,7 @@ const GAP: f64 = 8e-4;
 const WARM: f64 = 200.0;
 /// Of the state `soft` (1/K).
 const SOFTENING: f64 = 2.5e-4;
-/// With 80 nothing comes nearer: the modes carry the responses to forces at the contact nodes.
+/// Few, as they carry the responses to forces at the contact nodes.
 const MODES: usize = 10;
 /// Contact nodes, which are the nodes of the reference.
 const NODES: usize = 9;
