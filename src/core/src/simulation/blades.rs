@@ -17,21 +17,31 @@ use crate::{Error, Result, Rom, shown};
 ///
 /// Expansion strains nothing but what is held, so that a blade that turns expands as it does at rest: the load at speed is that
 /// which K(Ω) takes to the free expansion K⁻¹f. The load f of the shape at rest would bend the stretched blade.
-pub fn heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<[f64; 3]> {
-    let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) else { return Vec::new() };
+///
+/// # Errors
+/// Stiffening of a blade that nothing holds: it has no free expansion.
+pub fn heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Result<Vec<[f64; 3]>> {
+    let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) else { return Ok(Vec::new()) };
     let whole: Vec<f64> = thermal.loads.row_iter().map(|row| row.iter().sum()).collect();
     #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
     let all = if rom.is_cyclic() { libm::sqrt(rom.sectors as f64) } else { 1.0 };
     let mut loads: Vec<[f64; 3]> = model.modal_load(&whole).into_iter().map(|load| [all * load, 0.0, 0.0]).collect();
-    let spin = rom.extras.spin.as_ref().filter(|_| structure.spin.stiffening);
-    if let Some((spin, held)) = spin.zip(rom.stiffness.clone().cholesky()) {
+    if let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin.stiffening) {
+        let held = rom.stiffness.clone().cholesky().ok_or_else(|| {
+            let remedy = "Use a ROM whose root is held, or leave `thermal` or `spin.stiffening` out";
+            Error::invalid(
+                "ROM array `stiffness`",
+                "not positive definite: what nothing holds has no free expansion",
+                remedy,
+            )
+        })?;
         let expansion = held.solve(&DVector::from_vec(whole));
         for (power, stiffness) in [(1, &spin.stiffness_speed2), (2, &spin.stiffness_speed4)] {
             let added = model.modal_load((stiffness * &expansion).as_slice());
             loads.iter_mut().zip(added).for_each(|(load, added)| load[power] = added);
         }
     }
-    loads
+    Ok(loads)
 }
 
 /// Share of the elastic stiffness that is left at a temperature (K).

@@ -291,7 +291,7 @@ impl Compiled {
         let body = &mut self.bodies[body];
         body.reference_speed = speed;
         body.centrifugal = centrifugal(structure, rom, &body.model);
-        body.heat = heat(structure, rom, &body.model);
+        body.heat = heat(structure, rom, &body.model)?;
         if let Some(watched) = &rom.extras.watched {
             body.watched = &watched.map * &body.model.shapes;
         }

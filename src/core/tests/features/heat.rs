@@ -111,6 +111,13 @@ fn blades_that_turn_expand_as_at_rest() {
         assert!(left < 1e-6, "{left:e}");
         assert!(real(&run, "energy_residual_relative").abs() < 1e-10);
     }
+    // What nothing holds has no free expansion to keep.
+    let mut loose = scene(rom);
+    loose.settings.structures[0].spin.stiffening = true;
+    loose.roms[0].stiffness.row_mut(0).fill(0.0);
+    loose.roms[0].stiffness.column_mut(0).fill(0.0);
+    let refused = Simulation::new(&loose).and_then(|mut run| run.initialise(0.0)).unwrap_err().to_string();
+    assert!(refused.contains("`stiffness`") && refused.contains("not positive definite"), "{refused}");
 }
 
 /// A softened blade rings at ω√(1 − sT): as it starts, and when it is warmed up on the way, where its energy changes by what heat takes.
