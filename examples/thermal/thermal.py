@@ -92,7 +92,7 @@ class Files:
         if rotor:
             self.tiprub("reduce", "rotor37", *rotor, "--force", "-o", place / "rotor.rom.safetensors")
         else:
-            text = text.replace('"rotor.rom.safetensors"', '"builtin:rotor37"')
+            text = text.replace('"rotor.rom.safetensors"', '"builtin:rotor37-one-row"')
         (place / "rub.toml").write_text(text, encoding="utf-8")
         self.tiprub("package", place / "rub.toml", "--scalars", "-o", place, *self._library("TIPRUB_LIBRARY"))
         return {fmi: place / f"thermal_rub_fmi{fmi}.fmu" for fmi in (2, 3)}

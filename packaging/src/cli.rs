@@ -22,8 +22,8 @@ use crate::{
                   flexible, and ships that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
                   tiprub package scene.toml -o out/\n\n\
-                  Scenes that ship:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps\n  \
-                  builtin:rotor37-one-row   with contact as a mean over the thickness of the tip\n  \
+                  Scenes that ship:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps, recommended\n  \
+                  builtin:rotor37-one-row   one row of patches, which averages over the thickness of the tip\n  \
                   builtin:rotor37-paper     with the model and the method of the paper\n  \
                   builtin:flexible-casing   in an elastic casing with heat, friction power per patch\n  \
                   builtin:abradable         wearing the coating of a rigid casing\n  \
@@ -325,7 +325,8 @@ mod tests {
             ("reduce stage --coarse --contact-patches 5 --kind craig-bampton".into(), true),
             ("reduce stage --contact-patches 5 --contact-nodes 3".into(), false),
             ("reduce stage --contact-patches 5 --contact-rows 2".into(), true),
-            ("reduce stage --contact-rows 2".into(), false),
+            ("reduce stage --contact-rows 2".into(), true),
+            ("reduce stage --contact-rows 2 --contact-nodes 3".into(), false),
             ("reduce rotor37 --contact-rows 2".into(), true),
             (format!("reduce blade {own} --contact-rows 2"), true),
             (format!("reduce blade {own} --contact-nodes 3 --contact-rows 2"), false),

@@ -54,7 +54,7 @@ pub enum Model {
     Casing(Box<CasingArguments>),
     /// The NASA rotor 37 blade that ships with tiprub.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
-                            tiprub reduce rotor37 --contact-patches 17 --contact-rows 2 --modes 120 --mesh 32x2x40 -o fine.rom.safetensors")]
+                            tiprub reduce rotor37 --contact-patches 17 --modes 120 --mesh 32x2x40 -o fine.rom.safetensors")]
     Rotor37(Rotor37Arguments),
     /// The disk with 56 blades that ships.
     #[command(after_help = "Example:\n  tiprub reduce stage --coarse --inp sector.inp --vtk sector.vtu")]
@@ -82,10 +82,11 @@ pub struct Rotor37Arguments {
     /// The paper's contact nodes along the tip chord, leading edge to trailing edge (≥ 2), instead of patches.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Contact patches along the tip chord, over the whole thickness [default: 9].
+    /// Contact patches along the tip chord [default: 9].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
-    /// Rows of these across the thickness, from side to side: with two or more a tip that tilts touches with its sides [default: 1].
+    /// Rows of patches across the thickness, from side to side: with two or more the sides of a tilted tip touch; one row averages
+    /// contact over the thickness [default: 2].
     #[arg(long, value_name = "R", conflicts_with = "contact_nodes")]
     pub contact_rows: Option<usize>,
     /// Which modes are kept [default: free-interface; craig-bampton with --contact-nodes].
@@ -127,18 +128,27 @@ impl Rotor37Arguments {
 }
 
 impl StageArguments {
-    /// Name and options of the disk asked for.
+    /// Name and options of the disk. A coarse disk has contact nodes unless patches are given: its elements are wider than nine patches.
     pub fn options(&self) -> (&'static str, StageOptions) {
-        let (name, defaults) = builtin::stage(self.coarse);
+        let [patches, rows] = builtin::stage().1.tip.counts();
+        let has_patches = self.contact_patches.or(self.contact_rows).is_some();
+        let has_nodes = self.contact_nodes.is_some() || (self.coarse && !has_patches);
+        let (_, defaults) = if self.coarse { builtin::stage_nodes(true) } else { builtin::stage() };
         let options = StageOptions {
             tip: match (self.contact_nodes, self.contact_patches) {
                 (Some(nodes), _) => Tip::Nodes(nodes),
-                (None, Some(patches)) => Tip::patches([patches, self.contact_rows.unwrap_or(1)]),
-                (None, None) => defaults.tip,
+                (None, None) if has_nodes => defaults.tip,
+                (None, own) => Tip::patches([own.unwrap_or(patches), self.contact_rows.unwrap_or(rows)]),
             },
-            kind: KindChoice::kind(self.kind, self.contact_patches.is_some()),
+            kind: KindChoice::kind(self.kind, !has_nodes),
             modes: self.modes.map_or(defaults.modes, ModeSelection::Families),
             ..defaults
+        };
+        let name = match (has_nodes, self.coarse) {
+            (false, false) => "stage",
+            (false, true) => "stage-coarse",
+            (true, false) => "stage-nodes",
+            (true, true) => "stage-nodes-coarse",
         };
         (name, options)
     }
@@ -153,16 +163,16 @@ pub struct StageArguments {
     /// Modes kept per nodal diameter, in whole families [default: 25; 12 of the coarse mesh].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Contact nodes along the tip chord [default: 3].
+    /// Contact nodes along the tip chord, instead of patches [default: none; 3 of the coarse mesh].
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Contact patches along the tip chord, over the whole thickness, instead of nodes.
+    /// Contact patches along the tip chord [default: 9; none of the coarse mesh].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
-    /// Rows of these across the thickness, from side to side [default: 1].
-    #[arg(long, value_name = "R", requires = "contact_patches")]
+    /// Rows of patches across the thickness, from side to side [default: 2].
+    #[arg(long, value_name = "R", conflicts_with = "contact_nodes")]
     pub contact_rows: Option<usize>,
-    /// Which modes are kept [default: craig-bampton; free-interface with --contact-patches].
+    /// Which modes are kept [default: free-interface; craig-bampton with contact nodes].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
     /// What is written.
@@ -276,7 +286,7 @@ impl Model {
             Self::CasingMesh(own) => own.source().name(),
             Self::Casing(own) => own.options().name,
             Self::Rotor37(_) => "rotor37".to_owned(),
-            Self::Stage(own) => builtin::stage(own.coarse).0.to_owned(),
+            Self::Stage(own) => own.options().0.to_owned(),
             Self::StageCasing(own) => builtin::stage_casing(own.coarse).name,
             Self::Cube(_) => builtin::CUBE.to_owned(),
             Self::RingLeft(_) => left.0.to_owned(),

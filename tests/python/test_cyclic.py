@@ -24,9 +24,9 @@ LIBRARY = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.
 def coarse_scene():
     """The stage that ships, with coarse models, sooner in contact and sooner over."""
     text = (ROOT / "src" / "gallery" / "scenes" / "stage.toml").read_text()
-    text = text.replace('"builtin:stage-rows"', '"builtin:stage-coarse"').replace('"builtin:stage-casing"', '"builtin:stage-casing-coarse"')
+    text = text.replace('"builtin:stage"', '"builtin:stage-nodes-coarse"').replace('"builtin:stage-casing"', '"builtin:stage-casing-coarse"')
     text = text.replace("ramp_time = 5.0e-3", "ramp_time = 1.0e-3").replace("stop = 0.05 ", f"stop = {STOP} ")
-    assert re.findall('"builtin:(.*?)"', text) == ["stage-coarse", "stage-casing-coarse"]
+    assert re.findall('"builtin:(.*?)"', text) == ["stage-nodes-coarse", "stage-casing-coarse"]
     assert f"stop = {STOP}" in text and "1.0e-3" in text
     return text
 

@@ -252,7 +252,7 @@ def test_spools_are_those_of_closed_forms_and_a_rub_brakes_them(tiprub, scene, w
     expected = [2000.0 - 1500.0 * numpy.exp(-0.05 / 0.1), -900.0 + 600.0 * numpy.exp(-0.05 / 0.18)]
     assert pair.speed == pytest.approx(expected, rel=1e-12)
     path = work / "spools.toml"
-    path.write_text((EXAMPLE / "two_spools.toml").read_text().replace("builtin:rotor37", "rotor37.rom.safetensors"))
+    path.write_text((EXAMPLE / "two_spools.toml").read_text().replace("builtin:rotor37-one-row", "rotor37.rom.safetensors"))
     tiprub("package", path, "--fmi", "3", "--scalars", "-o", work / "spools.fmu", *library())
     taken = {}
     for way in (Way.JACOBI, Way.RUB_FIRST, Way.FIXED_POINT):

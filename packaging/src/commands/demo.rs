@@ -78,7 +78,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
 
     let libraries = watch
         .measure("building the FMU library", || library::load(library::Unit::Scene, &arguments.libraries, console))?;
-    let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::in_rows(), console))?;
+    let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::default(), console))?;
     let scene = write_inputs(directory, &reduction, &scene_text)?;
     let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
 

@@ -213,7 +213,7 @@ fn gap_text(contact: &ContactSettings) -> String {
 fn scene_text(settings: &SceneSettings) -> String {
     let colon = if settings.description.is_empty() { "" } else { ": " };
     let mut text = format!("scene {}{colon}{}\n", settings.name, settings.description);
-    settings.structures.iter().for_each(|structure| text.push_str(&structure_text(settings, structure)));
+    settings.structures.iter().for_each(|structure| text.push_str(&structure_text(structure)));
     // Gaps and surfaces of what flies freely are in the ROMs.
     let flies = |contact: &ContactSettings| {
         settings.master_of(contact).is_some_and(|structure| structure.motion == Motion::Free)
@@ -262,10 +262,7 @@ fn scene_text(settings: &SceneSettings) -> String {
     text
 }
 
-fn structure_text(settings: &SceneSettings, structure: &StructureSettings) -> String {
-    // With a preset the model is another than the one written.
-    let model =
-        tiprub_format::builtin_model(settings, structure).map(|name| format!("{}{name}", scene_source::BUILTIN));
+fn structure_text(structure: &StructureSettings) -> String {
     let motion = match structure.motion {
         Motion::Rotating => {
             format!("speed {} rad/s ({:.1} rpm)", structure.speed, structure.speed * 30.0 / std::f64::consts::PI)
@@ -279,7 +276,7 @@ fn structure_text(settings: &SceneSettings, structure: &StructureSettings) -> St
     format!(
         "  structure     {} from {}, {motion}, damping ratio {}\n",
         structure.name,
-        model.as_ref().unwrap_or(&structure.rom),
+        structure.rom,
         structure.damping_ratio.map_or("of the ROM".into(), |ratio| ratio.to_string())
     )
 }

@@ -92,10 +92,3 @@ fn inspect_tells_what_a_scene_that_ships_adds() {
         assert!(text.contains(part), "{part} is not in:\n{text}");
     }
 }
-
-#[test]
-fn inspect_names_the_model_that_a_preset_takes() {
-    let project = tempfile::tempdir().unwrap();
-    let text = succeed(&project, &["inspect", "builtin:rotor37-paper", "--quiet"]);
-    assert!(text.contains("rotor from builtin:rotor37-paper,"), "{text}");
-}

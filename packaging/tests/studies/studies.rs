@@ -233,7 +233,7 @@ fn around(rom: &str) -> String {
 fn with_rom(scene: &str, rom: &str) -> String {
     let (_, shipped) = tiprub_gallery::scene_source::BUILTIN_SCENES.iter().find(|(name, _)| *name == scene).unwrap();
     assert!(shipped.contains("step = 5.0e-7 "));
-    shipped.replace("builtin:rotor37", rom).replace("step = 5.0e-7 ", "step = 1.0e-6 ")
+    shipped.replace("builtin:rotor37-one-row", rom).replace("step = 5.0e-7 ", "step = 1.0e-6 ")
 }
 
 /// What the study of stability finds on a scene at two frictions, speeds and steps.

@@ -463,14 +463,14 @@ pub struct ExperimentSettings {
     pub communication_step: f64,
 }
 
-/// Model and method in one word.
+/// Scheme and solver in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
     /// Every setting by itself (default).
     #[default]
     None,
-    /// Those of the paper: central differences and the film of eq. 11, built-in models of Craig and Bampton with contact at nodes.
+    /// The paper's method: central differences and the film of eq. 11.
     Paper,
 }
 
@@ -483,7 +483,7 @@ pub struct SceneSettings {
     /// One or a few sentences for the importer's catalogue.
     #[serde(default)]
     pub description: String,
-    /// Model and method.
+    /// Scheme and solver in one word.
     #[serde(default, skip_serializing_if = "is_default")]
     pub preset: Preset,
     /// Flexible structures.

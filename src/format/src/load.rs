@@ -23,8 +23,8 @@ const LARGEST_TEXT: u64 = 64 << 20;
 pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
     let settings = load_settings(path)?;
     let directory = path.parent().unwrap_or(Path::new(""));
-    let rom = |(index, structure): (usize, &StructureSettings)| match builtin_model(&settings, structure) {
-        Some(name) => builtin_rom(path, index, &name, builtin(&name)),
+    let rom = |(index, structure): (usize, &StructureSettings)| match builtin_model(structure) {
+        Some(name) => builtin_rom(path, index, name, builtin(name)),
         None => {
             let remedy = format!(
                 "structure[{}].rom in {} names this file, relative to the scene file; correct the name, or write the \

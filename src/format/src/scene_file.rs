@@ -8,9 +8,6 @@ use crate::load::BUILTIN_PREFIX;
 use crate::scene_diagnosis::{Document, check_brackets, diagnose, position};
 use crate::{Error, Result};
 
-/// End of the name of a built-in model as the paper has it.
-pub const PAPER_SUFFIX: &str = "-paper";
-
 /// Read a scene; `origin` names the file in messages.
 ///
 /// # Errors
@@ -57,11 +54,9 @@ fn apply_preset(settings: &mut SceneSettings, document: &Document) {
     }
 }
 
-/// Name of the built-in model that a structure asks for; `None` where it names a file.
-pub fn builtin_model(settings: &SceneSettings, structure: &StructureSettings) -> Option<String> {
-    let name = structure.rom.strip_prefix(BUILTIN_PREFIX)?;
-    let of_the_paper = settings.preset == Preset::Paper && !name.ends_with(PAPER_SUFFIX);
-    Some(if of_the_paper { format!("{name}{PAPER_SUFFIX}") } else { name.to_owned() })
+/// Returns the name of the built-in model of a structure, `None` if it names a ROM file.
+pub fn builtin_model(structure: &StructureSettings) -> Option<&str> {
+    structure.rom.strip_prefix(BUILTIN_PREFIX)
 }
 
 /// A scene as TOML; reading it back gives the same settings, bit for bit.

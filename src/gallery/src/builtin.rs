@@ -1,7 +1,6 @@
 //! Models that ship with tiprub, by the name after `builtin:` in a scene; reduced when first asked for.
 
 use tiprub_core::Rom;
-use tiprub_format::PAPER_SUFFIX;
 use tiprub_model::{
     CasingOptions, Mesh, Rotor37Options,
     casing::CASING37,
@@ -23,15 +22,24 @@ use crate::{
     rom_cache::RomCache,
 };
 
-/// The bladed disk of the stage, with contact nodes as the paper's.
+/// Rotor 37, recommended: nine patches along the chord in two rows, which stand at the sides of its tip.
+pub(crate) const ROTOR37: &str = "rotor37";
+/// Rotor 37 with one row of patches: contact is averaged over the thickness of the tip.
+pub(crate) const ROTOR37_ONE_ROW: &str = "rotor37-one-row";
+/// [`ROTOR37_ONE_ROW`] with the effects of spin.
+pub(crate) const ROTOR37_ONE_ROW_SPIN: &str = "rotor37-one-row-spin";
+/// Rotor 37 with the paper's kind of model: Craig-Bampton modes and three contact nodes.
+pub(crate) const ROTOR37_PAPER: &str = "rotor37-paper";
+
+/// Bladed disk of the stage, recommended: nine patches along the chord of every blade in two rows.
 pub(crate) const STAGE: &str = "stage";
-/// The same with two rows of patches.
-pub(crate) const STAGE_ROWS: &str = "stage-rows";
-/// The casing of the stage.
+/// Bladed disk of the stage with three contact nodes per blade, as in the paper.
+pub(crate) const STAGE_NODES: &str = "stage-nodes";
+/// Casing of the stage.
 pub(crate) const STAGE_CASING: &str = "stage-casing";
-/// The same two on coarse meshes, for tests and first looks: shapes alike, frequencies some percent off.
-pub(crate) const STAGE_COARSE: &str = "stage-coarse";
-/// See [`STAGE_COARSE`].
+/// [`STAGE_NODES`] on a coarse mesh, for tests and first looks: similar shapes, frequencies some percent off.
+pub(crate) const STAGE_NODES_COARSE: &str = "stage-nodes-coarse";
+/// [`STAGE_CASING`] on a coarse mesh.
 pub(crate) const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
 
 /// The cube of the cube between two rings.
@@ -39,20 +47,18 @@ pub const CUBE: &str = "cube";
 /// Its rings.
 pub const RINGS: [(&str, Side); 2] = [("ring-left", Side::Left), ("ring-right", Side::Right)];
 
-/// Rotor 37 with two rows of patches, which stand at the sides of its tip.
-pub(crate) const ROWS: &str = "rotor37-rows";
-
 /// Every name that [`rom`] knows.
 #[cfg(test)]
-pub(crate) const NAMES: [&str; 12] = [
-    "rotor37",
-    "rotor37-spin",
-    ROWS,
+pub(crate) const NAMES: [&str; 13] = [
+    ROTOR37,
+    ROTOR37_ONE_ROW,
+    ROTOR37_ONE_ROW_SPIN,
+    ROTOR37_PAPER,
     CASING37,
     STAGE,
-    STAGE_ROWS,
+    STAGE_NODES,
     STAGE_CASING,
-    STAGE_COARSE,
+    STAGE_NODES_COARSE,
     STAGE_CASING_COARSE,
     CUBE,
     RINGS[0].0,
@@ -61,25 +67,21 @@ pub(crate) const NAMES: [&str; 12] = [
 
 /// The model of this name; `None` where there is no such model.
 pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
-    let (whole, name) = (name, plain(name));
-    let blade = |spin| {
-        let options = Rotor37Options { spin, ..rotor37(whole) };
-        let rom = cache.get(whole, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom))?;
-        Ok(known::told(&options, rom))
-    };
+    if let Some(options) = rotor37(name) {
+        let reduced = cache.get(name, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom));
+        return Some(reduced.map(|rom| known::told(&options, rom)));
+    }
     let disk = || {
         let model = DiskModel::named(name);
         let rom = cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))?;
         Ok(known::told(&model.options, rom))
     };
     Some(match name {
-        "rotor37" | ROWS => blade(None),
-        "rotor37-spin" => blade(Some(DESIGN_SPEED)),
         CASING37 => {
             let options = CasingOptions::default();
             cache.get(name, &options, console, &|| Ok(reduction::casing(&options, console)?.rom))
         }
-        STAGE | STAGE_ROWS | STAGE_COARSE => disk(),
+        STAGE | STAGE_NODES | STAGE_NODES_COARSE => disk(),
         STAGE_CASING | STAGE_CASING_COARSE => {
             let options = stage_casing(name == STAGE_CASING_COARSE);
             let title = "Reducing the casing of the stage";
@@ -98,23 +100,20 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
     })
 }
 
-/// Without the ending of the paper's models; those that have no other are the paper's.
-fn plain(name: &str) -> &str {
-    name.strip_suffix(PAPER_SUFFIX).unwrap_or(name)
-}
-
-/// The blade as it ships, with rows of patches, or as the paper has it.
-fn rotor37(name: &str) -> Rotor37Options {
+/// Options of the built-in blade with this name; `None` if there is no such blade.
+fn rotor37(name: &str) -> Option<Rotor37Options> {
     match name {
-        name if name.ends_with(PAPER_SUFFIX) => Rotor37Options::paper(),
-        ROWS => Rotor37Options::in_rows(),
-        _ => Rotor37Options::default(),
+        ROTOR37 => Some(Rotor37Options::default()),
+        ROTOR37_ONE_ROW => Some(Rotor37Options::one_row()),
+        ROTOR37_ONE_ROW_SPIN => Some(Rotor37Options { spin: Some(DESIGN_SPEED), ..Rotor37Options::one_row() }),
+        ROTOR37_PAPER => Some(Rotor37Options::paper()),
+        _ => None,
     }
 }
 
 /// Whether the contact nodes of a model can be chosen anew by their number: blades along their chord.
 pub fn has_chord(name: &str) -> bool {
-    name.starts_with("rotor37") || [STAGE, STAGE_ROWS, STAGE_COARSE].contains(&plain(name))
+    rotor37(name).is_some() || [STAGE, STAGE_NODES, STAGE_NODES_COARSE].contains(&name)
 }
 
 /// Meshes of blades beside the one that ships: numbers of elements along the edges, as factors on its own, the coarsest first.
@@ -154,17 +153,14 @@ pub fn refined(name: &str, other: Other, cache: &RomCache, console: &Console) ->
     let keep = |options: &dyn core::fmt::Debug, make: &dyn Fn() -> Result<Rom>| {
         cache.get(&other.told(name), options, console, make)
     };
-    let of_blade = |spin| {
-        let defaults = rotor37(name);
+    if let Some(defaults) = rotor37(name) {
         let mesh = rotor37_mesh(defaults.mesh, other.mesh);
-        let options = Rotor37Options { spin, mesh, tip: other.tip, modes: times(defaults.modes), ..defaults };
-        keep(&options, &|| Ok(reduction::rotor37(&options, console)?.rom))
-    };
-    Some(match plain(name) {
-        "rotor37" | ROWS => of_blade(None),
-        "rotor37-spin" => of_blade(Some(DESIGN_SPEED)),
-        name @ (STAGE | STAGE_ROWS | STAGE_COARSE) => {
-            let (name, options) = stage_named(name);
+        let options = Rotor37Options { mesh, tip: other.tip, modes: times(defaults.modes), ..defaults };
+        return Some(keep(&options, &|| Ok(reduction::rotor37(&options, console)?.rom)));
+    }
+    Some(match name {
+        STAGE | STAGE_NODES | STAGE_NODES_COARSE => {
+            let DiskModel { name, options } = DiskModel::named(name);
             let kind = match other.tip {
                 Tip::Nodes(_) => StageOptions::default().kind,
                 Tip::Patches(_) | Tip::Rows(_) => ReductionKind::FreeInterface,
@@ -200,16 +196,14 @@ pub fn refined(name: &str, other: Other, cache: &RomCache, console: &Console) ->
 /// # Errors
 /// A factor that leaves no element.
 pub fn mesh_nodes(name: &str, mesh: f64) -> Option<Result<usize>> {
-    let nodes = match plain(name) {
-        "rotor37" | "rotor37-spin" | ROWS => {
-            blade_mesh(rotor37_mesh(rotor37(name).mesh, mesh)).map(|blade| blade.mesh.nodes.len())
-        }
-        name @ (STAGE | STAGE_ROWS | STAGE_COARSE) => {
-            let sector = stage_named(name).1.sector;
-            let options = SectorOptions { counts: stage_mesh(sector.counts, mesh), ..sector };
-            sector_mesh(&options).map(|sector| sector.mesh.nodes.len())
-        }
-        _ => return None,
+    let nodes = if let Some(blade) = rotor37(name) {
+        blade_mesh(rotor37_mesh(blade.mesh, mesh)).map(|blade| blade.mesh.nodes.len())
+    } else if has_chord(name) {
+        let sector = DiskModel::named(name).options.sector;
+        let options = SectorOptions { counts: stage_mesh(sector.counts, mesh), ..sector };
+        sector_mesh(&options).map(|sector| sector.mesh.nodes.len())
+    } else {
+        return None;
     };
     Some(nodes.map_err(|error| reduction::failure(name, error)))
 }
@@ -244,29 +238,23 @@ fn scaled(modes: usize, factor: f64) -> usize {
     (modes as f64 * factor).round() as usize
 }
 
-/// Name and options of the bladed disk of the stage, of the paper's size or coarse.
-pub fn stage(coarse: bool) -> (&'static str, StageOptions) {
+/// Name and options of the bladed disk of the stage with three contact nodes per blade, full size or coarse.
+pub fn stage_nodes(coarse: bool) -> (&'static str, StageOptions) {
     if coarse {
-        (STAGE_COARSE, StageOptions { modes: ModeSelection::Families(12), ..StageOptions::coarse() })
+        (STAGE_NODES_COARSE, StageOptions { modes: ModeSelection::Families(12), ..StageOptions::coarse() })
     } else {
-        (STAGE, StageOptions::default())
+        (STAGE_NODES, StageOptions::default())
     }
 }
 
-/// The disk of this name; of every other that of the paper's size.
-fn stage_named(name: &str) -> (&'static str, StageOptions) {
-    match name {
-        STAGE_ROWS => (STAGE_ROWS, stage_in_rows()),
-        name => stage(name == STAGE_COARSE),
-    }
+/// Name and options of the bladed disk of the stage, full size, with nine patches along the chord in two rows at the sides of the tips.
+pub fn stage() -> (&'static str, StageOptions) {
+    let options =
+        StageOptions { tip: Tip::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..StageOptions::default() };
+    (STAGE, options)
 }
 
-/// Of the paper's size, with nine patches along the chord in two rows, which stand at the sides of the tips.
-pub fn stage_in_rows() -> StageOptions {
-    StageOptions { tip: Tip::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..StageOptions::default() }
-}
-
-/// The bladed disk of the stage, of the paper's size or coarse.
+/// A bladed disk of the stage: its name and what it is reduced from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiskModel {
     name: &'static str,
@@ -274,15 +262,19 @@ pub struct DiskModel {
 }
 
 impl DiskModel {
-    /// What is reduced; nothing is done yet.
-    pub fn new(coarse: bool) -> Self {
-        let (name, options) = stage(coarse);
+    /// The disk with three contact nodes per blade, full size or coarse; not yet reduced.
+    pub fn with_nodes(coarse: bool) -> Self {
+        let (name, options) = stage_nodes(coarse);
         Self { name, options }
     }
 
-    /// The disk of a name that ships.
+    /// The built-in disk with this name, [`STAGE`] for any other name.
     fn named(name: &str) -> Self {
-        let (name, options) = stage_named(name);
+        let (name, options) = match name {
+            STAGE_NODES => stage_nodes(false),
+            STAGE_NODES_COARSE => stage_nodes(true),
+            _ => stage(),
+        };
         Self { name, options }
     }
 
@@ -331,17 +323,18 @@ mod tests {
         for name in [CUBE, "none"] {
             assert!(refined(name, with(2.0), &off, &console).is_none(), "{name}");
         }
-        assert!(has_chord("rotor37-spin") && has_chord(STAGE) && !has_chord(STAGE_CASING) && !has_chord(CUBE));
+        assert!(has_chord(ROTOR37_ONE_ROW_SPIN) && has_chord(STAGE) && !has_chord(STAGE_CASING) && !has_chord(CUBE));
     }
 
     /// Every other mesh is one: its nodes grow with the factor, and a factor of 1 is the mesh that ships.
     #[test]
     fn other_meshes_are_coarser_and_finer() {
-        for (name, own) in [("rotor37", rotor37("rotor37").mesh), ("rotor37-paper", rotor37("rotor37-paper").mesh)] {
+        for name in [ROTOR37, ROTOR37_PAPER] {
+            let own = rotor37(name).unwrap().mesh;
             assert_eq!(rotor37_mesh(own, 1.0), own, "{name}");
         }
         assert_eq!(stage_mesh(SectorCounts::default(), 1.0), SectorCounts::default());
-        for name in ["rotor37", "rotor37-paper", STAGE] {
+        for name in [ROTOR37, ROTOR37_PAPER, STAGE] {
             let [coarsest, coarse, fine] = MESHES.map(|factor| mesh_nodes(name, factor).unwrap().unwrap());
             let own = mesh_nodes(name, 1.0).unwrap().unwrap();
             assert!(coarsest < coarse && coarse < own && own < fine, "{name}: {coarsest} {coarse} {own} {fine}");

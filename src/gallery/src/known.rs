@@ -28,7 +28,7 @@ struct Row {
 
 /// All rows.
 fn rows() -> [Row; 5] {
-    let rotor37 = Rotor37Options {
+    let one_row = Rotor37Options {
         mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
         tip: Tip::Patches(9),
         kind: ReductionKind::FreeInterface,
@@ -67,12 +67,12 @@ fn rows() -> [Row; 5] {
             errors: [Some(0.0014), None, None, Some(0.0084)],
         },
         Row {
-            options: format!("{rotor37:?}"),
+            options: format!("{one_row:?}"),
             found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms",
             errors: [Some(0.0176), Some(0.0311), Some(0.274), Some(0.0557)],
         },
         Row {
-            options: format!("{:?}", Rotor37Options { tip: Tip::Rows([9, 2]), ..rotor37.clone() }),
+            options: format!("{:?}", Rotor37Options { tip: Tip::Rows([9, 2]), ..one_row.clone() }),
             found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms",
             errors: [Some(0.0191), Some(0.0204), Some(0.0046), Some(0.0485)],
         },
@@ -100,7 +100,7 @@ mod tests {
     use tiprub_shell::console::Console;
 
     use super::*;
-    use crate::{builtin::stage_in_rows, reduction};
+    use crate::{builtin, reduction};
 
     /// With other defaults a row is of no model any more: renew the figures.
     #[test]
@@ -118,7 +118,7 @@ mod tests {
         let rom = told(&own, rom);
         let errors = rom.checks.rub_errors.clone().expect("a row of the blade that ships");
         assert!(
-            errors.found_on.contains("light rub") && errors.mesh.is_some() && errors.rows == Some(0.274),
+            errors.found_on.contains("light rub") && errors.rows == Some(0.0046) && errors.mesh == Some(0.0485),
             "{errors:?}"
         );
         assert!(
@@ -127,13 +127,13 @@ mod tests {
                 .rub_errors
                 .is_some_and(|errors| errors.patches == Some(0.34))
         );
-        let two = told(&Rotor37Options::in_rows(), rom.clone()).checks.rub_errors;
-        assert!(two.is_some_and(|errors| errors.rows == Some(0.0046) && errors.mesh == Some(0.0485)));
+        let one = told(&Rotor37Options::one_row(), rom.clone()).checks.rub_errors;
+        assert!(one.is_some_and(|errors| errors.rows == Some(0.274) && errors.mesh.is_some()));
         let stage = told(&StageOptions::default(), rom.clone()).checks.rub_errors;
         assert!(stage.is_some_and(|errors| errors.patches == Some(0.102) && errors.rows.is_none()));
-        let stage = told(&stage_in_rows(), rom.clone()).checks.rub_errors;
+        let stage = told(&builtin::stage().1, rom.clone()).checks.rub_errors;
         assert!(stage.is_some_and(|errors| errors.modes == Some(0.0014) && errors.mesh == Some(0.0084)));
-        let wider = StageOptions { tip: Tip::Rows([5, 2]), ..stage_in_rows() };
+        let wider = StageOptions { tip: Tip::Rows([5, 2]), ..builtin::stage().1 };
         for other in [StageOptions::coarse(), wider] {
             assert_eq!(told(&other, rom.clone()).checks.rub_errors, None, "{other:?}");
         }

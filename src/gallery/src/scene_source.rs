@@ -135,7 +135,7 @@ fn builtin_scene(name: &str, text: &str, reduce: &dyn Fn(&str) -> Option<Result<
     let settings = tiprub_format::parse_scene(text, name)?;
     let mut roms = Vec::new();
     for structure in &settings.structures {
-        let model = builtin_model(&settings, structure).and_then(|name| reduce(&name));
+        let model = builtin_model(structure).and_then(reduce);
         let model = model.unwrap_or_else(|| Err("not known".into()));
         roms.push(model.map_err(|problem| Failure::new(&structure.rom, problem, ""))?);
     }
@@ -215,6 +215,18 @@ mod tests {
             let models = settings.structures.iter().map(|structure| &structure.rom[BUILTIN.len()..]);
             assert!(models.clone().all(|model| builtin::NAMES.contains(&model)), "{name}");
         }
+    }
+
+    #[test]
+    fn scene_and_model_of_one_name_belong_together() {
+        let shared = ["rotor37", "rotor37-one-row", "rotor37-paper", "stage", "stage-nodes"];
+        for name in shared {
+            let (_, text) = BUILTIN_SCENES.iter().find(|(scene, _)| *scene == name).unwrap();
+            let settings = tiprub_format::parse_scene(text, name).unwrap();
+            assert_eq!(settings.structures[0].rom, format!("{BUILTIN}{name}"));
+        }
+        let both = BUILTIN_SCENES.iter().filter(|(scene, _)| builtin::NAMES.contains(scene));
+        assert_eq!(both.count(), shared.len());
     }
 
     #[test]

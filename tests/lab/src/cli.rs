@@ -254,11 +254,11 @@ impl Cli {
             Command::Error(arguments) => error::study(arguments, console),
             Command::Convergence(common) => {
                 let start = std::time::Instant::now();
-                let (reduction, _) = DiskModel::new(common.quick).reduce(console)?;
+                let (reduction, _) = DiskModel::with_nodes(common.quick).reduce(console)?;
                 convergence::study(&reduction, start.elapsed().as_secs_f64(), common.quick)
             }
             Command::Modes(arguments) => {
-                let (reduction, mesh) = DiskModel::new(arguments.common.quick).reduce(console)?;
+                let (reduction, mesh) = DiskModel::with_nodes(arguments.common.quick).reduce(console)?;
                 modes::study(&reduction, &mesh, arguments.speed, arguments.common.quick)
             }
             Command::Stage(arguments) => stage::study(arguments, console),

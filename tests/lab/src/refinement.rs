@@ -99,13 +99,13 @@ impl Standard {
     fn scene(&self, cache: &RomCache, console: &Console) -> Result<Scene> {
         let rom = |(index, structure): (usize, &tiprub_core::settings::StructureSettings)| -> Result<Rom> {
             let missing = || Failure::new(&structure.rom, "no such model", "");
-            let name = tiprub_format::builtin_model(&self.settings, structure).ok_or_else(missing)?;
+            let name = tiprub_format::builtin_model(structure).ok_or_else(missing)?;
             let found = match self.other.filter(|_| index == 0) {
                 Some((tip, mesh)) => {
                     let other = Other { modes: 1.0, tip, mesh };
-                    builtin::refined(&name, other, cache, console)
+                    builtin::refined(name, other, cache, console)
                 }
-                None => builtin::rom(&name, cache, console),
+                None => builtin::rom(name, cache, console),
             };
             found.ok_or_else(missing)?
         };
@@ -433,8 +433,8 @@ mod tests {
         let of = |name: &str| all.iter().find(|standard| standard.name == name).unwrap();
         let friction = |name: &str| of(name).settings.contacts[0].friction.to_bits();
         for (names, tip) in [
-            (["stage-smooth", "stage", "stage-digging"], builtin::stage_in_rows().tip),
-            (["stage-nodes-smooth", "stage-nodes", "stage-nodes-digging"], builtin::stage(false).1.tip),
+            (["stage-smooth", "stage", "stage-digging"], builtin::stage().1.tip),
+            (["stage-nodes-smooth", "stage-nodes", "stage-nodes-digging"], builtin::stage_nodes(false).1.tip),
         ] {
             assert!(names.iter().all(|name| of(name).other.unwrap().0 == tip), "{names:?}");
         }
@@ -448,6 +448,6 @@ mod tests {
         assert!(all.iter().all(|standard| FAMILIES.contains(&standard.family) || standard.family == APART));
         // The scene that ships has two rows, and the other one is held beside it.
         let rows = |name: &str| of(name).settings.structures[0].rom.clone();
-        assert_eq!(["rotor37-light", "rotor37-one-row"].map(rows), ["builtin:rotor37-rows", "builtin:rotor37"]);
+        assert_eq!(["rotor37-light", "rotor37-one-row"].map(rows), ["builtin:rotor37", "builtin:rotor37-one-row"]);
     }
 }

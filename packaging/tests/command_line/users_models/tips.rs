@@ -11,7 +11,7 @@ use super::{Project, data, guide};
 fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     let project = Project::new(&[]);
     let own = project
-        .succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp --contact-patches 4 --modes 20 -o own.rom.safetensors");
+        .succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp --contact-patches 4 --contact-rows 1 --modes 20 -o own.rom.safetensors");
     assert!(
         own["rom"]["origin"].as_str().unwrap().contains("forces on 4 patches and 20 free-interface modes"),
         "{own:#}"
@@ -38,13 +38,13 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
             .unwrap();
     project.write(
         "scene.toml",
-        scene.replace("builtin:rotor37", "read.rom.safetensors").replace("modal-exact", "massless-boundary"),
+        scene.replace("builtin:rotor37-one-row", "read.rom.safetensors").replace("modal-exact", "massless-boundary"),
     );
     let run = project.succeed("run scene.toml --stop 0.003");
     assert!(run["last"]["friction_loss"].as_f64().unwrap() > 100.0, "{run:#}");
     for (line, told) in [
         ("reduce rotor37 --contact-patches 4 --contact-nodes 3", "cannot be used with"),
-        ("reduce rotor37 --mesh 6x1x6 --contact-patches 40", "40 is outside 1..=16"),
+        ("reduce rotor37 --mesh 6x1x6 --contact-patches 40 --contact-rows 1", "40 is outside 1..=16"),
         (
             "reduce blade blade.inp --contact-set TIP --clamp-set HUB --contact-patches 2 --contact-names a",
             "1 names for 2 contact patches",
@@ -91,7 +91,7 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     assert_eq!(names, ["a_row_1", "b_row_1", "a_row_2", "b_row_2"]);
     // The scene that ships with rows, around the coarse blade.
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37.toml");
-    let scene = fs::read_to_string(path).unwrap().replace("builtin:rotor37-rows", "read.rom.safetensors");
+    let scene = fs::read_to_string(path).unwrap().replace("builtin:rotor37", "read.rom.safetensors");
     project.write("scene.toml", &scene);
     let run = project.succeed("run scene.toml --stop 0.003 --estimate");
     assert!(run["last"]["friction_loss"].as_f64().unwrap() > 100.0, "{run:#}");
@@ -109,7 +109,7 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     assert!(told.contains("contact[1].coating: excludes a ROM whose contact patches are in rows"), "{told}");
     for (line, told, code) in [
         ("reduce rotor37 --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
-        ("reduce stage --contact-rows 2".to_owned(), "--contact-patches", 2),
+        ("reduce stage --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
         (format!("{common} --contact-rows 2 -o no.rom"), "Say how many patches along the chord", 2),
         (
             format!("{common} --contact-patches 4 --contact-rows 14 -o no.rom"),

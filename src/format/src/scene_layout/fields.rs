@@ -21,8 +21,7 @@ pub const FIELDS: [SceneField; 98] = [
         "text",
         Some("`none`"),
         "`none`, `paper`",
-        "`paper`: the paper's method and models whole. Central differences, solver `film`, and of built-in models those with \
-         Craig-Bampton modes and contact at nodes.",
+        "`paper`: the paper's method, central differences with solver `film`. Its kind of model is `builtin:rotor37-paper`.",
     ),
     field("structure.name", "text", None, "as `name` of the scene", "Name by which contacts refer to it."),
     field(

@@ -67,15 +67,6 @@ fn the_papers_preset_is_the_method_whole() {
         let told = parse_scene(&text, "demo.toml").unwrap_err().to_string();
         assert!(told.contains(key) && told.contains("the method of the paper whole"), "{told}");
     }
-    // Models that ship come as the paper has them; files are what they are.
-    let model = |rom: &str, preset: Preset| {
-        let structure = StructureSettings { rom: rom.into(), ..StructureSettings::default() };
-        builtin_model(&SceneSettings { preset, ..scene.clone() }, &structure)
-    };
-    assert_eq!(model("builtin:rotor37", Preset::Paper).as_deref(), Some("rotor37-paper"));
-    assert_eq!(model("builtin:rotor37-paper", Preset::Paper).as_deref(), Some("rotor37-paper"));
-    assert_eq!(model("builtin:rotor37", Preset::None).as_deref(), Some("rotor37"));
-    assert_eq!(model("rotor.safetensors", Preset::Paper), None);
 }
 
 #[test]

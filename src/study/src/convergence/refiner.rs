@@ -53,7 +53,7 @@ impl<'a> Refiner<'a> {
         let mut refiner = Self { scene, own, again, mesh_nodes: None };
         refiner.mesh_nodes = match again.source {
             Some(source) => Some(refiner.check(source)?),
-            None => refiner.with_chord().and_then(|name| builtin::mesh_nodes(&name, again.mesh)).transpose()?,
+            None => refiner.with_chord().and_then(|name| builtin::mesh_nodes(name, again.mesh)).transpose()?,
         };
         Ok(refiner)
     }
@@ -80,7 +80,7 @@ impl<'a> Refiner<'a> {
             (Some(source), _) => source.reduce(None, factor * modes, tip, self.again.console).map(|found| found.rom),
             (None, Some(name)) => {
                 let other = Other { modes: factor as f64, tip, mesh: self.again.mesh };
-                builtin::refined(&name, other, self.again.cache, self.again.console)?
+                builtin::refined(name, other, self.again.cache, self.again.console)?
             }
             (None, None) => return None,
         };
@@ -126,9 +126,9 @@ impl<'a> Refiner<'a> {
     }
 
     /// The master where it is a model that ships and whose contact nodes and mesh can be chosen anew.
-    pub(super) fn with_chord(&self) -> Option<String> {
+    pub(super) fn with_chord(&self) -> Option<&'a str> {
         let structure = &self.scene.settings.structures[master(self.scene)];
-        builtin_model(&self.scene.settings, structure).filter(|name| builtin::has_chord(name))
+        builtin_model(structure).filter(|name| builtin::has_chord(name))
     }
 
     /// The source must give what the scene has; anything else would be a study of another model. Nodes of its mesh.
@@ -236,10 +236,10 @@ impl<'a> Refiner<'a> {
                 self.reduced(source, None, [count(factor * own as f64) as usize, nodes]).map(|found| found.rom)
             }
             None => {
-                let name = builtin_model(&self.scene.settings, &self.scene.settings.structures[index])?;
+                let name = builtin_model(&self.scene.settings.structures[index])?;
                 let mesh = if master { self.again.mesh } else { 1.0 };
                 let other = Other { modes: factor, tip: self.tip(nodes), mesh };
-                builtin::refined(&name, other, self.again.cache, self.again.console)?
+                builtin::refined(name, other, self.again.cache, self.again.console)?
             }
         };
         Some(again.map(|again| named_as(&self.scene.roms[index], again)))
@@ -291,7 +291,7 @@ impl<'a> Refiner<'a> {
             let rom = match (self.again.source, &builtin) {
                 _ if nodes == own => Ok(self.scene.roms[index].clone()),
                 (Some(source), _) => self.reduced(source, None, [modes, nodes]).map(|found| found.rom),
-                (None, name) => self.built_in(&name.clone().unwrap_or_default(), nodes, 1.0),
+                (None, name) => self.built_in(name.unwrap_or_default(), nodes, 1.0),
             };
             match rom {
                 Ok(rom) if nodes == own => {
@@ -370,8 +370,8 @@ impl<'a> Refiner<'a> {
                 let name = name.unwrap_or_default();
                 let factors = if self.again.quick { &builtin::MESHES[..1] } else { &builtin::MESHES[..] };
                 for factor in factors {
-                    let rom = self.built_in(&name, nodes, *factor)?;
-                    let of_mesh = builtin::mesh_nodes(&name, factor * self.again.mesh).transpose()?.unwrap_or_default();
+                    let rom = self.built_in(name, nodes, *factor)?;
+                    let of_mesh = builtin::mesh_nodes(name, factor * self.again.mesh).transpose()?.unwrap_or_default();
                     found.push(Meshed { rom, nodes: of_mesh });
                 }
             }

@@ -58,7 +58,7 @@ impl Refiner<'_> {
         let tip = self.tip_in_rows(along, rows);
         match (self.again.source, self.with_chord()) {
             (Some(source), _) => Some(source.reduce(None, modes, tip, self.again.console).map(|found| found.rom)),
-            (None, Some(name)) => Some(self.built_in_with(&name, tip, 1.0)),
+            (None, Some(name)) => Some(self.built_in_with(name, tip, 1.0)),
             (None, None) => None,
         }
     }

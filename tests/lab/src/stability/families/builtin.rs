@@ -84,7 +84,7 @@ fn rotor37() -> Vec<Case> {
 
 /// Against bumps that nothing moves.
 fn grown(friction: f64, step: f64) -> Result<Vec<Check>> {
-    let Some(rom) = model("rotor37") else { return Ok(Vec::new()) };
+    let Some(rom) = model("rotor37-one-row") else { return Ok(Vec::new()) };
     let mut scene = super::super::models::bumps(rom);
     scene.settings.contacts[0].friction = friction;
     scene.settings.structures[0].speed = 1800.0;
@@ -93,7 +93,7 @@ fn grown(friction: f64, step: f64) -> Result<Vec<Check>> {
 }
 
 fn at_limit(scheme: Scheme, solver: Solver, factor: f64) -> Happened {
-    let Some(rom) = model("rotor37") else { return Happened::refused("there is no rotor 37") };
+    let Some(rom) = model("rotor37-one-row") else { return Happened::refused("there is no rotor 37") };
     let fastest = tiprub_core::dynamics::modal::ModalModel::from_rom(&rom, 0.0)
         .map_or(f64::NAN, |model| model.largest_frequency());
     let mut scene = with_methods(round(rom), scheme, solver);
@@ -131,7 +131,7 @@ fn share_of_limit(share: f64, damping: f64) -> Happened {
 }
 
 fn rubbed(solver: Solver, friction: f64, sense: f64) -> Result<Vec<Check>> {
-    let Some(rom) = model("rotor37") else { return Ok(Vec::new()) };
+    let Some(rom) = model("rotor37-one-row") else { return Ok(Vec::new()) };
     let mut scene = super::super::models::bumps(rom);
     scene.settings.contacts[0].friction = friction;
     scene.settings.structures[0].speed = 1800.0 * sense;
