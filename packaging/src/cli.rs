@@ -213,7 +213,7 @@ pub enum StudyCommand {
     )]
     Error(Box<ErrorCommand>),
     /// Over friction, speed and internal step: what is right, warned of or refused and why, growth rates of sliding contact, and the
-    /// largest usable step of every scheme and solver.
+    /// largest accepted step of every scheme and solver.
     #[command(
         after_help = "Examples:\n  tiprub study stability scene.toml\n  tiprub study stability builtin:rotor37 --quick\n  \
                             tiprub study stability scene.toml --friction 0:0.6:13 --speeds -1700:1700:2 --steps 1e-7:2e-5:12\n\n\

@@ -260,7 +260,7 @@ fn three_steps(root: &Path, [friction, speed, step]: [f64; 3], method: &str) -> 
     serde_json::from_slice(&output.unwrap().stdout).unwrap()
 }
 
-/// Every answer of the study is that of a run with the same start values and step, and the largest usable steps part what is accepted
+/// Every answer of the study is that of a run with the same start values and step, and the largest accepted steps part what is accepted
 /// from what is refused.
 #[test]
 fn the_study_of_stability_answers_as_runs_do() {
@@ -298,7 +298,7 @@ fn the_study_of_stability_answers_as_runs_do() {
         assert_eq!(row[6].is_finite(), row[4] > 0.0, "what flutters has a frequency: {row:?}");
     }
     let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
-    assert!(page.contains("Largest usable internal step") && page.contains("Read a column"));
+    assert!(page.contains("Largest internal step that the start of a run accepts") && page.contains("Read a column"));
 }
 
 #[test]

@@ -180,15 +180,23 @@ impl Compiled {
         length / (length / largest * (1.0 - super::SAME_STEP)).ceil().max(1.0)
     }
 
-    /// A refusal whose remedy works with the preset of the scene.
+    /// A refusal whose remedy suits the scene: of a step it names adaptive steps first, where the scene allows them.
     fn of_preset(&self, error: Error) -> Error {
-        match error {
-            Error::Unstable { problem, remedy } if self.scene.settings.preset == Preset::Paper => {
-                let without = ", or leave `preset` out, which fixes the scheme";
-                Error::Unstable { problem, remedy: remedy.replace(stability::OTHER_SCHEME, without) }
-            }
-            other => other,
+        let Error::Unstable { problem, mut remedy } = error else { return error };
+        let preset = self.scene.settings.preset == Preset::Paper;
+        if preset {
+            remedy = remedy.replace(stability::OTHER_SCHEME, ", or leave `preset` out, which fixes the scheme");
         }
+        let of_step = |text: &str| text.contains("`time.step`");
+        let solver = self.scene.settings.contacts[0].solver;
+        let adaptive = if solver == Solver::Film { Solver::Lcp } else { solver };
+        if (of_step(&remedy) || of_step(&problem)) && self.scene.check_methods(Scheme::Galerkin, adaptive).is_ok() {
+            let without = if preset { "without `preset` " } else { "" };
+            let with = if solver == adaptive { "" } else { " with `contact.solver = \"lcp\"`" };
+            let rest = remedy[..1].to_lowercase() + &remedy[1..];
+            remedy = format!("Use adaptive steps ({without}`time.scheme = \"galerkin\"`{with}), or {rest}");
+        }
+        Error::Unstable { problem, remedy }
     }
 
     /// Largest factor on the frequencies of a structure.

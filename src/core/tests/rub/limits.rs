@@ -3,8 +3,8 @@
 use crate::blades::{crowded, energy, on_a_ring, round, with_step};
 use nalgebra::DMatrix;
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::settings::{Scheme, Solver, TimeSettings};
-use tiprub_core::{Scene, Simulation};
+use tiprub_core::settings::{ExcitationSettings, Scheme, Solver, TimeSettings};
+use tiprub_core::{Error, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, disk, go, real, reference, saved, set, try_started};
 
 /// The largest usable step that a refusal names (s).
@@ -243,8 +243,9 @@ fn steps_that_add_growth_are_refused_from_one_length_on() {
                 try_started(&scene).map(drop).map_err(|error| error.to_string())
             };
             let mut refused = None;
-            for octave in 0..10 {
-                let outcome = at(0.1 / highest * f64::from(1 << octave));
+            // Steps of all lengths, not only those that the check looks at.
+            for place in 0..30 {
+                let outcome = at(0.1 / highest * 1.27_f64.powi(place));
                 assert!(refused.is_none() || outcome.is_err(), "{seed}, {scheme:?}: {refused:?}");
                 let Err(message) = outcome else { continue };
                 if let Some((_, rest)) = message.split_once("too long for friction") {
@@ -259,6 +260,40 @@ fn steps_that_add_growth_are_refused_from_one_length_on() {
         }
     }
     assert!(named > 0);
+}
+
+/// Where a fixed step is refused, the remedy names adaptive steps first, if the scene allows them.
+#[test]
+fn refused_steps_name_adaptive_steps_first() {
+    let remedy = |change: &dyn Fn(&mut Scene)| {
+        let mut scene = with_step(round(Scheme::CentralDifference), 1e-3);
+        scene.roms[0] = models::rich_blade(12);
+        change(&mut scene);
+        let Err(Error::Unstable { remedy, .. }) = try_started(&scene).map(drop) else { panic!("accepted") };
+        remedy
+    };
+    let adaptive = "Use adaptive steps (`time.scheme = \"galerkin\"`), or set `time.step` (in the FMU";
+    for scheme in Scheme::RECURRENCES {
+        let found = remedy(&|scene| {
+            (scene.settings.time.scheme, scene.settings.contacts[0].solver) = (scheme, Solver::Lcp);
+        });
+        assert!(found.starts_with(adaptive), "{scheme:?}: {found}");
+    }
+    let film = remedy(&|scene| scene.settings.contacts[0].solver = Solver::Film);
+    assert!(film.contains("\"galerkin\"` with `contact.solver = \"lcp\"`), or set `time.step`"), "{film}");
+    // Too few modes, and what its tables do not have.
+    let few = remedy(&|scene| scene.roms[0] = models::blade(12));
+    let excited = remedy(&|scene| {
+        scene.settings.structures[0].excitation = Some(ExcitationSettings {
+            order: 2,
+            mode: Some(1),
+            node: None,
+            direction: None,
+            amplitude: 1.0,
+            phase: 0.0,
+        })
+    });
+    assert!([few, excited].iter().all(|remedy| remedy.starts_with("Set `time.step`")));
 }
 
 /// Remedies work under the preset, and name the keys of the scene.

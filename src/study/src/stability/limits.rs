@@ -74,7 +74,7 @@ pub fn of(asked: &Asked, own: &Own, threads: usize, quick: bool, console: &Conso
     let range = TRIED.map(|product| product / highest);
     // Quickly: from the scene's own step or the resolved one, whichever is longer; below it nothing is looked at.
     let range = if quick { [range[0].max(own.step).min(range[1]), range[1]] } else { range };
-    let task = console.task("Seeking the largest usable steps", Some(Scheme::RECURRENCES.len() as u64));
+    let task = console.task("Seeking the largest accepted steps", Some(Scheme::RECURRENCES.len() as u64));
     let of_scheme = |scheme: &Scheme| {
         let ask = |solver: Solver, step: f64| -> Answer { asked.at((*scheme, solver), step, &place).remove(0) };
         let known = (*scheme == Scheme::CentralDifference).then(|| 2.0 / highest);

@@ -1,5 +1,5 @@
 //! What a scene allows: right, warned or refused over friction, speed and internal step, growth of sliding contact, and the largest
-//! usable step of every scheme and solver.
+//! accepted step of every scheme and solver.
 //!
 //! The answers are those of the core, asked as a run asks it ([`asked`]). [`structure`] holds growth rates and limits of one structure
 //! by itself, [`grid`] what is asked, [`limits`] the largest steps, [`page`] pictures and tables.
@@ -88,7 +88,7 @@ pub struct Found {
     pub grid: Grid,
     /// All answers: step by step, in each speed by speed, in each by friction.
     pub points: Vec<Point>,
-    /// Largest usable steps.
+    /// Largest accepted steps.
     pub limits: Vec<limits::Usable>,
     /// Why growth rates cannot be told, where they cannot.
     pub no_rates: Option<&'static str>,

@@ -16,8 +16,8 @@ const VERDICTS: [Verdict; 4] = [Verdict::Right, Verdict::Warned, Verdict::Flutte
 
 const HOW_TO_READ: &str = "Every cell is the answer to a run with that friction, speed and internal step: the refusal or the warnings that \
     `tiprub run` would give, here without the run. Read a column from the bottom up: where it turns to refused is the longest step for that \
-    friction; growth by friction comes in bands, so that an accepted step above a refused one is possible, and the table of largest usable \
-    steps names the step below the first refusal. Flutter is physics and no error of the step: friction feeds the blades while they touch, and \
+    friction, and no longer one is accepted. The table of largest accepted steps names the step below the first refusal. An accepted step has \
+    passed the checks of the start and has not been run. Flutter is physics and no error of the step: friction feeds the blades while they touch, and \
     a shorter step does not help; a frequency of 0 Hz is divergence, which grows without swinging. The framed cell is the scene as it stands; the words of a cell show where the pointer rests on it, and stand \
     in the table and in answers-in-words.csv.";
 
@@ -60,7 +60,7 @@ pub fn study(found: &Found) -> Result<Study> {
             ),
             (
                 "largest-steps.csv".into(),
-                "largest usable step of every scheme and solver".into(),
+                "largest accepted step of every scheme and solver".into(),
                 limits_csv(found).into_bytes(),
             ),
         ],
@@ -103,7 +103,7 @@ fn facts(found: &Found) -> Vec<(String, String)> {
         ("asked: internal steps (s)".into(), steps),
     ];
     for usable in &found.limits {
-        facts.push((format!("largest usable step, {}", error_study::name(usable.method)), usable.to_text()));
+        facts.push((format!("largest accepted step, {}", error_study::name(usable.method)), usable.to_text()));
     }
     facts
 }
@@ -291,7 +291,7 @@ fn limits_csv(found: &Found) -> String {
 fn limits_table(found: &Found) -> Table {
     let (friction, speed) = (or_none(found.own.friction), or_none(found.own.speed));
     let caption = format!(
-        "Largest usable internal step at the scene's friction ({friction}) and speed ({speed} rad/s), to within 1 %: all shorter ones that were tried are accepted"
+        "Largest internal step that the start of a run accepts at the scene's friction ({friction}) and speed ({speed} rad/s), to within 1 %: all shorter ones that were tried are accepted"
     );
     let mut table = Table::new(caption, ["scheme and solver", "largest step (s)", "what refuses a longer one"]);
     for usable in &found.limits {

@@ -1,10 +1,11 @@
 //! Growth of closed sliding contact: what the equations make of it is told in one warning, what the step adds is refused where it
 //! matters.
 
-use super::checking::{Checking, with_expected};
+use super::checking::Checking;
 use super::in_range;
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
+use crate::simulation::SAME_STEP;
 use crate::stability::judged::{self, Judged};
 use crate::stability::{self, ContactDirections, Fastest, digging};
 use crate::{Error, Result, shown};
@@ -14,8 +15,10 @@ const GROWS: &str = "sliding contact";
 const STEP: &str = "the step makes sliding contact";
 /// A motion whose frequency (rad/s) is a smaller part of its rate grows without swinging.
 const SWINGS: f64 = 0.1;
-/// Steps looked at, at most.
-const MOST_STEPS: usize = 13;
+/// Steps looked at per octave, and octaves from where every mode is resolved well: what is longer is far beyond all that modes resolve, and is
+/// judged by the longest of them.
+const PER_OCTAVE: i32 = 4;
+const OCTAVES: i32 = 13;
 /// Growth with and without the mass of the contact nodes within this factor is that of both.
 const ALIKE: f64 = 1.25;
 
@@ -137,7 +140,7 @@ impl Checking<'_> {
         }
         let sign = [1.0, -1.0][sense];
         let (watched, physics) = self.watched(expected, sign);
-        let steps = looked_at(self.largest_frequency(), self.parameters.step).into_iter();
+        let steps = looked_at(self.largest_frequency(), self.parameters.step);
         let most = |of: &dyn Fn(&Watched) -> Option<Judged>| {
             let judged = watched.iter().filter_map(|watched| Some((watched.nodes.as_slice(), of(watched)?)));
             judged.fold(None, |most: Option<(&[usize], Judged)>, found| match most {
@@ -146,9 +149,8 @@ impl Checking<'_> {
             })
         };
         let at = |step: f64| most(&|watched| self.judged(watched, step, sign));
-        let ranges: Vec<_> = steps.map(|step| (step, at(step))).collect();
-        let ranges = with_expected(ranges, expected, most(&|watched| Some(watched.judged)));
-        Sense { grows: self.grows(&physics, sign), expected, ranges: self.added(&ranges, sign) }
+        let looked: Vec<_> = steps.into_iter().map(|step| (step, at(step))).collect();
+        Sense { grows: self.grows(&physics, sign), expected, ranges: self.added(&looked, sign) }
     }
 
     /// What the equations make of contact that slides in one sense, whatever the step.
@@ -219,7 +221,8 @@ impl Checking<'_> {
         (self.models[model].with_nodes(&places), places.iter().map(|place| all[*place]).collect())
     }
 
-    /// Limits of every range: what a shorter step is refused or told for, a longer one is too.
+    /// Limits of every range, which goes from a step that was looked at up to the next: what a shorter step is refused or told for, a
+    /// longer one is too. The steps are the same whatever the largest, so that a step is refused in every scene that allows longer ones too.
     fn added(&self, ranges: &[Looked<'_>], sign: f64) -> Vec<(f64, Option<Added>)> {
         let mut added: Vec<(f64, Option<Added>)> = Vec::new();
         let (mut allowed, mut quiet) = (f64::INFINITY, f64::INFINITY);
@@ -245,7 +248,8 @@ impl Checking<'_> {
                 refusal: self.refusal(worst, accepted, sign),
                 warning: self.warning(worst, silent, sign),
             });
-            added.push((*step, text));
+            let is_longest = added.len() + 1 == ranges.len();
+            added.push((if is_longest { f64::INFINITY } else { next_step(*step) }, text));
         }
         added.reverse();
         added
@@ -355,14 +359,19 @@ fn confirmed(found: &Fastest, with_mass: Option<&Fastest>) -> String {
     }
 }
 
-/// Steps at which growth is looked at, descending from the largest (s): octaves from where every mode is resolved well, the same ones
-/// whatever the largest.
+/// Steps at which growth is looked at, descending (s): quarters of an octave from where every mode is resolved well up to the largest, the
+/// same ones whatever the largest; where that is shorter than all of them, the shortest.
 fn looked_at(frequency: f64, largest: f64) -> Vec<f64> {
-    let octaves = (0..64).map(|octave| 0.1 / frequency * libm::exp2(f64::from(octave)));
-    let mut steps: Vec<f64> = octaves.take_while(|step| *step < largest * (1.0 - 1e-9)).chain([largest]).collect();
-    steps.reverse();
-    steps.truncate(MOST_STEPS);
-    steps
+    let resolved = 0.1 / frequency;
+    let top = libm::floor(f64::from(PER_OCTAVE) * libm::log2(largest * (1.0 + SAME_STEP) / resolved));
+    #[expect(clippy::cast_possible_truncation, reason = "the range of a step over that of a frequency")]
+    let top = top.clamp(0.0, f64::from(PER_OCTAVE * OCTAVES)) as i32;
+    (0..=top).rev().map(|place| resolved * libm::exp2(f64::from(place) / f64::from(PER_OCTAVE))).collect()
+}
+
+/// The end of the range that begins with a step that was looked at: just below the next (s).
+fn next_step(step: f64) -> f64 {
+    step * libm::exp2(1.0 / f64::from(PER_OCTAVE)) * (1.0 - 1e-6)
 }
 
 /// A step to three digits.
