@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 
 use super::compile::Compiled;
+use super::drive::Input;
 use super::{Quantity, Simulation};
 use crate::dynamics::bank::BankOptions;
 use crate::dynamics::excitation::{Excitation, most_moved};
@@ -273,6 +274,13 @@ impl Simulation {
         // Whole turns, which the phase of the rotor leaves out, are whole turns of any order.
         let angle = (order * self.rotors[body].phase(&rotor.speed, offset)) % std::f64::consts::TAU;
         Some([amplitude.at(offset), angle - phase.at(offset)])
+    }
+
+    /// How fast the excitation turns at an offset, by the speed and by its phase together (rad/s).
+    pub(super) fn excitation_rate(&self, body: usize, offset: f64) -> f64 {
+        let rotor = &self.inputs.rotors[body];
+        let order = self.compiled.references.engine_orders[body].map_or(0.0, |reference| self.values[reference]);
+        order * rotor.speed.at(offset) - rotor.excitation.get(1).map_or(0.0, Input::rate)
     }
 
     /// An excitation must not turn on too far within an internal step, by the speed and by its phase (rad/s) together.

@@ -273,6 +273,7 @@ impl Simulation {
     /// of q.
     fn load(&mut self, offset: f64) {
         let hold = self.holds();
+        let (scheme, step) = (self.system.scheme(), self.system.step_size());
         for body in 0..self.compiled.bodies.len() {
             let rotor = &self.inputs.rotors[body];
             let (speed, temperature) = (rotor.spin.at(offset), rotor.temperature_at(offset));
@@ -281,7 +282,8 @@ impl Simulation {
                 self.compiled.fill_loads(body, speed, temperature, loads);
             }
             if let Some([amplitude, phase]) = self.excitation_at(body, offset) {
-                self.system.structures_mut()[body].modes_mut().excite(amplitude, phase);
+                let factor = scheme.harmonic_factor(step * self.excitation_rate(body, offset));
+                self.system.structures_mut()[body].modes_mut().excite(factor * amplitude, phase);
             }
             if !hold && self.compiled.varies(body) {
                 self.system.set_speed(body, speed, temperature);

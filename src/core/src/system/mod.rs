@@ -219,6 +219,11 @@ impl System {
         self.structures.iter().flat_map(Structure::gaps)
     }
 
+    /// Time-stepping scheme.
+    pub fn scheme(&self) -> Scheme {
+        self.settings.scheme
+    }
+
     /// Length of the internal step (s).
     pub fn step_size(&self) -> f64 {
         self.structures[0].modes().step()

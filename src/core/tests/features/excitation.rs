@@ -85,7 +85,52 @@ fn a_mode_at_resonance_moves_by_the_force_over_twice_damping_and_stiffness() {
             off(&mut started(&scene), order, expected)
         });
         println!("| {} | {:.1e} | {:.1e} |", scheme.name(), errors[0], errors[1]);
-        assert!(errors[1] < 5e-5 && errors[0] / errors[1] > 3.0, "{scheme:?}: {errors:?}");
+        // Below 1e-6 transients are what is left.
+        let converges = errors[0] / errors[1] > 3.0 || errors[0] < 2e-6;
+        assert!(errors[1] < 5e-5 && converges, "{scheme:?}: {errors:?}");
+    }
+}
+
+/// The same where the excitation turns by most of a radian in one step, near the limit: a force that is held would make 7 % more of it.
+#[test]
+fn resonance_keeps_its_amplitude_on_long_steps() {
+    for (scheme, mode, turn) in [(Scheme::ModalExact, 4, 0.95), (Scheme::MasslessBoundary, 5, 0.3)] {
+        let rom = if scheme.is_massless() { models::rich_blade(5) } else { models::blade(5) };
+        let model = ModalModel::from_rom(&rom, 0.05).unwrap();
+        let (order, frequency) = (3, model.frequencies[mode - 1]);
+        let step = turn / frequency;
+        let mut scene = scene(rom, scheme, order, frequency / f64::from(order));
+        scene.settings.time.step = step;
+        scene.settings.structures[0].excitation.as_mut().unwrap().mode = Some(mode);
+        let shape = model.contact_modes.column(mode - 1);
+        let most = shape.iter().fold(0.0, |most: f64, value| if value.abs() > most.abs() { *value } else { most });
+        let size = AMPLITUDE * most.abs() / (2.0 * 0.05 * frequency * frequency);
+        let mut run = started(&scene);
+        (0..900).for_each(|_| go(&mut run, step));
+        let mut largest = 0.0_f64;
+        for _ in 0..300 {
+            go(&mut run, step);
+            let moved = (0..5).map(|sector| run.system().bank().modal_state(mode - 1, sector).0.abs());
+            largest = moved.fold(largest, f64::max);
+        }
+        let error = largest / size - 1.0;
+        println!("{}: {turn} rad per step, amplitude off by {error:.1e}", scheme.name());
+        assert!(error.abs() < 2e-3, "{scheme:?}: {error:e}");
+        assert!(real(&run, "energy_residual_relative").abs() < 1e-12);
+    }
+}
+
+/// Central differences move the resonance with the step, which no factor on the force can mend.
+#[test]
+fn central_differences_warn_of_excitation_on_long_steps() {
+    for (turn, warned) in [(0.2, false), (0.3, true)] {
+        let mut scene = scene(models::blade(3), Scheme::CentralDifference, 4, turn / 4.0 / 1e-6);
+        scene.settings.outputs.all_sectors = false;
+        let mut run = started(&scene);
+        go(&mut run, 2e-6);
+        let notes = run.take_notes();
+        let found = notes.iter().any(|text| text.contains("make a resonance 2 % too large"));
+        assert_eq!(found, warned, "{turn}: {notes:?}");
     }
 }
 
@@ -203,7 +248,9 @@ fn the_work_of_an_excitation_is_force_times_displacement_while_blades_rub() {
             set(&mut run, "casing_radius_change", -1.5e-4);
             let sectors = run.system().bank().sectors();
             let row = |run: &Simulation, sector: usize| run.system().bank().row(loaded, sector);
-            let force = |angle: f64, s: usize| 3.0 * (5.0 * (angle + TAU * s as f64 / sectors as f64) - PHASE).cos();
+            let amplitude = 3.0 * scheme.harmonic_factor(5.0 * 1300.0 * 5e-7);
+            let force =
+                |angle: f64, s: usize| amplitude * (5.0 * (angle + TAU * s as f64 / sectors as f64) - PHASE).cos();
             let (mut work, mut touched) = (0.0, 0);
             let mut before: Vec<f64> = (0..sectors).map(|s| row(&run, s)).collect();
             let mut now = before.clone();

@@ -3,11 +3,15 @@
 
 use super::{BodyLimits, Parameters, in_range, senses_of};
 use crate::plausibility;
+use crate::settings::Scheme;
 use crate::simulation::Simulation;
 use crate::stability::{self, massless};
 
 /// A step longer by this factor than the one told about is worth telling again.
 const MATERIAL: f64 = 1.5;
+
+/// Turn of the excitation per internal step (rad) from which central differences make a resonance more than 1 % too large: √0.06.
+const RESOLVED_TURN: f64 = 0.245;
 
 /// What depends on the step: modes of the master and of carriers that are not resolved, contact of massless-boundary that gains
 /// energy, flexibility that is passed over, casings that spoil solvability.
@@ -28,6 +32,8 @@ pub struct Told {
     pub(in crate::simulation) curved: Vec<bool>,
     /// Whether contact nodes are pulled at, of each structure that touches.
     pub(in crate::simulation) pulls: Vec<bool>,
+    /// Turn of the excitation per internal step (rad) that was warned of, of each structure that touches.
+    turned: Vec<f64>,
     /// Whether a tolerance was missed.
     pub(in crate::simulation) missed: bool,
 }
@@ -42,6 +48,7 @@ impl Told {
             friction: vec![0; bodies],
             curved: vec![false; bodies],
             pulls: vec![false; bodies],
+            turned: vec![RESOLVED_TURN / MATERIAL; bodies],
             missed: false,
         }
     }
@@ -103,8 +110,27 @@ impl Simulation {
         for body in 0..self.rotors.len() {
             for offset in [0.0, length] {
                 self.tell_of_speed(body, self.inputs.rotors[body].speed.at(offset));
+                self.warn_of_excitation(body, step * self.excitation_rate(body, offset).abs());
             }
         }
+    }
+
+    /// Central differences make a resonance too large where the excitation turns far in one internal step (rad).
+    fn warn_of_excitation(&mut self, body: usize, turn: f64) {
+        if self.system.scheme() != Scheme::CentralDifference || turn <= MATERIAL * self.told.turned[body] {
+            return;
+        }
+        self.told.turned[body] = turn;
+        let error = turn / libm::sin(turn) - 1.0;
+        let text = format!(
+            "the excitation turns by {turn:.2} rad in one internal step: central differences make a resonance {:.0} % too large and move \
+             it by {:.1} % of its frequency. Use modal-exact, or an internal_step_max (time.step) {:.1} times smaller",
+            100.0 * error,
+            100.0 * turn * turn / 24.0,
+            turn / RESOLVED_TURN
+        );
+        let text = self.compiled.named(body, text);
+        self.note(text);
     }
 
     fn tell_of_speed(&mut self, body: usize, speed: f64) {
