@@ -14,8 +14,8 @@ use tiprub_study as study;
 use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
-    bases, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, refinement, scatter,
-    stability, stage, tolerance, wear, witness,
+    bases, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, random, refinement,
+    scatter, stability, stage, tolerance, wear, witness,
 };
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
@@ -49,6 +49,9 @@ pub enum Command {
                       stability.md and results.json."
     )]
     Stability(StabilityArguments),
+    /// Random valid scenes, small and violent: energy, losses, penetration, saved states, and the bits of the FMU must hold in each.
+    #[command(after_help = "A scene follows from its seed: a wrong one is run alone with `lab random --only SEED`.")]
+    Random(RandomArguments),
     /// Frequency deviation and residual criterion of the reduced disk against the number of component modes.
     Convergence(StudyCommon),
     /// Natural frequencies against nodal diameter with engine orders, and mode shapes.
@@ -218,6 +221,32 @@ pub struct StabilityArguments {
     pub child: Option<String>,
 }
 
+/// Arguments of `lab random`.
+#[derive(Debug, Args)]
+pub struct RandomArguments {
+    /// Number of scenes.
+    #[arg(long, value_name = "N", default_value_t = 300)]
+    pub scenes: usize,
+    /// Seed of the run, from which the seeds of its scenes follow.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// Only the scene with this seed, and everything about it.
+    #[arg(long, value_name = "SEED", conflicts_with_all = ["scenes", "seed"])]
+    pub only: Option<u64>,
+    /// Compare each scene, or every N-th one, with the FMU library of both versions; 0 compares none.
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub fmu: usize,
+    /// Directory for wrong scenes, as scene and ROM files, and for the table as JSON.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Scenes at the same time [default: one per processor].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZero<usize>>,
+    /// FMU library, instead of the one found or built.
+    #[arg(long, value_name = "FILE")]
+    pub library: Option<PathBuf>,
+}
+
 impl Cli {
     /// Do what is asked for.
     ///
@@ -226,6 +255,7 @@ impl Cli {
     pub fn run(&self, console: &Console) -> Result<Outcome> {
         let (name, common) = match &self.command {
             Command::Stability(arguments) => return stability::command::run(arguments, console),
+            Command::Random(arguments) => return random::command::run(arguments, console),
             Command::Error(arguments) => ("error", &arguments.common),
             Command::Convergence(common) => ("convergence", common),
             Command::Modes(arguments) => ("modes", &arguments.common),
@@ -275,7 +305,7 @@ impl Cli {
             Command::Witness(common) => witness::study(common, console),
             Command::Stress(common) => witness::stress(common, console),
             Command::Wear(common) => wear::study(common, console),
-            Command::Stability(_) => unreachable!("`run` has answered it"),
+            Command::Stability(_) | Command::Random(_) => unreachable!("`run` has answered it"),
         }
     }
 }

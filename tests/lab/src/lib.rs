@@ -2,6 +2,7 @@
 //!
 //! - `error`: error against run time of the standard problems, beside methods that share no code with the product;
 //! - `stability`: stiff and extreme cases, each in a process of its own, judged;
+//! - `random`: random valid scenes, small and violent, with what must hold of each;
 //! - `cube`, `stage`, `convergence`, `modes`: what the paper's figures show of the models that ship;
 //! - `beside`: any scene of blades beside an independent stepper;
 //! - `witness`: reduced blades against full finite elements; `bases`: what a blade is reduced to;
@@ -22,6 +23,7 @@ mod error;
 mod estimates;
 mod inputs;
 mod modes;
+mod random;
 mod refinement;
 mod scatter;
 mod stability;

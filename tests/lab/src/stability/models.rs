@@ -14,6 +14,8 @@ use tiprub_test_models::{node, ring, structure};
 /// All schemes with their names.
 pub(crate) const SCHEMES: [(Scheme, &str); Scheme::RECURRENCES.len()] =
     [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
+/// Steps by a tolerance, which have rules of their own.
+pub(crate) const GALERKIN: (Scheme, &str) = (Scheme::Galerkin, "galerkin");
 /// All contact solvers with their names.
 pub(crate) const SOLVERS: [(Solver, &str); Solver::ALL.len()] =
     [(Solver::Film, "film"), (Solver::Lcp, "lcp"), (Solver::Coulomb, "coulomb")];

@@ -1,5 +1,6 @@
 //! The cases, family by family.
 
+pub(crate) mod blades;
 pub(crate) mod builtin;
 pub(crate) mod decay;
 pub(crate) mod disk;
@@ -31,6 +32,7 @@ pub(crate) fn all() -> Vec<Case> {
         decay::cases(),
         turning::cases(),
         disk::cases(),
+        blades::cases(),
         free::cases(),
         plates::cases(),
         builtin::cases(),

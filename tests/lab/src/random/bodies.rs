@@ -1,0 +1,54 @@
+//! Free bodies thrown among plates, by chance.
+
+use tiprub_core::Rom;
+use tiprub_core::settings::{Interpolation, SceneSettings, Scheme, Solver, SplineSettings};
+use tiprub_test_models::{Random, lattice};
+
+use super::structures::chance;
+use crate::stability::bodies::{Body, HALF, Plate, Throw};
+
+/// Settings, structures, and a length (m) that displacements go by.
+pub(crate) fn scene(random: &mut Random, scheme: Scheme, solver: Solver) -> (SceneSettings, Vec<Rom>, f64) {
+    let friction = random.of(&[0.0, 0.1, 0.3, 0.8]);
+    // Contact nodes on its faces alone leave modes that keep their inertia, as galerkin needs them; it is large, hence rare.
+    let mut scene = if scheme == Scheme::Galerkin && chance(random, 0.3) {
+        let plates = [(lattice::Side::Left, HALF + 5e-5), (lattice::Side::Right, HALF + 1e-4)];
+        let faces = lattice::faces([0.0; 3]);
+        let mut scene =
+            lattice::with(lattice::scene(faces, &plates, false, random.vector(8.0)), friction, solver, scheme);
+        for surface in &mut scene.settings.surfaces {
+            surface.rigid = chance(random, 0.7);
+        }
+        scene
+    } else {
+        throw(random, scheme, solver, friction).scene()
+    };
+    for surface in &mut scene.settings.surfaces {
+        if chance(random, 0.2) {
+            let interpolation = random.of(&[Interpolation::Spline, Interpolation::Facets]);
+            surface.spline = Some(SplineSettings { interpolation, ..SplineSettings::default() });
+        }
+    }
+    for structure in &mut scene.settings.structures {
+        structure.damping_ratio = chance(random, 0.4).then(|| random.scale(1e-4, 0.05));
+    }
+    (scene.settings, scene.roms, 1e-4)
+}
+
+fn throw(random: &mut Random, scheme: Scheme, solver: Solver, friction: f64) -> Throw {
+    let lumps = 1 + random.below(3);
+    let masses: Vec<f64> = (0..lumps).map(|_| random.scale(0.02, 1.0)).collect();
+    let body = if lumps == 1 { Body::rigid(masses[0]) } else { Body::elastic(&masses, random.scale(1e6, 1e8)) };
+    let radius = random.of(&[0.0, 0.0, 0.3]);
+    let mut plate = |side: f64| Plate {
+        side,
+        distance: HALF + random.scale(1e-5, 3e-4),
+        radius,
+        stiffness: random.of(&[0.0, 1e6, 1e7]),
+    };
+    let plates = match plate(-1.0) {
+        left if left.stiffness > 5e6 => vec![left],
+        left => vec![left, plate(1.0)],
+    };
+    Throw { body, velocity: random.vector(6.0), plates, friction, scheme, solver, step: 1e-6 }
+}

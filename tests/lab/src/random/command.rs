@@ -1,0 +1,102 @@
+//! `lab random`: run random scenes, print the table, write out what is wrong.
+
+use std::path::Path;
+
+use tiprub_packaging::cli::LibraryArguments;
+use tiprub_packaging::library;
+use tiprub_shell::console::{Console, Outcome};
+use tiprub_shell::{Failure, Result, output_file, sweep};
+
+use super::faces::Faces;
+use super::table::{Table, row_as_json, row_as_text};
+use super::{judged, scenes};
+use crate::cli::RandomArguments;
+
+/// Names at most this many wrong scenes.
+const NAMED: usize = 10;
+
+/// Run the scenes asked for.
+///
+/// # Errors
+/// No library, files that cannot be written, or a scene that is wrong.
+pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<Outcome> {
+    let directory = tempfile::tempdir()
+        .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
+    let faces = if arguments.fmu > 0 { Some(load(arguments, console, directory.path())?) } else { None };
+    if let Some(seed) = arguments.only {
+        return only(arguments, faces.as_ref(), seed);
+    }
+    let seeds: Vec<(usize, u64)> = (0..arguments.scenes).map(|index| (index, seed_of(arguments.seed, index))).collect();
+    let task = console.task("Random scenes", Some(seeds.len() as u64));
+    let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
+    let every = arguments.fmu.max(1);
+    let rows = sweep::sweep(
+        &seeds,
+        threads,
+        |(index, seed)| {
+            let row = judged(*seed, faces.as_ref().filter(|_| index.is_multiple_of(every)));
+            if row.is_wrong() {
+                task.line(&row_as_text(&row));
+            }
+            Ok(row)
+        },
+        |done| task.at(done as u64),
+    )?;
+    drop(task);
+    let table = Table { rows };
+    if let Some(out) = &arguments.out {
+        for row in table.wrong() {
+            write_scene(out, row.seed)?;
+        }
+        output_file::write(&out.join("results.json"), format!("{:#}\n", table.to_json()))?;
+    }
+    let seeds: Vec<u64> = table.wrong().map(|row| row.seed).collect();
+    if seeds.is_empty() {
+        return Ok(Outcome { text: table.to_text(), json: table.to_json() });
+    }
+    console.say(table.to_text());
+    let named: Vec<String> = seeds.iter().take(NAMED).map(u64::to_string).collect();
+    let problem = format!("{} of {} scenes are wrong: {}", seeds.len(), arguments.scenes, named.join(", "));
+    Err(Failure::new("random scenes", problem, format!("Run one alone with `lab random --only {}`", named[0])))
+}
+
+/// Seed of a scene of a run: its place in the run decides nothing else.
+fn seed_of(seed: u64, index: usize) -> u64 {
+    scenes::numbers(seed, 0x5ce0 + index as u64).0
+}
+
+/// One scene in full.
+fn only(arguments: &RandomArguments, faces: Option<&Faces>, seed: u64) -> Result<Outcome> {
+    let row = judged(seed, faces);
+    if let Some(out) = &arguments.out {
+        write_scene(out, seed)?;
+    }
+    if row.is_wrong() {
+        let problem = row.findings.iter().map(|one| format!("{}: {}", one.oracle, one.text)).collect::<Vec<_>>();
+        return Err(Failure::new(format!("scene {seed}"), problem.join("; "), row_as_text(&row)));
+    }
+    Ok(Outcome { text: row_as_text(&row), json: row_as_json(&row) })
+}
+
+/// The scene as TOML with its ROMs, as an FMU has them.
+fn write_scene(out: &Path, seed: u64) -> Result<()> {
+    let directory = out.join(seed.to_string());
+    output_file::create_directory(&directory)?;
+    for (name, bytes) in tiprub_format::resource_files(&scenes::trial(seed).scene, false) {
+        output_file::write(&directory.join(name), bytes)?;
+    }
+    Ok(())
+}
+
+fn load(arguments: &RandomArguments, console: &Console, directory: &Path) -> Result<Faces> {
+    let chosen =
+        LibraryArguments { library: arguments.library.iter().cloned().collect(), ..LibraryArguments::default() };
+    let libraries = library::load(library::Unit::Scene, &chosen, console)?;
+    let here = tiprub_fmi_host::Platform::here();
+    let fitting = libraries.into_iter().find(|library| Some(library.platform) == here);
+    let fitting =
+        fitting.ok_or_else(|| Failure::new("FMU library", "none is for this machine", "Give one with --library"))?;
+    let path = directory.join("tiprub_fmi");
+    output_file::write(&path, fitting.bytes)?;
+    Faces::load(&path)
+}

@@ -1,0 +1,141 @@
+//! The FMU library beside the native run: the same bits, the same rejections, states that go from one instance to another.
+
+use std::path::Path;
+
+use tiprub_fmi_host::api::{Fmi2Api, Fmi3Api};
+use tiprub_shell::Result;
+use tiprub_tests::scene::Resources;
+use tiprub_tests::{OK, WARNING, fmi2, fmi3};
+
+use super::march::{Face, Plan, Record};
+use super::oracles::Finding;
+use super::scenes::{Trial, numbers};
+use super::states::LATER;
+
+/// Both faces of the library.
+#[derive(Debug)]
+pub(crate) struct Faces {
+    two: Fmi2Api,
+    three: Fmi3Api,
+}
+
+/// What came of a scene natively.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Native<'a> {
+    /// It was rejected with this message.
+    Rejected(&'a str),
+    /// It ran.
+    Ran(&'a Plan, &'a Record),
+}
+
+/// An instance whose states can be carried elsewhere.
+trait Instance: Face {
+    fn state(&self) -> Vec<u8>;
+    fn resume(&self, bytes: &[u8]) -> std::result::Result<(), String>;
+}
+
+macro_rules! instance {
+    ($slave:ty) => {
+        impl Instance for $slave {
+            fn state(&self) -> Vec<u8> {
+                self.serialise(self.save())
+            }
+
+            fn resume(&self, bytes: &[u8]) -> std::result::Result<(), String> {
+                let (status, state) = self.deserialise(bytes);
+                let taken = status == OK && is_good(self.restore(state));
+                if taken { Ok(()) } else { Err(self.log()) }
+            }
+        }
+    };
+}
+
+instance!(fmi2::Slave<'_>);
+instance!(fmi3::Slave<'_>);
+
+fn is_good(status: i32) -> bool {
+    status == OK || status == WARNING
+}
+
+impl Faces {
+    /// Load a library.
+    ///
+    /// # Errors
+    /// It cannot be loaded.
+    pub(crate) fn load(path: &Path) -> Result<Self> {
+        Ok(Self { two: Fmi2Api::load(path)?, three: Fmi3Api::load(path)? })
+    }
+
+    /// Run a scene as both versions and compare with what came of it natively.
+    pub(crate) fn compare(&self, trial: &Trial, native: Native) -> Vec<Finding> {
+        let resources = Resources::of(&trial.scene, false);
+        let two = |time: f64| {
+            let slave = fmi2::Slave::try_new(&self.two, &fmi2::Arguments::new(&resources))?;
+            let good = is_good(slave.setup(time, None)) && is_good(slave.enter()) && is_good(slave.exit());
+            if good { Ok(slave) } else { Err(slave.log()) }
+        };
+        let three = |time: f64| {
+            let slave = fmi3::Slave::try_new(&self.three, &fmi3::Arguments::new(&resources))?;
+            let good = is_good(slave.enter(time, None)) && is_good(slave.exit());
+            if good { Ok(slave) } else { Err(slave.log()) }
+        };
+        let mut texts = vec![difference("FMI 2.0", two, trial, native)];
+        // FMI 3.0 has no derivatives of inputs.
+        if !trial.slopes || matches!(native, Native::Rejected(_)) {
+            texts.push(difference("FMI 3.0", three, trial, native));
+        }
+        texts.into_iter().flatten().map(|text| Finding { oracle: "FMU", text }).collect()
+    }
+}
+
+/// How a face differs from the native run, if it does.
+fn difference<I: Instance>(
+    name: &str,
+    start: impl Fn(f64) -> std::result::Result<I, String>,
+    trial: &Trial,
+    native: Native,
+) -> Option<String> {
+    let (plan, record) = match native {
+        Native::Rejected(message) => {
+            return match start(0.0) {
+                Ok(_) => Some(format!("{name} accepts what is rejected natively: {message}")),
+                Err(log) if log.contains(message) => None,
+                Err(log) => Some(format!("{name} rejects with {log:?} what is natively rejected with {message:?}")),
+            };
+        }
+        Native::Ran(plan, record) => (plan, record),
+    };
+    let mut slave = match start(0.0) {
+        Ok(slave) => slave,
+        Err(log) => return Some(format!("{name} rejects what runs natively: {log}")),
+    };
+    let mut random = numbers(trial.seed, 4);
+    let at = random.below(record.points.len() + 1);
+    let mut own = Record::default();
+    for index in 0..at {
+        match plan.step(&mut slave, index) {
+            Ok(point) => own.points.push(point),
+            Err(end) => return Some(format!("{name} ends after communication step {index}: {end}")),
+        }
+    }
+    let bytes = slave.state();
+    let rest = plan.march(&mut slave, at, |_, _| ());
+    own.points.extend(rest.points);
+    own.end = rest.end;
+    if let Some(off) = own.differs(record, plan, 0) {
+        return Some(format!("{name}: {off}"));
+    }
+    // A scene whose shape has grown in by then may not start later.
+    let (began, mut other) = match start(LATER) {
+        Ok(other) if random.unit() < 0.6 => (LATER, other),
+        _ => (0.0, start(0.0).ok()?),
+    };
+    if let Err(log) = other.resume(&bytes) {
+        return Some(format!(
+            "{name}: an instance that began at {began} s refuses the state of communication point {at}: {log}"
+        ));
+    }
+    let after = plan.march(&mut other, at, |_, _| ());
+    let off = after.differs(&record.from(at), plan, at)?;
+    Some(format!("{name}, state of communication point {at} in an instance that began at {began} s: {off}"))
+}

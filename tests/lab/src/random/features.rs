@@ -1,0 +1,74 @@
+//! Which features a scene has, by the names of the table.
+
+use tiprub_core::Scene;
+use tiprub_core::settings::{InputInterpolation, Interpolation, Motion, StructureSettings, SurfaceSettings};
+
+/// A feature's name, and whether a scene has it.
+type Feature = (&'static str, fn(&Scene) -> bool);
+
+/// All features.
+pub(crate) const FEATURES: [Feature; 36] = [
+    ("rotor", |scene| any_structure(scene, |own| own.motion == Motion::Rotating)),
+    ("free body", |scene| any_structure(scene, |own| own.motion == Motion::Free)),
+    ("two rotors", |scene| rotors(scene) > 1),
+    ("several pairs", |scene| scene.settings.contacts.len() > 1),
+    ("coupled sectors", |scene| scene.roms.iter().any(tiprub_core::Rom::is_cyclic)),
+    ("flexible casing", |scene| any_surface(scene, |own| own.structure.is_some() && !own.rigid)),
+    ("shared casing", |scene| {
+        let carried = |own: &&SurfaceSettings| own.structure.is_some() && !own.rigid;
+        rotors(scene) > 0 && scene.settings.surfaces.iter().filter(carried).count() > 1
+    }),
+    ("rigid open surface", |scene| any_surface(scene, |own| own.rigid)),
+    ("spline", |scene| any_surface(scene, |own| own.spline.is_some())),
+    ("facets", |scene| {
+        any_surface(scene, |own| own.spline.is_some_and(|own| own.interpolation == Interpolation::Facets))
+    }),
+    ("moving casing", |scene| any_surface(scene, |own| own.moving)),
+    ("ramp", |scene| any_surface(scene, |own| own.ramp_time > 0.0)),
+    ("patches", |scene| scene.roms.iter().any(|rom| rom.contact_nodes[0].area > 0.0)),
+    ("rows", |scene| scene.roms.iter().any(|rom| rom.rows() > 1)),
+    ("heat patches", |scene| any_surface(scene, |own| own.patches.is_some())),
+    ("mistuning", |scene| any_structure(scene, |own| !own.frequency_factors.is_empty())),
+    ("sector gaps", |scene| scene.settings.contacts.iter().any(|contact| !contact.sector_gaps.is_empty())),
+    ("damping by mode", |scene| any_structure(scene, |own| !own.damping_ratios.is_empty())),
+    ("excitation", |scene| any_structure(scene, |own| own.excitation.is_some())),
+    ("initial motion", |scene| any_structure(scene, |own| !own.initial.is_empty())),
+    ("stiffening", |scene| any_structure(scene, |own| own.spin.stiffening)),
+    ("growth", |scene| any_structure(scene, |own| own.spin.growth)),
+    ("Coriolis", |scene| any_structure(scene, |own| own.spin.coriolis)),
+    ("heat of rotors", |scene| any_structure(scene, |own| own.thermal && own.motion == Motion::Rotating)),
+    ("heat of casings", |scene| any_structure(scene, |own| own.thermal && own.motion == Motion::Still)),
+    ("softening", |scene| any_structure(scene, |own| own.softening > 0.0)),
+    ("load on casing", |scene| any_structure(scene, |own| own.load.is_some())),
+    ("stress", |scene| scene.settings.outputs.stress),
+    ("coating, plastic", |scene| coatings(scene, false)),
+    ("coating, cut", |scene| coatings(scene, true)),
+    ("whirl", |scene| any_structure(scene, |own| own.whirl)),
+    ("axial shift", |scene| any_structure(scene, |own| own.axial_shift)),
+    ("friction", |scene| scene.settings.contacts.iter().any(|contact| contact.friction > 0.0)),
+    ("slow sliding", |scene| any_structure(scene, |own| own.motion == Motion::Rotating && own.speed.abs() < 30.0)),
+    ("inputs held", |scene| scene.settings.time.input_interpolation == InputInterpolation::Hold),
+    ("steps bounded", |scene| scene.settings.time.steps_at_most.is_some()),
+];
+
+fn any_structure(scene: &Scene, has: impl Fn(&StructureSettings) -> bool) -> bool {
+    scene.settings.structures.iter().any(has)
+}
+
+fn any_surface(scene: &Scene, has: impl Fn(&SurfaceSettings) -> bool) -> bool {
+    scene.settings.surfaces.iter().any(has)
+}
+
+fn rotors(scene: &Scene) -> usize {
+    scene.settings.structures.iter().filter(|own| own.motion == Motion::Rotating).count()
+}
+
+fn coatings(scene: &Scene, cut: bool) -> bool {
+    let coatings = scene.settings.contacts.iter().filter_map(|contact| contact.coating.as_ref());
+    coatings.into_iter().any(|coating| coating.cutting.is_some() == cut)
+}
+
+/// Places in [`FEATURES`] of those that a scene has.
+pub(crate) fn of(scene: &Scene) -> Vec<usize> {
+    (0..FEATURES.len()).filter(|index| FEATURES[*index].1(scene)).collect()
+}

@@ -1,0 +1,185 @@
+//! A scene stepped through its communication steps, natively or through the C interface of an FMU.
+
+use tiprub_core::variables::{Causality, Kind};
+use tiprub_core::{Error, Simulation};
+use tiprub_tests::{OK, WARNING, fmi2, fmi3};
+
+use super::inputs::{Course, courses};
+use super::scenes::Trial;
+
+/// Whatever can be stepped.
+pub(crate) trait Face {
+    /// Set an input, with its slope where it is given.
+    fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) -> Result<(), String>;
+    /// One communication step.
+    fn step(&mut self, time: f64, length: f64) -> Result<(), String>;
+    /// Values as bits.
+    fn bits(&self, references: &[u32]) -> Vec<u64>;
+}
+
+/// What all runs of a scene have in common.
+#[derive(Debug)]
+pub(crate) struct Plan {
+    courses: Vec<Course>,
+    /// References of all real outputs.
+    pub outputs: Vec<u32>,
+    /// Start of each communication step, and the end of the last (s).
+    pub times: Vec<f64>,
+    lengths: Vec<f64>,
+    slopes: bool,
+}
+
+/// Outputs after each communication step, and how the run ended where it did not reach the end.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Record {
+    /// Outputs as bits, communication step by communication step.
+    pub points: Vec<Vec<u64>>,
+    /// The message of the step that was not done.
+    pub end: Option<String>,
+}
+
+impl Plan {
+    /// Of a scene whose tables are those of `simulation`, which was not started yet.
+    pub(crate) fn new(trial: &Trial, simulation: &Simulation) -> Self {
+        let mut times = vec![0.0];
+        for length in &trial.lengths {
+            times.push(times[times.len() - 1] + length);
+        }
+        let rows = simulation.table().variables().iter();
+        let outputs = rows.filter(|row| row.causality == Causality::Output && row.kind == Kind::Real);
+        let outputs = outputs.flat_map(|row| (row.reference..).take(row.len())).collect();
+        let slopes = trial.slopes;
+        Self { courses: courses(trial, simulation), outputs, times, lengths: trial.lengths.clone(), slopes }
+    }
+
+    /// Number of communication steps.
+    pub(crate) fn len(&self) -> usize {
+        self.lengths.len()
+    }
+
+    /// Length of a communication step (s).
+    pub(crate) fn length(&self, index: usize) -> f64 {
+        self.lengths[index]
+    }
+
+    /// References of all inputs.
+    pub(crate) fn inputs(&self) -> Vec<u32> {
+        self.courses.iter().map(|course| course.reference).collect()
+    }
+
+    /// Set the inputs of a communication step: where they go by its end, or with slopes where they are at its start.
+    pub(crate) fn set_inputs(&self, face: &mut impl Face, index: usize) -> Result<(), String> {
+        for course in &self.courses {
+            if self.slopes {
+                let (value, slope) = course.at(self.times[index]);
+                face.set(course.reference, value, Some(slope))?;
+            } else {
+                face.set(course.reference, course.at(self.times[index + 1]).0, None)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// One communication step with its inputs.
+    pub(crate) fn step(&self, face: &mut impl Face, index: usize) -> Result<Vec<u64>, String> {
+        self.set_inputs(face, index)?;
+        face.step(self.times[index], self.lengths[index])?;
+        Ok(face.bits(&self.outputs))
+    }
+
+    /// From a communication point to the end, or as far as it goes.
+    pub(crate) fn march<F: Face>(&self, face: &mut F, from: usize, mut look: impl FnMut(&F, usize)) -> Record {
+        let mut record = Record::default();
+        for index in from..self.len() {
+            match self.step(face, index) {
+                Ok(point) => record.points.push(point),
+                Err(end) => {
+                    record.end = Some(end);
+                    break;
+                }
+            }
+            look(face, index);
+        }
+        record
+    }
+}
+
+impl Record {
+    /// What is after a communication point.
+    pub(crate) fn from(&self, index: usize) -> Self {
+        Self { points: self.points[index.min(self.points.len())..].to_vec(), end: self.end.clone() }
+    }
+
+    /// The first difference from another record, in words; ends are compared by their message.
+    pub(crate) fn differs(&self, other: &Self, plan: &Plan, from: usize) -> Option<String> {
+        for (index, (own, other)) in self.points.iter().zip(&other.points).enumerate() {
+            let off = own.iter().zip(other).position(|(own, other)| own != other);
+            if let Some(place) = off {
+                let [own, other] = [own[place], other[place]].map(f64::from_bits);
+                let (step, reference) = (from + index + 1, plan.outputs[place]);
+                return Some(format!("output {reference} is {own:e}, not {other:e}, after communication step {step}"));
+            }
+        }
+        if self.points.len() != other.points.len() {
+            let [own, other] = [self, other].map(|record| {
+                let end = record.end.as_deref().unwrap_or("reached the end");
+                format!("{} steps ({end})", record.points.len())
+            });
+            return Some(format!("it does {own} instead of {other}"));
+        }
+        let ends = [self, other].map(|record| record.end.as_deref().unwrap_or_default());
+        (!ends[0].contains(ends[1])).then(|| format!("it ends with {:?} instead of {:?}", ends[0], ends[1]))
+    }
+}
+
+fn text(error: Error) -> String {
+    error.to_string()
+}
+
+impl Face for Simulation {
+    fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) -> Result<(), String> {
+        self.set_real(reference, value).map_err(text)?;
+        slope.map_or(Ok(()), |slope| self.set_input_derivative(reference, 1, slope).map_err(text))
+    }
+
+    fn step(&mut self, time: f64, length: f64) -> Result<(), String> {
+        self.do_step(time, length).map_err(text)
+    }
+
+    fn bits(&self, references: &[u32]) -> Vec<u64> {
+        references.iter().map(|reference| self.real(*reference).unwrap_or(f64::NAN).to_bits()).collect()
+    }
+}
+
+fn accepted(status: i32, log: impl FnOnce() -> String) -> Result<(), String> {
+    if status == OK || status == WARNING { Ok(()) } else { Err(log()) }
+}
+
+impl Face for fmi2::Slave<'_> {
+    fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) -> Result<(), String> {
+        accepted(self.set_reals(&[reference], &[value]), || self.log())?;
+        slope.map_or(Ok(()), |slope| accepted(self.set_derivatives(&[reference], 1, &[slope]), || self.log()))
+    }
+
+    fn step(&mut self, time: f64, length: f64) -> Result<(), String> {
+        accepted(fmi2::Slave::step(self, time, length), || self.log())
+    }
+
+    fn bits(&self, references: &[u32]) -> Vec<u64> {
+        self.reals(references).into_iter().map(f64::to_bits).collect()
+    }
+}
+
+impl Face for fmi3::Slave<'_> {
+    fn set(&mut self, reference: u32, value: f64, _slope: Option<f64>) -> Result<(), String> {
+        accepted(self.set_reals(&[reference], &[value]), || self.log())
+    }
+
+    fn step(&mut self, time: f64, length: f64) -> Result<(), String> {
+        accepted(fmi3::Slave::step(self, time, length).status, || self.log())
+    }
+
+    fn bits(&self, references: &[u32]) -> Vec<u64> {
+        self.reals(references, references.len()).into_iter().map(f64::to_bits).collect()
+    }
+}

@@ -1,0 +1,116 @@
+//! Scenes that nobody chose, and what must hold of each: `lab random`.
+//!
+//! A [`Trial`] follows from its seed alone: structures with a handful of modes, features, scheme, solver and inputs by chance, and casings
+//! that close within a few periods, so that contact is violent. [`judged`] runs it natively and, where it is given the FMU library, through
+//! the C interface of both versions, and compares it with oracles that know nothing of the scene.
+
+mod bodies;
+pub(crate) mod command;
+mod faces;
+mod features;
+mod inputs;
+mod march;
+mod oracles;
+mod scenes;
+mod states;
+mod structures;
+mod table;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::{Error, Simulation};
+
+use faces::{Faces, Native};
+use march::Plan;
+use oracles::{Finding, Watch};
+use scenes::Trial;
+
+/// What came of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    /// It ran to its end.
+    Ran,
+    /// It was rejected before its start.
+    Rejected,
+    /// A step was rejected, with its reason.
+    Ended,
+}
+
+/// A scene with what came of it, and all that should not be.
+#[derive(Debug, Clone, PartialEq)]
+struct Row {
+    seed: u64,
+    scheme: Scheme,
+    solver: Solver,
+    /// Places in [`features::FEATURES`].
+    features: Vec<usize>,
+    outcome: Outcome,
+    /// The message of a rejection or of an end.
+    message: Option<String>,
+    findings: Vec<Finding>,
+    /// It was compared with the FMU library.
+    compared: bool,
+    /// Wall-clock time (s).
+    seconds: f64,
+}
+
+impl Row {
+    fn is_wrong(&self) -> bool {
+        !self.findings.is_empty()
+    }
+}
+
+/// Run a scene and ask all oracles; with the library, those of the FMU too.
+fn judged(seed: u64, faces: Option<&Faces>) -> Row {
+    let clock = std::time::Instant::now();
+    let trial = scenes::trial(seed);
+    let mut row = Row {
+        seed,
+        scheme: trial.scene.settings.time.scheme,
+        solver: oracles::solver(&trial.scene),
+        features: features::of(&trial.scene),
+        outcome: Outcome::Rejected,
+        message: None,
+        findings: Vec::new(),
+        compared: faces.is_some(),
+        seconds: 0.0,
+    };
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(|| run(&trial, faces, &mut row))) {
+        let words = panic.downcast_ref::<String>().cloned();
+        let words = words.or_else(|| panic.downcast_ref::<&str>().map(|words| (*words).to_owned()));
+        row.findings.push(Finding { oracle: "panic", text: words.unwrap_or_default() });
+    }
+    row.seconds = clock.elapsed().as_secs_f64();
+    row
+}
+
+fn run(trial: &Trial, faces: Option<&Faces>, row: &mut Row) {
+    let begun = Simulation::new(&trial.scene).and_then(|mut simulation| {
+        let (plan, watch) = (Plan::new(trial, &simulation), Watch::new(trial, &simulation));
+        simulation.initialise(0.0)?;
+        Ok((simulation, plan, watch))
+    });
+    let (mut simulation, plan, mut watch) = match begun {
+        Ok(begun) => begun,
+        Err(error) => return reject(trial, faces, row, &error),
+    };
+    let record = plan.march(&mut simulation, 0, |simulation, _| watch.look(simulation));
+    row.outcome = if record.end.is_some() { Outcome::Ended } else { Outcome::Ran };
+    row.message.clone_from(&record.end);
+    row.findings.extend(record.end.as_deref().and_then(oracles::ends));
+    row.findings.extend(watch.findings());
+    row.findings.extend(states::restored(trial, &plan, &record));
+    row.findings.extend(states::differentiated(trial, &plan, &record));
+    if let Some(faces) = faces {
+        row.findings.extend(faces.compare(trial, Native::Ran(&plan, &record)));
+    }
+}
+
+fn reject(trial: &Trial, faces: Option<&Faces>, row: &mut Row, error: &Error) {
+    row.message = Some(error.to_string());
+    row.findings.extend(oracles::names(error));
+    if let Some(faces) = faces {
+        row.findings.extend(faces.compare(trial, Native::Rejected(&error.to_string())));
+    }
+}

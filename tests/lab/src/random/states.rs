@@ -1,0 +1,181 @@
+//! Saved states at random points, restored where they were saved and elsewhere; derivatives over steps that must not disturb.
+
+use tiprub_core::Simulation;
+use tiprub_test_models::Random;
+
+use super::march::{Plan, Record};
+use super::oracles::Finding;
+use super::scenes::{Trial, numbers};
+use super::structures::chance;
+
+/// A start time of an instance that begins later than any state was saved (s).
+pub(crate) const LATER: f64 = 7.5;
+
+/// Findings of the oracle of saved states, of a scene that ran as `record` says.
+pub(crate) fn restored(trial: &Trial, plan: &Plan, record: &Record) -> Vec<Finding> {
+    let mut random = numbers(trial.seed, 2);
+    if record.points.is_empty() {
+        return Vec::new();
+    }
+    let found = saved_between(trial, plan, record, &mut random)
+        .into_iter()
+        .chain(saved_within(trial, plan, record, &mut random))
+        .chain(after_reset(trial, plan, record, &mut random));
+    found.map(|text| Finding { oracle: "states", text }).collect()
+}
+
+fn started(trial: &Trial, time: f64) -> Result<Simulation, String> {
+    let mut simulation = Simulation::new(&trial.scene).map_err(|error| error.to_string())?;
+    simulation.initialise(time).map_err(|error| error.to_string())?;
+    Ok(simulation)
+}
+
+fn save(simulation: &Simulation) -> Vec<u8> {
+    let mut state = vec![0; simulation.state_size()];
+    simulation.save_state(&mut state).unwrap_or_else(|error| panic!("{error}"));
+    state
+}
+
+/// Go on from a state and compare.
+fn go_on(
+    name: &str,
+    simulation: &mut Simulation,
+    state: &[u8],
+    at: usize,
+    (plan, record): (&Plan, &Record),
+) -> Option<String> {
+    if let Err(error) = simulation.restore_state(state) {
+        return Some(format!("the state of communication point {at} is refused by {name}: {error}"));
+    }
+    let after = plan.march(simulation, at, |_, _| ());
+    let off = after.differs(&record.from(at), plan, at)?;
+    Some(format!("restored at communication point {at} into {name}: {off}"))
+}
+
+/// At a communication point: saving disturbs nothing, and the state leads to the same bits in this and in other instances.
+fn saved_between(trial: &Trial, plan: &Plan, record: &Record, random: &mut Random) -> Option<String> {
+    let at = random.below(record.points.len() + 1);
+    let mut simulation = started(trial, 0.0).ok()?;
+    for index in 0..at {
+        plan.step(&mut simulation, index).ok()?;
+    }
+    let state = save(&simulation);
+    let after = plan.march(&mut simulation, at, |_, _| ());
+    if let Some(off) = after.differs(&record.from(at), plan, at) {
+        return Some(format!("a state saved at communication point {at} disturbs: {off}"));
+    }
+    let both = (plan, record);
+    let (name, other) = match random.below(4) {
+        0 => ("the same instance", Ok(simulation)),
+        1 => ("an instance that was not initialised", Simulation::new(&trial.scene).map_err(|error| error.to_string())),
+        2 => ("a fresh instance", started(trial, 0.0)),
+        _ => ("an instance that started later", started(trial, LATER)),
+    };
+    // Where ramps are still to come, a scene may not start later.
+    go_on(name, &mut other.ok()?, &state, at, both)
+}
+
+/// Within a communication step, between two internal ones.
+fn saved_within(trial: &Trial, plan: &Plan, record: &Record, random: &mut Random) -> Option<String> {
+    let at = random.below(record.points.len());
+    let mut simulation = started(trial, 0.0).ok()?;
+    for index in 0..at {
+        plan.step(&mut simulation, index).ok()?;
+    }
+    plan.set_inputs(&mut simulation, at).ok()?;
+    simulation.begin_step(plan.times[at], plan.length(at)).ok()?;
+    simulation.fly_ahead();
+    let before = random.below(6);
+    for _ in 0..before {
+        if simulation.advance().ok()?.finished {
+            return None;
+        }
+    }
+    let state = save(&simulation);
+    let mut fresh = started(trial, 0.0).ok()?;
+    if let Err(error) = fresh.restore_state(&state) {
+        return Some(format!("the state within communication step {} is refused: {error}", at + 1));
+    }
+    for (name, instance) in [("the same", &mut simulation), ("a fresh", &mut fresh)] {
+        while !instance.advance().ok()?.finished {}
+        let after = super::march::Face::bits(instance, &plan.outputs);
+        let expected = &record.points[at];
+        if let Some(place) = after.iter().zip(expected).position(|(own, other)| own != other) {
+            let [own, other] = [after[place], expected[place]].map(f64::from_bits);
+            return Some(format!(
+                "{name} instance goes on after {before} internal steps of communication step {} with {own:e} for output {}, \
+                 not {other:e}",
+                at + 1,
+                plan.outputs[place]
+            ));
+        }
+    }
+    None
+}
+
+/// The same run after a reset at a random point.
+fn after_reset(trial: &Trial, plan: &Plan, record: &Record, random: &mut Random) -> Option<String> {
+    if !chance(random, 0.3) {
+        return None;
+    }
+    let at = random.below(record.points.len());
+    let mut simulation = started(trial, 0.0).ok()?;
+    for index in 0..at {
+        plan.step(&mut simulation, index).ok()?;
+    }
+    simulation.reset();
+    if let Err(error) = simulation.initialise(0.0) {
+        return Some(format!("after a reset the start is refused: {error}"));
+    }
+    let again = plan.march(&mut simulation, 0, |_, _| ());
+    let off = again.differs(record, plan, 0)?;
+    Some(format!("after a reset at communication point {at}: {off}"))
+}
+
+/// Derivatives over some steps: they disturb nothing.
+pub(crate) fn differentiated(trial: &Trial, plan: &Plan, record: &Record) -> Option<Finding> {
+    let mut random = numbers(trial.seed, 3);
+    let inputs = plan.inputs();
+    let mut simulation = Simulation::new(&trial.scene).ok()?;
+    let parameter = simulation.table().find("step_derivatives")?.reference;
+    simulation.set_integer(parameter, 2).ok()?;
+    simulation.initialise(0.0).ok()?;
+    let outputs: Vec<u32> = simulation
+        .table()
+        .variables()
+        .iter()
+        .filter(|row| plan.outputs.contains(&row.reference) && row.len() == 1)
+        .filter(|row| row.variability == tiprub_core::variables::Variability::Continuous)
+        .map(|row| row.reference)
+        .take(5)
+        .collect();
+    let asked: Vec<usize> = (0..2).map(|_| random.below(plan.len())).collect();
+    let mut refusal = None;
+    let after = {
+        let mut own = Record::default();
+        for index in 0..plan.len() {
+            match plan.step(&mut simulation, index) {
+                Ok(point) => own.points.push(point),
+                Err(end) => {
+                    own.end = Some(end);
+                    break;
+                }
+            }
+            if asked.contains(&index) {
+                let seed: Vec<f64> = inputs.iter().map(|_| random.signed()).collect();
+                let mut found = vec![0.0; outputs.len()];
+                match simulation.step_derivative(&outputs, &inputs, &seed, &mut found) {
+                    Ok(()) if found.iter().all(|value| value.is_finite()) => {}
+                    Ok(()) => refusal = Some(format!("a derivative is {found:?}")),
+                    Err(error) => refusal = super::oracles::names(&error).map(|finding| finding.text),
+                }
+            }
+        }
+        own
+    };
+    let text = refusal.or_else(|| {
+        let off = after.differs(record, plan, 0)?;
+        Some(format!("derivatives over the steps {asked:?} disturb: {off}"))
+    })?;
+    Some(Finding { oracle: "derivatives", text })
+}
