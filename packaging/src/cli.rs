@@ -54,7 +54,7 @@ pub enum Command {
     Demo(DemoArguments),
     /// From a finite-element model to a reduced-order model (ROM), with its checks: of your own, or one that ships.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  tiprub reduce casing --material titanium\n  \
-                            tiprub reduce blade blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
+                            tiprub reduce blade blade.inp --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
                             tiprub reduce blade --help\n\n\
                             docs/models.md describes models of your own; docs/rom-file.md writes a ROM from Python.")]
     Reduce(ReduceArguments),

@@ -194,14 +194,15 @@ pub struct CasingMeshArguments {
 /// Contact nodes of blades.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct TipOptions {
-    /// Number of contact nodes, chosen evenly along the chord out of the contact set or the tip.
+    /// Number of contact nodes, chosen evenly along the chord out of the contact set or the tip, instead of patches.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Number of patches along the chord that the faces within the contact set or the tip are divided into, instead of nodes [default:
-    /// 9 without a contact set, fewer where elements are wider].
+    /// Number of patches along the chord that the faces within the contact set or the tip are divided into [default: 9, fewer where
+    /// elements are wider; none for a contact set of at most 12 nodes, which are the contact nodes].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
-    /// Rows of patches across the thickness, from side to side: with two or more a tip that tilts touches with its sides [default: 1].
+    /// Rows of patches across the thickness, from side to side: with two or more the sides of a tilted tip touch [default: 2; 1 where
+    /// the mesh does not tell two apart].
     #[arg(long, value_name = "R", conflicts_with = "contact_nodes")]
     pub contact_rows: Option<usize>,
     /// Names of the contact nodes or patches along the chord, by growing z; of patches in rows NAME_row_1, NAME_row_2, ... [default:
@@ -213,8 +214,9 @@ pub struct TipOptions {
 /// What every model of one's own takes.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct ModelOptions {
-    /// Set of nodes that can touch: contact nodes or patches are taken from it. Or their numbers in the file, such as 12,57,103: then all of
-    /// them. Without it the tip of a mesh of blades is found: its outermost faces.
+    /// Set of nodes that can touch. With more than 12 nodes it is a tip, and contact is on patches; with fewer all of them are contact nodes,
+    /// and so are nodes given by their numbers in the file, such as 12,57,103. Without it the tip of a mesh of blades is found: its outermost
+    /// faces.
     #[arg(long, value_name = "SET")]
     pub contact_set: Option<String>,
     /// Set of nodes that are held, or their numbers in the file; may be repeated. `none`: the structure flies freely.

@@ -31,15 +31,15 @@ pub struct ReduceArguments {
 pub enum Model {
     /// Blades of your own on a rigid hub: a mesh (CalculiX/Abaqus .inp, Gmsh 4.1 .msh), or matrices of any code.
     #[command(
-        after_help = "Examples:\n  tiprub reduce blade blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
-                            tiprub reduce blade blade.msh --contact-set TIP --clamp-set ROOT --material titanium --contact-nodes 5\n  \
+        after_help = "Examples:\n  tiprub reduce blade blade.inp --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
+                            tiprub reduce blade blade.msh --contact-set TIP --clamp-set ROOT --material titanium --contact-patches 17\n  \
                             tiprub reduce blade job.inp --stiffness job.sti --mass job.mas --contact-set TIP --clamp-set ROOT\n\n\
                             Without --contact-set the tip is found in the mesh; without --clamp-set the sets of the file are listed."
     )]
     Blade(Box<BladeArguments>),
     /// A bladed disk of your own from a mesh or matrices of one sector: coupled sectors, nodal diameter by nodal diameter.
     #[command(
-        after_help = "Example:\n  tiprub reduce sector sector.inp --contact-set TIP --clamp-set BORE --sectors 56 --cyclic-low LOW --cyclic-high HIGH"
+        after_help = "Example:\n  tiprub reduce sector sector.inp --clamp-set BORE --sectors 56 --cyclic-low LOW --cyclic-high HIGH"
     )]
     Sector(Box<SectorArguments>),
     /// A casing of your own from a mesh, with a grid of contact nodes that a surface is laid through.

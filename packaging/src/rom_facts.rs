@@ -3,7 +3,11 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
-use tiprub_core::{Rom, plausibility, rom::Frame, stability};
+use tiprub_core::{
+    Rom, plausibility,
+    rom::{ContactNode, Frame},
+    stability,
+};
 use tiprub_shell::{Failure, Result};
 use tiprub_study::{
     estimate,
@@ -25,6 +29,10 @@ const RIGID: f64 = 1e-4;
 pub const DEVIATION_LIMIT: f64 = 0.3;
 /// The same for the residual convergence criterion (eq. 12, %).
 pub const RESIDUAL_LIMIT: f64 = 1.0;
+/// Friction coefficient that tips do not exceed: lock-up beyond it matters to no rub.
+const USUAL_FRICTION: f64 = 1.0;
+/// Factor between the lock-up frictions of both senses of rotation from which the lower one is asked about.
+const OTHER_SENSE: f64 = 2.0;
 
 /// Facts of one ROM.
 #[derive(Debug, Clone)]
@@ -42,8 +50,9 @@ pub struct RomFacts {
     /// Largest friction coefficient (in steps of 0.05, up to 2) for which the contact problem with all nodes of one
     /// sector closed has a unique solution at h = 1/ω_max, for slip in both directions; `None` if not even for 0.
     pub solvable_friction: Option<f64>,
-    /// The least friction with which closed contact that slides digs in, in the sense of the scene's speed where that is known.
-    pub digging: Option<Digging>,
+    /// Least friction with which closed contact locks up that slides towards +θ and −θ (positive and negative `speed`); `None` if no
+    /// friction does, and for the sense in which a known scene does not turn.
+    pub lock_up: [Option<Digging>; 2],
     /// Internal step of every scheme below which all are accepted, with the contact given.
     pub step_limits: Vec<StepLimit>,
     /// The contact they hold for, where it was given.
@@ -78,6 +87,9 @@ impl RomFacts {
         let mut frequencies = by_nodal_diameter.concat();
         frequencies.sort_by(f64::total_cmp);
         let limits = structure.models.iter().map(stability::central_difference_limit);
+        let speed = sliding.map_or(0.0, |sliding| sliding.speed);
+        let turns = |sense: f64| sense * speed >= 0.0;
+        let lock_up = [1.0, -1.0].map(|sense| turns(sense).then(|| structure.digs_in(sense)).flatten());
         Ok(Self {
             rom: rom.clone(),
             frequencies,
@@ -85,7 +97,7 @@ impl RomFacts {
             largest_angular_frequency: structure.highest(),
             central_difference_limit: limits.fold(f64::INFINITY, f64::min),
             solvable_friction: structure.solvable_friction(),
-            digging: structure.digs_in(sliding.map_or(0.0, |sliding| sliding.speed)),
+            lock_up,
             step_limits: structure.step_limits(sliding),
             sliding,
         })
@@ -211,12 +223,45 @@ impl RomFacts {
         }
     }
 
+    /// The lower of both senses.
+    fn least_lock_up(&self) -> Option<&Digging> {
+        self.lock_up.iter().flatten().min_by(|a, b| a.friction.total_cmp(&b.friction))
+    }
+
+    /// A blade that locks up with little friction in the sense of a positive speed, and with much more or never in the other sense: it may
+    /// be staggered for a rotor that turns the other way.
+    pub fn sense_warning(&self) -> Option<String> {
+        let [forward, backward] =
+            self.lock_up.each_ref().map(|found| found.as_ref().map_or(f64::INFINITY, |own| own.friction));
+        if forward >= USUAL_FRICTION || backward < OTHER_SENSE * forward {
+            return None;
+        }
+        let other =
+            if backward.is_finite() { format!("only from {backward:.2}") } else { "with no friction".to_owned() };
+        let ahead = self.leading_edge().map_or(String::new(), |node| {
+            format!(" With positive `speed` the edge at z = {:.4} m ({}) is ahead.", node.position[2], node.name)
+        });
+        Some(format!(
+            "the tip locks up from friction µ* = {forward:.2} when the rotor turns towards +θ (positive `speed`), and {other} when it turns \
+             towards −θ: is the blade staggered for a rotor that turns the other way?{ahead} If the other edge is to be ahead, give a negative \
+             `speed`, or mirror the mesh"
+        ))
+    }
+
+    /// Contact node at the end of the chord that is ahead when the rotor turns towards +θ.
+    fn leading_edge(&self) -> Option<&ContactNode> {
+        let nodes = &self.rom.contact_nodes;
+        let along = |a: &&ContactNode, b: &&ContactNode| a.position[2].total_cmp(&b.position[2]);
+        let ends = [nodes.iter().min_by(along)?, nodes.iter().max_by(along)?];
+        ends.into_iter().max_by(|a, b| a.position[1].total_cmp(&b.position[1]))
+    }
+
     /// "0.080 (closed at tip_2, nodal diameter 0, sliding in +θ)".
     pub(crate) fn digging_text(&self) -> String {
         let told = |Digging { friction, closed, sense }: &Digging| {
             format!("{friction:.3} (closed at {closed}, sliding in {})", ["+θ", "−θ"][*sense])
         };
-        self.digging.as_ref().map_or("none".to_owned(), told)
+        self.least_lock_up().map_or("none".to_owned(), told)
     }
 
     /// What the limits hold for.
@@ -328,9 +373,8 @@ impl RomFacts {
                 "modal-exact_resolves_all_modes_up_to": self.central_difference_limit,
             },
             "solvable_up_to_friction": self.solvable_friction,
-            "digs_in_above": self.digging.as_ref().map(|digging| json!({
-                "friction": digging.friction, "closed": digging.closed, "sense": if digging.sense == 0 { 1 } else { -1 },
-            })),
+            "digs_in_above": self.least_lock_up().map(lock_up_json),
+            "digs_in_by_sense": self.lock_up.iter().flatten().map(lock_up_json).collect::<Vec<_>>(),
             "checks": self.checks().iter().map(|row| json!({
                 "full_hz": row.full,
                 "reduced_hz": row.reduced,
@@ -370,6 +414,12 @@ impl Worst {
             residual: most(&|row| row.residual),
         })
     }
+}
+
+fn lock_up_json(found: &Digging) -> Value {
+    json!({
+        "friction": found.friction, "closed": found.closed, "sense": if found.sense == 0 { 1 } else { -1 },
+    })
 }
 
 /// Number of sectors, and how they are coupled.

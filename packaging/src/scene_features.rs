@@ -3,8 +3,8 @@
 use tiprub_core::{
     Rom, Scene,
     settings::{
-        CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Motion, SceneSettings, Scheme, Solver,
-        StructureSettings, SurfaceSettings, TOLERANCE,
+        CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Motion, Preset, SceneSettings, Scheme,
+        Solver, StructureSettings, SurfaceSettings, TOLERANCE,
     },
 };
 
@@ -34,6 +34,16 @@ pub fn features(scene: &Scene) -> Vec<String> {
         found.push("inputs act at once and hit like hammers where they jump (input_interpolation = \"hold\")".into());
     }
     found
+}
+
+/// Returns the scheme with why it is this one.
+pub fn scheme(settings: &SceneSettings) -> String {
+    let name = settings.time.scheme.name();
+    match (&settings.time.scheme_reason, settings.preset) {
+        (Some(reason), _) => format!("{name}, {reason}"),
+        (None, Preset::Paper) => format!("{name}, the scheme of preset = \"paper\""),
+        (None, Preset::None) => format!("{name}, named in the scene"),
+    }
 }
 
 fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String>) {

@@ -62,6 +62,23 @@ fn every_block_from_a_test_is_held_by_it() {
     }
 }
 
+/// One name means one thing: the first scene of the reference is the built-in scene with its model and its scheme.
+#[test]
+fn the_first_scene_of_the_reference_is_the_built_in_scene() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/scene-file.md");
+    let page = fs::read_to_string(page).unwrap();
+    let shown = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let [shown, built_in] = [shown, tiprub_gallery::scene_source::ROTOR37_SCENE]
+        .map(|text| tiprub_format::parse_scene(text, "scene").unwrap());
+    assert_eq!(shown.name, built_in.name);
+    assert_eq!(shown.structures, built_in.structures);
+    assert_eq!(shown.surfaces, built_in.surfaces);
+    assert_eq!(shown.contacts, built_in.contacts);
+    assert_eq!(shown.experiment, built_in.experiment);
+    let method = |scene: &tiprub_core::settings::SceneSettings| (scene.time.scheme, scene.time.step.to_bits());
+    assert_eq!(method(&shown), method(&built_in));
+}
+
 /// The rub of the first run at one, half and a quarter of its internal step: what a newcomer sees of the step.
 #[test]
 fn the_first_run_at_halved_steps() {

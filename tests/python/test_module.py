@@ -29,7 +29,7 @@ SCENE = {
     "structure": [{"name": "rotor", "rom": "blade.rom.safetensors", "speed": 500.0}],
     "surface": [{"name": "casing", "shape": {"kind": "lobes", "amplitude": 4e-4, "order": 3}, "ramp_time": 1e-3}],
     "contact": [{"master": "rotor", "slave": "casing", "gap": 3.56e-4, "friction": 0.05}],
-    "time": {"step": 1e-6},
+    "time": {"scheme": "modal-exact", "step": 1e-6},
     "experiment": {"stop": 2e-3, "communication_step": 1e-5},
 }
 

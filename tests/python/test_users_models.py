@@ -23,7 +23,7 @@ def product(tiprub, tmp_path_factory):
     scene = re.search(r"```toml\n(.*?)```", guide, re.S).group(1)
     (work / "blade.toml").write_text(scene)
     mesh = ROOT / "tests" / "data" / "models" / "blade_hex20.inp"
-    sets = ["--contact-set", "TIP", "--clamp-set", "ROOT", "--sectors", "36", "--units", "mm-t-s", "--material", "steel"]
+    sets = ["--clamp-set", "ROOT", "--sectors", "36", "--units", "mm-t-s", "--material", "steel"]
     tiprub("reduce", "blade", mesh, *sets, "-o", work / "blade.rom.safetensors")
     tiprub("run", work / "blade.toml", "--csv", work / "native.csv")
     library = ["--library", os.environ["TIPRUB_LIBRARY"]] if "TIPRUB_LIBRARY" in os.environ else []

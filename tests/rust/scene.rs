@@ -78,6 +78,7 @@ gap = 4e-4
 friction = 0.15
 
 [time]
+scheme = "modal-exact"
 step = 2e-6
 
 [outputs]

@@ -249,11 +249,10 @@ fn scene_text(settings: &SceneSettings) -> String {
                 .unwrap_or_default()
         );
     }
-    let scheme = serde_json::to_value(settings.time.scheme).ok();
-    let scheme = scheme.as_ref().and_then(Value::as_str).unwrap_or_default();
     let _ = writeln!(text, "  outputs       {}", serde_json::to_string(&settings.outputs).unwrap_or_default());
     let experiment = &settings.experiment;
-    let _ = writeln!(text, "  time          {scheme}, internal step at most {} s", settings.time.step);
+    let _ = writeln!(text, "  scheme        {}", scene_features::scheme(settings));
+    let _ = writeln!(text, "  time          internal step at most {} s", settings.time.step);
     let _ = writeln!(
         text,
         "  experiment    {} s to {} s, communication step {} s",

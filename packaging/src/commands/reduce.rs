@@ -56,6 +56,9 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     }
     let mut warnings = reduced.warnings.clone();
     warnings.extend(facts.warnings());
+    if matches!(arguments.model, Model::Blade(_) | Model::Sector(_)) {
+        warnings.extend(facts.sense_warning());
+    }
     warnings.extend(spin_warning(&reduced.spin_checks));
     console.warn(&warnings);
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();

@@ -20,7 +20,7 @@ use tiprub_study::{
     stability::limits::same_reason,
 };
 
-use crate::cli::RunArguments;
+use crate::{cli::RunArguments, scene_features};
 
 /// Load, run, write the CSV, sum up.
 ///
@@ -59,9 +59,13 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         .map(|(name, value)| (name.clone(), json!(value)))
         .collect();
     let extremes = extremes(&run.recording);
+    // A parameter of the command line replaces what the scene has.
+    let is_set = arguments.set.iter().any(|(name, _)| name == "scheme");
+    let scheme = if is_set { "set on the command line".to_owned() } else { scene_features::scheme(&scene.settings) };
     let estimates = estimated(&scene, arguments, &schedule, console)?;
     let mut json = json!({
         "model": scene.settings.name,
+        "scheme": scheme,
         "start": schedule.start,
         "stop": schedule.stop,
         "communication_step": schedule.step,
@@ -121,6 +125,7 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[String]) -> String {
     let per_step = |name: &str| json["milliseconds_per_communication_step"][name].as_f64().unwrap_or(f64::NAN);
     let mut text = format!(
         "{}: t = {} s to {} s, communication steps: {}, internal steps: {}\n\
+         scheme: {}\n\
          stepping took {:.3} s: {:.3} µs per internal step, {:.3} s of computing per simulated second\n\
          one communication step took {:.3} ms, at most {:.3} ms\n",
         json["model"].as_str().unwrap_or_default(),
@@ -128,6 +133,7 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[String]) -> String {
         json["stop"],
         json["communication_steps"],
         json["internal_steps"],
+        json["scheme"].as_str().unwrap_or_default(),
         number("stepping_seconds"),
         number("microseconds_per_internal_step"),
         number("real_time_factor"),

@@ -1,10 +1,10 @@
 //! Contact nodes, held nodes and faces, out of the sets of a model that was read.
 
 use tiprub_model::{
-    FeModel,
+    FeModel, Mesh,
     casing::GridNodes,
     cyclic::{CyclicBoundary, PairingReport},
-    patches::{FoundTip, find_tip, row_name, tip_patches},
+    patches::{FoundTip, find_root, find_tip, places_along_chord, row_name, tip_patches},
     read::{ContactChoice, Imported, choose_contact_nodes, set_counts},
     reduce::ContactPoint,
     stress::StressPlaces,
@@ -31,10 +31,18 @@ pub struct Chosen {
     pub grid: Option<GridNodes>,
     /// The tip of blades as the mesh shows it, and whether contact was taken from it because no set was named.
     pub tip: Option<(FoundTip, bool)>,
+    /// Nodes of the contact set that can move, if it names the whole tip and not single contact nodes; else empty.
+    pub tip_set: Vec<usize>,
+    /// Nodes of the root of blades as the mesh shows it, ascending; empty where there is no mesh.
+    pub root: Vec<usize>,
 }
 
-/// Patches where neither set nor numbers are given: more change little, fewer a lot.
+/// Patches along the chord by default: more change little, fewer a lot.
 pub const PATCHES: usize = 9;
+/// Rows of patches across the thickness by default: they stand at the sides of the tip.
+const ROWS: usize = 2;
+/// Sets with at most so many nodes name contact nodes. Larger ones name a tip.
+const SMALL_SET: usize = 12;
 
 /// For blades, or for a sector between its faces.
 ///
@@ -54,8 +62,11 @@ pub fn tips(
         fixed.sort_unstable();
     }
     let (free, by_number, tip) = candidates(imported, asked, &fixed)?;
-    let automatic = asked.contact_set.is_none() && tips.contact_nodes.is_none();
-    let patch_count = tips.contact_patches.or_else(|| automatic.then(|| default_patches(tips, &tip)));
+    let names_nodes = asked.contact_set.is_some() && (by_number || free.len() <= SMALL_SET);
+    let mesh = imported.model.mesh.as_ref().map(|(mesh, _)| mesh);
+    let default_mesh = mesh.filter(|_| !names_nodes && tips.contact_nodes.is_none());
+    let patch_count =
+        tips.contact_patches.or_else(|| default_mesh.map(|mesh| default_patches(tips, &tip, mesh, &free)));
     if let (Some(_), None) = (tips.contact_rows, patch_count) {
         let problem = "rows are of patches, and contact is at the nodes of the set";
         return Err(Failure::usage(
@@ -65,14 +76,22 @@ pub fn tips(
         ));
     }
     let contact = if let Some(count) = patch_count {
-        patches(imported, &free, [count, tips.contact_rows.unwrap_or(1)], &tips.contact_names)?
+        let in_rows = |rows: usize| patches(imported, &free, [count, rows], &tips.contact_names);
+        match tips.contact_rows {
+            Some(rows) => in_rows(rows)?,
+            // A coarse tip may not tell two rows apart.
+            None => in_rows(ROWS).or_else(|_| in_rows(1))?,
+        }
     } else {
         // Nodes given one by one are all meant.
         let count = tips.contact_nodes.or(by_number.then_some(free.len()));
         let choice = ContactChoice { count, names: tips.contact_names.clone() };
         choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?
     };
-    Ok(Chosen { stress: StressPlaces::default(), clamped, contact, faces, grid: None, tip })
+    let is_tip = asked.contact_set.is_some() && (tips.contact_patches.is_some() || !names_nodes);
+    let tip_set = if is_tip { free } else { Vec::new() };
+    let root = mesh.map_or(Vec::new(), find_root);
+    Ok(Chosen { stress: StressPlaces::default(), clamped, contact, faces, grid: None, tip, tip_set, root })
 }
 
 /// Nodes that may touch, whether they were given by number, and the tip with whether they are its.
@@ -90,10 +109,10 @@ fn candidates(imported: &Imported, asked: &ModelOptions, fixed: &[usize]) -> Res
     Ok((tip.nodes.clone(), false, Some((tip, true))))
 }
 
-/// As many as there are names; else five, or as many as a coarse tip can have.
-fn default_patches(tips: &TipOptions, tip: &Option<(FoundTip, bool)>) -> usize {
+/// As many as there are names; else nine, or as many as a coarse tip or contact set can have.
+fn default_patches(tips: &TipOptions, tip: &Option<(FoundTip, bool)>, mesh: &Mesh, set: &[usize]) -> usize {
     match tips.contact_names.len() {
-        0 => tip.as_ref().map_or(PATCHES, |(tip, _)| tip.at_most(PATCHES)),
+        0 => tip.as_ref().map_or(PATCHES, |(tip, _)| tip.at_most(PATCHES)).min(places_along_chord(mesh, set)),
         named => named,
     }
 }
@@ -173,6 +192,8 @@ pub fn grid(imported: &Imported, asked: &CasingMeshArguments) -> Result<Chosen> 
         faces: None,
         grid: Some(grid),
         tip: None,
+        tip_set: Vec::new(),
+        root: Vec::new(),
     })
 }
 

@@ -94,6 +94,34 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
     warnings
 }
 
+/// Sets that hold a part of what the mesh shows to be the tip and the root.
+pub fn set_warnings(asked: &ModelOptions, chosen: &Chosen) -> Vec<String> {
+    let within = |set: &[usize], whole: &[usize]| whole.iter().filter(|node| set.binary_search(node).is_ok()).count();
+    let mut warnings = Vec::new();
+    if let (Some(name), Some((tip, _)), false) = (&asked.contact_set, &chosen.tip, chosen.tip_set.is_empty()) {
+        let (on_tip, all, own) = (within(&chosen.tip_set, &tip.nodes), tip.nodes.len(), chosen.tip_set.len());
+        if on_tip < all {
+            warnings.push(format!(
+                "{name} has {on_tip} of the {all} nodes of the outermost faces, and the other nodes of the tip pass through the casing: is that \
+                 meant? Without --contact-set all of them are taken"
+            ));
+        } else if own > all {
+            warnings.push(format!(
+                "{name} has {own} nodes, of which {all} are all of the outermost faces: are the others meant to touch? Without --contact-set \
+                 they are left out"
+            ));
+        }
+    }
+    let (held, all) = (within(&chosen.clamped, &chosen.root), chosen.root.len());
+    if 0 < held && held < all {
+        warnings.push(format!(
+            "{} has {held} of the {all} nodes of the innermost faces, and the other nodes of the root are free: is that meant?",
+            asked.clamp_set.join(", ")
+        ));
+    }
+    warnings
+}
+
 /// More patches than the elements of a tip tell apart.
 pub fn narrow(patches: usize, edges: f64, most: usize) -> String {
     format!(
@@ -112,12 +140,15 @@ pub fn narrow_rows(rows: usize, elements: usize) -> String {
 }
 
 fn single(chosen: &Chosen) -> Option<String> {
-    let [point] = chosen.contact.as_slice() else { return None };
-    let what = if point.patch.is_empty() { "node" } else { "patch" };
+    let what = match chosen.contact.as_slice() {
+        [point] if point.patch.is_empty() => format!("the single node `{}`", point.name),
+        [point] => format!("the single patch `{}`", point.name),
+        all if ContactPoint::rows(all) == Some(all.len()) => "a single patch along the chord".to_owned(),
+        _ => return None,
+    };
     Some(format!(
-        "contact at the single {what} `{}`: where along the chord the tip touches is not told apart, nor is it held from tilting; ask for more \
-         (--contact-patches {PATCHES})",
-        point.name
+        "contact at {what}: where along the chord the tip touches is not told apart, nor is it held from tilting; ask for more \
+         (--contact-patches {PATCHES})"
     ))
 }
 

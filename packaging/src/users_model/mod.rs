@@ -150,6 +150,7 @@ fn told(
     let read = describe::describe(&imported, source.model, &chosen);
     warnings.extend(judge::radius_warning(&imported, &chosen));
     warnings.extend(judge::contact_warnings(&chosen));
+    warnings.extend(judge::set_warnings(source.model, &chosen));
     let mut model = imported.model;
     let clamped = (!chosen.clamped.is_empty()).then_some(CLAMPED);
     if let Some((mesh, _)) = model.mesh.as_mut().filter(|_| clamped.is_some()) {

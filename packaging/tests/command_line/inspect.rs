@@ -39,6 +39,26 @@ fn inspect_shows_where_contact_nodes_are_and_what_the_scene_sets() {
     assert!(scene.contains("\nstructure rotor, ROM small: One mass"), "{scene}");
 }
 
+/// One that is chosen when the scene is read goes with its reason into the FMU, whose scene names it.
+#[test]
+fn run_inspect_and_the_fmu_report_the_scheme_and_its_reason() {
+    let project = Project::new();
+    let reason = "modal-exact, the default with fixed steps, because";
+    let run = project.succeed(&["run", "scene.toml", "--stop", "2e-3"]);
+    assert!(run.contains(&format!("\nscheme: {reason}")), "{run}");
+    let set = project.succeed(&["run", "scene.toml", "--stop", "2e-3", "--set", "scheme=central-difference"]);
+    assert!(set.contains("\nscheme: set on the command line"), "{set}");
+    project.succeed(&["package", "scene.toml", "--fmi", "3", "-o", "x.fmu", "--library", "library.so"]);
+    for file in ["scene.toml", "x.fmu"] {
+        let text = project.succeed(&["inspect", file]);
+        assert!(text.contains(&format!("  scheme        {reason}")), "{file}: {text}");
+    }
+    let described = project.succeed(&["inspect", "x.fmu"]);
+    assert!(described.contains("Time-stepping scheme; at the start the default with fixed steps"), "{described}");
+    fs::write(project.path("scene.toml"), SCENE.replace("[time]", "[time]\nscheme = \"modal-exact\"")).unwrap();
+    assert!(project.succeed(&["inspect", "scene.toml"]).contains("  scheme        modal-exact, named in the scene"));
+}
+
 #[test]
 fn step_limits_are_those_at_which_a_scene_is_refused() {
     let project = Project::new();

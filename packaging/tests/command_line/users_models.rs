@@ -1,5 +1,6 @@
 //! Models of a user's own, as the user meets them: reduce, package, run, and what is said of wrong ones.
 
+mod sets;
 mod tips;
 
 use crate::guide::told;
@@ -81,9 +82,9 @@ fn scene() -> String {
 /// The command of the guide that reduces the blade, without `tiprub`.
 fn command() -> String {
     let guide = guide();
-    let lines = guide.split("\n    tiprub reduce blade blade.inp --contact-set TIP").nth(2).expect("the second one");
-    let text: String = lines.split("\n    tiprub package").next().unwrap().replace("\\\n", " ");
-    format!("reduce blade blade_hex20.inp --contact-set TIP{text}")
+    let lines = guide.split("\n    tiprub reduce blade blade.inp --clamp-set ROOT").nth(2).expect("the second one");
+    let text: String = lines.split("\n    tiprub run").next().unwrap().replace("\\\n", " ");
+    format!("reduce blade blade_hex20.inp --clamp-set ROOT{text}")
 }
 
 #[test]
@@ -93,18 +94,19 @@ fn a_mesh_of_gmsh_becomes_a_running_scene_as_the_guide_tells() {
     assert_eq!(told["rom"]["sectors"], 36);
     assert_eq!(told["model"]["sets"]["TIP"], 53);
     assert!((told["model"]["mass"].as_f64().unwrap() - 0.0771).abs() < 1e-4);
-    let names: Vec<&str> =
-        told["rom"]["contact_nodes"].as_array().unwrap().iter().map(|node| node["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["leading_edge", "mid_chord", "trailing_edge"]);
-    // The chord of the tip is 32 mm at 40 degrees to the axis: the edges' middles lie 12.26 mm before and behind.
+    // Seven patches are as wide as the six elements along the tip allow, in two rows at its sides.
     let rom = project.rom("blade.rom.safetensors");
-    for (node, z) in rom.contact_nodes.iter().zip([-12.256e-3, 0.0, 12.256e-3]) {
+    assert_eq!((rom.contact_nodes.len(), rom.rows()), (14, 2));
+    // The chord of the tip is 32 mm at 40 degrees to the axis: the edges' middles lie 12.26 mm before and behind.
+    let watched = &rom.extras.watched.as_ref().unwrap().points;
+    for (node, z) in watched.iter().zip([-12.256e-3, 0.0, 12.256e-3]) {
         let [radius, _, axial] = node.position;
         assert!((axial - z).abs() < 5e-6 && (radius - 0.26).abs() < 3e-4, "{node:?}");
     }
     project.write("blade.toml", scene());
     let run = project.succeed("run blade.toml --csv rub.csv");
     assert_eq!(run["communication_steps"], 500);
+    assert!(run["scheme"].as_str().unwrap().starts_with("galerkin, the default on rigid surfaces"), "{run:#}");
     let csv = fs::read_to_string(project.root.path().join("rub.csv")).unwrap();
     let names: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
     let column = names.iter().position(|name| *name == "clearance_minimum").unwrap();
@@ -207,7 +209,7 @@ fn patches_of_other_elements_are_as_soft() {
         project.rom("r.rom.safetensors").stiffness.try_inverse().unwrap()[(6, 6)]
     };
     let all = |contact: &str| files.each_ref().map(|file| radial(file, contact));
-    let (nodes, patches) = (all("--contact-nodes 5"), all("--contact-patches 5"));
+    let (nodes, patches) = (all("--contact-nodes 5"), all("--contact-patches 5 --contact-rows 1"));
     for (kind, (node, patch)) in kinds.iter().zip(nodes.into_iter().zip(patches)) {
         told!("| {kind} | {node} | {patch} |");
     }
@@ -340,7 +342,7 @@ fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about()
     let project = Project::new(&["blade_hex8.inp"]);
     let line =
         "reduce blade blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";
-    let told = project.succeed(&format!("{line} --contact-set TIP -o set.rom.safetensors"));
+    let told = project.succeed(&format!("{line} --contact-set TIP --contact-nodes 3 -o set.rom.safetensors"));
     let numbers: Vec<String> =
         told["model"]["contact_nodes"].as_array().unwrap().iter().map(|node| node["node"].to_string()).collect();
     project.succeed(&format!("{line} --contact-set {} -o numbers.rom.safetensors", numbers.join(",")));
@@ -351,7 +353,8 @@ fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about()
     let error = project.fail(&format!("{line} --contact-set 1,999999999"), 1);
     assert!(error.contains("no node 999999999"), "{error}");
     // Held at the tip, touching with the root.
-    let line = "reduce blade blade_hex8.inp --sectors 36 --units mm-t-s --material steel --modes 4 --force";
+    let line =
+        "reduce blade blade_hex8.inp --sectors 36 --units mm-t-s --material steel --modes 4 --contact-nodes 3 --force";
     let swapped = project.succeed(&format!("{line} --contact-set ROOT --clamp-set TIP"));
     assert!(swapped["warnings"].to_string().contains("tip and root"), "{}", swapped["warnings"]);
     let turned = project.succeed(

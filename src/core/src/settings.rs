@@ -2,6 +2,7 @@
 
 mod blades;
 mod coating;
+mod default_scheme;
 pub mod rules;
 mod validation;
 
@@ -79,6 +80,9 @@ fn two_lobe_width() -> f64 {
 
 /// Error that a step of `galerkin` may make where nothing else is said, as a share of the smallest clearance.
 pub const TOLERANCE: f64 = 1e-3;
+
+/// Longest step (s) of `galerkin` if the scene file gives none. The communication step bounds steps too.
+pub const ADAPTIVE_STEP: f64 = 8e-5;
 
 /// How a structure moves as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -374,10 +378,15 @@ pub enum InputInterpolation {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSettings {
-    /// Scheme.
+    /// Scheme. A file that names none has the [default](SceneSettings::default_scheme), which is chosen when the file is read.
     #[serde(default)]
     pub scheme: Scheme,
-    /// Largest internal step h (s); the step used divides the communication step evenly.
+    /// Why the file has this scheme if it named none; for people, without effect.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scheme_reason: Option<String>,
+    /// Largest internal step h (s); the step used divides the communication step evenly. With adaptive steps the longest one,
+    /// [`ADAPTIVE_STEP`] if the file gives none.
+    #[serde(default)]
     pub step: f64,
     /// Error that a step of `galerkin` may make in displacements, as a share of the smallest clearance; 1e-3 where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -496,6 +505,7 @@ pub struct SceneSettings {
     #[serde(rename = "contact")]
     pub contacts: Vec<ContactSettings>,
     /// Internal time stepping.
+    #[serde(default)]
     pub time: TimeSettings,
     /// What to expose.
     #[serde(default)]

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use tiprub_core::settings::{SceneSettings, StructureSettings};
+use tiprub_core::settings::SceneSettings;
 use tiprub_core::{Rom, Scene};
 
-use crate::{Error, Result, builtin_model, parse_scene, read_file, read_rom};
+use crate::{Error, Result, builtin_model, parse_scene, read_file, read_rom, read_scene};
 
 /// Start of a `rom` entry that names a model which comes with the program.
 pub(crate) const BUILTIN_PREFIX: &str = "builtin:";
@@ -21,9 +21,8 @@ const LARGEST_TEXT: u64 = 64 << 20;
 /// # Errors
 /// [`Error::File`] for files that cannot be read, else as [`parse_scene`] and [`read_rom`].
 pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
-    let settings = load_settings(path)?;
     let directory = path.parent().unwrap_or(Path::new(""));
-    let rom = |(index, structure): (usize, &StructureSettings)| match builtin_model(structure) {
+    read_scene(&scene_text(path)?, &path.display().to_string(), |index, structure| match builtin_model(structure) {
         Some(name) => builtin_rom(path, index, name, builtin(name)),
         None => {
             let remedy = format!(
@@ -34,9 +33,11 @@ pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, Stri
             );
             rom_file(&directory.join(&structure.rom), &remedy)
         }
-    };
-    let roms = settings.structures.iter().enumerate().map(rom).collect::<Result<_>>()?;
-    Ok(Scene { settings, roms })
+    })
+}
+
+fn scene_text(path: &Path) -> Result<String> {
+    read_text(path, "Give the path of a scene file (TOML)")
 }
 
 /// Read a scene file, without the ROM files.
@@ -44,7 +45,7 @@ pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, Stri
 /// # Errors
 /// [`Error::File`] for a file that cannot be read, else as [`parse_scene`].
 pub fn load_settings(path: &Path) -> Result<SceneSettings> {
-    parse_scene(&read_text(path, "Give the path of a scene file (TOML)")?, &path.display().to_string())
+    parse_scene(&scene_text(path)?, &path.display().to_string())
 }
 
 fn builtin_rom(scene: &Path, index: usize, name: &str, answer: Option<Result<Rom, String>>) -> Result<Rom> {

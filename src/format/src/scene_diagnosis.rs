@@ -238,7 +238,7 @@ fn description(value: &DeValue) -> String {
 }
 
 /// Type, range and meaning of a field, for a remedy; empty for unknown paths.
-fn requirement(fields: &str) -> String {
+pub(crate) fn requirement(fields: &str) -> String {
     let Some(field) = FIELDS.iter().find(|field| field.path == fields) else { return String::new() };
     let range = if field.range.is_empty() { String::new() } else { format!(" ({})", field.range) };
     format!("{}{range}. {}", field.value, field.description.trim_end_matches('.'))

@@ -2,19 +2,55 @@
 
 use toml::de::DeTable;
 
-use tiprub_core::settings::{Preset, SceneSettings, Scheme, Solver, StructureSettings};
+use tiprub_core::settings::{ADAPTIVE_STEP, Preset, SceneSettings, Scheme, Solver, StructureSettings, TimeSettings};
+use tiprub_core::{Rom, Scene};
 
 use crate::load::BUILTIN_PREFIX;
-use crate::scene_diagnosis::{Document, check_brackets, diagnose, position};
+use crate::scene_diagnosis::{Document, check_brackets, diagnose, position, requirement};
 use crate::{Error, Result};
 
-/// Read a scene; `origin` names the file in messages.
+/// Keys that a file may leave out.
+const SCHEME: &str = "time.scheme";
+const STEP: &str = "time.step";
+
+/// Read a scene; `origin` names the file in messages. If the text names no scheme, that of the settings without their ROMs is chosen.
 ///
 /// # Errors
 /// [`Error::Scene`] with line and column, the field path, what is wrong and the remedy: wrong syntax, unknown keys,
 /// missing keys, values of the wrong type, and whatever [`SceneSettings::validate`] refuses.
 pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
-    let document = DeTable::parse(text).map_err(|error| Error::Scene {
+    with_document(text, origin, |document| {
+        let mut settings = parse(document)?;
+        choose_scheme(&mut settings, &[], document)?;
+        Ok(settings)
+    })
+}
+
+/// Read a scene with its ROMs, which `rom` returns by the place of their structure and its settings. If the text names no scheme, it is
+/// chosen here with the ROMs, and all that runs, studies or packages the scene has this choice.
+///
+/// # Errors
+/// As [`parse_scene`], and those of `rom`.
+pub fn read_scene<E: From<Error>>(
+    text: &str,
+    origin: &str,
+    mut rom: impl FnMut(usize, &StructureSettings) -> Result<Rom, E>,
+) -> Result<Scene, E> {
+    with_document(text, origin, |document| {
+        let mut settings = parse(document)?;
+        let structures = settings.structures.iter().enumerate();
+        let roms = structures.map(|(index, structure)| rom(index, structure)).collect::<Result<Vec<_>, E>>()?;
+        choose_scheme(&mut settings, &roms, document)?;
+        Ok(Scene { settings, roms })
+    })
+}
+
+fn with_document<T, E: From<Error>>(
+    text: &str,
+    origin: &str,
+    work: impl FnOnce(&Document) -> Result<T, E>,
+) -> Result<T, E> {
+    let root = DeTable::parse(text).map_err(|error| Error::Scene {
         origin: origin.to_owned(),
         position: error.span().map(|span| position(text, span.start)),
         what: "TOML syntax".into(),
@@ -22,15 +58,38 @@ pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
         remedy: "Correct the file at this place; values that are words need quotation marks, and each key its own line"
             .into(),
     })?;
-    let document = Document { text, origin, root: document.get_ref() };
-    check_brackets(&document)?;
-    let mut settings: SceneSettings = toml::from_str(text).map_err(|error| diagnose(&document, &error))?;
-    apply_preset(&mut settings, &document);
+    work(&Document { text, origin, root: root.get_ref() })
+}
+
+/// Returns validated settings. The scheme of a document that names none is not chosen yet.
+fn parse(document: &Document) -> Result<SceneSettings> {
+    check_brackets(document)?;
+    let mut settings: SceneSettings = toml::from_str(document.text).map_err(|error| diagnose(document, &error))?;
+    apply_preset(&mut settings, document);
+    if !document.holds(STEP) {
+        settings.time.step = ADAPTIVE_STEP;
+    }
     settings.validate().map_err(|error| match error {
         tiprub_core::Error::Invalid { what, problem, remedy } => document.refusal(&what, problem, remedy),
         other => document.refusal("scene", other.to_string(), "Change the settings named".into()),
     })?;
     Ok(settings)
+}
+
+/// Chooses the scheme of a document that names none, with the ROMs that are known, and refuses fixed steps without a length.
+fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document) -> Result<()> {
+    if !document.holds(SCHEME) && settings.preset == Preset::None {
+        let (scheme, reason) = settings.default_scheme(roms);
+        (settings.time.scheme, settings.time.scheme_reason) = (scheme, Some(reason));
+    }
+    let TimeSettings { scheme, scheme_reason, .. } = &settings.time;
+    if document.holds(STEP) || *scheme == Scheme::Galerkin {
+        return Ok(());
+    }
+    let why = scheme_reason.as_ref().map_or(String::new(), |reason| format!(" ({reason})"));
+    let problem = format!("missing: the scheme is `{}`{why}, which has steps of one length", scheme.name());
+    let galerkin = if scheme_reason.is_some() { "" } else { ", or use scheme = \"galerkin\", which needs none" };
+    Err(document.refusal(STEP, problem, format!("Add `step = ...` to [time]: {}{galerkin}", requirement(STEP))))
 }
 
 /// Line and column, from 1, of the key at this path (indices from 1) in the text of a scene; `None` where it is not there.
@@ -44,7 +103,7 @@ fn apply_preset(settings: &mut SceneSettings, document: &Document) {
     if settings.preset != Preset::Paper {
         return;
     }
-    if !document.holds("time.scheme") {
+    if !document.holds(SCHEME) {
         settings.time.scheme = Scheme::CentralDifference;
     }
     for (index, contact) in settings.contacts.iter_mut().enumerate() {

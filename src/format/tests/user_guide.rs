@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::rom::{ContactNode, Frame};
-use tiprub_core::settings::{CuttingSettings, Preset, SceneSettings, Shape, rules};
+use tiprub_core::settings::{CuttingSettings, Preset, SceneSettings, Shape, TimeSettings, rules};
 use tiprub_format::{ARRAYS, FIELDS, METADATA, SceneField, parse_scene, read_rom, write_scene};
 
 fn chapter(name: &str) -> PathBuf {
@@ -67,6 +67,8 @@ fn the_list_of_keys_is_that_of_the_settings() {
         found.extend(keys(&scene));
     }
     found.extend(keys(&SceneSettings { preset: Preset::Paper, ..scene.clone() }));
+    let time = TimeSettings { scheme_reason: Some("because".into()), ..scene.time.clone() };
+    found.extend(keys(&SceneSettings { time, ..scene.clone() }));
     found.extend(keys(&features::scene_with_every_feature()));
     found.extend(keys(&features::scene_with_a_free_master()));
     let mut cut = features::scene_with_every_feature();

@@ -132,14 +132,10 @@ fn source(argument: &OsStr) -> Result<Source<'_>> {
 
 /// An embedded scene with embedded models from `reduce`.
 fn builtin_scene(name: &str, text: &str, reduce: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
-    let settings = tiprub_format::parse_scene(text, name)?;
-    let mut roms = Vec::new();
-    for structure in &settings.structures {
-        let model = builtin_model(structure).and_then(reduce);
-        let model = model.unwrap_or_else(|| Err("not known".into()));
-        roms.push(model.map_err(|problem| Failure::new(&structure.rom, problem, ""))?);
-    }
-    Ok(Scene { settings, roms })
+    tiprub_format::read_scene(text, name, |_, structure| {
+        let model = builtin_model(structure).and_then(reduce).unwrap_or_else(|| Err("not known".into()));
+        model.map_err(|problem| Failure::new(&structure.rom, problem, ""))
+    })
 }
 
 /// [`ROTOR37_ONE_ROW_SCENE`] around a blade reduced before.

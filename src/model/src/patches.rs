@@ -22,7 +22,7 @@ use crate::{Error, Result};
 
 pub(crate) use coordinates::PatchCoordinates;
 use outline::Outline;
-pub use tip::{FoundTip, find_tip};
+pub use tip::{FoundTip, find_root, find_tip};
 
 /// Every face is divided into so many parts in both directions: hat functions have kinks.
 const PARTS: usize = 4;
@@ -30,6 +30,11 @@ const PARTS: usize = 4;
 const DEPENDENT: f64 = 1e-9;
 /// Gauss-Legendre points and weights of a part, on 0 to 1.
 const GAUSS: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
+
+/// Number of places along the chord at which a set has nodes, and so its largest number of patches.
+pub fn places_along_chord(mesh: &Mesh, set: &[usize]) -> usize {
+    Places::new(&mesh.nodes, set).stations()
+}
 
 /// `count` patches along the chord of the tip whose nodes are `set`, by growing z as contact nodes are; `name` of each.
 ///

@@ -16,8 +16,8 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
         own["rom"]["origin"].as_str().unwrap().contains("forces on 4 patches and 20 free-interface modes"),
         "{own:#}"
     );
-    let line = "reduce blade blade.inp --contact-set TIP --clamp-set HUB --sectors 36 --contact-patches 4 --modes 20 \
-                -o read.rom.safetensors";
+    let line = "reduce blade blade.inp --contact-set TIP --clamp-set HUB --sectors 36 --contact-patches 4 --contact-rows 1 \
+                --modes 20 -o read.rom.safetensors";
     let read = project.succeed(line);
     assert_eq!(
         read["model"]["contact_nodes"][1]["patch_nodes"].as_u64().map(|nodes| nodes > 9),
@@ -65,10 +65,12 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     let common = "reduce blade blade.inp --contact-set TIP --clamp-set HUB --sectors 36 --modes 20";
     let read = project.succeed(&format!("{common} --contact-patches 4 --contact-rows 2 -o read.rom.safetensors"));
     assert_eq!((&own["rom"]["contact_rows"], &read["rom"]["contact_rows"]), (&2.into(), &2.into()));
+    let first = &read["model"]["contact_nodes"][0]["node"];
+    let by_number = format!("reduce blade blade.inp --contact-set {first} --clamp-set HUB");
     let [own, read] = ["own.rom.safetensors", "read.rom.safetensors"].map(|name| project.rom(name));
     assert_eq!([own.rows(), read.rows()], [2, 2]);
     for (contact, told) in
-        [("--contact-rows 2", "rows across the thickness 2\n"), ("", "1: the sides of the tip do not touch")]
+        [("", "rows across the thickness 2\n"), ("--contact-rows 1", "1: the sides of the tip do not touch")]
     {
         let line = format!("{common} --contact-patches 4 {contact} --force -o told.rom.safetensors");
         let output = project.run(&line);
@@ -110,7 +112,7 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     for (line, told, code) in [
         ("reduce rotor37 --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
         ("reduce stage --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
-        (format!("{common} --contact-rows 2 -o no.rom"), "Say how many patches along the chord", 2),
+        (format!("{by_number} --contact-rows 2 -o no.rom"), "Say how many patches along the chord", 2),
         (
             format!("{common} --contact-patches 4 --contact-rows 14 -o no.rom"),
             "14 rows of 4 are none, or more than the",
@@ -144,17 +146,25 @@ fn the_tip_of_a_mesh_is_found_and_told() {
         let radii = [0, 1].map(|end| tip["radius"][end].as_f64().unwrap());
         assert!((radii[0] - 0.2597).abs() < 4e-4 && (radii[1] - 0.2601).abs() < 4e-4, "{file}: {tip}");
         let patches = found["model"]["contact_nodes"].as_array().unwrap();
-        // Nine, or as many as the elements are wide.
-        let count = patches.len();
+        // Nine in two rows, or as many as the elements are wide.
+        let (count, rows) = (patches.len(), found["rom"]["contact_rows"].as_u64().unwrap());
         assert!(
-            (5..=9).contains(&count) && patches.iter().all(|patch| patch["patch_nodes"].as_u64() > Some(2)),
+            rows == 2
+                && (10..=18).contains(&count)
+                && patches.iter().all(|patch| patch["patch_nodes"].as_u64() > Some(2)),
             "{patches:?}"
         );
         assert!(
-            found["rom"]["origin"].as_str().unwrap().contains(&format!("{count} patches and 12 free-interface modes"))
+            found["rom"]["origin"]
+                .as_str()
+                .unwrap()
+                .contains(&format!("{count} patches in 2 rows and 12 free-interface modes"))
         );
-        project.succeed(&format!("{line} --contact-set TIP --contact-patches {count} -o named.rom.safetensors"));
-        assert!(project.rom("found.rom.safetensors") == project.rom("named.rom.safetensors"), "{file}");
+        // The set that names the tip gives the same contact, with numbers and without.
+        for numbers in [String::new(), format!("--contact-patches {} --contact-rows 2", count / 2)] {
+            project.succeed(&format!("{line} --contact-set TIP {numbers} -o named.rom.safetensors"));
+            assert!(project.rom("found.rom.safetensors") == project.rom("named.rom.safetensors"), "{file} {numbers}");
+        }
         let told = String::from_utf8(project.run(&format!("{line} -o text.rom.safetensors")).stdout).unwrap();
         let patches = format!("contact patches           {count} from the tip that was found");
         let wanted = ["tip found", "faces, ", "chord 0.032", &patches];
@@ -171,9 +181,10 @@ fn contact_at_points_of_a_fine_tip_is_warned_of() {
         project.succeed(&format!("reduce blade {line} {common}"))["warnings"].to_string()
     };
     for (line, wanted) in [
-        ("blade_hex20.inp --contact-set TIP", Some("contact at 3 nodes of a tip about")),
+        ("blade_hex20.inp --contact-set TIP --contact-nodes 3", Some("contact at 3 nodes of a tip about")),
         ("blade_hex20.inp --contact-set TIP --contact-nodes 1", Some("contact at a single node of a tip")),
-        ("blade_hex20.inp --contact-patches 1", Some("contact at the single patch `patch_1`")),
+        ("blade_hex20.inp --contact-patches 1", Some("contact at a single patch along the chord")),
+        ("blade_hex20.inp --contact-patches 1 --contact-rows 1", Some("contact at the single patch `patch_1`")),
         ("blade_hex20.inp --contact-nodes 7", None),
         ("blade_hex20.inp --contact-patches 3 --kind craig-bampton", None),
         ("blade_hex20.inp --contact-patches 7", None),
@@ -261,10 +272,9 @@ fn a_sector_has_patches_of_both_kinds() {
                 --modes 6";
     let free = project.succeed(&format!("{line} -o free.rom.safetensors"));
     let count = free["model"]["contact_nodes"].as_array().unwrap().len();
-    assert_eq!(count, 3, "two elements along the chord have no more than three patches");
-    assert!(free["rom"]["origin"].as_str().unwrap().contains(&format!("forces on {count} patches and")), "{free:#}");
-    let held =
-        format!("{line} --contact-set TIP --contact-patches {count} --kind craig-bampton -o held.rom.safetensors");
+    assert_eq!(count, 6, "two elements along the chord have no more than three patches in each row");
+    assert!(free["rom"]["origin"].as_str().unwrap().contains("forces on 6 patches in 2 rows and"), "{free:#}");
+    let held = format!("{line} --contact-set TIP --contact-patches 3 --kind craig-bampton -o held.rom.safetensors");
     project.succeed(&held);
     let [free, held] = ["free.rom.safetensors", "held.rom.safetensors"].map(|name| {
         let rom = project.rom(name);

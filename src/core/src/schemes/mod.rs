@@ -35,7 +35,8 @@ use serde::{Deserialize, Serialize};
 pub enum Scheme {
     /// Explicit central differences, the paper's scheme (eq. 9); stable for ωh < 2.
     CentralDifference,
-    /// Two-step recurrence that is exact in free flight and at rest under constant force (default).
+    /// Two-step recurrence that is exact in free flight and at rest under constant force (default of Rust; a scene file that names no scheme
+    /// has [another default](crate::settings::SceneSettings::default_scheme)).
     #[default]
     ModalExact,
     /// The highest modes, three per contact node, are quasi-static: contact acts through their residual flexibility

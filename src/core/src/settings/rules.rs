@@ -416,6 +416,13 @@ impl SceneSettings {
         [PRESETS, VARIABLES, METHODS].into_iter().try_for_each(|rules| check(rules, self.place(), path))
     }
 
+    /// Returns which rule excludes a scheme from this scene, and why; `roms` may be empty before they are known.
+    pub(super) fn excluded_method(&self, roms: &[Rom], scheme: Scheme) -> Option<String> {
+        let refusal = check(METHODS, Place { roms, scheme, ..self.place() }, path).err()?;
+        let Error::Invalid { problem, .. } = refusal else { return None };
+        Some(problem)
+    }
+
     fn place(&self) -> Place<'_> {
         let (scheme, solver) = (self.time.scheme, self.contacts[0].solver);
         Place { settings: self, roms: &[], scheme, solver, index: 0 }

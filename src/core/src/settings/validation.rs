@@ -57,12 +57,12 @@ impl SceneSettings {
         if let Some(tolerance) = self.time.tolerance {
             within("time.tolerance", tolerance, ranges::TOLERANCE[0], ranges::TOLERANCE[1])?;
         }
-        within("time.step", self.time.step, ranges::SHORTEST_STEP, ranges::LONGEST_STEP)?;
         let experiment = &self.experiment;
         at_most("experiment.start", experiment.start, ranges::TIME)?;
         at_most("experiment.stop", experiment.stop, ranges::TIME)?;
         let length = experiment.communication_step;
         within("experiment.communication_step", length, ranges::SHORTEST_STEP, ranges::TIME)?;
+        within("time.step", self.time.step, ranges::SHORTEST_STEP, ranges::LONGEST_STEP)?;
         if !(self.experiment.stop.is_finite() && self.experiment.stop > self.experiment.start) {
             return Err(Error::invalid(
                 "experiment.stop",

@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 98] = [
+pub const FIELDS: [SceneField; 99] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
     field(
@@ -486,15 +486,22 @@ pub const FIELDS: [SceneField; 98] = [
     field(
         "time.scheme",
         "text",
-        Some("`modal-exact`"),
+        Some("[depends on the scene](#adaptive-and-fixed-steps)"),
         "`modal-exact`, `central-difference`, `massless-boundary`, `galerkin`",
         "Time-stepping scheme of the modal equations; `massless-boundary` takes the highest modes, three per contact \
          node, as quasi-static, and so does `galerkin`, whose steps follow from a tolerance.",
     ),
     field(
+        "time.scheme_reason",
+        "text",
+        Some("empty"),
+        "any",
+        "Why `scheme` was chosen. FMUs have it in their scene if your scene names no scheme. It has no effect.",
+    ),
+    field(
         "time.step",
         "number, s",
-        None,
+        Some("8e-5 for `galerkin`; *needed* for other schemes"),
         "1e-12 to 1",
         "Largest internal step; the step used divides the communication step evenly. Of `galerkin` the longest step.",
     ),

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use tiprub_core::settings::*;
-use tiprub_format::{Error, builtin_model, parse_scene, write_scene};
+use tiprub_format::{Error, parse_scene, write_scene};
 
 use crate::common;
 
@@ -44,7 +44,7 @@ fn defaults_are_as_documented() {
     assert_eq!(scene.structures[0].damping_ratio, None);
     assert_eq!(scene.contacts[0].solver, Solver::Lcp);
     assert_eq!(scene.contacts[0].meridian, Meridian::Contour);
-    assert_eq!(scene.time.scheme, Scheme::ModalExact);
+    assert_eq!(scene.time.scheme, Scheme::Galerkin);
     assert_eq!(scene.outputs, OutputSettings::default());
     assert_eq!(scene.surfaces[0].shape, Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 });
 }
@@ -96,7 +96,8 @@ fn missing_keys_are_named_with_their_unit_and_range() {
         &["contact[1].gap: missing", "to [[contact]]", "number, m (> 0, up to a tenth"],
     );
     refused("name = \"demo\"\n", "", "", &["name: missing", "before the first [table]"]);
-    refused("[time]\nstep = 1e-6\n", "", "", &["time: missing", "Add a table [time]"]);
+    let experiment = "[experiment]\nstop = 1.0\ncommunication_step = 1e-3\n";
+    refused(experiment, "", "", &["experiment: missing", "Add a table [experiment]"]);
     refused("amplitude = 1e-4, ", "", ":7:9", &["surface[1].shape.amplitude: missing", "`shape` of [[surface]]"]);
     refused("kind = \"lobes\", ", "", ":7:9", &["surface[1].shape.kind: missing", "`two-lobe`"]);
 }

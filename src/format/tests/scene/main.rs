@@ -6,5 +6,6 @@ mod common;
 mod features;
 
 mod asked;
+mod default_scheme;
 mod file;
 mod resources;

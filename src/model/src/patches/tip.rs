@@ -1,4 +1,4 @@
-//! The tip of a blade, found in its mesh where nobody names it.
+//! The tip and the root of a blade, found in its mesh.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -49,7 +49,7 @@ impl FoundTip {
     }
 }
 
-/// An outer face that faces outward.
+/// An outer face that faces away from the axis, or towards it.
 struct Face<'a> {
     element: &'a Element,
     corners: &'static [usize],
@@ -70,7 +70,7 @@ impl Face<'_> {
 /// # Errors
 /// [`Error::Invalid`] for a mesh without such faces, and where they reach fixed nodes.
 pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
-    let faces = outward_faces(mesh);
+    let faces = radial_faces(mesh, Side::Outer);
     let first = (0..faces.len()).max_by(|&a, &b| faces[a].radius.total_cmp(&faces[b].radius).then(b.cmp(&a)));
     let Some(first) = first else {
         let problem = "no outer face of the mesh faces outward, within 45 degrees of the radial direction";
@@ -96,6 +96,16 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
     let (places, chord) = (places.stations(), places.chord_length());
     let (edge, axial) = (median_edge(mesh, &own), extent(mesh, &nodes, |[_, _, z]| z));
     Ok(FoundTip { faces: own.len(), nodes, places, across, chord, edge, radius, axial, elsewhere })
+}
+
+/// Returns the nodes of the root, mid-side ones too, ascending: of the innermost of all outer faces whose normals are within 45 degrees of the
+/// inward radial direction, and of all of these that are connected with it over edges. Empty for a mesh without such faces.
+pub fn find_root(mesh: &Mesh) -> Vec<usize> {
+    let faces = radial_faces(mesh, Side::Inner);
+    let first = (0..faces.len()).min_by(|&a, &b| faces[a].radius.total_cmp(&faces[b].radius).then(a.cmp(&b)));
+    let Some(first) = first else { return Vec::new() };
+    let chosen = connected(&faces, first);
+    nodes_of(&faces.iter().zip(&chosen).filter(|(_, chosen)| **chosen).map(|(face, _)| face).collect::<Vec<_>>())
 }
 
 /// Faces that a line across the chord meets in its middle; of triangles two in a layer.
@@ -145,7 +155,23 @@ fn extent(mesh: &Mesh, nodes: &[usize], of: fn([f64; 3]) -> f64) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
-fn outward_faces(mesh: &Mesh) -> Vec<Face<'_>> {
+/// Which faces are looked for: those whose normals point away from the axis, or towards it.
+#[derive(Clone, Copy)]
+enum Side {
+    Outer,
+    Inner,
+}
+
+impl Side {
+    fn sign(self) -> f64 {
+        match self {
+            Self::Outer => 1.0,
+            Self::Inner => -1.0,
+        }
+    }
+}
+
+fn radial_faces(mesh: &Mesh, side: Side) -> Vec<Face<'_>> {
     let mut count: HashMap<Vec<usize>, usize> = HashMap::new();
     let key = |element: &Element, corners: &[usize]| {
         let mut key: Vec<usize> = corners.iter().map(|&corner| element.nodes[corner]).collect();
@@ -157,11 +183,11 @@ fn outward_faces(mesh: &Mesh) -> Vec<Face<'_>> {
         *count.entry(key(element, corners)).or_default() += 1;
     }
     let outer = all().filter(|(element, corners)| count[&key(element, corners)] == 1);
-    outer.filter_map(|(element, corners)| outward(mesh, element, corners)).collect()
+    outer.filter_map(|(element, corners)| radial_face(mesh, element, corners, side)).collect()
 }
 
-/// The face, where it faces outward. Corners run counter-clockwise seen from outside.
-fn outward<'a>(mesh: &Mesh, element: &'a Element, corners: &'static [usize]) -> Option<Face<'a>> {
+/// The face, where it faces this side. Corners run counter-clockwise seen from outside.
+fn radial_face<'a>(mesh: &Mesh, element: &'a Element, corners: &'static [usize], side: Side) -> Option<Face<'a>> {
     let at: Vec<[f64; 3]> = corners.iter().map(|&corner| mesh.nodes[element.nodes[corner]]).collect();
     let mean = |pick: &dyn Fn([f64; 3]) -> f64| at.iter().map(|&point| pick(point)).sum::<f64>() / at.len() as f64;
     let [x, y] = [mean(&|[x, ..]| x), mean(&|[_, y, _]| y)];
@@ -175,7 +201,7 @@ fn outward<'a>(mesh: &Mesh, element: &'a Element, corners: &'static [usize]) -> 
     let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
     let radial = (normal[0] * x + normal[1] * y) / x.hypot(y);
     let radius = mean(&|[x, y, _]| x.hypot(y));
-    (radial >= OUTWARD * size).then(|| Face { element, corners, radius, axial: mean(&|[_, _, z]| z) })
+    (side.sign() * radial >= OUTWARD * size).then(|| Face { element, corners, radius, axial: mean(&|[_, _, z]| z) })
 }
 
 /// Which faces are connected with the first one over edges.

@@ -37,8 +37,6 @@ impl Full {
 
 /// Steps by a tolerance.
 pub const TOLERANT: Competitor = Competitor::Core(Scheme::Galerkin, Solver::Lcp);
-/// Its longest step (s), where communication steps are not shorter.
-pub const LONGEST: f64 = 8e-5;
 /// One over its tolerances that are compared.
 pub const TOLERANCES: [u32; 4] = [100, 1000, 10_000, 100_000];
 /// One over that of its finest run.

@@ -2,13 +2,13 @@
 
 use tiprub_core::{
     Scene, Simulation,
-    settings::{Motion, Scheme, Solver},
+    settings::{ADAPTIVE_STEP, Motion, Scheme, Solver},
     system::Structure,
 };
 use tiprub_shell::native;
 
 use super::{
-    competitor::{Competitor, LONGEST},
+    competitor::Competitor,
     run::{Run, Seen},
 };
 
@@ -86,7 +86,7 @@ impl SceneRun {
         if !Competitor::Core(scheme, solver).is_by_tolerance() {
             return Self::changed(scene, (scheme, solver), interval / f64::from(division), perturbation);
         }
-        let mut scene = Self::changed(scene, (scheme, solver), LONGEST.min(interval), perturbation);
+        let mut scene = Self::changed(scene, (scheme, solver), ADAPTIVE_STEP.min(interval), perturbation);
         scene.settings.time.tolerance = Some(1.0 / f64::from(division));
         scene
     }

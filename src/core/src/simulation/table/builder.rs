@@ -181,7 +181,9 @@ impl Builder {
         if settings.bounds_steps() {
             self.steps_at_most(settings);
         }
-        self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, "Time-stepping scheme");
+        let reason =
+            settings.time.scheme_reason.as_ref().map_or(String::new(), |reason| format!("; at the start {reason}"));
+        self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, &format!("Time-stepping scheme{reason}"));
         self.choice(Quantity::SolverChoice, "solver", &SOLVERS, solver, "Contact solver");
     }
 

@@ -1,0 +1,107 @@
+//! The scheme of a scene file that names none: chosen when the file is read, with the reason.
+
+use tiprub_core::Rom;
+use tiprub_core::settings::{ADAPTIVE_STEP, SceneSettings, Scheme};
+use tiprub_format::{Error, parse_scene, read_scene, write_scene};
+use tiprub_test_models::{blade, disk::Disk, rich_blade};
+
+/// Without a table `[time]`.
+const SCENE: &str = r#"name = "demo"
+[[structure]]
+name = "rotor"
+rom = "rotor.safetensors"
+[[surface]]
+name = "casing"
+[[contact]]
+master = "rotor"
+slave = "casing"
+gap = 1e-3
+friction = 0.1
+[experiment]
+stop = 1.0
+communication_step = 1e-3
+"#;
+
+const COATING: &str = "coating = { thickness = 2e-3, modulus = 1e9, yield_stress = 5e6, hardening = 1e8, cells_around = 90, cells_along = 3 }\n";
+const RING: &str = "[[structure]]\nname = \"ring\"\nrom = \"ring.safetensors\"\nmotion = \"still\"\n";
+
+/// The scene with lines after others, and fixed steps where it needs them.
+fn scene(after: &str, line: &str, step: bool) -> Result<SceneSettings, Error> {
+    assert_eq!(SCENE.matches(after).count(), 1, "{after:?}");
+    let time = if step { "[time]\nstep = 1e-6\n" } else { "" };
+    parse_scene(&(SCENE.replace(after, &format!("{after}{line}")) + time), "demo.toml")
+}
+
+/// Lines of a scene after others, and what its reason says.
+const FIXED: [(&str, &str, &str); 6] = [
+    ("gap = 1e-3\n", COATING, "`contact.coating`"),
+    ("rom = \"rotor.safetensors\"\n", "spin = { growth = true }\n", "`structure.spin`"),
+    ("rom = \"rotor.safetensors\"\n", "thermal = true\n", "`structure.thermal` of a rotor"),
+    ("rom = \"rotor.safetensors\"\n", "excitation = { order = 2, mode = 1 }\n", "`structure.excitation`"),
+    ("gap = 1e-3\n", "solver = \"film\"\n", "`contact.solver = \"film\"`"),
+    ("[[surface]]\nname = \"casing\"\n", "structure = \"ring\"\n", "the surface `casing` is elastic"),
+];
+
+#[test]
+fn a_rigid_casing_has_adaptive_steps_and_needs_no_time_table() {
+    let settings = parse_scene(SCENE, "demo.toml").unwrap();
+    assert_eq!((settings.time.scheme, settings.time.step), (Scheme::Galerkin, ADAPTIVE_STEP));
+    assert!(settings.time.scheme_reason.as_ref().unwrap().contains("the default on rigid surfaces"));
+    // What is packaged is this choice, and its reason stays with it.
+    assert_eq!(parse_scene(&write_scene(&settings), "again").unwrap(), settings);
+}
+
+#[test]
+fn features_that_exclude_adaptive_steps_have_fixed_steps_with_a_reason() {
+    for (after, line, reason) in FIXED {
+        let text = if line.contains("ring") { format!("{line}{RING}") } else { line.to_owned() };
+        let settings = scene(after, &text, true).unwrap_or_else(|error| panic!("{line}: {error}"));
+        let own = settings.time.scheme_reason.clone().unwrap();
+        assert_eq!((settings.time.scheme, settings.time.step), (Scheme::ModalExact, 1e-6), "{line}");
+        assert!(own.contains("fixed steps, because") && own.contains(reason), "{line}: {own}");
+        // Fixed steps need a length: the refusal says why they are fixed.
+        let refusal = scene(after, &text, false).unwrap_err().to_string();
+        assert!(refusal.contains("time.step: missing") && refusal.contains(reason), "{refusal}");
+        // What the file names is taken as it is.
+        let named = format!("{}[time]\nscheme = \"galerkin\"\n", SCENE.replace(after, &format!("{after}{text}")));
+        match parse_scene(&named, "demo.toml") {
+            Ok(settings) => assert!(reason.contains("elastic") && settings.time.scheme_reason.is_none()),
+            Err(error) => assert!(error.to_string().contains("excludes") && !reason.contains("elastic"), "{error}"),
+        }
+    }
+}
+
+#[test]
+fn a_scheme_that_is_named_has_no_reason_and_fixed_ones_need_a_step() {
+    for scheme in Scheme::ALL {
+        let text = format!("{SCENE}[time]\nscheme = \"{}\"\n", scheme.name());
+        let settings = parse_scene(&format!("{text}step = 1e-6\n"), "demo.toml").unwrap();
+        assert_eq!((settings.time.scheme, settings.time.scheme_reason), (scheme, None));
+        match parse_scene(&text, "demo.toml") {
+            Ok(settings) => assert_eq!((scheme, settings.time.step), (Scheme::Galerkin, ADAPTIVE_STEP)),
+            Err(error) => {
+                let text = error.to_string();
+                assert!(text.contains("time.step: missing") && text.contains("scheme = \"galerkin\""), "{text}");
+            }
+        }
+    }
+    let paper = parse_scene(&format!("preset = \"paper\"\n{SCENE}[time]\nstep = 1e-6\n"), "demo.toml").unwrap();
+    assert_eq!((paper.time.scheme, paper.time.scheme_reason), (Scheme::CentralDifference, None));
+}
+
+#[test]
+fn the_rom_decides_too() {
+    let choice = |rom: Rom| {
+        let text = format!("{SCENE}[time]\nstep = 1e-6\n");
+        let scene = read_scene::<Error>(&text, "demo.toml", |_, _| Ok(rom.clone())).unwrap();
+        (scene.settings.time.scheme, scene.settings.time.scheme_reason.unwrap())
+    };
+    assert_eq!(choice(rich_blade(4)).0, Scheme::Galerkin);
+    let (scheme, reason) = choice(blade(4));
+    assert!(scheme == Scheme::ModalExact && reason.contains("more than three modes per contact node"), "{reason}");
+    let (scheme, reason) = choice(Disk::random(6, 1, 4, 0.1, 1).cyclic());
+    assert!(scheme == Scheme::ModalExact && reason.contains("the sectors of `rotor` are coupled"), "{reason}");
+    // Without a step it is only known with the ROM that one is missing.
+    let refusal = read_scene::<Error>(SCENE, "demo.toml", |_, _| Ok(blade(4))).unwrap_err().to_string();
+    assert!(refusal.contains("time.step: missing") && refusal.contains("three modes per contact node"), "{refusal}");
+}
