@@ -294,8 +294,10 @@ fn excited(scheme: Scheme, order: u32, ratio: f64) -> Result<Vec<Check>> {
             }
         }
     }
+    // Quasi-static modes of massless-boundary follow the force one step late.
+    let late = if scheme == Scheme::MasslessBoundary { rate * STEP } else { 0.0 };
     Ok(vec![
-        Check::at_most("displacement from the response of the modes", apart, 2e-3),
+        Check::at_most("displacement from the response of the modes", apart, 2e-3 + late),
         Check::at_most("ledger residual", real(&simulation, "energy_residual_relative").abs(), 1e-9),
     ])
 }
