@@ -19,55 +19,64 @@ fn random(arguments: &[&str], code: i32) -> Value {
 }
 
 /// A fault that is known and still open: what it is, whether a finding shows it (oracle, scheme, solver, text), and how many findings of the
-/// 300 scenes may. One that is mended goes from here.
+/// 300 scenes may: a fifth more than were found, at least one, because any change of physics moves violent runs. A fault that is mended goes
+/// from here.
 type Known = (&'static str, fn(&str, &str, &str, &str) -> bool, usize);
 
 const KNOWN: [Known; 10] = [
     (
         "a state with ramp_time = 0 is refused by an instance that started later",
         |_, _, _, text| text.contains("beyond all bounds"),
-        28,
+        34,
     ),
     (
         "galerkin goes on from a state with other bits in another instance",
-        |oracle, scheme, _, text| oracle == "states" && scheme == "galerkin" && text.contains("restored at"),
-        3,
+        |oracle, scheme, _, text| {
+            oracle == "states"
+                && scheme == "galerkin"
+                && ["restored at", "goes on after"].iter().any(|words| text.contains(words))
+        },
+        4,
     ),
     (
-        "friction of a law without sticking gives energy",
-        |oracle, _, solver, _| oracle == "friction_loss" && solver != "coulomb",
-        18,
+        "friction of a law without sticking, or of massless-boundary, gives energy",
+        |oracle, scheme, solver, _| oracle == "friction_loss" && (solver != "coulomb" || scheme == "massless-boundary"),
+        22,
     ),
     (
         "massless-boundary gives impact energy back",
         |oracle, scheme, _, _| oracle == "impact_loss" && scheme == "massless-boundary",
-        40,
+        48,
     ),
     (
         "massless-boundary holds energy one step before its work",
         |oracle, scheme, _, _| oracle == "energy" && scheme == "massless-boundary",
-        1,
+        2,
     ),
     (
         "galerkin gives impact energy back, up to 2e-4 of the energy exchanged",
         |oracle, scheme, _, _| oracle == "impact_loss" && scheme == "galerkin",
-        11,
+        14,
     ),
     (
         "impact loss falls with modal-exact and central differences",
         |oracle, scheme, _, _| oracle == "impact_loss" && ["modal-exact", "central-difference"].contains(&scheme),
-        6,
+        8,
     ),
     (
         "film does not look again at nodes that others push",
         |oracle, _, solver, _| oracle == "penetration" && solver == "film",
-        13,
+        16,
     ),
-    ("the ledger does not close with coulomb", |oracle, _, solver, _| oracle == "ledger" && solver == "coulomb", 1),
+    (
+        "the ledger of free bodies does not close with recurrences",
+        |oracle, scheme, _, _| oracle == "ledger" && scheme != "galerkin",
+        2,
+    ),
     (
         "cutting work falls where a tip moves back",
         |oracle, _, _, text| oracle == "wear" && text.contains("cutting_work"),
-        1,
+        2,
     ),
 ];
 
