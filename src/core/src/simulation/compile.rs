@@ -12,13 +12,14 @@ use crate::gaps::{GapLaw, RevolutionGap};
 use crate::laws::coating::Coating;
 use crate::ranges::SMALL;
 use crate::rom::Support;
-use crate::settings::{ContactSettings, Motion, StructureSettings};
+use crate::settings::{ContactSettings, Meridian, Motion, StructureSettings};
 use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings, joined};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene, shown};
 use nalgebra::DMatrix;
 
 use super::blades::{heat, softened};
+use super::contour::check_contour;
 use super::loads::{CarrierLoads, centrifugal};
 use super::patches::Patches;
 use super::plan::{PairPlan, Plan, prefix};
@@ -453,7 +454,11 @@ impl Compiled {
         let surface = Surface::new(&settings.shape, contact.nominal_gap())?;
         check_lengths(rom, &clearances, &surface)?;
         let lanes = crate::dynamics::bank::lanes(rom.sectors);
-        if settings.spline.is_none() && plan.carrier.is_none() {
+        let spline = settings.spline.is_some() || plan.carrier.is_some();
+        if contact.meridian == Meridian::Contour {
+            check_contour(rom, &plan.nodes, !spline)?;
+        }
+        if !spline {
             let gap = RevolutionGap::new(rom, surface, &clearances, contact.meridian, lanes)?;
             let gap = gap.of_nodes(plan.nodes.clone()).with_moving_shaft(structure.whirl || structure.axial_shift);
             return Ok(GapLaw::Revolution(gap));

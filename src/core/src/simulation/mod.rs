@@ -4,6 +4,7 @@ mod access;
 mod blades;
 mod checks;
 mod compile;
+mod contour;
 mod drive;
 mod failures;
 mod fingerprint;

@@ -8,6 +8,7 @@ mod casing;
 mod chatter;
 mod checks;
 mod coating;
+mod contour;
 mod cutting;
 mod cyclic;
 mod cyclic_features;

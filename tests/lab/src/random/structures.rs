@@ -59,8 +59,26 @@ pub(crate) fn rotor(random: &mut Random, shape: Shape) -> Rom {
     if chance(random, 0.4) {
         patches(random, &mut rom);
     }
+    follow_slopes(&mut rom);
     rom.damping_ratio = random.of(&[0.0, 1e-3, 5e-3, 0.03]);
     rom
+}
+
+/// Radii of the contour whose slopes the contact nodes have; nodes at one place along the axis have the radius of the mean slope.
+fn follow_slopes(rom: &mut Rom) {
+    let axial: Vec<f64> = rom.contact_nodes.iter().map(|node| node.position[2]).collect();
+    let mut order: Vec<usize> = (0..axial.len()).collect();
+    order.sort_by(|a, b| axial[*a].total_cmp(&axial[*b]));
+    let mut before: Option<[f64; 3]> = None;
+    for place in order.chunk_by(|a, b| axial[*b] - axial[*a] < 1e-6) {
+        let slopes = place.iter().map(|node| rom.contact_nodes[*node].meridional_slope);
+        let (mean, here) = (slopes.sum::<f64>() / place.len() as f64, axial[place[0]]);
+        let radius = before.map_or(RADIUS, |[radius, slope, from]| radius + 0.5 * (slope + mean) * (here - from));
+        before = Some([radius, mean, here]);
+        for node in place {
+            rom.contact_nodes[*node].position[0] = radius;
+        }
+    }
 }
 
 /// Turn contact nodes into patches, in two rows where their number allows it.

@@ -335,10 +335,20 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
         "start" => &[&["experiment.start", "between -1e9 and 1e9"], &["experiment.stop", "after"]],
         "shape.depth" => &[&["surface[1].shape", "in metres"], &["surface[1].shape.depth", "between"]],
         "shape.phase" => &[&["surface[1].shape.phase", "between -1e6 and 1e6"]],
-        "rom.radius" => &[&["`contact_positions`", "between 1e-5 and 1000"], &["`contact_positions`", "not positive"]],
-        "rom.axial" => &[&["`contact_positions`", "between -1000 and 1000"]],
+        "rom.radius" => &[
+            &["`contact_positions`", "between 1e-5 and 1000"],
+            &["`contact_positions`", "not positive"],
+            &["`contact_meridional_slopes`", "their positions rise"],
+        ],
+        "rom.axial" => &[
+            &["`contact_positions`", "between -1000 and 1000"],
+            &["`contact_meridional_slopes`", "their positions rise"],
+        ],
         "rom.angle" => &[&["`contact_positions`", "between -1e6 and 1e6"]],
-        "rom.slope" => &[&["`contact_meridional_slopes`", "between -1000 and 1000"]],
+        "rom.slope" => &[
+            &["`contact_meridional_slopes`", "between -1000 and 1000"],
+            &["`contact_meridional_slopes`", "their positions rise"],
+        ],
         "rom.map" => &[&["`contact_map`", "beyond ±1e15"], &["µ"], &["small displacements"]],
         "shape.width" => &[&["surface[1].shape.width", "between 0.001 and 0.25"]],
         "rom.mass" => &[

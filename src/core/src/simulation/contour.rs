@@ -1,0 +1,99 @@
+//! The contour of the tip in the meridional plane: slopes that a ROM gives against those of its positions.
+//!
+//! A surface of revolution takes its normals from the slopes, a surface spline from a curve through the positions. Both have to mean the
+//! same contour.
+
+use crate::{Error, Result, Rom, shown};
+
+/// Slopes may differ from those between positions by this much (-), which turns a normal by 14 degrees: means over patches, a tip that is
+/// not quite a surface of revolution, a fillet.
+const APART: f64 = 0.25;
+/// The same of a cylinder, which is also what a ROM file that leaves slopes out has.
+const CYLINDER: f64 = 0.05;
+/// Contact nodes closer along the axis than this fraction of their extent are one place.
+const SAME_PLACE: f64 = 1e-3;
+/// Contact nodes within this fraction of their radius along the axis have no contour.
+const FLAT: f64 = 1e-6;
+/// Radii of one place may differ by this fraction: a tip may be cut flat.
+const UNEVEN: f64 = 1e-4;
+
+/// A place along the axis: its first node, and the means there.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    node: usize,
+    count: f64,
+    axial: f64,
+    radius: f64,
+    slope: f64,
+}
+
+/// Check the slopes of the contact nodes of one pair; `uses_slopes` for a surface whose normals follow them. Zeros are no slopes where
+/// nothing uses them.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the ROM, two nodes, their slopes and that of the positions between them.
+pub fn check_contour(rom: &Rom, nodes: &[usize], uses_slopes: bool) -> Result<()> {
+    let straight = nodes.iter().all(|node| rom.contact_nodes[*node].meridional_slope == 0.0);
+    if straight && !uses_slopes {
+        return Ok(());
+    }
+    let places = places(rom, nodes);
+    let apart = if straight { CYLINDER } else { APART };
+    for pair in places.windows(2) {
+        let [low, high] = [pair[0], pair[1]];
+        let length = high.axial - low.axial;
+        let rise = (high.radius - low.radius) / length;
+        // Between slopes of a parabola rises what they are on average; of a kink, up to half their difference more.
+        let bent = 0.25 * (high.slope - low.slope).abs();
+        let off = (rise - 0.5 * (low.slope + high.slope)).abs();
+        if off > apart + bent + UNEVEN * low.radius / length {
+            return Err(contradicted(rom, [low, high], rise, straight));
+        }
+    }
+    Ok(())
+}
+
+fn contradicted(rom: &Rom, [low, high]: [Place; 2], rise: f64, straight: bool) -> Error {
+    let [first, last] = [low, high].map(|place| &rom.contact_nodes[place.node].name);
+    let remedy = if straight {
+        "Give dr/dz of the tip contour at each node, which is 0 where the array is left out, or set meridian = \"cylinder\" for the contact"
+    } else {
+        "Give dr/dz of the tip contour at each node, with its sign along z; it is no angle"
+    };
+    Error::invalid(
+        format!("ROM `{}`, array `contact_meridional_slopes`", rom.name),
+        format!(
+            "nodes `{first}` and `{last}` have the slopes {} and {}, where their positions rise by {} m per m along the axis",
+            shown(low.slope),
+            shown(high.slope),
+            shown((rise * 1e4).round() / 1e4)
+        ),
+        remedy,
+    )
+}
+
+/// Places of some contact nodes by growing axial position; none without an extent along the axis.
+fn places(rom: &Rom, nodes: &[usize]) -> Vec<Place> {
+    let mut order = nodes.to_vec();
+    let axial = |node: &usize| rom.contact_nodes[*node].position[2];
+    order.sort_by(|a, b| axial(a).total_cmp(&axial(b)));
+    let mut places: Vec<Place> = Vec::new();
+    let [Some(first), Some(last)] = [order.first(), order.last()] else { return places };
+    let extent = axial(last) - axial(first);
+    if extent <= FLAT * rom.contact_nodes[*first].position[0] {
+        return places;
+    }
+    for node in order {
+        let own = &rom.contact_nodes[node];
+        let ([radius, _, axial], slope) = (own.position, own.meridional_slope);
+        match places.last_mut() {
+            Some(place) if axial - place.axial <= SAME_PLACE * extent => {
+                place.count += 1.0;
+                place.radius += (radius - place.radius) / place.count;
+                place.slope += (slope - place.slope) / place.count;
+            }
+            _ => places.push(Place { node, count: 1.0, axial, radius, slope }),
+        }
+    }
+    places
+}
