@@ -122,13 +122,15 @@ fn of_contact(contact: &ContactSettings, found: &mut Vec<String>) {
     if contact.solver == Solver::Coulomb {
         found.push("friction sticks and slides (coulomb)".into());
     }
-    if let Some(CoatingSettings { thickness, cells_around, cells_along, cutting, .. }) = contact.coating {
+    if let Some(CoatingSettings { thickness, cells_around, cells_along, contact_width, cutting, .. }) = contact.coating
+    {
         let cut = cutting.map_or(String::new(), |cut| {
             let CuttingSettings { specific_energy, normal_ratio } = cut;
             format!(", cut at {specific_energy:e} J/m3, normal force {normal_ratio} times the tangential one")
         });
+        let pressed = contact_width.map_or(String::new(), |width| format!(", pressed by tips {width} m wide"));
         found.push(format!(
-            "abradable coating on `{}`: {thickness} m, {cells_around} x {cells_along} cells{cut}",
+            "abradable coating on `{}`: {thickness} m, {cells_around} x {cells_along} cells{cut}{pressed}",
             contact.slave
         ));
     }

@@ -33,6 +33,7 @@ pub fn complete() -> Scene {
         hardening: 0.0,
         cells_around: 360,
         cells_along: 5,
+        contact_width: None,
         cutting: Some(CuttingSettings { specific_energy: 1e8, normal_ratio: 1.0 }),
     });
     let outputs = &mut scene.settings.outputs;

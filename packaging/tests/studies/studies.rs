@@ -82,7 +82,10 @@ fn the_quick_interaction_map_sees_the_branch_lean() {
 fn the_quick_study_of_errors_takes_any_scene() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
-    fs::write(root.path().join("coated.toml"), with_rom("abradable", "builtin:rotor37-paper")).unwrap();
+    // Contact nodes do not know how wide the tip is.
+    let coated = with_rom("abradable", "builtin:rotor37-paper");
+    let coated = coated.replace("\n[time]", "contact_width = 3e-3\n\n[time]");
+    fs::write(root.path().join("coated.toml"), coated).unwrap();
     for (scene, more) in [("scene.toml", ["--window", "2e-3"]), ("coated.toml", ["--set", "friction_coefficient=0.1"])]
     {
         let arguments = ["study", "error", scene, "--quick", "--json", "--quiet", "--out", "out"];

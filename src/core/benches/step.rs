@@ -52,6 +52,7 @@ fn coated(scene: &mut Scene) {
         hardening: 2e8,
         cells_around: 1000,
         cells_along: 20,
+        contact_width: Some(3e-3),
         cutting: None,
     });
 }

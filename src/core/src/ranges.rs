@@ -80,6 +80,8 @@ pub const STRESS: f64 = 1e13;
 pub const CUTTING_ENERGY: [f64; 2] = [1e3, 1e12];
 /// Normal force per tangential force of a cut: from tools that draw themselves in to tips that hardly cut.
 pub const NORMAL_RATIO: [f64; 2] = [0.05, 20.0];
+/// Width around the circumference over which a tip presses a coating (m): from a foil to a metre.
+pub const CONTACT_WIDTH: [f64; 2] = [1e-6, 1.0];
 /// Most cells of a coating: 80 megabytes of state.
 pub const CELLS: usize = 10_000_000;
 

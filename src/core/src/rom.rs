@@ -216,6 +216,11 @@ impl Rom {
         self.mass.nrows()
     }
 
+    /// Whether all its contact nodes are patches with an area and a length along the chord.
+    pub fn has_patches(&self) -> bool {
+        self.contact_nodes.iter().all(|node| node.area > 0.0 && node.length > 0.0)
+    }
+
     /// Check shapes, finiteness, symmetry and definiteness.
     ///
     /// # Errors

@@ -96,6 +96,7 @@ pub fn coating_of(thickness: f64, [cells_around, cells_along]: [usize; 2]) -> Co
         hardening: 2e7,
         cells_around,
         cells_along,
+        contact_width: Some(3e-3),
         cutting: None,
     }
 }

@@ -1,8 +1,9 @@
 //! Abradable coating: cells around the circumference and along the axis, each a rod that the blade wears off.
 //!
-//! A blade is a line in θ through its contact nodes. Axial row j of cells sees the penetration δ_j = −Σ N_ij g_i
-//! interpolated between its two neighbouring nodes, and returns its force F_j = σ·r Δθ Δz to them by the transpose
-//! of the same N, so that virtual work is exact. Gaps are measured to the unworn surface; the hard casing lies h₀
+//! A blade is a band in θ around the line through its contact nodes, as wide as its tip. Axial row j of cells sees the penetration
+//! δ_j = −Σ N_ij g_i interpolated between its two neighbouring nodes. Every cell that the band covers returns its force F = σ·b Δz, b
+//! being the covered arc, to these nodes by the transpose of the same N, so that virtual work is exact. The arcs of a row add up to the
+//! width of the tip, however wide cells are: cells only resolve the wear. Gaps are measured to the unworn surface; the hard casing lies h₀
 //! behind it, g ≥ −h₀. [`CoatedProblem`] finds gaps, rod forces and hard contact forces of one step together; wear
 //! grows only in [`Coating::commit`].
 
@@ -11,6 +12,7 @@ mod problem;
 mod rod;
 #[cfg(test)]
 mod tests;
+mod tip;
 
 use std::f64::consts::TAU;
 
@@ -19,6 +21,7 @@ pub use cutting::Way;
 use nalgebra::DMatrix;
 pub use problem::CoatedProblem;
 pub use rod::{Branch, Rod};
+pub use tip::Tip;
 
 use crate::persist::{Persist, Reader, Writer};
 use crate::settings::CoatingSettings;
@@ -41,9 +44,18 @@ struct Row {
     /// Radius, and width along the axis (m).
     radius: f64,
     width: f64,
+    /// Number of cells around that the tip is as wide as; 0 where the coating is cut.
+    covers: f64,
 }
 
 impl Row {
+    /// Cells that a blade can press or cut at once.
+    fn most_cells(&self) -> usize {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ cells around")]
+        let covered = self.covers as usize;
+        covered + 2
+    }
+
     /// Where a blade with contact nodes at `angles` (rad) is.
     fn angle(&self, angles: &[f64]) -> f64 {
         let [a, b] = self.nodes;
@@ -60,6 +72,7 @@ struct CellContact {
     /// Nodes within the group.
     nodes: [usize; 2],
     weights: [f64; 2],
+    /// That the blade presses or cuts (m²).
     area: f64,
     /// Plastic strain before the step; where it is cut, ahead of the blade.
     plastic: f64,
@@ -67,7 +80,7 @@ struct CellContact {
     /// Whose it is.
     blade: usize,
     row: usize,
-    /// It is the one that the blade faces, not one that it has left in this step.
+    /// It is the one that the blade faces, not one that it has left in this step; pressed in, one whose middle it covers.
     faced: bool,
 }
 
@@ -87,31 +100,14 @@ pub struct Coating {
 }
 
 impl Coating {
-    /// Unworn coating under the axial extent of the contact nodes of one blade: positions z (m) and radii (m) in any
-    /// order; `blades` pass it.
+    /// Unworn coating that `blades` equal tips pass.
     ///
     /// # Errors
-    /// As [`Coating::with_extent`]; fewer than two axial positions, which have no extent.
-    pub fn new(settings: &CoatingSettings, axial: &[f64], radii: &[f64], blades: usize) -> Result<Self> {
-        let low = axial.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = axial.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Self::with_extent(settings, axial, radii, [low, high], blades)
-    }
-
-    /// As [`Coating::new`], from axial position `extent[0]` to `extent[1]` (m). Rows beyond the outermost nodes, and
-    /// all rows of a single node, see the penetration of the nearest node.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] naming what does not fit: no extent, two nodes at one axial position, too few cells to give
-    /// every blade its own.
-    pub fn with_extent(
-        settings: &CoatingSettings,
-        axial: &[f64],
-        radii: &[f64],
-        extent: [f64; 2],
-        blades: usize,
-    ) -> Result<Self> {
-        let order = sorted(axial, radii, extent)?;
+    /// [`Error::Invalid`] naming what does not fit: no extent, two nodes at one axial position, too few cells or too wide a tip
+    /// to give every blade its own.
+    pub fn new(settings: &CoatingSettings, tip: &Tip, blades: usize) -> Result<Self> {
+        let Tip { axial, radii, widths, extent } = tip;
+        let order = sorted(tip)?;
         let (around, along) = (settings.cells_around, settings.cells_along);
         // Two cells per pitch: deformed blades never share a cell.
         if around < 2 * blades || along == 0 {
@@ -125,15 +121,31 @@ impl Coating {
         let row = |index: usize| {
             let centre = extent[0] + (number(index) + 0.5) * width;
             let (nodes, weights) = neighbours(axial, &order, centre);
-            let radius = weights[0] * radii[nodes[0]] + weights[1] * radii[nodes[1]];
-            Row { nodes, weights, area: radius * TAU / number(around) * width, axial: centre, radius, width }
+            let mean = |of: &[f64]| weights[0] * of[nodes[0]] + weights[1] * of[nodes[1]];
+            let radius = mean(radii);
+            let arc = radius * TAU / number(around);
+            let covers = if settings.cutting.is_some() { 0.0 } else { mean(widths) / arc };
+            Row { nodes, weights, area: arc * width, axial: centre, radius, width, covers }
         };
+        let rows: Vec<Row> = (0..along).map(row).collect();
+        // The cells of a band are up to one cell wider than it is.
+        let pitch = number(around) / number(blades);
+        if let Some(row) = rows.iter().find(|row| row.covers.is_nan() || row.covers + 1.0 > pitch) {
+            return Err(Error::invalid(
+                "contact.coating.contact_width",
+                format!(
+                    "the tip is as wide as {} cells, of {around} that {blades} blades share",
+                    shown((row.covers * 1e3).round() / 1e3)
+                ),
+                "Give more cells around, or a width of the tip around the circumference (m) below the pitch of the blades",
+            ));
+        }
         Ok(Self {
             rod: settings.cutting.map_or_else(|| Rod::new(settings), Cutting::rod),
             thickness: settings.thickness,
             around,
             nodes: axial.len(),
-            rows: (0..along).map(row).collect(),
+            rows,
             plastic: vec![0.0; around * along],
             cutting: settings.cutting.map(|cutting| Cutting::new(cutting, blades, along, axial.len())),
         })
@@ -141,27 +153,31 @@ impl Coating {
 
     /// Scratch for groups of at most `blades` coupled blades.
     pub fn problem(&self, blades: usize) -> CoatedProblem {
-        let cells = if self.cutting.is_some() { 2 } else { 1 };
-        CoatedProblem::new(self.rod, self.thickness, blades * self.nodes, blades * self.rows.len() * cells)
+        let cells = self.rows.iter().map(Row::most_cells).sum::<usize>();
+        CoatedProblem::new(self.rod, self.thickness, blades * self.nodes, blades * cells)
     }
 
-    /// Append a blade to a group: its nodes follow those already there, one cell of each row faces it. `angles` are
+    /// Append a blade to a group: its nodes follow those already there, and in each row the cells that it covers. `angles` are
     /// those of its contact nodes in the fixed frame (rad), in the order of the positions given at construction.
     pub fn locate(&self, problem: &mut CoatedProblem, angles: &[f64]) {
         let first = problem.append_nodes(self.nodes);
         for (index, row) in self.rows.iter().enumerate() {
             let [a, b] = row.nodes;
-            let cell = index * self.around + place(row.angle(angles), self.around).0;
-            problem.append_contact(CellContact {
-                cell,
-                nodes: [first + a, first + b],
-                weights: row.weights,
-                area: row.area,
-                plastic: self.plastic[cell],
-                branch: Branch::Free,
-                blade: 0,
-                row: index,
-                faced: true,
+            // A cell wears with the depth in its middle; where cells are wider than the tip, with that in the middle of the tip.
+            let half = 0.5 * row.covers.min(1.0);
+            covered(row.angle(angles), row.covers, self.around, |place, share| {
+                let cell = index * self.around + place;
+                problem.append_contact(CellContact {
+                    cell,
+                    nodes: [first + a, first + b],
+                    weights: row.weights,
+                    area: row.area * share,
+                    plastic: self.plastic[cell],
+                    branch: Branch::Free,
+                    blade: 0,
+                    row: index,
+                    faced: share >= half,
+                });
             });
         }
     }
@@ -172,7 +188,8 @@ impl Coating {
         for (contact, after) in problem.worn() {
             let before = self.plastic[contact.cell];
             if after > before {
-                work += contact.area * self.thickness * self.rod.wear_work(before, after);
+                // The whole cell, of which an edge of the tip may cover a part only.
+                work += self.rows[contact.row].area * self.thickness * self.rod.wear_work(before, after);
                 self.plastic[contact.cell] = after;
             }
         }
@@ -189,8 +206,14 @@ impl Coating {
         self.plastic.len()
     }
 
+    /// Angle (rad) that blades may turn by in a step without leaving out a cell: the width of a cell, or of the narrowest place of a tip.
+    pub fn stride(&self) -> f64 {
+        let narrowest = self.rows.iter().fold(f64::INFINITY, |narrowest, row| row.covers.min(narrowest));
+        narrowest.max(1.0) * self.width()
+    }
+
     /// Width of a cell around the circumference (rad).
-    pub fn width(&self) -> f64 {
+    fn width(&self) -> f64 {
         TAU / number(self.around)
     }
 
@@ -284,7 +307,7 @@ impl Persist for Coating {
 }
 
 /// Nodes in order of growing z, all at different places of a finite extent.
-fn sorted(axial: &[f64], radii: &[f64], extent: [f64; 2]) -> Result<Vec<usize>> {
+fn sorted(Tip { axial, radii, extent, .. }: &Tip) -> Result<Vec<usize>> {
     let length = extent[1] - extent[0];
     let refuse = |problem: String, remedy: &str| Err(Error::invalid("contact.coating", problem, remedy));
     let mut order: Vec<usize> = (0..axial.len()).collect();
@@ -323,6 +346,28 @@ fn place(angle: f64, around: usize) -> (usize, f64) {
     // The fraction of a tiny negative angle rounds to 1.
     let index = (places as usize).min(around - 1);
     (index, places - number(index))
+}
+
+/// Cells that a band covers which is as wide as so many of them, its middle at an angle (rad): the place of each around, and the share of
+/// it. Shares add up to the width.
+fn covered(angle: f64, width: f64, around: usize, mut take: impl FnMut(usize, f64)) {
+    let (middle, within) = place(angle, around);
+    let [low, high] = [within - 0.5 * width, within + 0.5 * width];
+    let mut edge = low.floor();
+    // Cells before the one in the middle, fewer than there are around.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ cells around")]
+    let before = -edge.min(0.0) as usize;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 or 1")]
+    let after = edge.max(0.0) as usize;
+    let mut cell = (middle + around - before + after) % around;
+    while edge < high {
+        let share = high.min(edge + 1.0) - low.max(edge);
+        if share > 0.0 {
+            take(cell, share);
+        }
+        cell = if cell + 1 == around { 0 } else { cell + 1 };
+        edge += 1.0;
+    }
 }
 
 /// A count as a factor.

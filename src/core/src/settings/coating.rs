@@ -31,6 +31,9 @@ pub struct CoatingSettings {
     pub cells_around: usize,
     /// Cells along the axis, over the axial extent of the contact nodes.
     pub cells_along: usize,
+    /// Width around the circumference over which a tip presses the coating (m), 1e-6 to 1: its thickness over the cosine of its stagger
+    /// angle. `None`: from areas and lengths of the contact patches in the ROM.
+    pub contact_width: Option<f64>,
     /// It is cut instead of pressed in; `modulus`, `yield_stress` and `hardening` are 0 then.
     pub cutting: Option<CuttingSettings>,
 }
@@ -49,22 +52,32 @@ struct Written {
     cells_around: usize,
     cells_along: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
+    contact_width: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     cutting: Option<CuttingSettings>,
 }
 
 impl From<CoatingSettings> for Written {
     fn from(settings: CoatingSettings) -> Self {
-        let CoatingSettings { thickness, modulus, yield_stress, hardening, cells_around, cells_along, cutting } =
-            settings;
+        let CoatingSettings {
+            thickness,
+            modulus,
+            yield_stress,
+            hardening,
+            cells_around,
+            cells_along,
+            contact_width,
+            cutting,
+        } = settings;
         let [modulus, yield_stress, hardening] =
             [modulus, yield_stress, hardening].map(|value| (cutting.is_none() || value != 0.0).then_some(value));
-        Self { thickness, modulus, yield_stress, hardening, cells_around, cells_along, cutting }
+        Self { thickness, modulus, yield_stress, hardening, cells_around, cells_along, contact_width, cutting }
     }
 }
 
 impl<'de> Deserialize<'de> for CoatingSettings {
     fn deserialize<D: Deserializer<'de>>(source: D) -> Result<Self, D::Error> {
-        let Written { thickness, modulus, yield_stress, hardening, cells_around, cells_along, cutting } =
+        let Written { thickness, modulus, yield_stress, hardening, cells_around, cells_along, contact_width, cutting } =
             Written::deserialize(source)?;
         let given = |value: Option<f64>, key: &'static str| match (value, cutting) {
             (None, None) => Err(D::Error::missing_field(key)),
@@ -77,6 +90,7 @@ impl<'de> Deserialize<'de> for CoatingSettings {
             hardening: given(hardening, "hardening")?,
             cells_around,
             cells_along,
+            contact_width,
             cutting,
         })
     }

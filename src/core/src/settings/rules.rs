@@ -136,6 +136,12 @@ static PARTS: &[Rule] = &[
         "what is cut off does not yield",
         "Remove the line, or `cutting` for the plastic law",
     ),
+    excludes(
+        &[CONTACT_WIDTH],
+        ("`contact.coating.cutting`", |at| at.is_cut()),
+        "a tip cuts with its edge, whatever its width",
+        "Remove the line, or `cutting` for the plastic law",
+    ),
     needs(
         &[SOLVER],
         ("that of contact[1]", |at| at.contact().solver == at.settings.contacts[0].solver),
@@ -335,6 +341,15 @@ static ROMS: &[Rule] = &[
         }),
         "a row of cells is worn by what it sees between two patches along the axis, and patches of several rows would take turns",
         "Reduce it with one row of patches (without --contact-rows), or remove the coating",
+    ),
+    needs(
+        &[PLASTIC_COATING],
+        ("`contact.coating.contact_width`, or contact patches with areas and lengths in the ROM of the master", |at| {
+            at.contact().coating.is_some_and(|coating| coating.contact_width.is_some())
+                || at.master_rom().is_some_and(Rom::has_patches)
+        }),
+        "the force on a tip grows with the width that it presses, which contact nodes do not have",
+        "Give the thickness of the tip over the cosine of its stagger angle (m), or reduce the blade with --contact-patches",
     ),
     needs(
         &[STRESS],

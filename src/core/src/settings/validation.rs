@@ -289,6 +289,10 @@ impl CoatingSettings {
         }
         within(&format!("{at}.yield_stress"), self.yield_stress, 0.0, ranges::STRESS)?;
         within(&format!("{at}.hardening"), self.hardening, 0.0, ranges::STRESS)?;
+        if let Some(width) = self.contact_width {
+            let [narrowest, widest] = ranges::CONTACT_WIDTH;
+            within(&format!("{at}.contact_width"), width, narrowest, widest)?;
+        }
         count(&format!("{at}.cells_around"), self.cells_around, 2, ranges::CELLS)?;
         count(&format!("{at}.cells_along"), self.cells_along, 1, ranges::CELLS)?;
         product(at, "cells", self.cells_around, self.cells_along, ranges::CELLS)

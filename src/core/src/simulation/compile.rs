@@ -9,9 +9,9 @@ use crate::gaps::open::{OpenGap, OpenSurface};
 use crate::gaps::shape::Surface;
 use crate::gaps::surface_spline::SurfaceSpline;
 use crate::gaps::{GapLaw, RevolutionGap};
-use crate::laws::coating::Coating;
+use crate::laws::coating::{Coating, Tip};
 use crate::ranges::SMALL;
-use crate::rom::Support;
+use crate::rom::{ContactNode, Support};
 use crate::settings::{ContactSettings, Meridian, Motion, StructureSettings};
 use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings, joined};
 use crate::variables::Quantity;
@@ -510,19 +510,8 @@ impl Compiled {
         let Some(settings) = &self.contact(pair).coating else { return Ok(None) };
         let plan = &self.plan.pairs[pair];
         let rom = self.body(plan.body).1;
-        let nodes = || plan.nodes.iter().map(|node| rom.contact_nodes[*node].position);
-        let axial: Vec<f64> = nodes().map(|position| position[2]).collect();
-        let radii: Vec<f64> = nodes().map(|position| position[0]).collect();
-        let low = axial.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = axial.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let coating = if high - low > 1e-6 * radii[0] {
-            Coating::new(settings, &axial, &radii, rom.sectors)?
-        } else {
-            // One node stands for a strip as wide as a tenth of its radius.
-            let half = 0.05 * radii[0];
-            Coating::with_extent(settings, &axial, &radii, [low - half, high + half], rom.sectors)?
-        };
-        Ok(Some(coating))
+        let nodes: Vec<&ContactNode> = plan.nodes.iter().map(|node| &rom.contact_nodes[*node]).collect();
+        Ok(Some(Coating::new(settings, &Tip::of(&nodes, settings), rom.sectors)?))
     }
 }
 

@@ -185,17 +185,17 @@ impl Simulation {
         rotation: f64,
     ) -> Result<()> {
         let scale = self.system.pairs()[pair].gap().angular_scale();
-        let cell = self.system.coating(pair).map(Coating::width);
+        let stride = self.system.coating(pair).map(Coating::stride);
         let relative = |offset: f64| (speed.at(offset) - rotation).abs();
         let turned = step * relative(0.0).max(relative(step_size));
         // The coating does not turn with the shape.
         let passed = step * speed.at(0.0).abs().max(speed.at(step_size).abs());
-        if let Some(cell) = cell.filter(|cell| passed > *cell) {
+        if let Some(stride) = stride.filter(|stride| passed > *stride) {
             return Err(Error::invalid(
                 format!("contact[{}].coating.cells_around", pair + 1),
                 format!(
-                    "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, past cells of the \
-                     coating {cell:.3e} rad wide, which would stay unworn",
+                    "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, more than the \
+                     {stride:.3e} rad that its tips or the cells of the coating are wide: cells between would stay unworn",
                     shown(self.time)
                 ),
                 "Use fewer cells around, a lower speed or a smaller internal_step_max",

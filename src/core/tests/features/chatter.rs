@@ -85,6 +85,7 @@ impl Case {
             hardening: 0.0,
             cells_around: self.blades * self.cells,
             cells_along: 1,
+            contact_width: None,
             cutting: Some(CuttingSettings { specific_energy: cutting / (RATIO * LENGTH), normal_ratio: RATIO }),
         });
         settings.time.step = delay / self.steps as f64;

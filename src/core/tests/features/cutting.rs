@@ -42,6 +42,7 @@ fn scene([cells_around, cells_along]: [usize; 2], step: f64) -> Scene {
         hardening: 0.0,
         cells_around,
         cells_along,
+        contact_width: None,
         cutting: Some(CuttingSettings { specific_energy: ENERGY, normal_ratio: RATIO }),
     });
     settings.time.step = step;

@@ -355,6 +355,7 @@ fn what_does_not_go_together_is_refused_by_name() {
         hardening: 2e7,
         cells_around: 500,
         cells_along: 3,
+        contact_width: Some(3e-3),
         cutting: None,
     });
     refused(&scene, "contact[2].coating: excludes contacts solved together");

@@ -3,7 +3,7 @@
 use crate::blades::{crowded, energy, on_a_ring, round, with_step};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
-use tiprub_core::settings::{Scheme, Solver, SplineSettings};
+use tiprub_core::settings::{CoatingSettings, Scheme, Solver, SplineSettings};
 use tiprub_core::{Result, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, go, real, reference, saved, set, try_started};
 
@@ -201,12 +201,15 @@ fn a_casing_that_small_displacements_cannot_describe_is_refused() {
 
 #[test]
 fn coating_cells_that_the_blades_would_skip_are_refused() {
-    for (cells, refused) in [(4800, false), (5000, true), (100_000, true)] {
+    let narrow = [(4800, 1e-4, false), (5000, 1e-4, true), (100_000, 1e-4, true)];
+    // The tips turn by 0.325 mm in a step.
+    for (cells, width, refused) in narrow.into_iter().chain([(100_000, 3.0e-4, true), (100_000, 3.5e-4, false)]) {
         let mut scene = round(Scheme::ModalExact);
-        scene.settings.contacts[0].coating = Some(models::coating_of(1e-3, [cells, 3]));
+        let coating = models::coating_of(1e-3, [cells, 3]);
+        scene.settings.contacts[0].coating = Some(CoatingSettings { contact_width: Some(width), ..coating });
         let mut simulation = try_started(&scene).unwrap();
         let outcome = simulation.do_step(0.0, 1e-6);
-        assert_eq!(outcome.is_err(), refused, "{cells}: {outcome:?}");
+        assert_eq!(outcome.is_err(), refused, "{cells}, {width}: {outcome:?}");
         if let Err(error) = outcome {
             assert!(error.to_string().contains("cells_around"), "{error}");
             set(&mut simulation, "speed", 30.0);

@@ -456,6 +456,13 @@ pub const FIELDS: [SceneField; 99] = [
         "Cells along the axis, over the axial extent of the contact nodes.",
     ),
     field(
+        "contact.coating.contact_width",
+        "number, m",
+        Some("from the patches of the ROM"),
+        "1e-6 to 1; not with `cutting`",
+        "Width around the circumference over which a tip presses the coating: its thickness over the cosine of its stagger angle.",
+    ),
+    field(
         "contact.coating.cutting",
         "table",
         Some("none"),

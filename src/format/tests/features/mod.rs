@@ -57,6 +57,7 @@ fn coating() -> CoatingSettings {
         hardening: 1e8,
         cells_around: 1000,
         cells_along: 20,
+        contact_width: Some(4e-3),
         cutting: None,
     }
 }

@@ -60,6 +60,7 @@ fn the_softest_contact_leaves_resonance_where_linear_theory_has_it() {
         hardening: 0.0,
         cells_around: 720,
         cells_along: 3,
+        contact_width: Some(3e-3),
         cutting: None,
     });
     let crossing = meeting(&scene);

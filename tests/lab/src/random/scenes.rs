@@ -311,6 +311,7 @@ impl Draw<'_> {
             hardening: material(self.random.of(&[0.0, 1e7, 1e9])),
             cells_around: self.random.of(&[60, 200, 720]),
             cells_along: self.random.of(&[1, 2, 4]),
+            contact_width: (!cut).then_some(3e-3),
             cutting,
         }
     }

@@ -126,7 +126,7 @@ impl CoatedProblem {
 
     /// Cells that the last solution wears, and their plastic strain after it.
     pub(super) fn worn(&self) -> impl Iterator<Item = (&CellContact, f64)> {
-        let yielding = self.contacts.iter().filter(|contact| contact.branch == Branch::Plastic);
+        let yielding = self.contacts.iter().filter(|contact| contact.faced && contact.branch == Branch::Plastic);
         yielding.map(|contact| (contact, self.rod.worn(self.strain(contact, &self.gaps))))
     }
 

@@ -19,13 +19,32 @@ fn material(
     cells_around: usize,
     cells_along: usize,
 ) -> CoatingSettings {
-    CoatingSettings { thickness: THICKNESS, modulus, yield_stress, hardening, cells_around, cells_along, cutting: None }
+    CoatingSettings {
+        thickness: THICKNESS,
+        modulus,
+        yield_stress,
+        hardening,
+        cells_around,
+        cells_along,
+        contact_width: None,
+        cutting: None,
+    }
 }
 
-/// One blade with nodes at z = 0, 1, ... on radius 1.
+/// A tip on radius 1, as wide as a cell.
+fn tip(settings: &CoatingSettings, axial: &[f64]) -> Tip {
+    Tip::new(axial, &vec![1.0; axial.len()], TAU / number(settings.cells_around))
+}
+
+/// One blade with nodes at z = 0, 1, ...
 fn coating(settings: &CoatingSettings, nodes: usize) -> Coating {
     let axial: Vec<f64> = (0..nodes).map(number).collect();
-    Coating::with_extent(settings, &axial, &vec![1.0; nodes], [-0.2, number(nodes) - 0.8], 1).unwrap()
+    Coating::new(settings, &tip(settings, &axial).with_extent([-0.2, number(nodes) - 0.8]), 1).unwrap()
+}
+
+/// In the middle of a cell: a tip as wide as a cell covers this one alone.
+fn middle(settings: &CoatingSettings) -> f64 {
+    0.5 * TAU / number(settings.cells_around)
 }
 
 fn set_wear(coating: &mut Coating, plastic: &[f64]) {
@@ -36,7 +55,7 @@ fn set_wear(coating: &mut Coating, plastic: &[f64]) {
 /// The rod with its node moved as prescribed: no flexibility, so the gap stays. Returns the force.
 fn press(coating: &mut Coating, penetration: f64) -> f64 {
     let mut problem = coating.problem(1);
-    coating.locate(&mut problem, &[0.1]);
+    coating.locate(&mut problem, &[TAU / 16.0]);
     problem.gaps[0] = -penetration;
     assert!(problem.solve().solved);
     assert!((problem.gaps[0] + penetration).abs() < 1e-15);
@@ -94,7 +113,7 @@ fn work_over_a_closed_cycle_is_plastic_and_hardening_energy() {
     let (mut work, mut reported, mut before) = (0.0, 0.0, (0.0, 0.0));
     for strain in path {
         let mut problem = coating.problem(1);
-        coating.locate(&mut problem, &[0.1]);
+        coating.locate(&mut problem, &[TAU / 16.0]);
         problem.gaps[0] = -strain * THICKNESS;
         assert!(problem.solve().solved);
         reported += coating.commit(&problem);
@@ -152,7 +171,8 @@ proptest! {
 fn interpolation_does_the_same_work_on_both_sides() {
     let settings = material(1.0, 0.1, 0.2, 100, 7);
     let axial = [0.03, 0.0, 0.011, 0.024]; // not in order
-    let coating = Coating::new(&settings, &axial, &[0.25, 0.26, 0.258, 0.252], 36).unwrap();
+    let width = 1e-3; // a sixteenth of a cell
+    let coating = Coating::new(&settings, &Tip::new(&axial, &[0.25, 0.26, 0.258, 0.252], width), 36).unwrap();
     let mut problem = coating.problem(1);
     coating.locate(&mut problem, &[0.1, 0.11, 0.09, 0.12]);
     let displacement = [0.3, -0.7, 0.45, 1.1];
@@ -171,7 +191,7 @@ fn interpolation_does_the_same_work_on_both_sides() {
     (0..4).for_each(|node| problem.gaps[node] = -depth(axial[node]));
     assert!(problem.solve().solved);
     for (row, (cell, force)) in coating.rows.iter().zip(problem.loaded_cells()) {
-        assert!((force - row.area * depth(row.axial) / THICKNESS).abs() < 1e-15);
+        assert!((force - width * row.width * depth(row.axial) / THICKNESS).abs() < 1e-15);
         assert!((coating.centre(cell).1 - row.axial).abs() < 1e-15);
     }
     let total: f64 = problem.loaded_cells().map(|(_, force)| force).sum();
@@ -187,7 +207,9 @@ fn interpolation_does_the_same_work_on_both_sides() {
 
 #[test]
 fn cells_follow_the_angle_of_the_blade() {
-    let coating = coating(&material(1.0, 0.1, 0.2, 10, 3), 2);
+    let width = 1e-3 * TAU / 10.0;
+    let tip = Tip::new(&[0.0, 1.0], &[1.0; 2], width).with_extent([-0.2, 1.2]);
+    let coating = Coating::new(&material(1.0, 0.1, 0.2, 10, 3), &tip, 1).unwrap();
     let cells = |first: f64, second: f64| {
         let mut problem = coating.problem(1);
         coating.locate(&mut problem, &[first, second]);
@@ -196,7 +218,7 @@ fn cells_follow_the_angle_of_the_blade() {
     let cell = std::f64::consts::TAU / 10.0;
     assert_eq!(cells(0.5 * cell, 0.5 * cell), [0, 10, 20]);
     assert_eq!(cells(-0.5 * cell, -0.5 * cell), [9, 19, 29]);
-    assert_eq!(cells(-1e-300, -1e-300), [9, 19, 29]);
+    assert_eq!(cells(-1e-300, -1e-300), [9, 0, 19, 10, 29, 20], "half of it on each side of the seam");
     assert_eq!(cells(1000.0 * TAU + 3.5 * cell, 3.5 * cell), [3, 13, 23]);
     // Swept across the seam: the middle row lies between its nodes; the outer ones are beyond the nodes at 0.2 and 0.8.
     assert_eq!(cells(-0.6 * cell, 1.0 * cell + 0.4 * cell), [9, 10, 21]);
@@ -204,6 +226,76 @@ fn cells_follow_the_angle_of_the_blade() {
     for index in 0..coating.cells() {
         let (angle, _) = coating.centre(index);
         assert_eq!(cells(angle, angle)[index / 10], index);
+    }
+}
+
+/// Shares of cells by the overlap of intervals, whatever the angle and the width.
+#[test]
+fn shares_of_covered_cells_add_up_to_the_width_of_the_tip() {
+    let mut random = tiprub_test_models::Random(3);
+    for _ in 0..3000 {
+        let (around, angle) = (40, 30.0 * (random.unit() - 0.5));
+        let width = random.scale(1e-3, 30.0);
+        let mut found = Vec::new();
+        covered(angle, width, around, |cell, share| found.push((cell, share)));
+        assert!(number(found.len()) <= width.floor() + 2.0);
+        assert!((found.iter().map(|(_, share)| share).sum::<f64>() - width).abs() < 1e-12 * (1.0 + width));
+        let middle = angle / TAU * number(around);
+        for cell in 0..around {
+            let expected: f64 = (-4..=4)
+                .map(|turn| {
+                    let edge = number(cell) + f64::from(turn) * number(around);
+                    ((edge + 1.0).min(middle + 0.5 * width) - edge.max(middle - 0.5 * width)).max(0.0)
+                })
+                .sum();
+            let own: f64 = found.iter().filter(|(other, _)| *other == cell).map(|(_, share)| share).sum();
+            assert!((own - expected).abs() < 1e-12 * (1.0 + middle.abs()), "{cell}: {own} {expected}");
+        }
+    }
+}
+
+/// Pressed alike, an unworn coating returns the same force to a tip on whatever cells, and wherever it stands on them.
+#[test]
+fn force_does_not_depend_on_the_width_of_cells() {
+    for (cells, angle) in [4, 7, 50, 720, 10_007].into_iter().flat_map(|cells| [0.1, 2.0, -3.3].map(|at| (cells, at))) {
+        let settings = material(2.0, 0.3, 0.4, cells, 3);
+        let tip = Tip::new(&[0.0, 1.0], &[1.0; 2], 0.2).with_extent([-0.2, 1.2]);
+        let coating = Coating::new(&settings, &tip, 1).unwrap();
+        let mut problem = coating.problem(1);
+        coating.locate(&mut problem, &[angle, angle + 0.03]);
+        problem.gaps.fill(-0.5 * THICKNESS);
+        assert!(problem.solve().solved);
+        let force: f64 = problem.coating.iter().sum();
+        let expected = return_mapping(&settings, &[0.0], &[0.2 * 1.4], 0.5 * THICKNESS);
+        assert!((force / expected - 1.0).abs() < 1e-12, "{cells} cells: {force} {expected}");
+    }
+}
+
+/// A staggered rectangle of 60 × 2 mm in five patches; widths are 2 mm over the cosine of its stagger.
+#[test]
+fn width_of_patches_is_their_thickness_over_the_cosine_of_the_stagger() {
+    for (stagger, radius) in [(0.0_f64, 0.25), (1.0, 0.25), (-1.0, 0.25), (1.0, 2.5)] {
+        let (chord, thickness) = (0.06, 2e-3);
+        let node = |index: usize| {
+            let (along, share) = (chord * number(index) / 4.0, if index % 4 == 0 { 0.125 } else { 0.25 });
+            // On both sides of the angle where counting starts anew.
+            let angle = (along * stagger.sin() / radius).rem_euclid(TAU);
+            let (area, length) = (share * chord * thickness, share * chord);
+            let position = [radius, angle, along * stagger.cos()];
+            crate::rom::ContactNode { position, area, length, ..crate::rom::ContactNode::default() }
+        };
+        let nodes: Vec<_> = [3, 0, 4, 1, 2].map(node).into();
+        let settings = material(1.0, 0.1, 0.1, 8, 2);
+        let tip = Tip::of(&nodes.iter().collect::<Vec<_>>(), &settings);
+        for width in &tip.widths {
+            assert!((width * stagger.cos() / thickness - 1.0).abs() < 1e-12, "{width}");
+        }
+        let given = CoatingSettings { contact_width: Some(0.7), ..settings };
+        assert_eq!(Tip::of(&nodes.iter().collect::<Vec<_>>(), &given).widths, [0.7; 5]);
+        // One by itself: its area over the strip that it stands for.
+        let alone = Tip::of(&[&nodes[0]], &settings);
+        let [low, high] = alone.extent;
+        assert!((alone.widths[0] * (high - low) / nodes[0].area - 1.0).abs() < 1e-12);
     }
 }
 
@@ -254,7 +346,7 @@ fn the_wear_map_survives_saving_bit_for_bit() {
 fn blades_of_one_group_are_coupled_and_find_their_own_cells() {
     let settings = material(3.0, 0.1, 0.7, 16, 4);
     let axial = [0.0, 1.0];
-    let coating = Coating::new(&settings, &axial, &[1.0; 2], 4).unwrap();
+    let coating = Coating::new(&settings, &Tip::new(&axial, &[1.0; 2], 0.5 * TAU / 16.0), 4).unwrap();
     let w = p_matrix(&[0.1, 0.9, -0.3, 0.4, 0.8, -0.5, 0.2, 0.6, 0.7, -0.2, 0.3, -0.8, 0.5, 0.1, -0.6, 0.9], 4);
     let gaps = [-0.4, 0.1, -0.9, -2.5];
     let solve = |blades: [usize; 2], w: &DMatrix<f64>| {
@@ -305,9 +397,17 @@ fn what_cannot_be_a_coating_is_refused() {
         let message = result.unwrap_err().to_string();
         assert!(message.contains(part), "{part:?} is not in {message:?}");
     };
-    refused(Coating::new(&settings, &[0.1], &[1.0], 1), "1 contact nodes per blade over 0 m");
-    refused(Coating::new(&settings, &[], &[], 1), "0 contact nodes");
-    refused(Coating::new(&settings, &[0.1, 0.0, 0.1], &[1.0; 3], 1), "nodes 1 and 3 are at the same axial");
-    refused(Coating::new(&settings, &[0.0, 1.0], &[1.0; 2], 5), "8 x 2 cells for 5 blades");
-    refused(Coating::new(&settings, &[0.0, f64::NAN], &[1.0; 2], 1), "m along the axis");
+    let made = |axial: &[f64], blades: usize| Coating::new(&settings, &tip(&settings, axial), blades);
+    refused(made(&[0.1], 1), "1 contact nodes per blade over 0 m");
+    refused(made(&[], 1), "0 contact nodes");
+    refused(made(&[0.1, 0.0, 0.1], 1), "nodes 1 and 3 are at the same axial");
+    refused(made(&[0.0, 1.0], 5), "8 x 2 cells for 5 blades");
+    refused(made(&[0.0, f64::NAN], 1), "m along the axis");
+    let as_wide = |cells: f64, blades: usize| {
+        Coating::new(&settings, &Tip::new(&[0.0, 1.0], &[1.0; 2], cells * TAU / 8.0), blades)
+    };
+    assert!(as_wide(2.999, 2).is_ok());
+    refused(as_wide(3.001, 2), "the tip is as wide as 3.001 cells, of 8 that 2 blades share");
+    refused(as_wide(f64::INFINITY, 1), "as wide as inf cells");
+    refused(as_wide(f64::NAN, 1), "as wide as NaN cells");
 }

@@ -67,6 +67,11 @@ pub(super) const GAP: Fact = fact("contact.gap", "", |at| at.contact().gap != 0.
 pub(super) const SECTOR_GAPS: Fact = fact("contact.sector_gaps", "", |at| !at.contact().sector_gaps.is_empty());
 pub(super) const MERIDIAN: Fact = fact("contact.meridian", "", |at| at.contact().meridian != Meridian::default());
 pub(super) const COATING: Fact = fact("contact.coating", "", |at| at.is_coated());
+pub(super) const PLASTIC_COATING: Fact =
+    fact("contact.coating", "without `cutting`", |at| at.is_coated() && !at.is_cut());
+pub(super) const CONTACT_WIDTH: Fact = fact("contact.coating.contact_width", "", |at| {
+    at.contact().coating.is_some_and(|coating| coating.contact_width.is_some())
+});
 pub(super) const MODULUS: Fact = fact("contact.coating.modulus", "", |at| at.plastic(|coating| coating.modulus));
 pub(super) const YIELD: Fact =
     fact("contact.coating.yield_stress", "", |at| at.plastic(|coating| coating.yield_stress));

@@ -59,7 +59,14 @@ fn flight() -> Scene {
 
 fn cut() -> Option<CoatingSettings> {
     let cutting = Some(CuttingSettings { specific_energy: 1e9, normal_ratio: 1.0 });
-    Some(CoatingSettings { modulus: 0.0, yield_stress: 0.0, hardening: 0.0, cutting, ..coating()? })
+    Some(CoatingSettings {
+        modulus: 0.0,
+        yield_stress: 0.0,
+        hardening: 0.0,
+        contact_width: None,
+        cutting,
+        ..coating()?
+    })
 }
 
 fn coating() -> Option<CoatingSettings> {
@@ -71,6 +78,7 @@ fn coating() -> Option<CoatingSettings> {
         hardening,
         cells_around: 500,
         cells_along: 3,
+        contact_width: Some(3e-3),
         cutting: None,
     })
 }
@@ -156,6 +164,9 @@ const OF_ROTORS: &[(&str, Change)] = &[
     ("contact[1].coating.modulus: excludes `contact.coating.cutting`", |scene| {
         scene.settings.contacts[0].coating = cut().map(|cut| CoatingSettings { modulus: 2e8, ..cut });
     }),
+    ("contact[1].coating.contact_width: excludes `contact.coating.cutting`", |scene| {
+        scene.settings.contacts[0].coating = cut().map(|cut| CoatingSettings { contact_width: Some(3e-3), ..cut });
+    }),
     ("time.scheme: `massless-boundary` excludes `contact.coating.cutting`", |scene| {
         scene.settings.contacts[0].coating = cut();
         scene.settings.time.scheme = Scheme::MasslessBoundary;
@@ -238,6 +249,10 @@ const OF_ROTORS: &[(&str, Change)] = &[
         couple(&mut scene.roms[0]);
     }),
     ("structure[2].thermal: needs thermal loads", |scene| scene.settings.structures[1].thermal = true),
+    ("contact[1].coating: without `cutting` needs `contact.coating.contact_width`, or contact patches", |scene| {
+        scene.settings.contacts[0].coating =
+            coating().map(|coating| CoatingSettings { contact_width: None, ..coating });
+    }),
     ("contact[1].coating: excludes a ROM whose contact patches are in rows", |scene| {
         scene.settings.contacts[0].coating = coating();
         scene.roms[0].extras.rows = Some(2);

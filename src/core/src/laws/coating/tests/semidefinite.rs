@@ -20,14 +20,15 @@ fn check(n: usize, modes: usize, modulus: f64, seed: u64) -> Result<(), String> 
     (0..4).for_each(|_| {
         random.unit();
     });
-    let mut coating = coating(&material(modulus, 0.05 * modulus, 0.1 * modulus, 4, n), n);
+    let settings = material(modulus, 0.05 * modulus, 0.1 * modulus, 4, n);
+    let mut coating = coating(&settings, n);
     set_wear(&mut coating, &[0.0, 0.3, 0.1]);
     let shapes = DMatrix::from_fn(n, modes, |_, _| 2.0 * random.unit() - 1.0);
     let w = &shapes * shapes.transpose();
     let forces: Vec<f64> =
         (0..n).map(|node| if random.unit() < 0.5 { 2.0 * random.unit() / w[(node, node)] } else { 0.0 }).collect();
     let mut problem = coating.problem(1);
-    coating.locate(&mut problem, &vec![0.1; n]);
+    coating.locate(&mut problem, &vec![middle(&settings); n]);
     problem.monotone = true;
     problem.delassus.copy_from(&w);
     for node in 0..n {
@@ -82,7 +83,7 @@ fn nodes_that_nothing_takes_off_the_hard_casing_at_once_are_not_solved() {
     for monotone in [false, true] {
         let coating = coating(&material(1.0, 0.05, 0.1, 4, 2), 2);
         let mut problem = coating.problem(1);
-        coating.locate(&mut problem, &[0.1; 2]);
+        coating.locate(&mut problem, &[TAU / 8.0; 2]);
         problem.monotone = monotone;
         problem.delassus.copy_from_slice(&[1.0, -1.0, -1.0, 1.0]);
         problem.gaps.copy_from_slice(&[-3.0 * THICKNESS, -2.0 * THICKNESS]);

@@ -63,7 +63,7 @@ proptest! {
         let mut coating = coating(&settings, n);
         set_wear(&mut coating, &plastic);
         let mut problem = coating.problem(1);
-        coating.locate(&mut problem, &[0.3, 0.2, 0.1][..n]);
+        coating.locate(&mut problem, &vec![middle(&settings); n]);
         problem.delassus.copy_from(&w);
         problem.gaps.copy_from_slice(&gaps[..n]);
         problem.closed.copy_from_slice(&guess[..n]);
@@ -84,7 +84,7 @@ proptest! {
         coating.commit(&problem);
         let forces = problem.coating.clone();
         problem.clear();
-        coating.locate(&mut problem, &[0.3, 0.2, 0.1][..n]);
+        coating.locate(&mut problem, &vec![middle(&settings); n]);
         problem.delassus.copy_from(&w);
         problem.gaps.copy_from_slice(&gaps[..n]);
         let outcome = problem.solve();
@@ -106,7 +106,7 @@ proptest! {
     ) {
         let modulus = 10.0_f64.powf(exponent);
         let settings = material(modulus, yields * modulus, hardens * modulus, 8, 20);
-        let mut coating = Coating::new(&settings, &[0.0, 0.3, 0.7, 1.0], &[1.0; 4], blades).unwrap();
+        let mut coating = Coating::new(&settings, &tip(&settings, &[0.0, 0.3, 0.7, 1.0]), blades).unwrap();
         set_wear(&mut coating, &plastic);
         let w = p_matrix(&entries, 4 * blades);
         let mut problem = coating.problem(blades);
@@ -225,10 +225,11 @@ fn violation(
 /// Rods that all reach the ends of their branches together, first unworn, then where wear has just stopped.
 #[test]
 fn equal_rods_do_not_hold_up_the_path() {
-    let mut coating = Coating::new(&material(50.0, 3.0, 5.0, 8, 20), &[0.0, 0.5, 1.0], &[1.0; 3], 1).unwrap();
+    let settings = material(50.0, 3.0, 5.0, 8, 20);
+    let mut coating = Coating::new(&settings, &tip(&settings, &[0.0, 0.5, 1.0]), 1).unwrap();
     for gap in [-0.2, -0.6, -0.6, -0.6, -5.0, -5.0, -0.1] {
         let mut problem = coating.problem(1);
-        coating.locate(&mut problem, &[0.1; 3]);
+        coating.locate(&mut problem, &[middle(&settings); 3]);
         problem.delassus.fill_with_identity();
         problem.gaps.fill(gap);
         let mut path = problem.clone();
@@ -250,9 +251,9 @@ fn limits_of_the_modulus_are_hard_contact_and_none() {
     let gaps = DVector::from_column_slice(&[-0.3, 0.1, -0.25]);
     let solve = |modulus: f64, extent: [f64; 2]| {
         let settings = material(modulus, modulus, 0.0, 4, 3);
-        let coating = Coating::with_extent(&settings, &[0.0, 1.0, 2.0], &[1.0; 3], extent, 1).unwrap();
+        let coating = Coating::new(&settings, &tip(&settings, &[0.0, 1.0, 2.0]).with_extent(extent), 1).unwrap();
         let mut problem = coating.problem(1);
-        coating.locate(&mut problem, &[0.1; 3]);
+        coating.locate(&mut problem, &[middle(&settings); 3]);
         problem.delassus.copy_from(&w);
         problem.gaps.copy_from_slice(gaps.as_slice());
         assert!(problem.solve().solved);
@@ -310,7 +311,7 @@ fn the_path_does_not_know_the_unit_of_length() {
         let (w, gaps) = (p_matrix(random.matrix(6, 6).as_slice(), 6), random.matrix(6, 1) * 1.5);
         let found = [1.0, 2.0_f64.powi(-13), 2.0_f64.powi(20)].map(|unit| {
             let settings = CoatingSettings { thickness: unit * THICKNESS, ..material(5.0, 0.4, 0.6, 8, 9) };
-            let mut coating = Coating::new(&settings, &[0.0, 0.5, 1.0], &[1.0; 3], 2).unwrap();
+            let mut coating = Coating::new(&settings, &tip(&settings, &[0.0, 0.5, 1.0]), 2).unwrap();
             set_wear(&mut coating, &plastic);
             let mut problem = coating.problem(2);
             (0..2).for_each(|blade| coating.locate(&mut problem, &[3.0 * number(blade); 3]));
@@ -334,11 +335,11 @@ fn rods_that_move_alike_do_not_lead_the_path_in_circles() {
         {
             let axial: Vec<f64> = (0..n).map(number).collect();
             let settings = material(modulus, yields * modulus, 0.0, 8, 3);
-            let mut coating =
-                Coating::with_extent(&settings, &axial, &vec![1.0; n], [-0.5, number(n) - 0.5], 1).unwrap();
+            let tip = tip(&settings, &axial).with_extent([-0.5, number(n) - 0.5]);
+            let mut coating = Coating::new(&settings, &tip, 1).unwrap();
             set_wear(&mut coating, &[worn]);
             let mut problem = coating.problem(1);
-            coating.locate(&mut problem, &vec![0.1; n]);
+            coating.locate(&mut problem, &vec![middle(&settings); n]);
             problem.delassus.copy_from(&DMatrix::from_fn(n, n, |i, j| match (j + n - i) % n {
                 0 => 1.0,
                 1 => pushes,
@@ -360,13 +361,13 @@ fn a_path_back_and_forth_is_followed_to_its_end() {
     for _ in 0..4 {
         let modulus = random.scale(1e-4, 1e2);
         let settings = material(modulus, random.unit() * 0.4 * modulus, random.unit() * 0.3 * modulus, 8, 1500);
-        let mut coating = Coating::new(&settings, &[0.0, 0.3, 0.7, 1.0], &[1.0; 4], 1).unwrap();
+        let mut coating = Coating::new(&settings, &tip(&settings, &[0.0, 0.3, 0.7, 1.0]), 1).unwrap();
         let worn: Vec<f64> = (0..64).map(|_| if random.unit() < 0.5 { 0.0 } else { 0.8 * random.unit() }).collect();
         set_wear(&mut coating, &worn);
         let (a, skew) = (random.matrix(4, 4), random.matrix(4, 4) * random.scale(0.1, 10.0));
         let w = &a * a.transpose() + DMatrix::identity(4, 4) * random.scale(1e-2, 1.0) + (&skew - skew.transpose());
         let mut problem = coating.problem(1);
-        coating.locate(&mut problem, &[0.1; 4]);
+        coating.locate(&mut problem, &[middle(&settings); 4]);
         problem.delassus.copy_from(&w);
         problem.gaps.copy_from_slice((random.matrix(4, 1) * 2.0).as_slice());
         problem.guess();
