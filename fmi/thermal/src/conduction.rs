@@ -25,7 +25,7 @@ impl Unit for Conduction {
     }
 
     fn take_notes(&mut self) -> Vec<String> {
-        Vec::new()
+        self.0.take_notes()
     }
 
     fn begin_step(&mut self, current_time: f64, step_size: f64, _partial: bool) -> Result<()> {

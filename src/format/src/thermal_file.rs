@@ -73,6 +73,7 @@ pub fn write_thermal(model: &Model) -> Vec<u8> {
         ("name", model.name.clone()),
         ("origin", model.origin.clone()),
         ("heat_capacity", model.heat_capacity.to_string()),
+        ("element_time", model.element_time.to_string()),
     ]
     .into_iter()
     .map(|(key, value)| (key.to_owned(), value))
@@ -124,10 +125,10 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<Model> {
     };
     let entry =
         |key: &str| metadata.get(key).cloned().ok_or_else(|| refuse(format!("metadata `{key}`"), "missing".into()));
-    let capacity = entry("heat_capacity")?;
-    let heat_capacity = capacity
-        .parse()
-        .map_err(|_| refuse("metadata `heat_capacity`".into(), format!("{capacity:?} is no number")))?;
+    let number = |key: &str| {
+        let text = entry(key)?;
+        text.parse().map_err(|_| refuse(format!("metadata `{key}`"), format!("{text:?} is no number")))
+    };
     let edges = array("patches")?;
     if edges.ncols() != 4 {
         return Err(refuse("array `patches`".into(), format!("{} columns found, 4 expected", edges.ncols())));
@@ -139,7 +140,8 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<Model> {
     let model = Model {
         name: entry("name")?,
         origin: entry("origin")?,
-        heat_capacity,
+        heat_capacity: number("heat_capacity")?,
+        element_time: number("element_time")?,
         conduction: array("conduction")?,
         gas_convection: array("gas_convection")?,
         ambient_convection: array("ambient_convection")?,

@@ -253,7 +253,7 @@ pub fn lowest_modes(
             report(listener, stage, converged, count);
             if converged == count {
                 let shapes = basis.combined(ritz.vectors.as_ref());
-                return checked(mass, factor, shift, &ritz.values, shapes);
+                return checked((mass, factor), shift, &ritz.values, shapes, end);
             }
             if exhausted {
                 return Err(Error::NotConverged { wanted: count, converged, basis: end, tolerance: TOLERANCE });
@@ -289,8 +289,15 @@ fn ritz_pairs(projected: MatRef<'_, f64>, coupling: MatRef<'_, f64>, count: usiz
     Ok(Ritz { values, vectors, bounds })
 }
 
-/// Form the residual of every pair explicitly and refuse what does not hold.
-fn checked(mass: &SparseMatrix, factor: &Factor, shift: f64, thetas: &[f64], shapes: Mat<f64>) -> Result<Modes> {
+/// Form the residual of every pair explicitly and refuse what does not hold: of a basis that has reached its capacity the bounds know
+/// nothing. `basis` is its size.
+fn checked(
+    (mass, factor): (&SparseMatrix, &Factor),
+    shift: f64,
+    thetas: &[f64],
+    shapes: Mat<f64>,
+    basis: usize,
+) -> Result<Modes> {
     let mut residuals = Vec::with_capacity(thetas.len());
     for (part, some) in thetas.chunks(CHECKED_TOGETHER).enumerate() {
         let some_shapes = shapes.get(.., part * CHECKED_TOGETHER..part * CHECKED_TOGETHER + some.len());
@@ -306,7 +313,7 @@ fn checked(mass: &SparseMatrix, factor: &Factor, shift: f64, thetas: &[f64], sha
     // NaN must count as failure, hence the comparison's direction.
     let converged = residuals.iter().filter(|&&residual| residual <= CHECKED_TOLERANCE).count();
     if converged < thetas.len() {
-        let (wanted, basis) = (thetas.len(), shapes.ncols());
+        let wanted = thetas.len();
         return Err(Error::NotConverged { wanted, converged, basis, tolerance: CHECKED_TOLERANCE });
     }
     let eigenvalues = thetas.iter().map(|theta| shift + 1.0 / theta).collect();

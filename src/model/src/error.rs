@@ -46,7 +46,7 @@ pub enum Error {
     /// The eigenvalue iteration ended before all wanted pairs were found.
     #[error(
         "only {converged} of {wanted} eigenpairs converged to {tolerance:.1e} in a Krylov basis of {basis} vectors. Ask \
-         for fewer modes, or check the mesh for parts that hang loosely together"
+         for more modes, whose number the basis grows with, or check the mesh for parts that hang loosely together"
     )]
     NotConverged {
         /// Pairs asked for.

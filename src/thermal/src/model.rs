@@ -38,6 +38,9 @@ pub struct Model {
     pub places: DMatrix<f64>,
     /// The patches, as those of the mechanical model.
     pub patches: Vec<Patch>,
+    /// Diffusion time of the elements under the heated surface (s): their largest depth squared over the diffusivity. What heat does within
+    /// a shorter time happens inside one element, which does not resolve it.
+    pub element_time: f64,
 }
 
 impl Model {
@@ -70,6 +73,9 @@ impl Model {
         }
         if !(self.heat_capacity.is_finite() && self.heat_capacity > 0.0) {
             return refuse("heat_capacity", format!("{} J/K is not positive", shown(self.heat_capacity)));
+        }
+        if !(self.element_time.is_finite() && self.element_time > 0.0) {
+            return refuse("element_time", format!("{} s is not positive", shown(self.element_time)));
         }
         for (name, array, shape) in [
             ("conduction", &self.conduction, (order, order)),

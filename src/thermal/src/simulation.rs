@@ -38,6 +38,10 @@ pub struct Simulation {
     phi: Vec<Phi>,
     /// Heat of the patches at the beginning and at the end of a step (W).
     heat: [Vec<f64>; 2],
+    /// Whether steps shorter than elements resolve were warned of, once for all steps of the instance.
+    warned: bool,
+    /// Warnings since the last [`Simulation::take_notes`].
+    notes: Vec<String>,
 }
 
 impl Simulation {
@@ -65,6 +69,8 @@ impl Simulation {
             under_way: None,
             phi: vec![Phi::default(); order],
             heat: [vec![0.0; patches], vec![0.0; patches]],
+            warned: false,
+            notes: Vec::new(),
             model,
         };
         simulation.reset();
@@ -232,7 +238,30 @@ impl Simulation {
             }
         }
         self.under_way = Some([current_time + step_size, step_size]);
+        if step_size < self.model.element_time && !self.warned {
+            self.warned = true;
+            self.notes.push(self.unresolved(step_size));
+        }
         Ok(())
+    }
+
+    /// The warning of a communication step that ends before heat has passed an element.
+    fn unresolved(&self, step_size: f64) -> String {
+        format!(
+            "{}: the communication step of {} s is shorter than the {:.3} s in which heat passes an element of the heated surface \
+             (the square of its depth over the diffusivity), so that `surface_temperature` rises too slowly after `casing_heat` has \
+             changed; `casing_temperature`, means over the volume, and heat are not affected. Hand heat over as its mean over longer \
+             communication steps, or make the model with thinner elements: `tiprub thermal --mesh` with twice the elements through \
+             the thickness lets steps be a quarter as long",
+            self.model.name,
+            shown(step_size),
+            self.model.element_time
+        )
+    }
+
+    /// Warnings since this was asked the last time.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
     }
 
     /// Solve the communication step that was begun.

@@ -44,6 +44,7 @@ fn model() -> Model {
         wetted_means: rows(2, 31),
         places: rows(4, 41),
         patches: (0..PATCHES).map(|k| Patch { angle: [angle(k), angle(k + 1)], axial: [0.0, 0.1] }).collect(),
+        element_time: 1e-6,
     }
 }
 

@@ -38,6 +38,7 @@ pub fn model() -> Model {
         wetted_means: rows(2, 31),
         places: rows(4, 41),
         patches: (0..PATCHES).map(|k| Patch { angle: [angle(k), angle(k + 1)], axial: [0.0, 0.1] }).collect(),
+        element_time: 1e-6,
     }
 }
 
@@ -123,6 +124,28 @@ fn states_go_back_go_on_and_go_to_others() {
     damaged[200] ^= 4;
     assert_eq!(other.deserialise(&damaged).0, ERROR);
     assert!(other.log().contains("checksum"));
+}
+
+/// Steps in which heat does not pass an element: a message of each instance, once, with what to do.
+#[test]
+fn short_steps_are_warned_of_once_through_both_faces() {
+    let path = thermal();
+    let (two, three) = (fmi2::load(&path), fmi3::load(&path));
+    let resources = Resources::of_thermal(&Model { element_time: 0.5, ..model() }, false);
+    let told = |log: String| log.matches("shorter than the 0.500 s in which heat passes an element").count();
+    for _instance in 0..2 {
+        let (old, new) = (fmi2::Slave::initialised(&two, &resources), fmi3::Slave::new(&three, &resources));
+        new.initialise();
+        old.expect(old.step(0.0, 0.6));
+        new.expect(new.step(0.0, 0.6).status);
+        assert_eq!((told(old.log()), told(new.log())), (0, 0));
+        for (step, expected) in [(0, 1), (1, 0)] {
+            let time = 0.6 + 0.1 * f64::from(step);
+            old.expect(old.step(time, 0.1));
+            new.expect(new.step(time, 0.1).status);
+            assert_eq!((told(old.log()), told(new.log())), (expected, expected), "step {step}");
+        }
+    }
 }
 
 /// Both libraries in one process, with the resources of the other.

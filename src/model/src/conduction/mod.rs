@@ -36,6 +36,11 @@ pub struct Conductor {
 }
 
 impl Conductor {
+    /// Diffusivity k/(ρc) at a density (m²/s).
+    pub fn diffusivity(&self, density: f64) -> f64 {
+        self.conductivity / (density * self.specific_heat)
+    }
+
     /// Carbon steel at 20 °C: k = 54 − 0.0333·20, c = 425 + 0.773·20 − 1.69e-3·20² + 2.22e-6·20³ (EN 1993-1-2, 3.4.1.3 and 3.4.1.2).
     pub fn steel() -> Self {
         Self { conductivity: 53.3, specific_heat: 439.8 }
@@ -117,6 +122,8 @@ pub struct FullConduction {
     pub places: Vec<usize>,
     /// Areas in the gas, in the air, and heated (m²).
     pub areas: [f64; 3],
+    /// Largest depth of an element under the heated surface (m).
+    pub depth: f64,
 }
 
 impl FullConduction {
@@ -142,6 +149,7 @@ impl FullConduction {
             patch_means: patch_means(mesh, &of_elements, patches.len())?,
             places: surfaces.places(mesh),
             areas: surfaces.areas(mesh),
+            depth: surfaces.depth(mesh)?,
             conduction,
             capacity,
             films,

@@ -16,10 +16,14 @@ use crate::casing::{CasingOptions, supported_ring};
 use crate::eigen::{Modes, lowest_modes, positive_factor};
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
-use crate::sparse::tall_product;
+use crate::sparse::{SparseMatrix, tall_product};
 use crate::thermal::equal_patches;
 use crate::{Error, Result};
 
+/// Inverse iterations from the uniform temperature for an estimate of the slowest rate, from above.
+const ITERATIONS: usize = 10;
+/// Share of the slowest rate from which rates are looked at.
+const BELOW: f64 = 0.98;
 /// What is left of a vector, as a share of it, that depends on those before.
 const DEPENDENT: f64 = 1e-9;
 /// Rates of growth, as multiples of the slowest rate of decay, whose responses are in the basis.
@@ -86,8 +90,7 @@ pub fn reduce_conduction(
     let full = FullConduction::new(mesh, patches, options)?;
     report(listener, Stage::Assembly, 1, 1);
     let nominal = full.operator([1.0; 2]);
-    let factor = positive_factor(&nominal, &full.capacity, "K + H (conduction and films)", NO_HOLD)?;
-    let modes = lowest_modes(&full.capacity, &factor, 0.0, options.modes, Stage::FullModes, listener)?;
+    let modes = slowest_modes(&full.capacity, &nominal, options.modes, listener)?;
     let basis = basis(&full, &modes, options.films)?;
     report(listener, Stage::Checks, 0, 1);
     let model = project(mesh, &full, &basis, (patches, options))?;
@@ -109,6 +112,33 @@ pub fn reduce_conduction(
     })
 }
 
+/// The slowest eigenmodes of K + H. Rates of a casing that conducts badly stand closer together than the iteration can tell apart from
+/// zero; from just below the slowest they are far apart.
+fn slowest_modes(
+    capacity: &SparseMatrix,
+    operator: &SparseMatrix,
+    count: usize,
+    listener: Listener<'_>,
+) -> Result<Modes> {
+    let held = positive_factor(operator, capacity, OPERATOR, NO_HOLD)?;
+    let found = lowest_modes(capacity, &held, 0.0, count, Stage::FullModes, listener);
+    if !matches!(found, Err(Error::NotConverged { .. })) {
+        return found;
+    }
+    let mut vector = Mat::from_fn(capacity.order(), 1, |_, _| 1.0);
+    for _ in 0..ITERATIONS {
+        vector = held.solve(capacity.times(vector.as_ref()));
+    }
+    let product = |matrix: &SparseMatrix| vector.col(0).transpose() * matrix.times(vector.as_ref()).col(0);
+    let shift = BELOW * product(operator) / product(capacity);
+    // Refused where that is not below the slowest rate after all.
+    match operator.plus_scaled(-shift, capacity).factor(OPERATOR, NO_HOLD) {
+        Ok(near) => lowest_modes(capacity, &near, shift, count, Stage::FullModes, listener),
+        Err(_) => found,
+    }
+}
+
+const OPERATOR: &str = "K + H (conduction and films)";
 const NO_HOLD: &str = "Check the mesh for parts that hang together with nothing";
 
 /// C-orthonormal vectors, the uniform temperature first; nodes × coordinates.
@@ -158,7 +188,7 @@ fn response(full: &FullConduction, factors: [f64; 2], growth: f64) -> Result<Mat
         if k < patches { full.heat[(i, k)] } else { films[(i, k - patches)] }
     });
     let operator = full.operator(factors).plus_scaled(growth, &full.capacity);
-    Ok(operator.factor("K + H (conduction and films)", NO_HOLD)?.solve(loads))
+    Ok(operator.factor(OPERATOR, NO_HOLD)?.solve(loads))
 }
 
 fn project(
@@ -168,7 +198,7 @@ fn project(
     (patches, options): (&[Patch], &ConductionOptions),
 ) -> Result<Model> {
     let order = basis.ncols();
-    let product = |matrix: &crate::sparse::SparseMatrix| {
+    let product = |matrix: &SparseMatrix| {
         let product = tall_product(basis.as_ref(), matrix.times(basis.as_ref()).as_ref());
         DMatrix::from_fn(order, order, |i, j| 0.5 * (product[(i, j)] + product[(j, i)]))
     };
@@ -209,6 +239,7 @@ fn project(
         wetted_means,
         places,
         patches: patches.to_vec(),
+        element_time: full.depth * full.depth / options.conductor.diffusivity(options.density),
     })
 }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use faer::Mat;
 
 use super::add;
+use crate::element::consistent_mass;
 use crate::mesh::{Element, Mesh};
 use crate::patches::{face_points, on_face};
 use crate::sparse::{Pattern, SparseMatrix};
@@ -121,6 +122,22 @@ impl Surfaces {
             .iter()
             .flat_map(|face| face.corners.iter().map(|&corner| mesh.elements[face.element].nodes[corner]));
         nodes.collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    /// Largest depth of an element under a heated face (m): its volume over the area of the face.
+    ///
+    /// # Errors
+    /// An element without volume.
+    pub(super) fn depth(&self, mesh: &Mesh) -> Result<f64> {
+        let mut deepest = 0.0_f64;
+        for face in &self.heated {
+            let element = &mesh.elements[face.element];
+            let products = consistent_mass(element.kind, &mesh.coordinates(element), 1.0, face.element)?;
+            let mut area = 0.0;
+            face.integrate(mesh, |_, part| area += part);
+            deepest = deepest.max(products.sum() / area);
+        }
+        Ok(deepest)
     }
 
     /// In the gas, in the air, heated (m²).

@@ -202,7 +202,7 @@ pub(super) fn lowest_modes(operator: &Operator<'_>, order: usize, count: usize) 
             let ritz = ritz_pairs(projected.as_ref(), coupling.as_ref(), count, order == end, operator.real)?;
             let converged = ritz.bounds.iter().filter(|&&bound| bound <= TOLERANCE).count();
             if converged == count {
-                return checked(operator, &ritz.values, basis.vectors.get(.., ..end) * &ritz.vectors);
+                return checked(operator, &ritz.values, basis.vectors.get(.., ..end) * &ritz.vectors, end);
             }
             if exhausted {
                 return Err(Error::NotConverged { wanted: count, converged, basis: end, tolerance: TOLERANCE });
@@ -267,8 +267,9 @@ pub(super) fn hermitian_eigen(
     Ok(((0..size).map(|k| eigen.S()[k].re).collect(), eigen.U().to_owned()))
 }
 
-/// Form the residual of every pair explicitly and refuse what does not hold.
-fn checked(operator: &Operator<'_>, thetas: &[f64], mut shapes: Mat<c64>) -> Result<ComplexModes> {
+/// Form the residual of every pair explicitly and refuse what does not hold: of a basis that has reached its capacity the bounds know
+/// nothing. `basis` is its size.
+fn checked(operator: &Operator<'_>, thetas: &[f64], mut shapes: Mat<c64>, basis: usize) -> Result<ComplexModes> {
     let sector = operator.condensed.sector;
     // A NaN compares as false and is refused, too.
     let supported = 1.0 / thetas[0] > MECHANISM * operator.condensed.shifted.trace() / sector.mass.trace();
@@ -285,7 +286,7 @@ fn checked(operator: &Operator<'_>, thetas: &[f64], mut shapes: Mat<c64>) -> Res
     let norms = column_norms(residual.as_ref(), operator.mass(residual.as_ref()).as_ref());
     let converged = norms.iter().zip(thetas).filter(|(norm, theta)| **norm <= CHECKED_TOLERANCE * theta.abs()).count();
     if converged < thetas.len() {
-        let (wanted, basis) = (thetas.len(), shapes.ncols());
+        let wanted = thetas.len();
         return Err(Error::NotConverged { wanted, converged, basis, tolerance: CHECKED_TOLERANCE });
     }
     fix_phases(&mut shapes);

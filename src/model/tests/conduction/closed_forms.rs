@@ -78,6 +78,44 @@ fn a_wall_cools_as_its_series_says_and_converges_with_mesh_and_modes() {
     assert!(modes.iter().all(|worst| *worst < 1e-4) && modes[3] < 2e-6, "{modes:?}");
 }
 
+/// A thick wall from 0 K under a constant flux q, by single steps: T = 2q/k √(αt/π) at its surface (Carslaw and Jaeger, 2.9). Elements
+/// resolve it from their diffusion time on, and steps that are shorter are warned of, once.
+#[test]
+fn steps_shorter_than_elements_resolve_are_warned_of() {
+    let (thickness, elements) = (0.04, 8);
+    let Conductor { conductivity, specific_heat } = Conductor::steel();
+    let diffusivity = conductivity / (7850.0 * specific_heat);
+    let model = reduced(&wall(thickness, elements), &options([1.0, 0.0], [-1.0, 1.0], 3 * elements)).model;
+    let depth = thickness / elements as f64;
+    assert!((model.element_time * diffusivity / (depth * depth) - 1.0).abs() < 1e-9, "{}", model.element_time);
+    let (flux, area) = (1e5, 1e-4);
+    println!("| step, of the diffusion time of an element | surface, against the closed form | warned |");
+    let low = [1e-3, 1e-2, 0.1, 0.99, 1.01, 4.0].map(|share| {
+        let step = share * model.element_time;
+        let mut simulation = Simulation::new(model.clone()).unwrap();
+        set(&mut simulation, "casing_heat", flux * area);
+        simulation.initialise(0.0).unwrap();
+        simulation.do_step(0.0, step).unwrap();
+        let expected = 2.0 * flux / conductivity * (diffusivity * step / PI).sqrt();
+        let off = get(&simulation, "surface_temperature") / expected - 1.0;
+        let notes = simulation.take_notes();
+        println!("| {share} | {off:.3} | {} |", notes.len());
+        assert_eq!(notes.len(), usize::from(share < 1.0), "{notes:?}");
+        if let Some(note) = notes.first() {
+            for part in ["wall: the communication step of", "surface_temperature", "--mesh"] {
+                assert!(note.contains(part), "{part:?} is not in {note:?}");
+            }
+        }
+        simulation.do_step(step, step).unwrap();
+        simulation.reset();
+        simulation.initialise(0.0).unwrap();
+        simulation.do_step(0.0, step).unwrap();
+        assert!(simulation.take_notes().is_empty(), "once for an instance");
+        off
+    });
+    assert!(low[0] < -0.5 && low[4].abs() < 0.1 && low[5].abs() < 0.05, "{low:?}");
+}
+
 /// A casing without flanges: a cylinder of radii a and b, whose end faces let no heat through.
 fn cylinder(around: usize, through: usize) -> CasingOptions {
     let contour = Contour::new(&[[0.0, 0.05], [0.02, 0.05]]).unwrap();

@@ -3,8 +3,10 @@
 use std::f64::consts::PI;
 
 use faer::Mat;
-use tiprub_model::casing::{Support, supported_ring};
-use tiprub_model::conduction::{ConductionOptions, FullConduction, reduce_conduction, reduce_ring_conduction};
+use tiprub_model::casing::{ContactRings, Contour, RingCounts, RingGeometry, Support, supported_ring};
+use tiprub_model::conduction::{
+    ConductionOptions, Conductor, FullConduction, reduce_conduction, reduce_ring_conduction,
+};
 use tiprub_model::progress::silent;
 use tiprub_model::sparse::SparseMatrix;
 use tiprub_model::thermal::equal_patches;
@@ -33,6 +35,39 @@ fn steady_states_are_those_of_the_full_model() {
     // Patches of a ring are alike.
     let means = &reduced.model.patch_means * &reduced.model.heat_loads;
     assert!((means[(0, 0)] / means[(7, 7)] - 1.0).abs() < 1e-6);
+}
+
+/// A titanium cylinder conducts so badly along itself that its slowest rates are nearly one: the smaller basis of fewer modes finds them too.
+#[test]
+fn reduces_a_casing_whose_rates_stand_close_together() {
+    let cylinder = CasingOptions {
+        name: "cylinder".into(),
+        geometry: RingGeometry {
+            contour: Contour::new(&[[0.0, 0.25], [0.1, 0.25]]).unwrap(),
+            thickness: 4e-3,
+            flanges: [None, None],
+        },
+        counts: RingCounts { around: 24, through: 1, along: 6, flange: 1 },
+        rings: ContactRings { around: 24, along: 3, axial: [0.01, 0.09] },
+        patches: [12, 1],
+        ..CasingOptions::default()
+    };
+    let reduced = [5, 20, 60].map(|modes| {
+        let options = ConductionOptions {
+            density: 4430.0,
+            conductor: Conductor::titanium(),
+            ..options([700.0, 40.0], [0.01, 0.09], modes)
+        };
+        reduce_ring_conduction(&cylinder, &options, &silent).unwrap()
+    });
+    let [few, some, many] = reduced.map(|reduced| reduced.time_constants);
+    println!("{:?}", &many[..20]);
+    assert!(many[0] / many[1] < 1.001, "{:?}", &many[..2]);
+    for own in [&few, &some] {
+        for (found, expected) in own.iter().zip(&many) {
+            assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        }
+    }
 }
 
 /// Areas, capacity and conductance against those of a cylinder with flanges: the mesh is round.
