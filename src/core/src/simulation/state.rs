@@ -49,6 +49,8 @@ const LARGEST: f64 = 1e50;
 struct Lead {
     phase: Phase,
     time: f64,
+    /// Start of the run (s), from which shapes grow.
+    initial_time: f64,
     communication: Communication,
     inputs: Inputs,
     rotors: Vec<RotorAngle>,
@@ -154,6 +156,7 @@ impl Simulation {
         let mut lead = Lead {
             phase: self.phase,
             time: 0.0,
+            initial_time: 0.0,
             communication: Communication::default(),
             inputs: self.inputs.clone(),
             rotors: self.rotors.clone(),
@@ -167,7 +170,7 @@ impl Simulation {
         let runs = matches!(lead.phase, Phase::Ready | Phase::Stepping);
         let largest = if runs { LARGEST } else { f64::INFINITY };
         take(&mut lead.time, reader);
-        self.initial_time.check(reader);
+        take(&mut lead.initial_time, reader);
         self.initial_energies.check(reader);
         take(&mut lead.communication, reader);
         self.previous_length.check(reader);
@@ -214,7 +217,9 @@ impl Simulation {
             Phase::Ready => (done == count, lead.time.to_bits() == lead.communication.time(count).to_bits()),
             phase => (done < count || phase == Phase::Failed, (lead.time - start).abs() <= TIME_TOLERANCE * length),
         };
-        let counted = lead.time.is_finite() && (1.0..=MOST_STEPS).contains(&number) && done <= count && ends;
+        // A first step may begin that much before the start.
+        let started = lead.initial_time.is_finite() && lead.initial_time <= lead.time + TIME_TOLERANCE * length;
+        let counted = started && lead.time.is_finite() && (1.0..=MOST_STEPS).contains(&number) && done <= count && ends;
         let largest = lead.values[self.compiled.references.step_max];
         let internal = if length > 0.0 { length / number } else { largest };
         let same = if length > 0.0 { same_step(start, length) } else { SAME_STEP };
@@ -267,8 +272,11 @@ impl Simulation {
 
     /// Make ready for a state what follows from its parameters and can be refused.
     fn follow(&mut self, lead: Lead) -> Result<()> {
-        let before =
-            (std::mem::replace(&mut self.values, lead.values), std::mem::replace(&mut self.inputs, lead.inputs));
+        let before = (
+            std::mem::replace(&mut self.values, lead.values),
+            std::mem::replace(&mut self.inputs, lead.inputs),
+            std::mem::replace(&mut self.initial_time, lead.initial_time),
+        );
         // Before initialisation nothing has been computed from them, and what does not fit together is not refused yet.
         let moves = self.is_moved_within_reason(lead.communication.length, lead.time);
         let references = lead.reference_speeds.iter().zip(&lead.reference_temperatures);
@@ -283,7 +291,7 @@ impl Simulation {
             Phase::Ready | Phase::Failed => self.adopt(&references),
         };
         if outcome.is_err() {
-            (self.values, self.inputs) = before;
+            (self.values, self.inputs, self.initial_time) = before;
         }
         outcome.or_else(|error| damaged(&error.to_string()))
     }

@@ -12,8 +12,10 @@ pub struct Growth {
 }
 
 impl Growth {
-    /// Share of a shape that has grown in after a time (s) of `length` (s).
+    /// Share of a shape that has grown in after a time (s) of `length` (s). Before the start, where rounding may put the
+    /// beginning of a first step, it is that of the start.
     pub fn share(elapsed: f64, length: f64) -> f64 {
+        let elapsed = elapsed.max(0.0);
         if elapsed >= length { 1.0 } else { 0.5 * (1.0 - libm::cos(std::f64::consts::PI * elapsed / length)) }
     }
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use tiprub_core::persist::fingerprint;
-use tiprub_core::settings::{LoadSettings, Scheme, Solver, SplineSettings};
+use tiprub_core::settings::{LoadSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::variables::{Causality, Variability};
 use tiprub_core::{Error, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, coating, disk, flexible, go, lattice, real, reference, saved, started};
@@ -185,6 +185,60 @@ fn what_was_saved_is_restored_whatever_was_there() {
                 assert!(to == 0 || saved(&twin) == *second, "{name}, {from} to {to}");
             }
         }
+    }
+}
+
+/// The scenes with shapes that are there at once, too shallow to reach the blades, or that grow in.
+fn ramped() -> impl Iterator<Item = (&'static str, Scene)> {
+    let with = |(name, scene): (&'static str, Scene), ramp: f64| {
+        let mut scene = scene;
+        for surface in &mut scene.settings.surfaces {
+            surface.ramp_time *= ramp;
+            if let Shape::TwoLobe { depth, .. } = &mut surface.shape {
+                *depth = 0.1;
+            }
+        }
+        (name, scene)
+    };
+    scenes().into_iter().flat_map(move |(name, scene)| [0.0, 1.0].map(|ramp| with((name, scene.clone()), ramp)))
+}
+
+/// The times of a state are its own: when the receiving instance started is of no account.
+#[test]
+fn a_state_is_restored_by_an_instance_that_started_at_another_time() {
+    for (name, scene) in ramped() {
+        let length = scene.settings.experiment.communication_step;
+        let mut simulation = started(&scene);
+        let mut states = vec![saved(&simulation)];
+        go(&mut simulation, length);
+        states.push(saved(&simulation));
+        simulation.begin_step(simulation.time(), length).unwrap();
+        simulation.advance().unwrap();
+        states.push(saved(&simulation));
+        for start in [0.5 * length, 7.0, -7.0] {
+            let mut other = Simulation::new(&scene).unwrap();
+            for (moment, state) in states.iter().enumerate() {
+                other.initialise(start).unwrap();
+                let restored = other.restore_state(state);
+                restored.unwrap_or_else(|error| panic!("{name}, moment {moment}, started at {start} s: {error}"));
+                assert!(saved(&other) == *state, "{name}, moment {moment}, started at {start} s");
+            }
+        }
+    }
+}
+
+/// Importers add up steps: the first may begin a rounding before the start, where a shape without a ramp is there all the same.
+#[test]
+fn a_first_step_may_begin_a_rounding_before_the_start() {
+    for (name, scene) in ramped() {
+        let length = scene.settings.experiment.communication_step;
+        let (mut early, mut exact) = (started(&scene), started(&scene));
+        early.do_step(-1e-12 * length, length).unwrap_or_else(|error| panic!("{name}: {error}"));
+        exact.do_step(0.0, length).unwrap();
+        let same = |reference: u32| (early.real(reference).unwrap_or(0.0) - exact.real(reference).unwrap_or(0.0)).abs();
+        let clearance = reference(&exact, "clearance_minimum");
+        assert!(same(clearance) < 1e-12, "{name}: {}", same(clearance));
+        early.restore_state(&saved(&early)).unwrap_or_else(|error| panic!("{name}: {error}"));
     }
 }
 
