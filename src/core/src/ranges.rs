@@ -85,6 +85,9 @@ pub const CONTACT_WIDTH: [f64; 2] = [1e-6, 1.0];
 /// Most cells of a coating: 80 megabytes of state.
 pub const CELLS: usize = 10_000_000;
 
+/// Most values of all variables of a scene: a map of wear of a thousand cells by a thousand. Each has a name and a column in results.
+pub const VALUES: usize = 1_000_000;
+
 /// Refuse a number outside `low` to `high`.
 ///
 /// # Errors

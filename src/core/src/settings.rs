@@ -3,6 +3,7 @@
 mod blades;
 mod coating;
 mod default_scheme;
+pub(crate) mod relations;
 pub mod rules;
 mod validation;
 

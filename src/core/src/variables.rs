@@ -4,7 +4,9 @@
 //! a variable has reference `variable.reference + i`. FMI 2.0 sees every element as a scalar named
 //! `name[i+1]`; FMI 3.0 sees the array under its first reference (or the scalars, when packaged so).
 
-use crate::{Error, Result};
+use std::collections::{BTreeMap, HashSet};
+
+use crate::{Error, Result, ranges};
 
 /// What a clearance output says where no node has anything to touch (m): finite, as FMI wants it, and no distance in any
 /// engine. Its time derivative is 0 then.
@@ -144,7 +146,7 @@ pub struct Variable {
 }
 
 /// What a variable stands for, where code other than the reader of an output asks for it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
     /// Simulated time.
     Time,
@@ -299,18 +301,40 @@ pub struct VariableTable {
     variables: Vec<Variable>,
     /// Row of each value reference.
     rows: Vec<u32>,
+    /// First row of each quantity of a structure or pair.
+    places: BTreeMap<(Quantity, usize), usize>,
+}
+
+/// Refuse more values than anything reads.
+fn check_count(variables: &[Variable]) -> Result<()> {
+    let count = variables.iter().fold(0, |sum: usize, variable| sum.saturating_add(variable.len()));
+    let Some(largest) = variables.iter().max_by_key(|variable| variable.len()).filter(|_| count > ranges::VALUES)
+    else {
+        return Ok(());
+    };
+    Err(Error::invalid(
+        "scene",
+        format!(
+            "its variables have {count} values, more than the {} that are possible; `{}` alone has {}",
+            ranges::VALUES,
+            largest.name,
+            largest.len()
+        ),
+        "Ask for fewer outputs, or give fewer coating cells, structures or sectors",
+    ))
 }
 
 impl VariableTable {
     /// A table from rows whose references are consecutive, starting at 0.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where a reference leaves a gap, or a name occurs twice.
+    /// [`Error::Invalid`] where a reference leaves a gap, a name occurs twice, or there are more than [`ranges::VALUES`] in all.
     pub fn new(variables: Vec<Variable>) -> Result<Self> {
-        let mut rows = Vec::new();
+        check_count(&variables)?;
+        let (mut rows, mut names) = (Vec::new(), HashSet::with_capacity(variables.len()));
         for (row, variable) in variables.iter().enumerate() {
             let expected = u32::try_from(rows.len()).unwrap_or(u32::MAX);
-            let repeated = variables[..row].iter().any(|other| other.name == variable.name);
+            let repeated = !names.insert(variable.name.as_str());
             if variable.reference != expected || repeated {
                 return Err(Error::invalid(
                     format!("variable `{}`", variable.name),
@@ -320,7 +344,11 @@ impl VariableTable {
             }
             rows.extend(std::iter::repeat_n(u32::try_from(row).unwrap_or(u32::MAX), variable.len()));
         }
-        Ok(Self { variables, rows })
+        let mut places = BTreeMap::new();
+        for (row, variable) in variables.iter().enumerate() {
+            places.entry((variable.quantity, variable.of)).or_insert(row);
+        }
+        Ok(Self { variables, rows, places })
     }
 
     /// Number of value references (elements of all variables).
@@ -335,7 +363,7 @@ impl VariableTable {
 
     /// The variable with this quantity of one structure or pair.
     pub fn with_quantity_of(&self, quantity: Quantity, of: usize) -> Option<&Variable> {
-        self.variables.iter().find(|variable| variable.quantity == quantity && variable.of == of)
+        self.places.get(&(quantity, of)).map(|row| &self.variables[*row])
     }
 
     /// All rows.

@@ -41,6 +41,24 @@ pub fn two_rotors(mut scene: Scene, shift: f64, change: impl Fn(&mut StructureSe
     scene
 }
 
+/// The rotor of the scene so many times, each in its own casing.
+pub fn rotors(scene: &Scene, count: usize) -> Scene {
+    let (mut many, settings) = (scene.clone(), &scene.settings);
+    (many.settings.structures, many.settings.surfaces, many.settings.contacts) = (Vec::new(), Vec::new(), Vec::new());
+    for index in 0..count {
+        let (mut structure, mut surface, mut contact) =
+            (settings.structures[0].clone(), settings.surfaces[0].clone(), settings.contacts[0].clone());
+        structure.name = format!("rotor_{index}");
+        surface.name = format!("casing_{index}");
+        (contact.master, contact.slave) = (structure.name.clone(), surface.name.clone());
+        many.settings.structures.push(structure);
+        many.settings.surfaces.push(surface);
+        many.settings.contacts.push(contact);
+    }
+    many.roms = vec![scene.roms[0].clone(); count];
+    many
+}
+
 /// Two rotors in one elastic ring.
 pub fn in_one_casing(mut scene: Scene, solver: Solver, friction: f64) -> Scene {
     scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[2] *= 0.4);

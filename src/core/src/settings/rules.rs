@@ -6,7 +6,8 @@ mod place;
 #[cfg(test)]
 mod tests;
 
-use super::{ContactSettings, Motion, Preset, Scene, SceneSettings, Scheme, Solver, SpinSettings, StructureSettings};
+use super::relations::Relations;
+use super::{Motion, Preset, Scene, SceneSettings, Scheme, Solver, SpinSettings, StructureSettings};
 use crate::rom::Frame;
 use crate::{Error, Result, Rom};
 use facts::*;
@@ -76,7 +77,7 @@ static PARTS: &[Rule] = &[
     ),
     excludes(
         &[CARRIED],
-        ("a structure that is the master of a contact", |at| at.carrier().is_some_and(|own| at.touches(own))),
+        ("a structure that is the master of a contact", |at| at.carrier_touches()),
         "contact nodes and control points of one structure together are not made for",
         "Let it be the master of both contacts, with surfaces on what it meets",
     ),
@@ -124,9 +125,7 @@ static PARTS: &[Rule] = &[
     ),
     excludes(
         &[COATING],
-        ("contacts solved together with another pair's", |at| {
-            at.settings.contacts.iter().any(|other| at.settings.are_together(at.contact(), other))
-        }),
+        ("contacts solved together with another pair's", |at| at.is_coupled()),
         "pairs of one structure, or of surfaces on one flexible structure, push each other",
         "Leave out the coating, or give the pair a structure and a surface of its own",
     ),
@@ -278,10 +277,7 @@ static METHODS: &[Rule] = &[
     ),
     excludes(
         &[MASSLESS],
-        ("several surfaces on one flexible structure", |at| {
-            let one = |pair: &ContactSettings| at.settings.contacts.iter().any(|other| at.settings.share(pair, other));
-            at.settings.contacts.iter().any(one)
-        }),
+        ("several surfaces on one flexible structure", |at| at.contacts().any(|at| at.shares_carrier())),
         "the largest step is not known there",
         "Use \"modal-exact\" or \"central-difference\", or rigid surfaces",
     ),
@@ -423,31 +419,34 @@ impl Rule {
 impl SceneSettings {
     /// What structures, surfaces and contacts need and exclude, whose names are checked.
     pub(super) fn check_parts(&self) -> Result<()> {
-        check(PARTS, self.place(), path)
+        check(PARTS, self.place(&Relations::of(self)), path)
     }
 
     /// The same of outputs, inputs, scheme and solver.
     pub(super) fn check_whole(&self) -> Result<()> {
-        [PRESETS, VARIABLES, METHODS].into_iter().try_for_each(|rules| check(rules, self.place(), path))
+        let relations = Relations::of(self);
+        [PRESETS, VARIABLES, METHODS].into_iter().try_for_each(|rules| check(rules, self.place(&relations), path))
     }
 
     /// Returns which rule excludes a scheme from this scene, and why; `roms` may be empty before they are known.
     pub(super) fn excluded_method(&self, roms: &[Rom], scheme: Scheme) -> Option<String> {
-        let refusal = check(METHODS, Place { roms, scheme, ..self.place() }, path).err()?;
+        let relations = Relations::of(self);
+        let refusal = check(METHODS, Place { roms, scheme, ..self.place(&relations) }, path).err()?;
         let Error::Invalid { problem, .. } = refusal else { return None };
         Some(problem)
     }
 
-    fn place(&self) -> Place<'_> {
+    fn place<'a>(&'a self, relations: &'a Relations) -> Place<'a> {
         let (scheme, solver) = (self.time.scheme, self.contacts[0].solver);
-        Place { settings: self, roms: &[], scheme, solver, index: 0 }
+        Place { settings: self, relations, roms: &[], scheme, solver, index: 0 }
     }
 }
 
 impl Scene {
     /// What a validated scene needs of its ROMs, and what they exclude.
     pub(crate) fn check_roms(&self) -> Result<()> {
-        check(ROMS, Place { roms: &self.roms, ..self.settings.place() }, path)
+        let relations = Relations::of(&self.settings);
+        check(ROMS, Place { roms: &self.roms, ..self.settings.place(&relations) }, path)
     }
 
     /// Whether a validated scene can be stepped with a scheme and a solver.
@@ -456,7 +455,8 @@ impl Scene {
     /// Naming parameter and remedy.
     pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
         let parameter = |_: &Place, key: &str| format!("parameter `{}`", key.rsplit('.').next().unwrap_or(key));
-        check(METHODS, Place { roms: &self.roms, scheme, solver, ..self.settings.place() }, parameter)
+        let relations = Relations::of(&self.settings);
+        check(METHODS, Place { roms: &self.roms, scheme, solver, ..self.settings.place(&relations) }, parameter)
     }
 }
 

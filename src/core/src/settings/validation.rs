@@ -2,6 +2,9 @@
 
 mod pairs;
 
+use std::collections::HashSet;
+
+use super::relations::{Relations, structure};
 use super::{
     CoatingSettings, ContactSettings, ExcitationSettings, InitialSettings, Motion, SceneSettings, Shape,
     SplineSettings, StructureSettings, SurfaceSettings,
@@ -40,18 +43,20 @@ impl SceneSettings {
         for (index, structure) in self.structures.iter().enumerate() {
             structure.validate(&format!("structure[{}]", index + 1))?;
         }
+        let names: HashSet<&str> = self.structures.iter().map(|structure| structure.name.as_str()).collect();
         for (index, surface) in self.surfaces.iter().enumerate() {
-            surface.validate(self, &format!("surface[{}]", index + 1))?;
+            surface.validate((self, &names), &format!("surface[{}]", index + 1))?;
         }
         self.validate_unique_names()?;
-        for (index, contact) in self.contacts.iter().enumerate() {
-            contact.validate_names(self, &format!("contact[{}]", index + 1))?;
-        }
+        self.validate_contact_names()?;
         self.check_parts()?;
         self.validate_pairs()?;
         self.check_whole()?;
+        let relations = Relations::of(self);
         for (index, contact) in self.contacts.iter().enumerate() {
-            contact.validate(self, &format!("contact[{}]", index + 1))?;
+            let master = structure(self, relations.masters[index]);
+            let flies = master.is_some_and(|master| master.motion == Motion::Free);
+            contact.validate(flies, &format!("contact[{}]", index + 1))?;
         }
         within("time.steps_at_most", f64::from(self.time.steps_at_most.unwrap_or(0)), 0.0, ranges::STEPS)?;
         if let Some(tolerance) = self.time.tolerance {
@@ -90,19 +95,37 @@ impl SceneSettings {
         Ok(())
     }
 
+    fn validate_contact_names(&self) -> Result<()> {
+        let relations = Relations::of(self);
+        for (index, contact) in self.contacts.iter().enumerate() {
+            let master = relations.masters[index].is_none().then_some(("master", &contact.master));
+            let slave = relations.surfaces[index].is_none().then_some(("slave", &contact.slave));
+            let Some((field, name)) = master.or(slave) else { continue };
+            let known: Vec<&str> = match field {
+                "master" => self.structures.iter().map(|structure| structure.name.as_str()).collect(),
+                _ => self.surfaces.iter().map(|surface| surface.name.as_str()).collect(),
+            };
+            return Err(Error::invalid(
+                format!("contact[{}].{field}", index + 1),
+                format!("`{name}` is not defined"),
+                format!("Use one of: {}", known.join(", ")),
+            ));
+        }
+        Ok(())
+    }
+
     fn validate_unique_names(&self) -> Result<()> {
         let structures = self.structures.iter().map(|structure| ("structure", &structure.name)).zip(1..);
         let surfaces = self.surfaces.iter().map(|surface| ("surface", &surface.name)).zip(1..);
-        let mut before = Vec::new();
+        let mut before = HashSet::new();
         for ((kind, name), number) in structures.chain(surfaces) {
-            if before.contains(&name) {
+            if !before.insert(name) {
                 return Err(Error::invalid(
                     format!("{kind}[{number}].name"),
                     format!("`{name}` is used by two structures or surfaces"),
                     "Give each structure and surface a name of its own",
                 ));
             }
-            before.push(name);
         }
         Ok(())
     }
@@ -175,9 +198,10 @@ impl InitialSettings {
 }
 
 impl SurfaceSettings {
-    fn validate(&self, scene: &SceneSettings, at: &str) -> Result<()> {
+    /// `known` are the scene and the names of its structures.
+    fn validate(&self, known: (&SceneSettings, &HashSet<&str>), at: &str) -> Result<()> {
         within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, ranges::TIME)?;
-        self.validate_carrier(scene, at)?;
+        self.validate_carrier(known, at)?;
         if let Some(SplineSettings { around, along, .. }) = self.spline {
             let ([least_around, most_around], [least_along, most_along]) =
                 (ranges::SPLINE_AROUND, ranges::SPLINE_ALONG);
@@ -193,9 +217,9 @@ impl SurfaceSettings {
     }
 
     /// The structure that carries the surface.
-    fn validate_carrier(&self, scene: &SceneSettings, at: &str) -> Result<()> {
+    fn validate_carrier(&self, (scene, names): (&SceneSettings, &HashSet<&str>), at: &str) -> Result<()> {
         let Some(name) = &self.structure else { return Ok(()) };
-        if scene.structures.iter().any(|structure| structure.name == *name) {
+        if names.contains(name.as_str()) {
             return Ok(());
         }
         let still = scene.structures.iter().filter(|structure| structure.motion == Motion::Still);
@@ -234,23 +258,8 @@ impl SurfaceSettings {
 }
 
 impl ContactSettings {
-    fn validate_names(&self, scene: &SceneSettings, at: &str) -> Result<()> {
-        let structures: Vec<&str> = scene.structures.iter().map(|s| s.name.as_str()).collect();
-        let surfaces: Vec<&str> = scene.surfaces.iter().map(|s| s.name.as_str()).collect();
-        for (field, name, known) in [("master", &self.master, &structures), ("slave", &self.slave, &surfaces)] {
-            if !known.contains(&name.as_str()) {
-                return Err(Error::invalid(
-                    format!("{at}.{field}"),
-                    format!("`{name}` is not defined"),
-                    format!("Use one of: {}", known.join(", ")),
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    /// The numbers, of a scene that has what they need.
-    fn validate(&self, scene: &SceneSettings, at: &str) -> Result<()> {
+    /// The numbers, of a scene that has what they need; there is no gap before a master that `flies`.
+    fn validate(&self, flies: bool, at: &str) -> Result<()> {
         if self.nodes.as_ref().is_some_and(String::is_empty) {
             let remedy = "Give the beginning of the names, or remove the line for all nodes";
             return Err(Error::invalid(format!("{at}.nodes"), "an empty text", remedy));
@@ -262,7 +271,7 @@ impl ContactSettings {
         if let Some(coating) = &self.coating {
             coating.validate(&format!("{at}.coating"))?;
         }
-        if scene.master_of(self).is_some_and(|master| master.motion == Motion::Free) {
+        if flies {
             return Ok(());
         }
         if self.gap == 0.0 && self.sector_gaps.is_empty() {

@@ -1,5 +1,6 @@
 //! Which structures and surfaces of a scene meet: found once, from names.
 
+use crate::settings::relations::Relations;
 use crate::settings::{ContactSettings, Motion, SceneSettings, StructureSettings, SurfaceSettings};
 use crate::{Error, Result, Rom, Scene};
 
@@ -27,6 +28,8 @@ pub struct Plan {
     pub carriers: Vec<usize>,
     /// In the order of the scene.
     pub pairs: Vec<PairPlan>,
+    /// Pairs of each body.
+    of_bodies: Vec<Vec<usize>>,
 }
 
 /// Names that a scene of one has no need of.
@@ -47,44 +50,40 @@ impl Plan {
         }
         scene.check_roms()?;
         check_factors(scene)?;
-        let structure = |name: &str| settings.structures.iter().position(|structure| structure.name == name);
-        let touches =
-            |index: &usize| settings.contacts.iter().any(|one| one.master == settings.structures[*index].name);
-        let bodies: Vec<usize> = (0..settings.structures.len()).filter(touches).collect();
-        let mut plan = Self { bodies, carriers: Vec::new(), pairs: Vec::new() };
+        let relations = Relations::of(settings);
+        let bodies: Vec<usize> = (0..settings.structures.len()).filter(|one| relations.touches(*one)).collect();
+        let of_bodies = vec![Vec::new(); bodies.len()];
+        let mut plan = Self { bodies, carriers: Vec::new(), pairs: Vec::<PairPlan>::new(), of_bodies };
+        let mut carriers = vec![None; settings.structures.len()];
         for (index, contact) in settings.contacts.iter().enumerate() {
-            let surface = settings.surfaces.iter().position(|surface| surface.name == contact.slave);
-            let (Some(master), Some(surface)) = (structure(&contact.master), surface) else {
+            let (Some(master), Some(surface)) = (relations.masters[index], relations.surfaces[index]) else {
                 unreachable!("validated")
             };
-            let under = settings.surfaces[surface].structure.as_deref().and_then(structure);
+            let under = relations.carriers[index];
             let open = settings.structures[master].motion == Motion::Free;
-            let body = plan.bodies.iter().position(|body| *body == master).unwrap_or(0);
-            let carrier = under.filter(|_| !settings.surfaces[surface].rigid).map(|under| plan.carrier(under));
+            let body = plan.bodies.binary_search(&master).unwrap_or(0);
+            let carrier = under.filter(|_| !settings.surfaces[surface].rigid).map(|under| {
+                *carriers[under].get_or_insert_with(|| {
+                    plan.carriers.push(under);
+                    plan.carriers.len() - 1
+                })
+            });
             let nodes = nodes_of(contact, &scene.roms[master], index)?;
-            let own = plan.pairs.iter().enumerate().filter(|(_, pair)| pair.body == body);
-            if let Some((other, node)) = claimed(own, &nodes) {
+            if let Some((other, node)) = claimed(plan.pairs_of(body), &nodes) {
                 let name = &scene.roms[master].contact_nodes[node].name;
                 let problem = format!("claims the node `{name}`, which contact[{}] claims as well", other + 1);
                 let at = format!("contact[{}].nodes", index + 1);
                 return Err(Error::invalid(at, problem, "Give each contact node to one pair"));
             }
+            plan.of_bodies[body].push(index);
             plan.pairs.push(PairPlan { surface, body, grid: under.filter(|_| open), carrier, nodes });
         }
         Ok(plan)
     }
 
-    fn carrier(&mut self, structure: usize) -> usize {
-        let known = self.carriers.iter().position(|carrier| *carrier == structure);
-        known.unwrap_or_else(|| {
-            self.carriers.push(structure);
-            self.carriers.len() - 1
-        })
-    }
-
     /// Pairs of a body.
     pub fn pairs_of(&self, body: usize) -> impl Iterator<Item = (usize, &PairPlan)> {
-        self.pairs.iter().enumerate().filter(move |(_, pair)| pair.body == body)
+        self.of_bodies[body].iter().map(|pair| (*pair, &self.pairs[*pair]))
     }
 
     /// The structure of a body.

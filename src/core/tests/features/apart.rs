@@ -3,8 +3,8 @@
 use tiprub_core::settings::{LoadSettings, Motion, PatchSettings, Scheme, Shape, Solver, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{
-    RADIUS, disk, go, lattice, modal, node, real, rich_blade, ring, ring_of, round, rub, saved, set, several, started,
-    try_started,
+    RADIUS, coating_of, disk, go, lattice, modal, node, real, rich_blade, ring, ring_of, round, rub, saved, set,
+    several, started, try_started,
 };
 
 /// Rotors `front` and `rear`, each in a rigid casing of its own.
@@ -24,6 +24,27 @@ fn alone(scene: &Scene) -> Scene {
     alone.settings.contacts.truncate(1);
     alone.roms.truncate(1);
     alone
+}
+
+/// Checks that look for each name among all of them, pair by pair, take more than a minute here.
+#[test]
+fn start_up_of_fifteen_hundred_rotors_is_quick() {
+    let scene = several::rotors(&rub(2), 1500);
+    let clock = std::time::Instant::now();
+    let simulation = started(&scene);
+    let taken = clock.elapsed().as_secs_f64();
+    println!("{} values, {taken:.2} s", simulation.table().references());
+    assert!(taken < 12.0, "{taken} s");
+}
+
+/// A name, a column and a place in memory each: no reader has so many.
+#[test]
+fn more_values_than_anything_reads_are_refused_by_name() {
+    let mut scene = rub(4);
+    scene.settings.contacts[0].coating = Some(coating_of(1.5e-4, [2000, 1000]));
+    scene.settings.outputs.wear = true;
+    let message = Simulation::new(&scene).unwrap_err().to_string();
+    assert!(message.contains("more than the 1000000 that are possible; `wear_depth` alone has 2000000"), "{message}");
 }
 
 fn lobes(amplitude: f64, order: u32) -> Shape {

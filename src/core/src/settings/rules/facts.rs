@@ -60,9 +60,8 @@ pub(super) const CLOSURE: Fact = fact("surface.spline.closure", "", |at| {
 });
 
 pub(super) const FREE_MASTER: Fact = fact("contact.master", "a free structure", |at| at.is_free());
-pub(super) const ONE_OF_SEVERAL: Fact = fact("contact.master", "a structure of several contacts", |at| {
-    at.settings.contacts.iter().filter(|other| other.master == at.contact().master).count() > 1
-});
+pub(super) const ONE_OF_SEVERAL: Fact =
+    fact("contact.master", "a structure of several contacts", |at| at.has_other_contacts());
 pub(super) const GAP: Fact = fact("contact.gap", "", |at| at.contact().gap != 0.0);
 pub(super) const SECTOR_GAPS: Fact = fact("contact.sector_gaps", "", |at| !at.contact().sector_gaps.is_empty());
 pub(super) const MERIDIAN: Fact = fact("contact.meridian", "", |at| at.contact().meridian != Meridian::default());

@@ -1,6 +1,7 @@
 //! Where rules are asked for: structures and contacts of a scene, and the scene as a whole.
 
 use crate::Rom;
+use crate::settings::relations::{Relations, structure};
 use crate::settings::{
     CoatingSettings, ContactSettings, Motion, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings,
     SurfaceSettings,
@@ -10,6 +11,7 @@ use crate::settings::{
 #[derive(Clone, Copy)]
 pub struct Place<'a> {
     pub(super) settings: &'a SceneSettings,
+    pub(super) relations: &'a Relations,
     /// As the structures; empty before ROMs are known.
     pub(super) roms: &'a [Rom],
     pub(super) scheme: Scheme,
@@ -23,7 +25,7 @@ pub(super) fn path(at: &Place, key: &str) -> String {
     let (table, rest) = key.split_once('.').unwrap_or((key, ""));
     let number = match table {
         "structure" | "contact" => at.index,
-        "surface" => at.settings.surfaces.iter().position(|one| one.name == at.contact().slave).unwrap_or(0),
+        "surface" => at.relations.surfaces[at.index].unwrap_or(0),
         _ => return key.to_owned(),
     };
     format!("{table}[{}].{rest}", number + 1)
@@ -55,8 +57,8 @@ impl<'a> Place<'a> {
 
     /// Of a contact, whose names are checked.
     pub(super) fn surface(&self) -> &'a SurfaceSettings {
-        let own = self.settings.surfaces.iter().find(|surface| surface.name == self.contact().slave);
-        own.unwrap_or_else(|| unreachable!("validated"))
+        let own = self.relations.surfaces[self.index];
+        &self.settings.surfaces[own.unwrap_or_else(|| unreachable!("validated"))]
     }
 
     pub(super) fn outputs(&self) -> &'a OutputSettings {
@@ -69,7 +71,7 @@ impl<'a> Place<'a> {
 
     /// Whether the master of the contact flies freely.
     pub(super) fn is_free(&self) -> bool {
-        self.settings.master_of(self.contact()).is_some_and(|master| master.motion == Motion::Free)
+        self.master().is_some_and(|master| master.motion == Motion::Free)
     }
 
     pub(super) fn is_coated(&self) -> bool {
@@ -85,45 +87,56 @@ impl<'a> Place<'a> {
         self.contact().coating.is_some_and(|coating| value(&coating) != 0.0)
     }
 
-    /// Place among the structures of the one under the surface of the contact.
-    fn under(&self) -> Option<usize> {
-        let name = self.surface().structure.as_ref()?;
-        self.settings.structures.iter().position(|structure| structure.name == *name)
+    fn master(&self) -> Option<&'a StructureSettings> {
+        structure(self.settings, self.relations.masters[self.index])
     }
 
+    /// The structure under the surface of the contact.
     pub(super) fn carrier(&self) -> Option<&'a StructureSettings> {
-        self.under().map(|index| &self.settings.structures[index])
+        structure(self.settings, self.relations.carriers[self.index])
+    }
+
+    /// Whether that structure is the master of a contact too.
+    pub(super) fn carrier_touches(&self) -> bool {
+        self.relations.carriers[self.index].is_some_and(|carrier| self.relations.touches(carrier))
+    }
+
+    /// Whether several contacts have the master of this one.
+    pub(super) fn has_other_contacts(&self) -> bool {
+        let Some(master) = self.relations.masters[self.index] else { return false };
+        let own = self.relations.contacts[master].iter();
+        own.filter(|contact| self.relations.masters[**contact] == Some(master)).count() > 1
+    }
+
+    /// Whether the contact is solved together with another pair's.
+    pub(super) fn is_coupled(&self) -> bool {
+        self.relations.is_coupled(self.settings, self.index)
+    }
+
+    /// Whether another pair has its surface on the same flexible structure.
+    pub(super) fn shares_carrier(&self) -> bool {
+        self.relations.shares_carrier(self.settings, self.index)
     }
 
     /// Of the master of a contact.
     pub(super) fn master_rom(&self) -> Option<&'a Rom> {
-        let name = &self.contact().master;
-        self.settings.structures.iter().position(|structure| structure.name == *name).map(|index| &self.roms[index])
+        self.relations.masters[self.index].map(|index| &self.roms[index])
     }
 
     pub(super) fn carrier_rom(&self) -> Option<&'a Rom> {
-        self.under().map(|index| &self.roms[index])
-    }
-
-    pub(super) fn touches(&self, structure: &StructureSettings) -> bool {
-        self.settings.touches(structure)
+        self.relations.carriers[self.index].map(|index| &self.roms[index])
     }
 
     /// Whether the structure takes part in a contact whose master moves like this.
     pub(super) fn meets(&self, moves: fn(Motion) -> bool) -> bool {
-        let own = self.index;
-        self.contacts().any(|at| {
-            let Some(master) = at.settings.master_of(at.contact()) else { return false };
-            (master.name == self.structure().name || at.under() == Some(own)) && moves(master.motion)
-        })
+        let own = self.relations.contacts[self.index].iter();
+        own.filter_map(|contact| Self { index: *contact, ..*self }.master()).any(|master| moves(master.motion))
     }
 
     /// Whether there is room for `coulomb`: a coupled problem of all sectors has it only if the scene says so.
     pub(super) fn may_stick(&self) -> bool {
         let settings = self.settings;
-        let rotors = settings.contacts.iter().filter_map(|contact| settings.master_of(contact));
-        let small =
-            rotors.zip(self.contacts()).all(|(rotor, at)| rotor.motion != Motion::Free && at.carrier().is_none());
+        let small = self.contacts().all(|at| !at.is_free() && at.carrier().is_none());
         let uncoupled = self.roms.iter().all(|rom| !rom.is_cyclic());
         let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
         settings.contacts[0].solver == Solver::Coulomb
@@ -132,8 +145,8 @@ impl<'a> Place<'a> {
 
     /// Whether every structure that touches keeps modes with inertia; before ROMs are known it may.
     pub(super) fn has_modes_left(&self) -> bool {
-        let structures = self.settings.structures.iter().zip(self.roms);
-        structures.filter(|(structure, _)| self.touches(structure)).all(|(_, rom)| {
+        let structures = self.roms.iter().enumerate();
+        structures.filter(|(structure, _)| self.relations.touches(*structure)).all(|(_, rom)| {
             let harmonics = rom.extras.harmonics.iter().map(|harmonic| harmonic.mass.nrows());
             harmonics.chain([rom.order()]).all(|modes| modes > 3 * rom.contact_nodes.len())
         })
