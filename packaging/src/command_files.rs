@@ -1,16 +1,17 @@
 //! What each command reads and writes, looked at before any work.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result, output_file,
-    places::{Named, apart, identity, outputs},
+    places::{Identity, Named, apart, identity, outputs},
 };
 
 use crate::{
-    cli::{Command, StudyCommand},
-    commands::demo,
+    cli::{Command, LibraryArguments, PackageArguments, StudyCommand},
+    commands::{demo, package::targets, study::directory},
+    fmu::FmiVersion,
     library,
     shared_arguments::Written,
 };
@@ -26,33 +27,58 @@ pub fn check(command: &Command) -> Result<()> {
     match command {
         Command::Run(arguments) => {
             let csv = arguments.csv.clone().filter(|path| path != Path::new("-"));
-            outputs(&scene(&arguments.scene), &Vec::from_iter(Named::option("--csv", &csv)))
+            let inputs = Named::option("--inputs", &arguments.inputs);
+            let read: Vec<Named> = scene(&arguments.scene).into_iter().chain(inputs).collect();
+            outputs(&read, &Vec::from_iter(Named::option("--csv", &csv)))
         }
         Command::Reduce(arguments) => outputs(&arguments.model.files(), &written(arguments.model.written())),
         Command::Demo(arguments) => {
             let files: Vec<Named> = demo::FILES.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
-            let libraries = library::given(&arguments.libraries)?;
-            let libraries = libraries.iter().map(|path| Named::new("--library", path));
-            apart(&libraries.collect::<Vec<_>>(), &files)?;
+            apart(&libraries(&arguments.libraries)?, &files)?;
             output_file::try_directory(&arguments.out)
         }
         Command::Study(arguments) => match &arguments.study {
-            StudyCommand::Map(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
+            StudyCommand::Map(own) => study(&own.scene, &directory("map", &own.common), Vec::new()),
             StudyCommand::Convergence(own) => {
                 let read = scene(&own.study.scene).into_iter().chain(own.from.files()).collect::<Vec<_>>();
                 outputs(&read, &Vec::from_iter(Named::option("--into", &own.study.into)))?;
-                study(&own.study.scene, own.study.common.out.as_deref(), own.from.files())
+                study(&own.study.scene, &directory("convergence", &own.study.common), own.from.files())
             }
-            StudyCommand::Stability(arguments) => study(&arguments.scene, arguments.common.out.as_deref(), Vec::new()),
-            StudyCommand::Error(own) => study(&own.study.scene, own.study.common.out.as_deref(), own.from.files()),
+            StudyCommand::Stability(own) => study(&own.scene, &directory("stability", &own.common), Vec::new()),
+            StudyCommand::Error(own) => {
+                study(&own.study.scene, &directory("error", &own.study.common), own.from.files())
+            }
         },
-        // Names follow from the scene: see the command.
-        Command::Package(_) | Command::Thermal(_) | Command::Inspect(_) => Ok(()),
+        Command::Package(arguments) => package(arguments),
+        Command::Thermal(arguments) => {
+            let targets = targets(arguments.fmi, &arguments.output, &arguments.name())?;
+            outputs(&libraries(&arguments.libraries)?, &fmus(&targets))
+        }
+        Command::Inspect(_) => Ok(()),
     }
 }
 
+/// The files of an FMU are named after the scene.
+fn package(arguments: &PackageArguments) -> Result<()> {
+    // What is wrong with the command line alone comes first.
+    targets(arguments.fmi, &arguments.output, "model")?;
+    let read = libraries(&arguments.libraries)?;
+    let name = scene_source::settings(&arguments.scene)?.name;
+    let read: Vec<Named> = scene(&arguments.scene).into_iter().chain(read).collect();
+    outputs(&read, &fmus(&targets(arguments.fmi, &arguments.output, &name)?))
+}
+
+fn fmus(targets: &[(FmiVersion, PathBuf)]) -> Vec<Named> {
+    targets.iter().map(|(_, path)| Named::new("--output", path)).collect()
+}
+
+/// The libraries that are named on the command line.
+fn libraries(arguments: &LibraryArguments) -> Result<Vec<Named>> {
+    Ok(library::given(arguments)?.into_iter().map(|path| Named::new("--library", path)).collect())
+}
+
 /// The files of a scene.
-pub fn scene(argument: &str) -> Vec<Named> {
+fn scene(argument: &str) -> Vec<Named> {
     let files = scene_source::files(argument).into_iter();
     files
         .enumerate()
@@ -67,14 +93,16 @@ fn written(arguments: &Written) -> Vec<Named> {
 }
 
 /// A study names its files itself, in one directory: what is read must not be there under a name of that kind.
-pub fn study(argument: &str, out: Option<&Path>, more: Vec<Named>) -> Result<()> {
-    let Some(out) = out else { return Ok(()) };
-    let directory = identity(out);
+fn study(argument: &str, out: &Path, more: Vec<Named>) -> Result<()> {
+    let replaced = |path: &PathBuf| {
+        let kind = path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
+        STUDY_FILES.contains(&kind.as_str())
+    };
+    // No directory, no files.
+    let files = out.read_dir().into_iter().flatten().flatten().map(|entry| entry.path()).filter(replaced);
+    let files: Vec<Identity> = files.filter_map(|path| identity(&path)).collect();
     for input in scene(argument).into_iter().chain(more) {
-        let kind = input.path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
-        let real = output_file::destination(&input.path).unwrap_or_else(|_| input.path.clone());
-        let inside = directory.is_some() && identity(real.parent().unwrap_or(Path::new("."))) == directory;
-        if inside && STUDY_FILES.contains(&kind.as_str()) {
+        if identity(&input.path).is_some_and(|place| files.contains(&place)) {
             let problem =
                 format!("holds {}, {}, which a file of the study may replace", input.role, input.path.display());
             return Err(Failure::usage(format!("--out {}", out.display()), problem, "Give another directory"));
@@ -82,3 +110,6 @@ pub fn study(argument: &str, out: Option<&Path>, more: Vec<Named>) -> Result<()>
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

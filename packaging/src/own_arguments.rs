@@ -1,5 +1,7 @@
 //! Options of `tiprub reduce blade`, `sector` and `casing-mesh`: finite-element models of one's own.
 
+mod included;
+
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -332,16 +334,22 @@ impl Source<'_> {
     /// All files that are read.
     pub fn files(&self) -> Vec<Named> {
         let mesh = self.file.map(|path| Named::new("FILE", path));
+        let mut parts = Vec::new();
+        self.file.iter().for_each(|path| included::collect(path, &mut parts));
+        let parts = parts.into_iter().map(|path| Named::new("a file that FILE includes,", path));
         let matrices = self.matrices.into_iter().flat_map(|own| {
+            // Without --dofs the list beside CalculiX's stiffness file is read.
+            let storage = own.stiffness.as_ref().filter(|path| path.extension().is_some_and(|kind| kind == "sti"));
+            let dofs = own.dofs.clone().or(storage.map(|path| path.with_extension("dof")));
             let all = [
-                ("--stiffness", &own.stiffness),
-                ("--mass", &own.mass),
-                ("--nodes", &own.nodes),
-                ("--dofs", &own.dofs),
+                ("--stiffness", own.stiffness.clone()),
+                ("--mass", own.mass.clone()),
+                ("--nodes", own.nodes.clone()),
+                ("--dofs", dofs),
             ];
-            all.into_iter().filter_map(|(role, path)| Named::option(role, path))
+            all.into_iter().filter_map(|(role, path)| Named::option(role, &path))
         });
-        mesh.into_iter().chain(matrices).collect()
+        mesh.into_iter().chain(parts).chain(matrices).collect()
     }
 
     /// The material that the command line gives, if any.

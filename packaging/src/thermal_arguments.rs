@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use tiprub_model::{CasingOptions, casing::CASING37};
 
 use crate::{
     casing_arguments::RingArguments,
@@ -49,4 +50,14 @@ pub struct ThermalArguments {
     /// Libraries that go into the FMU.
     #[command(flatten)]
     pub libraries: LibraryArguments,
+}
+
+impl ThermalArguments {
+    /// Name of the model.
+    pub fn name(&self) -> String {
+        self.name.clone().unwrap_or_else(|| {
+            let built_in = self.ring.options() == CasingOptions::default();
+            format!("{}_thermal", if built_in { CASING37 } else { "casing" })
+        })
+    }
 }

@@ -7,12 +7,10 @@ use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
     console::{Console, Outcome, shown_path},
-    places::{self, Named},
 };
 
 use crate::{
     cli::{FmiChoice, PackageArguments},
-    command_files,
     fmu::{FmiVersion, Package},
     library::{self, Unit},
 };
@@ -22,19 +20,11 @@ use crate::{
 /// # Errors
 /// A wrong scene, no library, or files that cannot be written.
 pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
-    // What is wrong with the command line is said before any work.
-    targets(arguments.fmi, &arguments.output, "model")?;
-    let given = library::given(&arguments.libraries)?;
-    let libraries =
-        if given.is_empty() { None } else { Some(library::load(Unit::Scene, &arguments.libraries, console)?) };
+    // A wrong library is found before a model is reduced; one that has to be built waits for a scene that is right.
+    let given = !arguments.libraries.library.is_empty();
+    let libraries = given.then(|| library::load(Unit::Scene, &arguments.libraries, console)).transpose()?;
     let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
     let targets = targets(arguments.fmi, &arguments.output, &scene.settings.name)?;
-    let files: Vec<Named> = targets.iter().map(|(_, path)| Named::new("--output", path)).collect();
-    let library_files = given.iter().map(|path| Named::new("--library", path));
-    places::outputs(
-        &command_files::scene(&arguments.scene).into_iter().chain(library_files).collect::<Vec<_>>(),
-        &files,
-    )?;
     let libraries = libraries.map_or_else(|| library::load(Unit::Scene, &arguments.libraries, console), Ok)?;
     let package =
         Package::new(&scene, &libraries).map_err(|failure| scene_source::located(&arguments.scene, failure))?;

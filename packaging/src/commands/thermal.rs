@@ -4,14 +4,12 @@ use std::fmt::Write as _;
 
 use serde_json::json;
 use tiprub_gallery::reduction;
-use tiprub_model::{
-    casing::CASING37,
-    conduction::{AMBIENT_FILM, Conduction, ConductionOptions, Conductor, GAS_FILM, MODES, reduce_ring_conduction},
+use tiprub_model::conduction::{
+    AMBIENT_FILM, Conduction, ConductionOptions, Conductor, GAS_FILM, MODES, reduce_ring_conduction,
 };
 use tiprub_shell::{
     Failure, Result,
     console::{Console, Outcome, shown_path},
-    places::{self, Named},
 };
 
 use crate::{
@@ -28,14 +26,8 @@ use crate::{
 /// A casing that cannot be, no library, or files that cannot be written.
 pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
     let casing = arguments.ring.options();
-    let name = arguments.name.clone().unwrap_or_else(|| {
-        let shipped = casing == tiprub_model::CasingOptions::default();
-        format!("{}_thermal", if shipped { CASING37 } else { "casing" })
-    });
+    let name = arguments.name();
     let targets = targets(arguments.fmi, &arguments.output, &name)?;
-    let files: Vec<Named> = targets.iter().map(|(_, path)| Named::new("--output", path)).collect();
-    let given = library::given(&arguments.libraries)?;
-    places::outputs(&given.iter().map(|path| Named::new("--library", path)).collect::<Vec<_>>(), &files)?;
     let conductor = match arguments.ring.material {
         None | Some(MaterialChoice::Steel) => Some(Conductor::steel()),
         Some(MaterialChoice::Titanium) => Some(Conductor::titanium()),
