@@ -18,12 +18,16 @@ use crate::{library::Library, scene_features};
 /// File name of the library inside the FMU, without extension, and `modelIdentifier` of both versions.
 pub const MODEL_IDENTIFIER: &str = "tiprub";
 
-/// Communication steps of the reference result that is packed with the documentation.
+/// Communication steps of the reference result that is packed with the documentation, and most values in it.
 const REFERENCE_STEPS: usize = 100;
+const REFERENCE_VALUES: usize = 20_000_000;
 
 /// Most variables of an FMI 3.0 unit that are scalars by default. Several importers read no arrays, or take their first
 /// element for the whole; no person reads a list of more.
 pub const MOST_SCALARS: usize = 300;
+
+/// Most variables of an FMU without arrays: each takes half a kilobyte of its description, and importers hold all of it in memory.
+pub const MOST_VARIABLES: usize = 100_000;
 
 /// What FMI-LS-REF says of a file of an FMU: path, MIME type, role, description.
 pub type Related<'a> = (&'a str, &'a str, &'a str, &'a str);
@@ -77,6 +81,7 @@ pub struct Package<'a> {
     simulation: Simulation,
     libraries: &'a [Library],
     reference_csv: String,
+    reference_steps: usize,
     warnings: Vec<String>,
     generated: String,
 }
@@ -92,9 +97,10 @@ impl<'a> Package<'a> {
         let mut simulation = Simulation::new(scene).map_err(in_scene)?;
         simulation.initialise(schedule.start).map_err(in_scene)?;
         let warnings = [simulation.warnings(), &schedule.warnings()].concat();
-        if schedule.count > REFERENCE_STEPS {
-            schedule.count = REFERENCE_STEPS;
-            schedule.stop = schedule.start + REFERENCE_STEPS as f64 * schedule.step;
+        let reference_steps = REFERENCE_STEPS.min(REFERENCE_VALUES / simulation.table().references());
+        if schedule.count > reference_steps {
+            schedule.count = reference_steps;
+            schedule.stop = schedule.start + reference_steps as f64 * schedule.step;
         }
         let reference_csv = native::run(scene, &schedule, Given::default(), &|_| {})?.recording.to_csv();
         let generated = generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())?;
@@ -104,6 +110,7 @@ impl<'a> Package<'a> {
             simulation,
             libraries,
             reference_csv,
+            reference_steps,
             warnings,
             generated,
         })
@@ -118,10 +125,28 @@ impl<'a> Package<'a> {
     /// be more than [`MOST_SCALARS`] variables. FMI 2.0 has scalars.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// More than [`MOST_VARIABLES`] without arrays; the file cannot be written.
     pub fn write(&self, target: &Path, version: FmiVersion, arrays: Option<bool>) -> Result<()> {
-        let many = self.simulation.table().references() > MOST_SCALARS;
-        archive::write(target, &self.entries(version, arrays.unwrap_or(many)))
+        let values = self.simulation.table().references();
+        let arrays = arrays.unwrap_or(values > MOST_SCALARS);
+        if values > MOST_VARIABLES && !(arrays && version == FmiVersion::Three) {
+            return Err(self.too_many(values, version));
+        }
+        archive::write(target, &self.entries(version, arrays))
+    }
+
+    fn too_many(&self, values: usize, version: FmiVersion) -> Failure {
+        let without = if version == FmiVersion::Two { "FMI 2.0 has no arrays" } else { "--scalars gives it no arrays" };
+        let rows = self.simulation.table().variables().iter();
+        let largest = rows.max_by_key(|row| row.len()).map(|row| format!("; `{}` has {}", row.name, row.len()));
+        Failure::new(
+            format!("scene `{}`", self.scene.settings.name),
+            format!(
+                "{without}, and its {values} variables are more than the {MOST_VARIABLES} that such an FMU may have{}",
+                largest.unwrap_or_default()
+            ),
+            "Ask for fewer outputs in the scene, or write FMI 3.0 with arrays alone: --fmi 3 --arrays",
+        )
     }
 
     /// Files of the .fmu in their order.
@@ -129,7 +154,8 @@ impl<'a> Package<'a> {
         let resources = tiprub_format::resource_files(self.scene, arrays);
         let token = tiprub_format::instantiation_token(&resources);
         let description = self.description(&token, arrays);
-        contents(version, &description, self.libraries, resources, Some(&self.reference_csv), SCENE)
+        let reference = Some((self.reference_csv.as_str(), self.reference_steps));
+        contents(version, &description, self.libraries, resources, reference, SCENE)
     }
 
     /// The internal step (s) where every communication step that is a multiple of it is divided by it: the largest step
@@ -176,30 +202,29 @@ impl<'a> Package<'a> {
     }
 }
 
-/// Files of an .fmu in their order: what its description says, the libraries, and the model that it reads.
+/// Files of an .fmu in their order: what its description says, the libraries, and the model that it reads; a reference result comes with
+/// the number of communication steps that it has at most.
 pub fn contents(
     version: FmiVersion,
     description: &Description,
     libraries: &[Library],
     resources: Vec<(String, Vec<u8>)>,
-    reference_csv: Option<&str>,
+    reference: Option<(&str, usize)>,
     model: Related,
 ) -> Vec<Entry> {
     let identifier = description.identifier;
-    let reference = format!("documentation/{identifier}_ref.csv");
-    let result = (
-        reference.as_str(),
-        "text/csv",
-        "result",
-        "All outputs of the default experiment, of its first 100 communication steps if there are more",
-    );
+    let name = format!("documentation/{identifier}_ref.csv");
+    let told = reference.map(|(_, steps)| {
+        format!("All outputs of the default experiment, of its first {steps} communication steps if there are more")
+    });
+    let result = told.as_deref().map(|told| (name.as_str(), "text/csv", "result", told));
     let page = (
         "documentation/index.html",
         "text/html",
         "document",
         "The model, its variables, its limits and its reduced-order models",
     );
-    let related: Vec<Related> = reference_csv.map(|_| result).into_iter().chain([page, model]).collect();
+    let related: Vec<Related> = result.into_iter().chain([page, model]).collect();
     let (xml, number, icon) = match version {
         FmiVersion::Two => (fmi2_xml(description), "2.0", "model.png"),
         FmiVersion::Three => (fmi3_xml(description), "3.0", "terminalsAndIcons/icon.png"),
@@ -212,7 +237,7 @@ pub fn contents(
     }
     entries.extend(resources.into_iter().map(|(name, bytes)| Entry::new(format!("resources/{name}"), bytes)));
     entries.push(Entry::new("documentation/index.html", html(description)));
-    entries.extend(reference_csv.map(|csv| Entry::new(reference.as_str(), csv)));
+    entries.extend(reference.map(|(csv, _)| Entry::new(name.as_str(), csv)));
     entries.extend([
         Entry::new("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml", references_manifest(&related)),
         Entry::new("documentation/licenses/license.txt", LICENSE),

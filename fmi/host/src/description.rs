@@ -8,6 +8,11 @@ use quick_xml::{
 };
 use tiprub_shell::{Failure, Result};
 
+/// Deeper elements, and more attributes of one, are in no description; each would take memory, and attributes are compared with
+/// each other.
+const MOST_NESTED: usize = 50;
+const MOST_ATTRIBUTES: usize = 50;
+
 /// Data type of a variable, by the getter that reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VariableType {
@@ -146,6 +151,9 @@ impl Parser {
             _ => {}
         }
         if has_content {
+            if self.path.len() == MOST_NESTED {
+                return Err(wrong(format!("elements are nested more than {MOST_NESTED} deep")));
+            }
             self.path.push(name);
         }
         Ok(())
@@ -234,7 +242,10 @@ impl Parser {
 
 fn read_attributes(element: &BytesStart<'_>) -> Result<Attributes> {
     let mut attributes = Attributes::new();
-    for attribute in element.attributes() {
+    for (index, attribute) in element.attributes().enumerate() {
+        if index == MOST_ATTRIBUTES {
+            return Err(wrong(format!("an element has more than {MOST_ATTRIBUTES} attributes")));
+        }
         let attribute = attribute.map_err(|error| wrong(format!("attribute: {error}")))?;
         let value = attribute
             .normalized_value(XmlVersion::Implicit1_0)
@@ -297,6 +308,14 @@ mod tests {
         let three = parse(FMI3).unwrap();
         let names: Vec<_> = three.numeric_outputs().flat_map(ImportedVariable::scalar_names).collect();
         assert_eq!(names, ["f[1]", "f[2]", "f[3]", "g[1]", "g[2]", "g[3]", "g[4]", "count"]);
+    }
+
+    #[test]
+    fn descriptions_that_no_tool_writes_are_refused() {
+        let nested = "<a>".repeat(60);
+        assert!(parse(&nested).unwrap_err().problem.contains("nested"));
+        let attributes: String = (0..60).map(|index| format!(" a{index}=\"\"")).collect();
+        assert!(parse(&format!("<a{attributes}/>")).unwrap_err().problem.contains("attributes"));
     }
 
     #[test]

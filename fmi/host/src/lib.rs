@@ -31,8 +31,8 @@ use tiprub_shell::{Failure, Result, recording::Recording, schedule::Schedule};
 const LARGEST_UNPACKED: u64 = 2 << 30;
 /// Describes the FMU, at the root of the archive.
 const DESCRIPTION: &str = "modelDescription.xml";
-/// Its largest size (bytes).
-const LARGEST_DESCRIPTION: u64 = 256 << 20;
+/// Its largest size (bytes): that of a hundred thousand variables, whose descriptions are long.
+const LARGEST_DESCRIPTION: u64 = 64 << 20;
 
 /// An FMU unpacked to a temporary directory, which lives as long as this value.
 #[derive(Debug)]
@@ -114,6 +114,17 @@ pub(crate) fn unpack_entry(
     Ok(())
 }
 
+/// A file may not be larger than what it can mean.
+fn check_size(name: &str, size: u64, largest: Option<u64>) -> Result<()> {
+    let Some(most) = largest.filter(|most| size > *most) else { return Ok(()) };
+    let problem = format!("it would take {size} bytes unpacked, more than the {most} that such a file may have");
+    Err(Failure::new(
+        format!("entry {name}"),
+        problem,
+        "Do not trust this file; make the FMU again with `tiprub package`",
+    ))
+}
+
 fn damaged(name: &str, error: &dyn std::fmt::Display) -> Failure {
     let remedy = "Copy the file again, or make it again with `tiprub package`";
     Failure::new(format!("entry {name}"), format!("damaged ({error})"), remedy)
@@ -125,21 +136,26 @@ impl UnpackedFmu {
     /// # Errors
     /// Not a zip, a damaged entry, a name that leads out of the directory, or an unreadable description.
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_part(path, |_| true)
+        Self::open_part(path, |_| Some(LARGEST_UNPACKED))
     }
 
-    /// The same with those entries alone whose names are `wanted`, beside modelDescription.xml; the others are only read, to
-    /// check them.
+    /// The same with those entries alone that `largest` gives a size for, the largest that they may have (bytes), beside
+    /// modelDescription.xml; the others are only read, to check them.
     ///
     /// # Errors
-    /// As [`UnpackedFmu::open`].
-    pub fn open_part(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Self> {
+    /// As [`UnpackedFmu::open`]; an entry larger than that, before any is unpacked.
+    pub fn open_part(path: &Path, largest: impl Fn(&str) -> Option<u64>) -> Result<Self> {
         let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
         let mut archive = open_archive(path)?;
+        let largest = |name: &str| if name == DESCRIPTION { Some(LARGEST_DESCRIPTION) } else { largest(name) };
+        let entries = entries(&mut archive).map_err(in_file)?;
+        for (name, size) in &entries {
+            check_size(name, *size, largest(name)).map_err(in_file)?;
+        }
         let directory = TempDir::with_prefix("tiprub-fmu-")
             .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
-        for (index, (name, _)) in entries(&mut archive).map_err(in_file)?.into_iter().enumerate() {
-            let unpacked = if wanted(&name) || name == DESCRIPTION {
+        for (index, (name, _)) in entries.into_iter().enumerate() {
+            let unpacked = if largest(&name).is_some() {
                 unpack(&mut archive, index, &name, directory.path())
             } else {
                 unpack_entry(&mut archive, index, &name, &mut io::sink())
@@ -304,6 +320,19 @@ mod tests {
                 failure.what.contains("resources/zeros") && failure.problem.contains("damaged"),
                 "{size}: {failure}"
             );
+        }
+    }
+
+    /// What compresses well, such as a text of newlines, may take no more than what it can mean: no disk, and no memory.
+    #[test]
+    fn an_entry_beyond_what_it_can_mean_is_refused_before_anything_is_unpacked() {
+        for name in [DESCRIPTION, "resources/scene.toml", "resources/package.toml", "resources/a.safetensors"] {
+            let (_root, path) = archive_with(&[Entry::new(name, "\n".repeat(1 << 16))]);
+            announce(&path, 1 << 30);
+            let resource = |name: &str| name.strip_prefix("resources/").and_then(tiprub_format::largest_resource);
+            let failure = UnpackedFmu::open_part(&path, resource).unwrap_err();
+            assert!(failure.what.ends_with(&format!("entry {name}")), "{failure}");
+            assert!(failure.problem.contains("1073741824 bytes unpacked, more than the"), "{failure}");
         }
     }
 

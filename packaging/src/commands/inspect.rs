@@ -81,7 +81,8 @@ fn kind(path: &Path) -> Result<FileKind> {
 fn inspect_fmu(path: &Path, console: &Console) -> Result<Outcome> {
     let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
     let files = entries(&mut open_archive(path)?).map_err(in_file)?;
-    let fmu = UnpackedFmu::open_part(path, |name| name.starts_with("resources/"))?;
+    let resource = |name: &str| name.strip_prefix("resources/").and_then(tiprub_format::largest_resource);
+    let fmu = UnpackedFmu::open_part(path, resource)?;
     let description = &fmu.description;
     let count = |causality: &str| description.variables.iter().filter(|row| row.causality == causality).count();
     let mut text = format!(

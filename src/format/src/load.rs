@@ -10,10 +10,32 @@ use crate::{Error, Result, builtin_model, parse_scene, read_file, read_rom, read
 /// Start of a `rom` entry that names a model which comes with the program.
 pub(crate) const BUILTIN_PREFIX: &str = "builtin:";
 
-/// Largest file of a scene or ROM (bytes): far beyond any, far below what exhausts the machine.
-pub(crate) const LARGEST: u64 = 8 << 30;
-/// Largest file of text.
-const LARGEST_TEXT: u64 = 64 << 20;
+/// Largest ROM file (bytes): mass, stiffness and three matrices of spin of 3500 coordinates, whose eigenvalues take minutes.
+pub const LARGEST_ROM: u64 = 512 << 20;
+/// Largest scene file (bytes): five thousand rotors, each with its surface. A parser makes tenfold of a text.
+pub(crate) const LARGEST_SCENE: u64 = 8 << 20;
+/// Largest size of all ROM files of a scene together (bytes).
+const LARGEST_ROMS: u64 = 2 << 30;
+
+/// Counts the bytes of the ROM files of a scene, of which several structures may name one.
+#[derive(Default)]
+pub(crate) struct RomBytes(u64);
+
+impl RomBytes {
+    /// Account for one more file.
+    ///
+    /// # Errors
+    /// All of them together are more than is read.
+    pub(crate) fn add(&mut self, path: &Path, bytes: usize) -> Result<()> {
+        self.0 = self.0.saturating_add(bytes as u64);
+        if self.0 <= LARGEST_ROMS {
+            return Ok(());
+        }
+        let problem =
+            format!("with it the ROM files of this scene have more than the {LARGEST_ROMS} bytes that are read");
+        Err(Error::file(path, problem, "Give fewer structures, or smaller ROMs"))
+    }
+}
 
 /// Read a scene file and its ROM files, which are named relative to it. Names after `builtin:` are handed to
 /// `builtin`, which answers `None` for a name it does not know, and otherwise a ROM or why there is none.
@@ -22,6 +44,7 @@ const LARGEST_TEXT: u64 = 64 << 20;
 /// [`Error::File`] for files that cannot be read, else as [`parse_scene`] and [`read_rom`].
 pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
     let directory = path.parent().unwrap_or(Path::new(""));
+    let mut read = RomBytes::default();
     read_scene(&scene_text(path)?, &path.display().to_string(), |index, structure| match builtin_model(structure) {
         Some(name) => builtin_rom(path, index, name, builtin(name)),
         None => {
@@ -31,7 +54,10 @@ pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, Stri
                 index + 1,
                 path.display()
             );
-            rom_file(&directory.join(&structure.rom), &remedy)
+            let path = directory.join(&structure.rom);
+            let bytes = read_bytes(&path, LARGEST_ROM, &remedy)?;
+            read.add(&path, bytes.len())?;
+            read_rom(&bytes, &path.display().to_string())
         }
     })
 }
@@ -71,21 +97,13 @@ fn builtin_rom(scene: &Path, index: usize, name: &str, answer: Option<Result<Rom
     }
 }
 
-/// Read one ROM file; `remedy` says what to do where it cannot be opened.
-pub(crate) fn rom_file(path: &Path, remedy: &str) -> Result<Rom> {
-    read_rom(&read_bytes(path, remedy)?, &path.display().to_string())
-}
-
-pub(crate) fn read_bytes(path: &Path, remedy: &str) -> Result<Vec<u8>> {
-    read(path, LARGEST, remedy)
-}
-
-fn read(path: &Path, most: u64, remedy: &str) -> Result<Vec<u8>> {
+/// Bytes of a file of at most `most` bytes; `remedy` says what to do where it cannot be read.
+pub(crate) fn read_bytes(path: &Path, most: u64, remedy: &str) -> Result<Vec<u8>> {
     read_file(path, most).map_err(|error| Error::file(path, format!("cannot be read: {error}"), remedy))
 }
 
-pub(crate) fn read_text(path: &Path, remedy: &str) -> Result<String> {
-    String::from_utf8(read(path, LARGEST_TEXT, remedy)?).map_err(|error| text_error(path, &error))
+fn read_text(path: &Path, remedy: &str) -> Result<String> {
+    String::from_utf8(read_bytes(path, LARGEST_SCENE, remedy)?).map_err(|error| text_error(path, &error))
 }
 
 pub(crate) fn text_error(path: &Path, error: &std::string::FromUtf8Error) -> Error {

@@ -10,13 +10,17 @@ use tiprub_core::rom::{RomExtras, SUPPORT_ROWS, Support};
 use tiprub_core::settings::{SceneSettings, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
-use crate::load::{read_bytes, text_error};
+use crate::load::{LARGEST_ROM, LARGEST_SCENE, RomBytes, read_bytes, text_error};
 use crate::{Error, Result, parse_scene, read_rom, write_rom, write_scene};
 
 /// File name of the scene inside `resources/`.
 pub const SCENE_FILE: &str = "scene.toml";
 /// File name of the packaging choices inside `resources/`.
 pub(crate) const PACKAGE_FILE: &str = "package.toml";
+/// Largest size of it (bytes).
+const LARGEST_PACKAGE: u64 = 1 << 12;
+/// How names of ROM files and thermal models end.
+const ARRAYS_END: &str = ".safetensors";
 /// Version of the layout of `resources/`.
 pub(crate) const RESOURCES_FORMAT_VERSION: u32 = 1;
 
@@ -32,6 +36,15 @@ pub struct Resources {
     pub token: String,
     /// Whether the FMI 3.0 description has arrays (else scalars, as FMI 2.0 has).
     pub fmi3_arrays: bool,
+}
+
+/// Largest size (bytes) of a file of this name inside `resources/`; none of a file that is not read.
+pub fn largest_resource(name: &str) -> Option<u64> {
+    match name {
+        SCENE_FILE => Some(LARGEST_SCENE),
+        PACKAGE_FILE => Some(LARGEST_PACKAGE),
+        _ => name.ends_with(ARRAYS_END).then_some(LARGEST_ROM),
+    }
 }
 
 /// The content of `package.toml`.
@@ -158,7 +171,7 @@ pub fn load_resources(directory: &Path) -> Result<Resources> {
     let mut files = Vec::new();
     let scene_path = directory.join(SCENE_FILE);
     let settings = parse_scene(&read_into(directory, SCENE_FILE, &mut files)?, &scene_path.display().to_string())?;
-    let mut roms: Vec<Rom> = Vec::new();
+    let (mut roms, mut read) = (Vec::<Rom>::new(), RomBytes::default());
     for (index, structure) in settings.structures.iter().enumerate() {
         let name = &structure.rom;
         if Path::new(name).file_name() != Some(name.as_ref()) || name.contains(['/', '\\']) {
@@ -166,7 +179,8 @@ pub fn load_resources(directory: &Path) -> Result<Resources> {
             return Err(Error::file(&scene_path, problem, INTACT));
         }
         let path = directory.join(name);
-        let bytes = read_bytes(&path, INTACT)?;
+        let bytes = read_bytes(&path, LARGEST_ROM, INTACT)?;
+        read.add(&path, bytes.len())?;
         roms.push(read_rom(&bytes, &path.display().to_string())?);
         files.push((name.clone(), bytes));
     }
@@ -177,7 +191,7 @@ pub fn load_resources(directory: &Path) -> Result<Resources> {
 
 fn read_into(directory: &Path, name: &str, files: &mut Vec<(String, Vec<u8>)>) -> Result<String> {
     let path = directory.join(name);
-    let bytes = read_bytes(&path, INTACT)?;
+    let bytes = read_bytes(&path, largest_resource(name).unwrap_or(LARGEST_PACKAGE), INTACT)?;
     files.push((name.to_owned(), bytes.clone()));
     String::from_utf8(bytes).map_err(|error| text_error(&path, &error))
 }

@@ -1,6 +1,6 @@
 //! The ROM file: safetensors with the arrays and metadata of [`crate::rom_layout`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensorError, SafeTensors};
@@ -35,6 +35,18 @@ pub fn read_rom(bytes: &[u8], origin: &str) -> Result<Rom> {
     Reader { origin }.read(bytes)
 }
 
+/// Largest header (bytes): names of ten thousand contact nodes, or the arrays of a thousand nodal diameters.
+const LARGEST_HEADER: u64 = 4 << 20;
+
+/// Length and content of the header of a safetensors container.
+pub(crate) fn header(bytes: &[u8]) -> std::result::Result<(usize, safetensors::tensor::Metadata), SafeTensorError> {
+    let length = bytes.first_chunk().map(|length| u64::from_le_bytes(*length));
+    if length.is_some_and(|length| length > LARGEST_HEADER) {
+        return Err(SafeTensorError::HeaderTooLarge);
+    }
+    SafeTensors::read_metadata(bytes)
+}
+
 struct Reader<'a> {
     origin: &'a str,
 }
@@ -57,7 +69,7 @@ impl Reader<'_> {
 
     /// Arrays and metadata of the container, names and data types checked.
     fn content(&self, bytes: &[u8]) -> Result<(Arrays, Metadata)> {
-        let (_, header) = SafeTensors::read_metadata(bytes).map_err(|error| self.container_error(&error, bytes))?;
+        let (_, header) = header(bytes).map_err(|error| self.container_error(&error, bytes))?;
         let metadata: Metadata = header.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect();
         self.check_format(&metadata)?;
         let known: Vec<&str> = METADATA.iter().map(|entry| entry.name).collect();
@@ -97,7 +109,10 @@ impl Reader<'_> {
         let problem = match error {
             SafeTensorError::HeaderTooSmall => format!("{} bytes only, too short for a header", bytes.len()),
             SafeTensorError::HeaderTooLarge | SafeTensorError::InvalidHeaderLength => {
-                format!("header length does not fit the file of {} bytes", bytes.len())
+                format!(
+                    "header length does not fit the file of {} bytes, or exceeds {LARGEST_HEADER} bytes",
+                    bytes.len()
+                )
             }
             SafeTensorError::MetadataIncompleteBuffer => {
                 format!("the header promises another length than the {} bytes found: truncated or damaged", bytes.len())
@@ -226,13 +241,14 @@ impl Reader<'_> {
             let problem = format!("{} names found, {nodes} expected (as in `{positions}`)", names.len());
             return Err(self.error(what, problem, "Give one name each, separated by commas"));
         }
-        for (index, name) in names.iter().enumerate() {
+        let mut known = HashSet::with_capacity(names.len());
+        for name in &names {
             let starts_well = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
             if !starts_well || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
                 let remedy = "Use letters, digits and underscores, not starting with a digit";
                 return Err(self.error(what, format!("{name:?} cannot be part of a variable name"), remedy));
             }
-            if names[..index].contains(name) {
+            if !known.insert(name.as_str()) {
                 return Err(self.error(what, format!("{name:?} appears twice"), "Give each its own name"));
             }
         }

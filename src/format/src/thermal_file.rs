@@ -7,9 +7,9 @@ use safetensors::{Dtype, SafeTensors};
 use tiprub_core::rom::Patch;
 use tiprub_thermal::Model;
 
-use crate::load::read_bytes;
+use crate::load::{LARGEST_ROM, read_bytes};
 use crate::resources::{INTACT, check_directory, instantiation_token, package_file, read_package};
-use crate::rom_file::{Array, Arrays, Metadata, checksum, container, matrix};
+use crate::rom_file::{Array, Arrays, Metadata, checksum, container, header, matrix};
 use crate::{Error, Result};
 
 /// File name of the model inside `resources/`.
@@ -41,7 +41,7 @@ pub fn thermal_resource_files(model: &Model, fmi3_arrays: bool) -> Vec<(String, 
 pub fn load_thermal_resources(directory: &Path) -> Result<ThermalResources> {
     check_directory(directory)?;
     let path = directory.join(THERMAL_FILE);
-    let bytes = read_bytes(&path, INTACT)?;
+    let bytes = read_bytes(&path, LARGEST_ROM, INTACT)?;
     let model = read_thermal(&bytes, &path.display().to_string())?;
     let mut files = vec![(THERMAL_FILE.to_owned(), bytes)];
     let fmi3_arrays = read_package(directory, &mut files)?;
@@ -95,7 +95,7 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<Model> {
     };
     let damaged =
         |error: safetensors::SafeTensorError| refuse("not a readable safetensors file".into(), error.to_string());
-    let (_, header) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
+    let (_, header) = header(bytes).map_err(damaged)?;
     let metadata: Metadata = header.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect();
     for (key, expected) in [("format", FORMAT), ("format_version", VERSION)] {
         let found = metadata.get(key).map_or("nothing", String::as_str);

@@ -38,9 +38,6 @@ pub const BUILTIN_SCENES: [(&str, &str); 8] = [
     ("cube-between-rings", CUBE_SCENE),
 ];
 
-/// Largest ROM file (bytes).
-const LARGEST: u64 = 8 << 30;
-
 /// What names of embedded scenes and models begin with.
 pub const BUILTIN: &str = "builtin:";
 
@@ -181,8 +178,8 @@ pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
 /// # Errors
 /// Missing or damaged file, naming the array.
 pub fn read_rom(path: &Path) -> Result<Rom> {
-    let bytes =
-        tiprub_format::read_file(path, LARGEST).map_err(|error| Failure::file(path, "cannot be read", &error))?;
+    let bytes = tiprub_format::read_file(path, tiprub_format::LARGEST_ROM)
+        .map_err(|error| Failure::file(path, "cannot be read", &error))?;
     Ok(tiprub_format::read_rom(&bytes, &path.display().to_string())?)
 }
 

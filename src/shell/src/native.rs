@@ -204,10 +204,18 @@ fn locate(table: &VariableTable, name: &str) -> Result<(Kind, Option<usize>, u32
     Err(Failure::usage(format!("--set {name}"), "no such variable", suggestion(name, &settable)))
 }
 
+/// More names are not listed in a message.
+const MOST_LISTED: usize = 60;
+
 pub(crate) fn suggestion(name: &str, candidates: &[&str]) -> String {
     let scored = candidates.iter().map(|candidate| (strsim::jaro_winkler(name, candidate), *candidate));
     match scored.max_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((score, candidate)) if score > 0.8 => format!("Did you mean `{candidate}`?"),
+        _ if candidates.len() > MOST_LISTED => format!(
+            "Inputs and parameters are: {}, and {} more; `tiprub inspect` lists those of an FMU",
+            candidates[..MOST_LISTED].join(", "),
+            candidates.len() - MOST_LISTED
+        ),
         _ => format!("Inputs and parameters are: {}", candidates.join(", ")),
     }
 }

@@ -95,6 +95,11 @@ fn damaged_resources_are_refused_with_the_path() {
         refused(&|path| fs::remove_file(path.join(name)).unwrap(), &[name, "cannot be read", "tiprub package"]);
         refused(&|path| fs::write(path.join(name), b"\xff\xfe\x00").unwrap(), &[name]);
     }
+    // Larger than what they can mean: refused by their size, before a byte is read.
+    for (name, size) in [("scene.toml", 9 << 20), ("rotor.rom.safetensors", 1 << 30), ("package.toml", 1 << 13)] {
+        let grow = |path: &Path| fs::File::create(path.join(name)).and_then(|file| file.set_len(size)).unwrap();
+        refused(&grow, &[name, "it has more than the"]);
+    }
     refused(&|path| fs::remove_dir_all(path).unwrap(), &["no such directory"]);
     let package = |text: &'static str| move |path: &Path| fs::write(path.join("package.toml"), text).unwrap();
     refused(

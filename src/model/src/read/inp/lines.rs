@@ -9,6 +9,8 @@ use crate::Result;
 /// Files included within each other at most this deep, and this many in all.
 const LARGEST_DEPTH: usize = 16;
 const LARGEST_COUNT: usize = 1000;
+/// Largest size of all included files together (bytes): one may be included many times.
+const LARGEST_INCLUDED: usize = 1 << 30;
 
 /// A keyword line with what follows it.
 #[derive(Debug)]
@@ -73,7 +75,8 @@ impl Card {
 
 /// All cards of a file and of the files it includes.
 pub(super) fn cards(path: &Path, bytes: &[u8], open: Open<'_>) -> Result<Vec<Card>> {
-    let mut reader = Reader { open, cards: Vec::new(), active: Vec::new(), count: 0, before_first_keyword: None };
+    let mut reader =
+        Reader { open, cards: Vec::new(), active: Vec::new(), count: 0, included: 0, before_first_keyword: None };
     reader.file(path.to_path_buf(), bytes)?;
     if let Some(place) = reader.before_first_keyword {
         let problem = "data stands before the first keyword";
@@ -87,6 +90,8 @@ struct Reader<'a> {
     cards: Vec<Card>,
     active: Vec<PathBuf>,
     count: usize,
+    /// Bytes of included files so far.
+    included: usize,
     before_first_keyword: Option<ClosestPoint>,
 }
 
@@ -160,6 +165,11 @@ impl Reader<'_> {
         let bytes = (self.open)(&path).map_err(|error| {
             place.error(format!("the included file cannot be read: {error}"), "Keep included files beside this one")
         })?;
+        self.included = self.included.saturating_add(bytes.len());
+        if self.included > LARGEST_INCLUDED {
+            let problem = format!("with {} the included files have more than 1 GiB together", path.display());
+            return Err(place.error(problem, "Include every file once, or give a smaller mesh"));
+        }
         self.file(path, &bytes)
     }
 }
