@@ -39,17 +39,19 @@ done
 find . -name bill-of-materials.json -not -path './target/*' -delete
 
 packaging/libraries.sh
+# The same bytes for everybody: order, owner, times and modes do not depend on the machine or its umask.
 tarred() {
-    tar --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" -C "$1" -c "$2" | gzip -9n > "$out/$3.tar.gz"
+    tar --sort=name --owner=0 --group=0 --numeric-owner --mode=a=rX,u+w --mtime="@$SOURCE_DATE_EPOCH" -C "$1" -c "$2" |
+        gzip -9n > "$out/$3.tar.gz"
 }
 tarred "$target_dir" libraries "tiprub-libraries-$version"
 if command -v mdbook > /dev/null; then
     packaging/book.sh
-    tarred "$target_dir" book "tiprub-guide-$version"
+    tarred "$target_dir" book "tiprub-guide-html-$version"
 else
-    tarred . docs "tiprub-guide-$version"
+    tarred . docs "tiprub-guide-markdown-$version"
 fi
-git archive --format=tar --prefix="tiprub-$version/" HEAD | gzip -9n > "$out/tiprub-$version.tar.gz"
+git -c tar.umask=0022 archive --format=tar --prefix="tiprub-$version/" HEAD | gzip -9n > "$out/tiprub-$version.tar.gz"
 cp packaging/assets/third-party.txt LICENSE-MIT LICENSE-APACHE CHANGELOG.md "$out"
 if [ $wheels = yes ]; then
     packaging/wheels.sh

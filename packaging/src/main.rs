@@ -3,7 +3,7 @@
 use std::{ffi::OsString, process::ExitCode};
 
 use tiprub_packaging::{cli::Cli, commands, spelling};
-use tiprub_shell::console::Console;
+use tiprub_shell::{Failure, console::Console};
 
 fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
@@ -14,11 +14,42 @@ fn main() -> ExitCode {
     }
     let cli: Cli = spelling::parsed(&asked);
     let console = Console::new(cli.quiet, cli.json);
-    match commands::run(&cli.command, &console).and_then(|outcome| console.deliver(&outcome)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            console.fail(&failure);
-            ExitCode::from(failure.exit_code())
-        }
+    if stdout_at_start::was_closed() {
+        return console.finish(Err(Failure::new(
+            "stdout",
+            "is closed: no result can be printed",
+            "Open it, or send it to /dev/null",
+        )));
+    }
+    console.finish(commands::run(&cli.command, &console))
+}
+
+/// Before `main`, Rust opens /dev/null in the place of a closed stdout, which then takes all results in silence.
+#[cfg(target_os = "linux")]
+mod stdout_at_start {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    static CLOSED: AtomicBool = AtomicBool::new(false);
+
+    extern "C" fn look() {
+        // SAFETY: asks for the flags of a descriptor, which need not be open, and touches no memory.
+        let flags = unsafe { libc::fcntl(libc::STDOUT_FILENO, libc::F_GETFD) };
+        CLOSED.store(flags == -1, Ordering::Relaxed);
+    }
+
+    /// The C library calls what stands in this section before Rust starts.
+    #[used]
+    #[unsafe(link_section = ".init_array")]
+    static LOOK: extern "C" fn() = look;
+
+    pub(crate) fn was_closed() -> bool {
+        CLOSED.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod stdout_at_start {
+    pub(crate) fn was_closed() -> bool {
+        false
     }
 }

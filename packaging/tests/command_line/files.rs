@@ -110,12 +110,17 @@ fn no_output_is_an_input_or_another_output() {
     fs::create_dir(project.path("out")).unwrap();
     fs::write(project.path("out/scene.json"), SCENE).unwrap();
     fs::copy(project.path("library.so"), project.path("library.fmu")).unwrap();
+    let inputs = "time,speed\n0,1000\n0.05,1100\n";
+    fs::write(project.path("speed.csv"), inputs).unwrap();
+    std::os::unix::fs::symlink("speed.csv", project.path("link.csv")).unwrap();
     let before = project.files();
     for words in [
         &["run", "scene.toml", "--csv", "scene.toml"][..],
         &["run", "scene.toml", "--csv", "./out/../scene.toml"],
         &["run", "scene.toml", "--csv", "hard.csv"],
         &["run", "scene.toml", "--csv", "soft.csv"],
+        &["run", "scene.toml", "--inputs", "speed.csv", "--csv", "speed.csv"],
+        &["run", "scene.toml", "--inputs", "speed.csv", "--csv", "link.csv"],
         &["reduce", "rotor37", "-o", "x", "--vtk", "x"],
         &["reduce", "rotor37", "-o", "new/x", "--inp", "new/y/../x"],
         &["reduce", "blade", "small.msh", "-o", "y", "--vtk", "small.msh", "--force"],
@@ -130,6 +135,7 @@ fn no_output_is_an_input_or_another_output() {
     let message = project.fail(&["study", "map", "out/scene.json", "--out", "out"], 2);
     assert!(message.contains("a file of the study may replace"), "{message}");
     assert_eq!(fs::read_to_string(project.path("scene.toml")).unwrap(), SCENE);
+    assert_eq!(fs::read_to_string(project.path("speed.csv")).unwrap(), inputs);
     assert_eq!(project.files().len(), before.len() + 1);
 }
 
@@ -146,4 +152,25 @@ fn new_files_follow_the_umask() {
         let made = fs::metadata(project.path(&format!("{mask}.csv"))).unwrap().permissions().mode();
         assert_eq!(made & 0o777, mode, "umask {mask}");
     }
+}
+
+/// The same files give the same archive, whatever the umask of who makes it.
+#[test]
+#[cfg(target_os = "linux")]
+fn archives_of_a_release_do_not_depend_on_the_umask() {
+    let root = tempfile::tempdir().unwrap();
+    let script = format!(
+        "set -eu\n\
+         eval \"$(sed -n '/^tarred() {{/,/^}}/p' {}/release.sh)\"\n\
+         export SOURCE_DATE_EPOCH=0\n\
+         for mask in 077 002; do\n\
+             out=$PWD/$mask\n\
+             (umask $mask; mkdir -p $out/tree/below; echo x > $out/tree/below/file; touch $out/tree/run; chmod u+x $out/tree/run)\n\
+             tarred $out tree name\n\
+         done\n\
+         cmp 077/name.tar.gz 002/name.tar.gz",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let output = Command::new("bash").current_dir(root.path()).args(["-c", &script]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&[output.stdout, output.stderr].concat()));
 }

@@ -1,6 +1,9 @@
 //! `tiprub run`.
 
-use std::fs;
+use std::{
+    fs,
+    process::{Command, Stdio},
+};
 
 use crate::project::{Project, SCENE, columns, json};
 
@@ -54,6 +57,26 @@ fn the_summary_of_a_run_tells_its_extremes() {
     let told = text.split("over the run:").nth(1).unwrap();
     assert!(told.contains(&format!(" N at t = {at} s")) && told.contains("smallest clearance: "), "{text}");
     assert!(told.contains("most contact nodes touching at a communication point: "), "{text}");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn results_that_nobody_takes_are_no_success() {
+    let project = Project::new();
+    let command = |line: &str| {
+        let mut shell = Command::new("sh");
+        shell.current_dir(project.root.path()).args(["-c", line, env!("CARGO_BIN_EXE_tiprub")]);
+        shell
+    };
+    let run = "exec \"$0\" run scene.toml --quiet --csv -";
+    let closed = command(&format!("{run} >&-")).output().unwrap();
+    let told = String::from_utf8_lossy(&closed.stderr).into_owned();
+    assert!(closed.status.code() == Some(1) && told.starts_with("error: stdout: is closed"), "{told}");
+    let mut left = command(run).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(left.stdout.take());
+    let left = left.wait_with_output().unwrap();
+    assert!(left.status.code() == Some(141) && left.stderr.is_empty(), "{left:?}");
+    assert!(command(&format!("{run} > /dev/null")).status().unwrap().success());
 }
 
 #[test]

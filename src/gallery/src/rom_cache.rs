@@ -23,8 +23,8 @@ const LAYOUT: &str = "1";
 const MARK: &str = "tiprub-cached-rom";
 /// Names the directory, or is empty to keep no files.
 const VARIABLE: &str = "TIPRUB_CACHE";
-/// Largest file (bytes).
-const LARGEST: u64 = 8 << 30;
+/// Largest file (bytes): a line and a ROM.
+const LARGEST: u64 = tiprub_format::LARGEST_ROM + (1 << 10);
 /// Versions of one model that are kept: other options and releases may be in use side by side.
 const KEPT: usize = 4;
 
@@ -57,6 +57,11 @@ impl RomCache {
         }
     }
 
+    /// Where models are kept; none where nothing is kept.
+    pub fn directory(&self) -> Option<&Path> {
+        self.directory.as_deref()
+    }
+
     /// The model `name` with these options: as kept, or as `make` makes it, which is then kept.
     ///
     /// # Errors
@@ -83,7 +88,8 @@ impl RomCache {
             Err(None) => {}
         }
         let rom = make()?;
-        if let Err(failure) = output_file::write(&path, content(&rom, &key)) {
+        let kept = output_file::only_a_file(&path).and_then(|()| output_file::write(&path, content(&rom, &key)));
+        if let Err(failure) = kept {
             console.say(format_args!("Model {name} is not kept for the next time: {failure}"));
         }
         prune(directory, name);
@@ -272,9 +278,13 @@ mod tests {
         let path = root.path().join(format!("a-{}.rom", &key("a", &1)[..32]));
         assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
         let (done, answer) = std::sync::mpsc::channel();
-        std::thread::spawn(move || done.send(read(&path, &key("a", &1)).unwrap_err()));
-        let answer = answer.recv_timeout(std::time::Duration::from_secs(20)).expect("an answer");
-        assert_eq!(answer.as_deref(), Some("is no file"));
+        let cache = RomCache::at(root.path());
+        std::thread::spawn(move || {
+            let refused = read(&path, &key("a", &1)).unwrap_err();
+            done.send((refused, cache.get("a", &1, &Console::new(true, false), &|| Ok(rom(1.0)))))
+        });
+        let (refused, made) = answer.recv_timeout(std::time::Duration::from_secs(20)).expect("an answer");
+        assert_eq!((refused.as_deref(), made), (Some("is no file"), Ok(rom(1.0))));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::{
     borrow::Cow,
     io::{IsTerminal, Write},
     path::Path,
+    process::ExitCode,
     time::Duration,
 };
 
@@ -39,6 +40,9 @@ fn is_obeyed(character: char) -> bool {
     let turns = matches!(character, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     turns || (character.is_control() && !matches!(character, '\n' | '\t'))
 }
+
+/// Exit code where the reader of stdout left early, such as `head`: what shells show of a program that SIGPIPE ends.
+const READER_LEFT: u8 = 128 + 13;
 
 /// Result of a command, in both forms the user can ask for.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,19 +110,29 @@ impl Console {
         Task { bar, lines: false }
     }
 
+    /// Print what came of the command: the result on stdout, or the failure. Returns the exit code of the program.
+    pub fn finish(&self, result: Result<Outcome>) -> ExitCode {
+        match result.and_then(|outcome| self.deliver(&outcome)) {
+            Ok(code) => code,
+            Err(failure) => {
+                self.fail(&failure);
+                ExitCode::from(failure.exit_code())
+            }
+        }
+    }
+
     /// Print the result of the command on stdout.
     ///
     /// # Errors
-    /// Stdout takes it not or in part, such as a file on a full disk. A reader that closes it early (`| head`) is fine.
-    pub fn deliver(&self, outcome: &Outcome) -> Result<()> {
+    /// Stdout takes it not or in part, such as a file on a full disk.
+    fn deliver(&self, outcome: &Outcome) -> Result<ExitCode> {
         let json = self.json.then(|| format!("{:#}", outcome.json));
         let text = json.as_deref().map_or_else(|| printable(outcome.text.trim_end()), printable_json);
         let mut stdout = std::io::stdout().lock();
         match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
-            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-                Err(Failure::file(Path::new("stdout"), "cannot be written", &error))
-            }
-            _ => Ok(()),
+            Ok(()) => Ok(ExitCode::SUCCESS),
+            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(ExitCode::from(READER_LEFT)),
+            Err(error) => Err(Failure::file(Path::new("stdout"), "cannot be written", &error)),
         }
     }
 

@@ -53,8 +53,8 @@ impl Failure {
         let remedy = match error.kind() {
             std::io::ErrorKind::NotFound => "Check the path",
             std::io::ErrorKind::PermissionDenied if READING.contains(&doing) => "Check the permissions",
-            std::io::ErrorKind::PermissionDenied => "Check the permissions, or choose another place with -o/--out",
-            std::io::ErrorKind::StorageFull => "Free some space, or choose another place with -o/--out",
+            std::io::ErrorKind::PermissionDenied => "Check the permissions, or choose another place",
+            std::io::ErrorKind::StorageFull => "Free some space, or choose another place",
             std::io::ErrorKind::InvalidInput => "Give a file",
             std::io::ErrorKind::FileTooLarge => "Give the file that was meant",
             std::io::ErrorKind::IsADirectory => "Name a file, not a directory",

@@ -53,6 +53,17 @@ pub fn try_target(target: &Path) -> Result<()> {
     }
 }
 
+/// Refuse a device or a pipe, for files that nobody named: writing to them might wait without end.
+///
+/// # Errors
+/// What is there is no file.
+pub fn only_a_file(target: &Path) -> Result<()> {
+    match place(target)? {
+        ClosestPoint::File(_) => Ok(()),
+        ClosestPoint::Stream => Err(Failure::new(target.display(), "is a pipe or a device, not a file", "Remove it")),
+    }
+}
+
 /// What already is under the name of a target.
 enum ClosestPoint {
     /// Nothing, or a file to replace, at this path (symbolic links resolved).

@@ -10,11 +10,5 @@ fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
     let cli: Cli = spelling::parsed(&Console::new(true, spelling::asks_for_json(&arguments)));
     let console = Console::new(cli.quiet, cli.json);
-    match cli.run(&console).and_then(|outcome| console.deliver(&outcome)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            console.fail(&failure);
-            ExitCode::from(failure.exit_code())
-        }
-    }
+    console.finish(cli.run(&console))
 }
