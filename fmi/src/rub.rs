@@ -14,7 +14,12 @@ pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
     let loaded = tiprub_format::load_resources(resources).map_err(|error| error.to_string())?;
     let scene = loaded.scene;
     let unit = move || -> Result<Box<dyn Unit>> { Ok(Box::new(Rub(Simulation::new(&scene)?))) };
-    Ok(Loaded { unit: Box::new(unit), token: loaded.token, fmi3_arrays: loaded.fmi3_arrays })
+    Ok(Loaded {
+        unit: Box::new(unit),
+        token: loaded.token,
+        fmi3_arrays: loaded.fmi3_arrays,
+        release: tiprub_format::LIBRARY_RELEASE,
+    })
 }
 
 impl Unit for Rub {

@@ -30,7 +30,7 @@ use crate::{
                   builtin:stage             56 coupled blades in an oval elastic casing\n  \
                   builtin:stage-nodes       with contact at three nodes and more friction\n  \
                   builtin:cube-between-rings  a cube that flies through two clamped rings\n\n\
-                  Exit codes: 0 done, 1 the work failed, 2 the command line is wrong."
+                  Exit codes: 0 done, 1 the work failed, 2 the command line is wrong, 141 the reader of stdout left early."
 )]
 pub struct Cli {
     /// Print one JSON object with the result on stdout (errors too); progress stays on stderr.
@@ -96,7 +96,7 @@ pub enum Command {
 /// Libraries that go into an FMU.
 #[derive(Debug, Clone, Default, Args)]
 pub struct LibraryArguments {
-    /// Library of one platform, or a directory of libraries, instead of those found beside tiprub (or built, when it runs
+    /// Library of one platform, or a directory of libraries, instead of those found beside tiprub (or built
     /// from its sources); may be repeated. What a file is made for is read from its content.
     #[arg(long, value_name = "FILE|DIR")]
     pub library: Vec<PathBuf>,

@@ -166,6 +166,8 @@ pub struct Loaded {
     pub token: String,
     /// Whether the description of FMI 3.0 has arrays; else scalars, as FMI 2.0 has.
     pub fmi3_arrays: bool,
+    /// What the library is, for messages; a program that packages it finds this in its bytes.
+    pub release: &'static str,
 }
 
 /// Reads the unit of a library from the unpacked directory `resources/`, or says what is wrong with it.

@@ -66,6 +66,8 @@ impl Project {
         // The header of a shared library for Linux on x86-64, which is all that packaging looks at.
         let mut library = vec![0_u8; 4096];
         library[64..86].copy_from_slice(b"fmi2DoStep\0fmi3DoStep\0");
+        library[96..][..tiprub_format::LIBRARY_RELEASE.len()]
+            .copy_from_slice(tiprub_format::LIBRARY_RELEASE.as_bytes());
         library[..20].copy_from_slice(b"\x7fELF\x02\x01\x01\0\0\0\0\0\0\0\0\0\x03\0\x3e\0");
         fs::write(root.path().join("library.so"), library).unwrap();
         Self { root }

@@ -21,8 +21,10 @@ mod thermal_file;
 
 pub use error::Error;
 pub use input::{open_file, read_file};
-pub use load::{load_scene, load_settings};
-pub use resources::{Resources, SCENE_FILE, instantiation_token, load_resources, packed_roms, resource_files};
+pub use load::{LARGEST_ROM, load_scene, load_settings};
+pub use resources::{
+    Resources, SCENE_FILE, instantiation_token, largest_resource, load_resources, packed_roms, resource_files,
+};
 pub use rom_file::{read_rom, write_rom};
 pub use rom_layout::{ARRAYS, ArrayLayout, METADATA, MetadataLayout};
 pub use scene_file::{builtin_model, parse_scene, position_of, read_scene, write_scene};
@@ -30,6 +32,12 @@ pub use scene_layout::{FIELDS, SceneField};
 pub use thermal_file::{
     THERMAL_FILE, ThermalResources, load_thermal_resources, read_thermal, thermal_resource_files, write_thermal,
 };
+
+/// What the marks of all releases begin with.
+pub const LIBRARY_MARK: &str = "tiprub library ";
+/// Stands in every library of an FMU, and in the program that packages it: the release and a digest of the sources of both.
+pub const LIBRARY_RELEASE: &str =
+    concat!("tiprub library ", env!("CARGO_PKG_VERSION"), ", sources ", env!("TIPRUB_LIBRARY_SOURCES"));
 
 /// Result of this crate.
 pub(crate) type Result<T, E = Error> = core::result::Result<T, E>;

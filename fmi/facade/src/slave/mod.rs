@@ -114,9 +114,10 @@ impl Slave {
             };
             return Err(Refusal::error(format!(
                 "{name} \"{token}\" does not belong to the resources in {}, whose token is \"{}\". Pass the {file} of \
-                 modelDescription.xml of the same FMU, and unpack the FMU completely",
+                 modelDescription.xml of the same FMU, and unpack the FMU completely (this is {})",
                 resources.display(),
-                loaded.token
+                loaded.token,
+                loaded.release
             )));
         }
         Ok(Self {

@@ -1,0 +1,186 @@
+//! Libraries built from the sources of this program.
+
+use std::{
+    collections::VecDeque,
+    env,
+    io::{BufRead, BufReader, Read},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    thread,
+};
+
+use tempfile::TempDir;
+use tiprub_fmi_host::Platform;
+use tiprub_format::{LIBRARY_MARK, LIBRARY_RELEASE};
+use tiprub_shell::{Failure, Result, console::Console, output_file};
+
+use super::{LARGEST, Unit, holds, is_library};
+
+/// Lines of cargo's stderr kept for the error message.
+const LINES_KEPT: usize = 30;
+
+/// Where a library of these sources for this platform is kept between two commands.
+pub(super) fn kept(unit: Unit, directory: &Path) -> Option<PathBuf> {
+    let name = format!("{}{}", unit.prefix(), Platform::here()?.file_name());
+    let sources = LIBRARY_RELEASE.strip_prefix(LIBRARY_MARK)?.replace(", ", "-").replace(' ', "-");
+    Some(directory.join("libraries").join(sources).join(name))
+}
+
+/// Build the library of a program that cargo installed, in a directory that goes afterwards, and keep it for the next command.
+pub(super) fn build_once(
+    unit: Unit,
+    workspace: &Path,
+    cache: Option<&Path>,
+    console: &Console,
+) -> Result<(Vec<PathBuf>, Option<TempDir>)> {
+    let place = cache.filter(|directory| output_file::create_directory(directory).is_ok());
+    let place = place.map_or_else(env::temp_dir, Path::to_path_buf);
+    let target = TempDir::with_prefix_in("tiprub-library-", &place)
+        .map_err(|error| Failure::file(&place, "no temporary directory can be made", &error))?;
+    console
+        .say("The FMU library is built from the sources that tiprub was installed from; this takes some minutes, once");
+    let built = build(unit, workspace, target.path(), console)?;
+    let bytes =
+        tiprub_format::read_file(&built, LARGEST).map_err(|error| Failure::file(&built, "cannot be read", &error))?;
+    if !holds(&bytes, LIBRARY_RELEASE.as_bytes()) {
+        return Err(Failure::new(
+            workspace.display(),
+            "these sources have changed since tiprub was installed from them",
+            format!("Install it again: cargo install --path {}", workspace.join("packaging").display()),
+        ));
+    }
+    let Some(library) = cache.and_then(|directory| kept(unit, directory)) else {
+        return Ok((vec![built], Some(target)));
+    };
+    match output_file::only_a_file(&library).and_then(|()| output_file::write(&library, bytes)) {
+        Ok(()) => Ok((vec![library], None)),
+        Err(failure) => {
+            console.say(format_args!("The library is not kept for the next time: {failure}"));
+            Ok((vec![built], Some(target)))
+        }
+    }
+}
+
+/// The cargo target directory that `executable` lies in, recognised by the file cargo keeps there.
+pub(super) fn cargo_target(executable: &Path) -> Option<&Path> {
+    executable.ancestors().skip(1).find(|directory| directory.join(".rustc_info.json").is_file())
+}
+
+/// Build the crate of the unit alone and return the library cargo reports.
+pub(super) fn build(unit: Unit, workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> {
+    let task = console.task("Building the FMU library", None);
+    let failed = |problem: String, remedy: &str| Failure::new("building the FMU library", problem, remedy);
+    let mut child = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .args(["build", "--package", unit.names().0, "--profile", "fmu", "--message-format", "json-render-diagnostics"])
+        .arg("--manifest-path")
+        .arg(workspace.join("Cargo.toml"))
+        .arg("--target-dir")
+        .arg(target)
+        .args(without_builder_paths(workspace))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(|error| failed(format!("cargo cannot be started: {error}"), "Install Rust, or give --library FILE"))?;
+    let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
+    let messages = thread::spawn(move || {
+        let mut text = String::new();
+        // A broken pipe shows up as a missing artifact below.
+        let _ = stdout.map(|mut pipe| pipe.read_to_string(&mut text));
+        text
+    });
+    let mut last_lines = VecDeque::new();
+    for line in stderr.into_iter().flat_map(|pipe| BufReader::new(pipe).lines().map_while(Result::ok)) {
+        task.now(&format!("Building the FMU library: {}", line.trim()));
+        task.line(line.trim());
+        last_lines.push_back(line);
+        if last_lines.len() > LINES_KEPT {
+            last_lines.pop_front();
+        }
+    }
+    let status = child.wait().map_err(|error| failed(format!("cargo was lost: {error}"), "Try again"))?;
+    if !status.success() {
+        let lines = Vec::from(last_lines).join("\n");
+        return Err(failed(format!("cargo ended with {status}:\n{lines}\n"), "Correct what it names, then try again"));
+    }
+    artifact(&messages.join().unwrap_or_default(), unit.names().1)
+        .ok_or_else(|| failed("cargo reported no shared library".into(), "Give --library FILE"))
+}
+
+/// Cargo options that keep the places of cargo's home, its registry and the workspace, and with them the builder's name
+/// and the registry's host, out of the library: the same sources then give the same bytes for everybody. Flags of the
+/// user's own environment take precedence, as cargo has it. `remap.sh` does the same for the scripts.
+fn without_builder_paths(workspace: &Path) -> Vec<String> {
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| env::var_os("HOME").map(|home| Path::new(&home).join(".cargo")));
+    let flags: Vec<String> = remaps(home.as_deref(), workspace)
+        .iter()
+        .map(|(from, to)| format!("{:?}", format!("--remap-path-prefix={}={to}", from.display())))
+        .collect();
+    vec!["--config".into(), format!("target.\"cfg(all())\".rustflags=[{}]", flags.join(","))]
+}
+
+/// Directories and the neutral names that stand for them; of two that match, rustc takes the later.
+fn remaps(home: Option<&Path>, workspace: &Path) -> Vec<(PathBuf, &'static str)> {
+    let mut remaps = Vec::new();
+    if let Ok(workspace) = workspace.canonicalize() {
+        remaps.push((workspace, "tiprub"));
+    }
+    if let Some(home) = home {
+        remaps.push((home.to_path_buf(), "cargo"));
+        let registries = std::fs::read_dir(home.join("registry/src")).into_iter().flatten().flatten();
+        let mut registries: Vec<PathBuf> = registries.map(|registry| registry.path()).collect();
+        registries.sort();
+        remaps.extend(registries.into_iter().map(|registry| (registry, "crates")));
+    }
+    remaps
+}
+
+/// The shared library in cargo's JSON messages, one per line.
+fn artifact(messages: &str, name: &str) -> Option<PathBuf> {
+    messages
+        .lines()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .filter(|message| message["reason"] == "compiler-artifact" && message["target"]["name"] == name)
+        .flat_map(|message| message["filenames"].as_array().cloned().unwrap_or_default())
+        .filter_map(|name| name.as_str().map(PathBuf::from))
+        .find(|path| is_library(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_artifact_is_taken_from_cargo_messages() {
+        let messages = concat!(
+            r#"{"reason":"compiler-artifact","target":{"name":"nalgebra"},"filenames":["/t/libnalgebra.rlib"]}"#,
+            "\nnot json\n",
+            r#"{"reason":"compiler-artifact","target":{"name":"tiprub_fmi"},"filenames":["/t/libtiprub_fmi.so"]}"#,
+            "\n{\"reason\":\"build-finished\",\"success\":true}\n"
+        );
+        assert_eq!(artifact(messages, "tiprub_fmi"), Some(PathBuf::from("/t/libtiprub_fmi.so")));
+        assert_eq!(artifact("", "tiprub_fmi"), None);
+    }
+
+    #[test]
+    fn places_of_the_builder_get_neutral_names() {
+        let root = tempfile::tempdir().unwrap();
+        let home = root.path().join("home");
+        let registry = home.join("registry/src/index.example-0123");
+        std::fs::create_dir_all(&registry).unwrap();
+        let workspace = root.path().canonicalize().unwrap();
+        let expected = [(workspace, "tiprub"), (home.clone(), "cargo"), (registry, "crates")];
+        assert_eq!(remaps(Some(&home), root.path()), expected);
+        assert_eq!(remaps(None, &root.path().join("missing")), []);
+    }
+
+    #[test]
+    fn a_program_in_a_target_directory_of_cargo_is_recognised() {
+        let root = tempfile::tempdir().unwrap();
+        let executable = root.path().join("release/tiprub");
+        assert_eq!(cargo_target(&executable), None);
+        std::fs::write(root.path().join(".rustc_info.json"), "").unwrap();
+        assert_eq!(cargo_target(&executable), Some(root.path()));
+    }
+}
