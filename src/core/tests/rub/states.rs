@@ -227,21 +227,6 @@ fn a_state_is_restored_by_an_instance_that_started_at_another_time() {
     }
 }
 
-/// Importers add up steps: the first may begin a rounding before the start, where a shape without a ramp is there all the same.
-#[test]
-fn a_first_step_may_begin_a_rounding_before_the_start() {
-    for (name, scene) in ramped() {
-        let length = scene.settings.experiment.communication_step;
-        let (mut early, mut exact) = (started(&scene), started(&scene));
-        early.do_step(-1e-12 * length, length).unwrap_or_else(|error| panic!("{name}: {error}"));
-        exact.do_step(0.0, length).unwrap();
-        let same = |reference: u32| (early.real(reference).unwrap_or(0.0) - exact.real(reference).unwrap_or(0.0)).abs();
-        let clearance = reference(&exact, "clearance_minimum");
-        assert!(same(clearance) < 1e-12, "{name}: {}", same(clearance));
-        early.restore_state(&saved(&early)).unwrap_or_else(|error| panic!("{name}: {error}"));
-    }
-}
-
 fn run(simulation: &mut Simulation, steps: u32, length: f64) {
     for _ in 0..steps {
         go(simulation, length);
