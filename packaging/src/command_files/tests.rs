@@ -103,6 +103,12 @@ fn answer(line: &str) -> Result<(), tiprub_shell::Failure> {
     check(&Cli::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}")).command)
 }
 
+/// A scene whose FMUs have the names that [`written`] says.
+fn named_written() -> String {
+    let name = tiprub_format::parse_scene(ROTOR37_SCENE, "built-in").unwrap().name;
+    ROTOR37_SCENE.replacen(&format!("{name:?}"), "\"written\"", 1)
+}
+
 /// The file that is written is there, and what is read is a link to it.
 #[test]
 #[cfg(unix)]
@@ -115,7 +121,7 @@ fn no_command_replaces_what_it_reads() {
             let file = directory.join(name.as_deref().unwrap_or("x.fmu"));
             fs::create_dir(&directory).unwrap();
             for path in [&file, &scene] {
-                fs::write(path, ROTOR37_SCENE.replacen("name = \"rotor37\"", "name = \"written\"", 1)).unwrap();
+                fs::write(path, named_written()).unwrap();
             }
             std::os::unix::fs::symlink(&file, &link).unwrap();
             let target = if name.is_some() { &directory } else { &file };
