@@ -15,7 +15,7 @@ use tiprub_study::arguments::{Speeds, StudyCommon, positive, speeds};
 
 use crate::{
     bases, beside, conjugacy, convergence, coupling, cube, error, estimates, inputs, modes, random, refinement,
-    scatter, stability, stage, tolerance, wear, witness,
+    scatter, stability, stage, wear, witness,
 };
 
 /// Evidence for tiprub: studies of the models that ship and of standard problems.
@@ -41,7 +41,7 @@ pub struct Cli {
 /// Studies by name.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Error against run time of every scheme and solver on standard problems, beside independent methods.
+    /// Error against run time of every method on built-in scenes and standard problems, beside independent methods.
     Error(ErrorArguments),
     /// Stiff and extreme cases: each must end in a right answer or in a refusal that says why.
     #[command(
@@ -72,8 +72,6 @@ pub enum Command {
     Refinement(RefinementArguments),
     /// Modes with the contact held or free, contact at nodes or patches: error, largest steps and cost against the number of modes.
     Bases(StudyCommon),
-    /// Error against run time of steps by a tolerance, beside steps of one length, on rubs of rotor 37.
-    Tolerance(StudyCommon),
     /// Any scene of blades without coupling in a rigid casing beside a stepper that shares only the matrices with the product.
     Beside(BesideArguments),
     /// Errors of steps by a tolerance on random rubs, energy over very many switches, random contact problems.
@@ -156,20 +154,40 @@ pub enum ErrorScene {
     BouncingBar,
     /// The cube between two rings.
     Cube,
-    /// Rotor 37 touching lightly.
+    /// Rotor 37 with the default model, touching lightly.
     #[value(name = "rotor37-light")]
     Rotor37Light,
-    /// Rotor 37 rubbing by the whole gap.
+    /// Rotor 37 with the default model, rubbing by the whole gap.
     #[value(name = "rotor37-heavy")]
     Rotor37Heavy,
-    /// The stage of 56 coupled sectors in its elastic casing.
+    /// Rotor 37 in an elastic casing.
+    FlexibleCasing,
+    /// The stage: coupled blades in an elastic casing.
     Stage,
+    /// The paper's model of rotor 37, touching lightly.
+    #[value(name = "rotor37-paper-light")]
+    Rotor37PaperLight,
+    /// The paper's model of rotor 37, rubbing by the whole gap.
+    #[value(name = "rotor37-paper-heavy")]
+    Rotor37PaperHeavy,
+    /// The stage on a coarse mesh, beside an independent solver.
+    StageCoarse,
 }
 
 impl ErrorScene {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Carpenter, Self::BouncingBar, Self::Cube, Self::Rotor37Light, Self::Rotor37Heavy, Self::Stage];
+    pub const ALL: [Self; 10] = [
+        Self::Rotor37Light,
+        Self::Rotor37Heavy,
+        Self::Rotor37PaperLight,
+        Self::Rotor37PaperHeavy,
+        Self::FlexibleCasing,
+        Self::Stage,
+        Self::StageCoarse,
+        Self::Cube,
+        Self::Carpenter,
+        Self::BouncingBar,
+    ];
 }
 
 /// Arguments of `lab modes`.
@@ -267,7 +285,6 @@ impl Cli {
             Command::Estimates(arguments) => ("estimates", &arguments.common),
             Command::Refinement(arguments) => ("refinement", &arguments.common),
             Command::Bases(common) => ("bases", common),
-            Command::Tolerance(common) => ("tolerance", common),
             Command::Beside(arguments) => ("beside", &arguments.common),
             Command::Scatter(common) => ("scatter", common),
             Command::Witness(common) => ("witness", common),
@@ -299,7 +316,6 @@ impl Cli {
             Command::Estimates(arguments) => estimates::study(arguments, console),
             Command::Refinement(arguments) => refinement::study(arguments, console),
             Command::Bases(common) => bases::study(common, console),
-            Command::Tolerance(common) => tolerance::study(common, console),
             Command::Beside(arguments) => beside::study(arguments, console),
             Command::Scatter(common) => scatter::study(common, console),
             Command::Witness(common) => witness::study(common, console),

@@ -67,7 +67,7 @@ fn bars_converge_to_the_exact_solution_with_the_elements_and_to_the_reference_wi
 #[test]
 fn film_levels_off_in_a_rub_where_lcp_converges() {
     let root = tempfile::tempdir().unwrap();
-    let json = study(root.path(), &["rotor37-light"]);
+    let json = study(root.path(), &["rotor37-paper-light"]);
     let scene = &json["results"]["scenes"][0];
     let errors = |competitor| -> Vec<f64> {
         values(scene, competitor, "error_of_steps").into_iter().filter_map(|(_, error)| error).collect()
@@ -100,4 +100,31 @@ fn the_cube_comes_nearer_to_the_full_model_with_steps_and_modes() {
     }
     assert!(values(scene, "massless-boundary + lcp", "seconds").iter().all(|(_, seconds)| seconds.is_none()));
     assert!(finest(scene, "modal-exact + lcp", "ledger_residual").abs() < 1e-12);
+}
+
+#[test]
+fn adaptive_steps_converge_on_the_default_model_with_less_time_than_the_papers_method() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), &["rotor37-light"]);
+    let scene = &json["results"]["scenes"][0];
+    let rows = || scene["rows"].as_array().unwrap().iter();
+    let errors: Vec<f64> = rows()
+        .filter(|row| row["competitor"] == "galerkin")
+        .map(|row| row["error_of_own_limit"].as_f64().unwrap())
+        .collect();
+    assert!(errors.len() == 2 && errors[1] < 0.7 * errors[0] && errors[0] < 3e-2, "{errors:?}");
+    // The paper's method is rejected for growth at the longer steps, and the rejection names it.
+    let rejected: Vec<&str> = rows()
+        .filter(|row| row["competitor"] == "central-difference + film")
+        .filter_map(|row| row["refused"].as_str())
+        .collect();
+    assert!(!rejected.is_empty() && rejected.iter().all(|reason| reason.contains('µ')), "{rejected:?}");
+    let table = fs::read_to_string(root.path().join("out/communication-steps.md")).unwrap();
+    let cells = |line: &str| line.split(" | ").map(|cell| cell.trim_matches(['|', ' ']).to_owned()).collect::<Vec<_>>();
+    let lines: Vec<Vec<String>> = table.lines().skip(4).map(cells).collect();
+    assert_eq!(lines.len(), 9, "three tolerances, three lengths: {table}");
+    for line in &lines {
+        let [tolerance, error] = [&line[1], &line[4]].map(|cell| cell.parse::<f64>().unwrap());
+        assert!(error > 0.0 && error < 3.0 * tolerance, "{line:?}");
+    }
 }

@@ -94,6 +94,12 @@ pub trait Case {
         None
     }
 
+    /// Known error of the displacements by modes, patches, rows and mesh of the model, added up (relative); `None` where it is unknown or where
+    /// other sizes show it.
+    fn model_error(&self) -> Option<f64> {
+        None
+    }
+
     /// Releases that are looked for: a time before which contact has ended (s), and a time after which it began.
     fn releases(&self) -> Vec<[f64; 2]> {
         Vec::new()

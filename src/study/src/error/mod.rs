@@ -14,6 +14,7 @@ pub mod ranking;
 pub mod run;
 pub mod scene;
 pub mod sheets;
+pub mod summary;
 pub mod total;
 mod total_page;
 pub mod window;
@@ -137,8 +138,25 @@ pub fn of_cases(
     }
     text.push_str(&format!("\n## Orders\n\n{}", orders.to_markdown()));
     study.files.push(("tables.md".into(), "pictures and tables as Markdown".into(), text.into_bytes()));
+    add_summary(&mut study, &measured);
     study.results = json!({ "scenes": results, "quick": quick });
     Ok(study)
+}
+
+/// Tables over all scenes, where there are several.
+fn add_summary(study: &mut Study, measured: &[(Box<dyn Case>, Measured)]) {
+    if measured.len() < 2 {
+        return;
+    }
+    let scenes: Vec<(&dyn Case, &Measured)> = measured.iter().map(|(case, found)| (case.as_ref(), found)).collect();
+    let tables = [
+        ("summary-steps.md", "cheapest settings for an error of the steps", summary::of_steps(&scenes)),
+        ("summary-total.md", "cheapest settings for a total error", summary::in_total(&scenes)),
+        ("summary-limits.md", "distances of the references", summary::limits(&scenes)),
+    ];
+    for (name, meaning, table) in tables {
+        study.files.push((name.into(), meaning.into(), table.to_markdown().into_bytes()));
+    }
 }
 
 /// Head of the page of the guide.
@@ -372,7 +390,7 @@ fn bounds(case: &dyn Case, tried: &[Tried]) -> String {
 }
 
 /// What central differences refuse, and how long the steps of modal-exact may be.
-fn limits(case: &dyn Case, found: &Measured) -> [Statement; 2] {
+fn limits(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let own = |scheme: Scheme| {
         let competitor = Competitor::Core(scheme, Solver::Lcp);
         found.rows.iter().filter(move |row| row.competitor == competitor)
@@ -385,7 +403,10 @@ fn limits(case: &dyn Case, found: &Measured) -> [Statement; 2] {
     let tried: Vec<Tried> = own(Scheme::CentralDifference)
         .map(|row| Tried { size: row.size, step: row.step, outcome: Outcome::of(row) })
         .collect();
-    [
+    if tried.is_empty() {
+        return Vec::new();
+    }
+    vec![
         Statement {
             expected: format!(
                 "{}: central differences refuse steps, for ω_max·h ≥ 2 alone, and at every size all that run are shorter",

@@ -11,7 +11,7 @@ use super::{
 use crate::Statement;
 
 /// Errors that are asked for.
-pub const TARGETS: [f64; 3] = [1e-2, 1e-3, 1e-4];
+pub const TARGETS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
 /// Points of which an order is fitted.
 const FITTED: usize = 3;
 /// Errors below this are rounding.
@@ -153,7 +153,7 @@ pub fn costs(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
     let caption = format!("{}: time that every competitor needs for an error of {of}", case.title());
     let mut table = Table::new(
         caption,
-        ["competitor", "1e-2", "1e-3", "1e-4", "least error", "largest step or tolerance that ran"],
+        ["competitor", "1e-1", "1e-2", "1e-3", "1e-4", "least error", "largest step or tolerance that ran"],
     );
     for competitor in Competitor::all() {
         let own: Vec<&Row> = rows.iter().copied().filter(|row| row.competitor == competitor).collect();

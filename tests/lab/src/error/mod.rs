@@ -1,6 +1,8 @@
-//! Error against run time of the standard problems, beside methods that share nothing with the product.
+//! Error against run time of built-in scenes and standard problems, beside methods that share nothing with the product.
 
 pub(crate) mod bars;
+mod built_in;
+mod communication;
 pub(crate) mod cube;
 pub(crate) mod full;
 pub(crate) mod marched;
@@ -11,9 +13,11 @@ pub(crate) mod stage;
 mod turning;
 
 use bars::Bars;
+use built_in::BuiltIn;
 use case::Case;
 use cube::Cube;
 use rotor::{Rub, rotor};
+use tiprub_figure::table::Table;
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_shell::{Failure, Result, console::Console};
 use tiprub_study::{
@@ -23,37 +27,66 @@ use tiprub_study::{
 
 use crate::cli::{ErrorArguments, ErrorScene};
 
+/// Time and error by the length of the communication step, as Markdown.
+const COMMUNICATION: &str = "communication-steps.md";
 /// The study.
 ///
 /// # Errors
-/// A reference fails; never with the scenes that ship.
+/// A reference fails; never with the built-in scenes.
 pub(crate) fn study(arguments: &ErrorArguments, console: &Console) -> Result<Study> {
     let scenes = if arguments.scenes.is_empty() { ErrorScene::ALL.to_vec() } else { arguments.scenes.clone() };
     let quick = arguments.common.quick;
     let cache = arguments.common.cache.cache();
-    let cases = scenes.into_iter().map(|scene| case_of(scene, quick, &cache, console)).collect::<Result<Vec<_>>>()?;
+    let mut communication = None;
+    let mut cases: Vec<Box<dyn Case>> = Vec::new();
+    for scene in scenes {
+        cases.push(case_of(scene, (quick, &cache), console, &mut communication)?);
+    }
     let shaken = [Bars::shaken(false).map_err(never)?, Bars::shaken(true).map_err(never)?];
     let smooth = shaken.each_ref().map(|bars| bars as &dyn Case);
-    let summary = "Every time scheme and contact solver, at steps on both sides of the stability limit and with several numbers of modes, beside \
+    let summary = "Adaptive steps, fixed steps and the paper's method on built-in scenes; every scheme and solver on standard problems, beside \
                    methods that share no code with them."
         .to_owned();
-    of_cases(cases, &smooth, (quick, summary), console)
+    let mut study = of_cases(cases, &smooth, (quick, summary), console)?;
+    if let Some(table) = communication {
+        let text = table.to_markdown().into_bytes();
+        study.files.push((COMMUNICATION.into(), "time and error by the length of the communication step".into(), text));
+    }
+    Ok(study)
 }
 
 fn never(problem: String) -> Failure {
     Failure::new("error study", problem, "Report this to the developers")
 }
 
-/// The scene of this name, reduced where it has to be.
-fn case_of(scene: ErrorScene, quick: bool, cache: &RomCache, console: &Console) -> Result<Box<dyn Case>> {
-    Ok(match scene {
-        ErrorScene::Carpenter => Box::new(Bars::carpenter(quick).map_err(never)?),
-        ErrorScene::BouncingBar => Box::new(Bars::bouncing(quick).map_err(never)?),
-        ErrorScene::Rotor37Light => Box::new(rotor(Rub::Light, quick, cache, console)?),
-        ErrorScene::Rotor37Heavy => Box::new(rotor(Rub::Heavy, quick, cache, console)?),
-        ErrorScene::Cube => Box::new(Cube::new(quick, cache, console)?),
-        ErrorScene::Stage => Box::new(stage::stage(quick, cache, console)?),
-    })
+/// The scene of this name, reduced where it has to be; rows of built-in scenes are added to the table of communication steps.
+fn case_of(
+    scene: ErrorScene,
+    (quick, cache): (bool, &RomCache),
+    console: &Console,
+    communication: &mut Option<Table>,
+) -> Result<Box<dyn Case>> {
+    let mut built_in = |facts: built_in::Facts| -> Result<Box<dyn Case>> {
+        let case = BuiltIn::new(facts, quick, cache, console)?;
+        let mut table = communication::table(&case, quick, console)?;
+        match communication {
+            Some(all) => all.rows.append(&mut table.rows),
+            None => *communication = Some(table),
+        }
+        Ok(Box::new(case))
+    };
+    match scene {
+        ErrorScene::Rotor37Light => built_in(built_in::LIGHT),
+        ErrorScene::Rotor37Heavy => built_in(built_in::HEAVY),
+        ErrorScene::FlexibleCasing => built_in(built_in::CASING),
+        ErrorScene::Stage => built_in(built_in::STAGE),
+        ErrorScene::Rotor37PaperLight => Ok(Box::new(rotor(Rub::Light, quick, cache, console)?)),
+        ErrorScene::Rotor37PaperHeavy => Ok(Box::new(rotor(Rub::Heavy, quick, cache, console)?)),
+        ErrorScene::StageCoarse => Ok(Box::new(stage::stage(quick, cache, console)?)),
+        ErrorScene::Cube => Ok(Box::new(Cube::new(quick, cache, console)?)),
+        ErrorScene::Carpenter => Ok(Box::new(Bars::carpenter(quick).map_err(never)?)),
+        ErrorScene::BouncingBar => Ok(Box::new(Bars::bouncing(quick).map_err(never)?)),
+    }
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Scenes 4 and 5: the blades of rotor 37 rubbing against a casing with two bumps, lightly and heavily.
+//! The paper's model: blades of rotor 37 with three contact nodes, in a light and in a heavy rub against a casing with two bumps.
 
 use tiprub_core::{Rom, settings::Shape};
 use tiprub_gallery::{reduction, rom_cache::RomCache, scene_source};
@@ -50,12 +50,12 @@ pub(crate) enum Rub {
 pub(crate) fn rotor(rub: Rub, quick: bool, cache: &RomCache, console: &Console) -> Result<Turning<BladeScene>> {
     let (name, figures, title, intrusion, bumps) = match rub {
         Rub::Light => {
-            let figures = ["rotor37-light-steps", "rotor37-light-total"];
-            ("rotor37-light", figures, "Rotor 37, light rub", "a fifth of the gap", LIGHT)
+            let figures = ["rotor37-paper-light-steps", "rotor37-paper-light-total"];
+            ("rotor37-paper-light", figures, "The paper's model, light rub", "a fifth of the gap", LIGHT)
         }
         Rub::Heavy => {
-            let figures = ["rotor37-heavy-steps", "rotor37-heavy-total"];
-            ("rotor37-heavy", figures, "Rotor 37, heavy rub", "the whole gap", HEAVY)
+            let figures = ["rotor37-paper-heavy-steps", "rotor37-paper-heavy-total"];
+            ("rotor37-paper-heavy", figures, "The paper's model, heavy rub", "the whole gap", HEAVY)
         }
     };
     let mut sizes = Vec::new();
@@ -69,7 +69,7 @@ pub(crate) fn rotor(rub: Rub, quick: bool, cache: &RomCache, console: &Console) 
         sizes.push((modes, scene, outside));
     }
     let description = format!(
-        "36 blades of rotor 37 at design speed rub with µ = 0.15 against a rigid casing whose two bumps intrude by {intrusion}. The truth \
+        "36 blades of rotor 37 with three contact nodes each, at design speed, rub with µ = 0.15 against a rigid casing whose two bumps intrude by {intrusion}. The truth \
          is the reference with most component modes."
     );
     let facts = Facts {

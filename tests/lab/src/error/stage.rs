@@ -51,9 +51,9 @@ pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<
     let description = "56 coupled sectors (coarse mesh) in an elastic casing that goes oval until it touches, µ = 0.15. The truth is the \
                        reference with most component modes.";
     let facts = Facts {
-        name: "stage",
-        figures: ["stage-steps", "stage-total"],
-        title: "Stage, coupled sectors",
+        name: "stage-coarse",
+        figures: ["stage-coarse-steps", "stage-coarse-total"],
+        title: "Stage on a coarse mesh",
         description: description.into(),
         size_name: "modes per nodal diameter",
         interval: INTERVAL,

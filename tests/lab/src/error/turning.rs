@@ -6,7 +6,7 @@ use tiprub_shell::{Failure, Result};
 
 use super::{
     case::{Case, without_finest},
-    competitor::{Competitor, Family},
+    competitor::{Competitor, Family, TOLERANCES, TOLERANT},
     outside::{OutsideRun, Softness},
     run::Run,
     scene::SceneRun,
@@ -105,7 +105,15 @@ impl<S: reduced::Scene> Case for Turning<S> {
         without_finest(&self.facts.divisions, size == self.standard())
     }
 
+    fn competitors(&self, size: usize) -> Vec<Competitor> {
+        let reduced = Competitor::reduced().into_iter().chain([TOLERANT]);
+        reduced.filter(|competitor| competitor.is_core() || size == self.standard()).collect()
+    }
+
     fn divisions_of(&self, size: usize, competitor: Competitor) -> Vec<u32> {
+        if competitor.is_by_tolerance() {
+            return TOLERANCES.to_vec();
+        }
         let outside = self.facts.outside_divisions.as_ref().filter(|_| !competitor.is_core());
         outside.map_or_else(|| self.divisions(size), Vec::clone)
     }
@@ -135,7 +143,8 @@ impl<S: reduced::Scene> Case for Turning<S> {
         let Facts { interval, softness, .. } = self.facts;
         Ok(match competitor {
             Competitor::Core(scheme, solver) => {
-                Box::new(SceneRun::new(scene, (scheme, solver), interval, division, perturbation)?)
+                let scene = SceneRun::by(scene, (scheme, solver), interval, division, perturbation);
+                Box::new(SceneRun::with_start_values(&scene, interval, division, &[])?)
             }
             Competitor::Moreau | Competitor::Augmented | Competitor::Penalty(_) | Competitor::Full(_) => {
                 Box::new(OutsideRun::new(outside, competitor, interval, division, softness)?)

@@ -1,0 +1,202 @@
+//! Two tables over all scenes: the cheapest setting for each error of the steps and for each total error, beside the paper's method with the
+//! same model.
+
+use tiprub_figure::table::Table;
+
+use super::{
+    case::Case,
+    competitor::{Competitor, PAPER, TOLERANT},
+    measure::{Figures, Measured, Row},
+    ranking::{self, Kind, TARGETS, cheapest, that_tell},
+};
+
+/// A run that finished: its setting and its figures.
+type Finished<'a> = (&'a Row, &'a Figures);
+
+/// Processor time per simulated time (s/s) with three significant digits.
+pub fn rate(seconds: f64) -> String {
+    match seconds {
+        _ if seconds < 0.995 => format!("{seconds:.3}"),
+        _ if seconds < 9.95 => format!("{seconds:.2}"),
+        _ if seconds < 99.5 => format!("{seconds:.1}"),
+        _ => format!("{seconds:.0}"),
+    }
+}
+
+/// Cheapest setting for each error of the steps. Every method is compared with the converged solution of its own equations.
+pub fn of_steps(scenes: &[(&dyn Case, &Measured)]) -> Table {
+    let columns = [
+        "scene",
+        "error of the steps",
+        "cheapest method",
+        "step or tolerance",
+        "time (s/s)",
+        "galerkin (s/s)",
+        "the paper's method (s/s)",
+        "factor",
+    ];
+    let mut table = Table::new("Cheapest setting for an error of the steps", columns);
+    for &(case, measured) in scenes {
+        let rows = Kind::OfOwn.rows(case, measured);
+        for target in TARGETS {
+            let readable = that_tell(case, measured, Kind::OfOwn, &rows, target);
+            let cells = cells(case, &readable, &rows, &|only| cheapest(&readable, Kind::OfOwn, only, target), |_| {
+                String::new()
+            });
+            table.rows.push(beside(case, target, cells));
+        }
+    }
+    table
+}
+
+/// Cheapest setting for each total error: steps, and the errors of the model (modes, patches, rows, mesh, elements).
+pub fn in_total(scenes: &[(&dyn Case, &Measured)]) -> Table {
+    let columns = [
+        "scene",
+        "total error",
+        "cheapest method",
+        "step or tolerance",
+        "time (s/s)",
+        "galerkin (s/s)",
+        "the paper's method (s/s)",
+        "factor",
+    ];
+    let mut table = Table::new("Cheapest setting for a total error", columns);
+    for &(case, measured) in scenes {
+        let Some(error) = total_error(case) else { continue };
+        let rows = Kind::Total.rows(case, measured);
+        for target in TARGETS {
+            let readable = match case.model_error() {
+                Some(_) => that_tell(case, measured, Kind::OfOwn, &rows, target),
+                None => that_tell(case, measured, Kind::Total, &rows, target),
+            };
+            let best = |only: Option<Competitor>| {
+                let own = readable.iter().filter(|row| only.is_none_or(|competitor| row.competitor == competitor));
+                let finished = own.filter_map(|row| row.outcome.as_ref().ok().map(|figures| (*row, figures)));
+                let within = finished.filter(|(_, figures)| error(figures) <= target);
+                within.min_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds))
+            };
+            let size = |row: &Row| match case.sizes().len() {
+                1 => String::new(),
+                _ => format!(", {} {}", case.sizes()[row.size], case.size_name()),
+            };
+            let mut cells = cells(case, &readable, &rows, &best, size);
+            if let (Some(left), "none") = (case.model_error(), cells[0].as_str())
+                && left > target
+            {
+                cells[1] = format!("the model's own error is {left:.1e}");
+            }
+            table.rows.push(beside(case, target, cells));
+        }
+    }
+    table
+}
+
+/// How the total error of a run follows from its figures; `None` where a case has no finer model and no known errors.
+fn total_error(case: &dyn Case) -> Option<Box<dyn Fn(&Figures) -> f64>> {
+    if let Some(left) = case.model_error() {
+        return Some(Box::new(move |figures| figures.of_own + left));
+    }
+    super::sheets::has_total(case).then(|| Box::new(|figures: &Figures| figures.total) as Box<dyn Fn(&Figures) -> f64>)
+}
+
+fn beside(case: &dyn Case, target: f64, cells: Vec<String>) -> Vec<String> {
+    [case.title().to_owned(), format!("{target:.0e}")].into_iter().chain(cells).collect()
+}
+
+/// Cheapest method, its setting and time; the times of `galerkin` and of the paper's method; the factor between the first and the last.
+fn cells<'a>(
+    case: &dyn Case,
+    readable: &[&'a Row],
+    all: &[&'a Row],
+    best: &dyn Fn(Option<Competitor>) -> Option<Finished<'a>>,
+    size: impl Fn(&Row) -> String,
+) -> Vec<String> {
+    let simulated = case.interval() * case.samples() as f64;
+    let time = |(_, figures): Finished| rate(figures.seconds / simulated);
+    let any = best(None);
+    let paper = best(Some(PAPER));
+    let factor = any.zip(paper).map(|((_, any), (_, paper))| format!("{:.1}", paper.seconds / any.seconds));
+    let first = match any {
+        Some((row, _)) => [format!("`{}`", row.competitor.name()), row.competitor.setting(row.step) + &size(row)],
+        None if readable.is_empty() => ["none".into(), "below the distance of the references".into()],
+        None => ["none".into(), String::new()],
+    };
+    let without = || if all.iter().any(|row| row.competitor == TOLERANT) { "not reached" } else { "-" }.to_owned();
+    first
+        .into_iter()
+        .chain([
+            any.map_or_else(String::new, time),
+            best(Some(TOLERANT)).map_or_else(without, time),
+            paper.map_or_else(|| paper_misses(all), time),
+            factor.unwrap_or_else(|| "-".into()),
+        ])
+        .collect()
+}
+
+/// Why the paper's method does not reach an error: rejected at every step that was tried, or its smallest error.
+fn paper_misses(rows: &[&Row]) -> String {
+    let own = || rows.iter().filter(|row| row.competitor == PAPER);
+    let shortest = own().map(|row| row.step).fold(f64::INFINITY, f64::min);
+    let errors = own().filter_map(|row| row.outcome.as_ref().ok()).map(|figures| Kind::OfOwn.of(figures));
+    match errors.reduce(f64::min) {
+        _ if shortest.is_infinite() => "-".into(),
+        Some(least) => format!("not reached, {least:.1e} at best"),
+        None => format!("rejected, down to {}", PAPER.setting(shortest)),
+    }
+}
+
+/// Distances of the references, which limit the errors that can be read.
+pub fn limits(scenes: &[(&dyn Case, &Measured)]) -> Table {
+    let mut table = Table::new(
+        "Errors below these distances cannot be read",
+        ["scene", "window (ms)", "first and second reference", "galerkin and massless-boundary"],
+    );
+    for &(case, measured) in scenes {
+        let massless = measured.references.get(case.standard()).and_then(|own| own.massless_apart);
+        table.rows.push(vec![
+            case.title().to_owned(),
+            format!("{:.2}", 1e3 * case.interval() * case.samples() as f64),
+            format!("{:.1e}", ranking::readable(case, measured, Kind::OfOwn)),
+            massless.map_or_else(|| "-".into(), |apart| format!("{apart:.1e}")),
+        ]);
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(competitor: Competitor, step: f64, outcome: Result<f64, &str>) -> Row {
+        let figures = |error: f64| Figures {
+            seconds: 1e-3,
+            total: error,
+            of_time: error,
+            of_own: error,
+            impulse: 0.0,
+            impulse_total: 0.0,
+            energy: 0.0,
+            residual: None,
+            penetration: 0.0,
+            adhesion: 0.0,
+            release: None,
+        };
+        Row { size: 0, competitor, step, outcome: outcome.map(figures).map_err(str::to_owned) }
+    }
+
+    #[test]
+    fn rates_keep_three_digits() {
+        assert_eq!([0.1234, 1.234, 12.34, 1234.5].map(rate), ["0.123", "1.23", "12.3", "1234"]);
+    }
+
+    #[test]
+    fn rejection_names_the_shortest_step() {
+        let rejected =
+            [row(PAPER, 1e-6, Err("growth")), row(PAPER, 2.5e-7, Err("growth")), row(TOLERANT, 1e-2, Ok(1e-3))];
+        assert_eq!(paper_misses(&rejected.iter().collect::<Vec<_>>()), "rejected, down to h = 0.250 µs");
+        let ran = [row(PAPER, 1e-6, Err("growth")), row(PAPER, 2.5e-7, Ok(2e-3))];
+        assert_eq!(paper_misses(&ran.iter().collect::<Vec<_>>()), "not reached, 2.0e-3 at best");
+        assert_eq!(paper_misses(&[]), "-");
+    }
+}

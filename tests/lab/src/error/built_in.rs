@@ -1,0 +1,226 @@
+//! Built-in scenes as they ship: adaptive steps beside fixed steps and the paper's method, each with the same model.
+
+use tiprub_core::{
+    Scene,
+    settings::{Preset, Scheme, Shape, Solver},
+};
+use tiprub_gallery::{rom_cache::RomCache, scene_source};
+use tiprub_shell::{Failure, Result, console::Console};
+
+use super::{
+    case::Case,
+    competitor::{Competitor, DEFAULT, Family, PAPER, TOLERANCES, TOLERANT},
+    run::Run,
+    scene::SceneRun,
+    window,
+};
+
+/// Time between samples, and communication step of all runs (s).
+const INTERVAL: f64 = 8e-5;
+/// The massless-boundary scheme with the contact solver of the default.
+const MASSLESS: Competitor = Competitor::Core(Scheme::MasslessBoundary, Solver::Lcp);
+/// Samples per window of impulses.
+const IMPULSE_WINDOW: usize = 4;
+/// Internal steps per sample of the runs that show how long trajectories can be followed.
+const PARTING_DIVISION: u32 = 80;
+
+/// A built-in scene and the steps that are compared on it.
+pub(crate) struct Facts {
+    pub name: &'static str,
+    /// File names of the two pictures.
+    pub figures: [&'static str; 2],
+    pub title: &'static str,
+    pub description: &'static str,
+    /// Source of the scene.
+    pub scene: &'static str,
+    /// Depth of the two bumps (fraction of the gap); `None` leaves the casing as the scene has it.
+    pub depth: Option<f64>,
+    /// Samples: the whole study, its quick form.
+    pub samples: [usize; 2],
+    /// Internal steps per sample of the paper's method, of `modal-exact` and of `massless-boundary`, ascending.
+    pub divisions: [&'static [u32]; 3],
+    /// Internal steps per sample of the fine run that all errors are relative to.
+    pub reference: u32,
+}
+
+const BLADES: [&[u32]; 3] = [&[80, 320, 1280, 2000, 4000], &[80, 160, 320, 640], &[40, 80, 160, 320, 640]];
+const COUPLED: [&[u32]; 3] = [&[80, 320, 1280], &[40, 80, 160, 320], &[10, 20, 40, 80, 160]];
+
+pub(crate) const LIGHT: Facts = Facts {
+    name: "rotor37-light",
+    figures: ["rotor37-light-steps", "rotor37-light-total"],
+    title: "Rotor 37, light rub",
+    description: "36 blades of rotor 37 with 18 contact patches and 80 modes each, at design speed, µ = 0.15. The two bumps of the rigid casing \
+                  intrude by a fifth of the gap.",
+    scene: "builtin:rotor37",
+    depth: Some(0.6),
+    samples: [66, 14],
+    divisions: BLADES,
+    reference: 4000,
+};
+
+pub(crate) const HEAVY: Facts = Facts {
+    name: "rotor37-heavy",
+    figures: ["rotor37-heavy-steps", "rotor37-heavy-total"],
+    title: "Rotor 37, heavy rub",
+    description: "The same blades. The two bumps intrude by the whole gap.",
+    depth: Some(1.0),
+    ..LIGHT
+};
+
+pub(crate) const CASING: Facts = Facts {
+    name: "flexible-casing",
+    figures: ["flexible-casing-steps", "flexible-casing-total"],
+    title: "Rotor 37 in an elastic casing",
+    description: "36 blades of rotor 37 in an elastic casing with a B-spline surface, one revolution: all blades are coupled by the casing.",
+    scene: "builtin:flexible-casing",
+    depth: None,
+    samples: [44, 8],
+    divisions: COUPLED,
+    reference: 1600,
+};
+
+pub(crate) const STAGE: Facts = Facts {
+    name: "stage",
+    figures: ["stage-steps", "stage-total"],
+    title: "Stage",
+    description: "56 blades that are coupled by their disk, with 18 contact patches each, in an elastic casing under load.",
+    scene: "builtin:stage",
+    samples: [120, 8],
+    ..CASING
+};
+
+/// One scene, one model: errors of the steps only.
+pub(crate) struct BuiltIn {
+    facts: Facts,
+    scene: Scene,
+    samples: usize,
+    quick: bool,
+    parting: Vec<f64>,
+}
+
+impl BuiltIn {
+    /// Loads the scene and finds how long its trajectories can be followed.
+    ///
+    /// # Errors
+    /// The model cannot be reduced or a run fails; never with the built-in scenes.
+    pub(crate) fn new(facts: Facts, quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
+        let mut scene = scene_source::load(facts.scene, cache, console)?;
+        scene.settings.preset = Preset::None;
+        scene.settings.experiment.communication_step = INTERVAL;
+        if let (Some(bumps), Shape::TwoLobe { depth, .. }) = (facts.depth, &mut scene.settings.surfaces[0].shape) {
+            *depth = bumps;
+        }
+        let samples = facts.samples[usize::from(quick)];
+        let mut case = Self { facts, scene, samples, quick, parting: Vec::new() };
+        case.parting = window::parting(&case, PARTING_DIVISION, samples)
+            .map_err(|problem| Failure::new(case.facts.name, problem, "Report this to the developers"))?;
+        case.samples = window::samples(&case.parting, samples);
+        Ok(case)
+    }
+
+    /// The scene.
+    pub(crate) fn scene(&self) -> &Scene {
+        &self.scene
+    }
+}
+
+impl Case for BuiltIn {
+    fn name(&self) -> &'static str {
+        self.facts.name
+    }
+
+    fn figures(&self) -> [&'static str; 2] {
+        self.facts.figures
+    }
+
+    fn title(&self) -> &str {
+        self.facts.title
+    }
+
+    fn description(&self) -> String {
+        self.facts.description.into()
+    }
+
+    fn size_name(&self) -> &'static str {
+        "coordinates of the first ROM"
+    }
+
+    fn sizes(&self) -> Vec<usize> {
+        vec![self.scene.roms[0].order()]
+    }
+
+    fn interval(&self) -> f64 {
+        INTERVAL
+    }
+
+    fn samples(&self) -> usize {
+        self.samples
+    }
+
+    fn impulse_window(&self) -> usize {
+        IMPULSE_WINDOW
+    }
+
+    fn divisions(&self, _: usize) -> Vec<u32> {
+        self.facts.divisions[1].to_vec()
+    }
+
+    /// The quick form leaves out the finer half.
+    fn divisions_of(&self, _: usize, competitor: Competitor) -> Vec<u32> {
+        let all = match competitor {
+            TOLERANT => &TOLERANCES[..],
+            PAPER => self.facts.divisions[0],
+            MASSLESS => self.facts.divisions[2],
+            _ => self.facts.divisions[1],
+        };
+        let count = if self.quick { all.len().div_ceil(2) } else { all.len() };
+        all[..count].to_vec()
+    }
+
+    fn reference_divisions(&self, _: usize) -> (u32, u32) {
+        let fine = if self.quick { 640 } else { self.facts.reference };
+        (fine, fine / 2)
+    }
+
+    fn second(&self) -> Competitor {
+        DEFAULT
+    }
+
+    fn relation(&self) -> &'static str {
+        "the same scheme with twice the step"
+    }
+
+    fn competitors(&self, _: usize) -> Vec<Competitor> {
+        vec![PAPER, DEFAULT, MASSLESS, TOLERANT]
+    }
+
+    /// Known where every direction was refined, on the blade in a rigid casing.
+    fn model_error(&self) -> Option<f64> {
+        let [rom] = &self.scene.roms[..] else { return None };
+        let known = rom.checks.rub_errors.as_ref()?;
+        Some(known.modes? + known.patches? + known.rows? + known.mesh?)
+    }
+
+    fn start<'a>(
+        &'a self,
+        _: usize,
+        competitor: Competitor,
+        division: u32,
+        perturbation: f64,
+    ) -> std::result::Result<Box<dyn Run + 'a>, String> {
+        let Competitor::Core(scheme, solver) = competitor else {
+            return Err("only the product's own methods run on a built-in scene".into());
+        };
+        let scene = SceneRun::by(&self.scene, (scheme, solver), INTERVAL, division, perturbation);
+        Ok(Box::new(SceneRun::with_start_values(&scene, INTERVAL, division, &[])?))
+    }
+
+    fn parting(&self) -> &[f64] {
+        &self.parting
+    }
+
+    fn families(&self, _: usize) -> Vec<Family> {
+        vec![Family::MASSLESS]
+    }
+}
