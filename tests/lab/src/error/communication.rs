@@ -2,11 +2,11 @@
 
 use tiprub_core::{
     Scene, Simulation,
-    settings::{Scheme, Solver},
+    settings::{ADAPTIVE_STEP, Scheme, Solver},
 };
 use tiprub_figure::table::Table;
 use tiprub_shell::{Failure, Result, console::Console};
-use tiprub_study::error::{case::Case, clock, competitor::LONGEST, measure::parts_apart, summary::rate};
+use tiprub_study::error::{case::Case, clock, measure::parts_apart, summary::rate};
 
 use super::built_in::BuiltIn;
 
@@ -31,7 +31,7 @@ fn record(scene: &Scene, tolerance: f64, multiple: usize, milliseconds: usize) -
     let interval = SHORTEST * multiple as f64;
     scene.settings.experiment.communication_step = interval;
     let time = &mut scene.settings.time;
-    (time.scheme, time.step, time.tolerance) = (Scheme::Galerkin, LONGEST.min(interval), Some(tolerance));
+    (time.scheme, time.step, time.tolerance) = (Scheme::Galerkin, ADAPTIVE_STEP.min(interval), Some(tolerance));
     scene.settings.contacts.iter_mut().for_each(|contact| contact.solver = Solver::Lcp);
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
