@@ -69,6 +69,8 @@ pub struct Ledger {
     pub step_change: Sum,
     /// Sum of the magnitudes of all external work: the scale of the residual.
     pub turnover: Sum,
+    /// Sum of the magnitudes of the work that contact forces do on the structures: what a vibration takes from contact and gives back.
+    pub contact_work: Sum,
 }
 
 /// Every sum by its name, once: a field that is missing here does not compile.
@@ -85,7 +87,7 @@ macro_rules! sums_of_ledger {
     };
 }
 
-sums_of_ledger! { 16:
+sums_of_ledger! { 17:
     damping_loss,
     friction_loss,
     impact_loss,
@@ -102,6 +104,7 @@ sums_of_ledger! { 16:
     curvature_work,
     step_change,
     turnover,
+    contact_work,
 }
 
 impl Ledger {

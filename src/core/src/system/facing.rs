@@ -284,6 +284,7 @@ impl Facing<'_> {
         let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
         let (drives, motions) = (&self.record.drives[pair], &self.record.motions[pair]);
         let (gap, slides) = (self.pairs[pair].gap(), self.pairs[pair].friction() != 0.0);
+        let mut heats = 0.0;
         for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {
             let normal_force = trial.multiplier(i, node);
             let at = self.at(node, &drives[i].0);
@@ -325,8 +326,16 @@ impl Facing<'_> {
             work.casing += normal_force * gap.surface_motion(at, point, normal, place, motion);
             work.heat += heat;
             tally.heat += heat;
+            heats += heat;
             work.closing -= normal_force * open;
             work.exact += dot(force, there);
+            work.moved += dot(force, there).abs();
+        }
+        if heats < 0.0 && trial.sticks() {
+            // The force at the start is not that of the slip to come: what it puts in is paid by what impacts have left.
+            work.heat -= heats;
+            tally.heat -= heats;
+            work.closing += heats;
         }
         (self.record.tallies[node], self.record.work) = (tally, work);
     }

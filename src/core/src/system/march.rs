@@ -242,6 +242,7 @@ fn enter_work(ledger: &mut Ledger, work: &Worked) {
         (&mut ledger.impact_loss, work.closing + work.dropped),
         (&mut ledger.curvature_work, work.exact + work.heat + work.closing - moved),
         (&mut ledger.turnover, work.shaft.abs() + work.whirl.abs() + work.shift.abs() + work.casing.abs()),
+        (&mut ledger.contact_work, work.moved),
     ] {
         sum.add(term);
     }

@@ -108,8 +108,9 @@ pub struct Worked {
     pub heat: f64,
     /// Of gaps that close.
     pub closing: f64,
-    /// On the structure.
+    /// On the structure, and its magnitudes.
     pub exact: f64,
+    pub moved: f64,
     /// Damping loss.
     pub damping: f64,
     /// What constant forces lose against those before.

@@ -4,6 +4,7 @@ use super::pair::{When, at_place};
 use super::{ContactEvent, StepFailure, System};
 use crate::gaps::wrench::{At, Motion};
 use crate::gaps::{Geometry, dot};
+use crate::settings::Solver;
 
 /// What one contact did over a step (J).
 #[derive(Debug, Clone, Copy, Default)]
@@ -13,6 +14,8 @@ struct Work {
     shift: f64,
     casing: f64,
     heat: f64,
+    /// Friction that gives, of contacts that may stick (≤ 0): the tip turns round between the two steps whose mean is booked.
+    turned: f64,
     /// Against what is cut off.
     cut: f64,
     /// Of the node that stops at the surface.
@@ -23,6 +26,8 @@ struct Work {
     exact: f64,
     /// Magnitudes of the work of all inputs.
     turnover: f64,
+    /// Magnitude of the work on both structures.
+    moved: f64,
 }
 
 impl Work {
@@ -34,16 +39,26 @@ impl Work {
         self.shift += other.shift;
         self.casing += other.casing;
         self.heat += other.heat;
+        self.turned += other.turned;
         self.cut += other.cut;
         self.closing += other.closing;
         self.worn += other.worn;
         self.exact += other.exact;
         self.turnover += other.turnover;
+        self.moved += other.moved;
     }
 
     /// What has no other name.
     fn curvature(&self) -> f64 {
         self.exact + self.heat + self.cut + self.closing - (self.shaft + self.whirl + self.shift + self.casing)
+    }
+
+    /// A tip that an impact turns round within a step takes what friction gives from what the impact costs. The rest, of tips that turn
+    /// round while they stay closed, vanishes with the step and is left to what has no other name.
+    fn settle(&mut self) {
+        if self.turned != 0.0 {
+            self.closing = self.worn + (self.closing - self.worn + self.turned).max(0.0);
+        }
     }
 }
 
@@ -147,7 +162,8 @@ impl System {
     }
 
     /// Enter the work of all contacts of a set in a step into its ledger.
-    fn enter(&mut self, set: usize, work: Work) {
+    fn enter(&mut self, set: usize, mut work: Work) {
+        work.settle();
         let ledger = &mut self.counted.ledgers[set];
         ledger.wear_work.add(work.worn);
         ledger.impact_loss.add(work.closing - work.worn);
@@ -159,6 +175,7 @@ impl System {
         ledger.casing_work.add(work.casing);
         ledger.curvature_work.add(work.curvature());
         ledger.turnover.add(work.turnover);
+        ledger.contact_work.add(work.moved);
     }
 
     /// The work on both structures is f·(u⁺ − u⁻)/2 with u the relative displacement. It is what inputs do, force times
@@ -183,17 +200,21 @@ impl System {
         let opposed = -dot(tangential, slip);
         let cut = if pair.cutting() > 0.0 { opposed * share_cut(event, pair.cutting()) } else { 0.0 };
         let (whirl, shift) = (-(x * across[0] + y * across[1]), -z * across[2]);
+        let (heat, exact) = (opposed - cut, dot(event.force, moved));
+        let turned = if self.settings.solver == Solver::Coulomb { heat.min(0.0) } else { 0.0 };
         Work {
             shaft,
             whirl,
             shift,
             casing,
-            heat: opposed - cut,
+            heat: heat - turned,
+            turned,
             cut,
             closing: event.normal * approach,
             worn: event.coating * approach,
-            exact: dot(event.force, moved),
+            exact,
             turnover: shaft.abs() + whirl.abs() + shift.abs() + casing.abs(),
+            moved: exact.abs(),
         }
     }
 

@@ -26,8 +26,6 @@ pub struct Verdict {
     pub switches: bool,
     /// Energy that this adds (J): Σ λ_i S_ik g_k of those nodes, and what friction puts in.
     pub switched: f64,
-    /// What friction puts in, of that (J).
-    pub gained: f64,
     /// A node may have touched between the points.
     pub near: bool,
     /// Linear systems factorised.
@@ -76,9 +74,9 @@ impl Trial {
         let mut turn = 0.0;
         if self.sticking.is_some() {
             turn = self.find_turn(rows.residual(), level.step, obstacle);
-            verdict.gained = self.find_gain(obstacle);
-            verdict.switches |= verdict.gained > 0.0;
-            verdict.switched += verdict.gained;
+            let gained = self.find_gain(obstacle);
+            verdict.switches |= gained > 0.0;
+            verdict.switched += gained;
         }
         if pushed {
             self.left.fill(0.0);

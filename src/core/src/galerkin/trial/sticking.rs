@@ -207,21 +207,28 @@ impl Trial {
         std::array::from_fn(|c| now[c] - before[c] + under[c])
     }
 
-    /// Energy that friction puts in over a step that is solved (J): the force at its start is not that of the slip to come.
+    /// Energy that friction puts in at nodes over a step that is solved (J): the force at its start is not that of the slip to come.
     pub fn find_gain(&self, obstacle: &impl Obstacle) -> f64 {
-        let (mut gain, mut moved) = (0.0, 0.0);
+        let mut gain = 0.0;
         for node in (0..self.lanes.nodes).filter(|node| (0..2).any(|point| self.multiplier(point, *node) > 0.0)) {
             let slip = self.slip(node, obstacle);
             let pushed = self.lanes.three(&self.pushed, node);
+            let (mut own, mut moved) = (0.0, 0.0);
             for point in 0..2 {
                 let (force, normal) = (self.force(point, node), self.normal(point, node));
                 let multiplier = self.multiplier(point, node);
                 let tangential: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
-                gain += 0.5 * dot(tangential, slip);
+                own += 0.5 * dot(tangential, slip);
                 moved += dot(tangential, tangential).sqrt() * dot(pushed, pushed).sqrt();
             }
+            gain += if own > ROUNDING * moved { own } else { 0.0 };
         }
-        if gain > ROUNDING * moved { gain } else { 0.0 }
+        gain
+    }
+
+    /// Whether contacts may stick.
+    pub fn sticks(&self) -> bool {
+        self.sticking.is_some()
     }
 
     /// How far nodes may have gone on and come back within a step (m): where sliding turns round they stick before. Four times that, as

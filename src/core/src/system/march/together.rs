@@ -449,7 +449,6 @@ impl Marching<'_> {
             }
             verdict.switches |= own.switches;
             verdict.switched += own.switched;
-            verdict.gained += own.gained;
             verdict.near |= own.near;
             for node in 0..trial.nodes() {
                 let impulse = trial.impulse(node);
@@ -572,7 +571,7 @@ impl Marched for Marching<'_> {
         verdict
     }
 
-    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
+    fn take(&mut self, step: Step, kind: Kind, _: &Verdict) -> f64 {
         let level = &self.together.tables[0][0].levels[step.level];
         let points = if kind == Kind::Constant { 1 } else { level.basis.degree };
         self.together.casings.iter_mut().for_each(|casing| casing.weigh(points));
@@ -602,7 +601,7 @@ impl Marched for Marching<'_> {
         self.go_on(step, kind);
         // What gaps within the precision of contacts that stay closed give is paid as well.
         let after: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
-        if kind == Kind::Constant { dropped + closed } else { after - before - verdict.gained }
+        if kind == Kind::Constant { dropped + closed } else { after - before }
     }
 }
 
