@@ -261,6 +261,12 @@ static METHODS: &[Rule] = &[
         "it solves the complementarity of contact",
         "Use solver = \"lcp\", or \"coulomb\"",
     ),
+    excludes(
+        &[MASSLESS],
+        ("`contact.solver = \"film\"`", |at| at.solver == Solver::Film),
+        "film looks once for penetration, and without inertia a node that it leaves inside the surface stays there",
+        "Use solver = \"lcp\", or another scheme",
+    ),
     needs(
         &[GALERKIN],
         ("a clearance above 0 of what does not fly", |at| {

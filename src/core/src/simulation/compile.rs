@@ -244,14 +244,6 @@ impl Compiled {
         self.plan.pairs.iter().filter(|pair| pair.carrier == Some(carrier)).count()
     }
 
-    /// Speed (rad/s) below which tips that vibrate by their clearance in the lowest mode move faster than they slide.
-    pub fn slow_sliding(&self, body: usize) -> f64 {
-        let lowest = self.bodies[body].lowest_frequency();
-        let radius = self.body(body).1.contact_nodes.iter().fold(0.0, |most: f64, node| most.max(node.position[0]));
-        let gap = self.plan.pairs_of(body).map(|(pair, _)| self.contact(pair).nominal_gap()).fold(0.0, f64::max);
-        if lowest.is_finite() { gap * lowest / radius } else { 0.0 }
-    }
-
     /// Whether tips of a structure cut a coating.
     pub fn cuts(&self, body: usize) -> bool {
         self.plan

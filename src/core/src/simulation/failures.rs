@@ -74,8 +74,12 @@ impl Simulation {
                 ),
                 "Use a smaller internal step".to_owned(),
             ),
+            StepFailure::Gives { set, loss, given, exchanged } => self.told_gain(set, loss, [given, exchanged]),
             StepFailure::Pulls { structure, node, share } => {
                 (self.pulls(structure, node, share), self.against_pulling(structure))
+            }
+            StepFailure::LeftInside { structure, node, share } => {
+                (self.left_inside(structure, node, share), self.against_pulling(structure))
             }
             StepFailure::TooFast { structure } => (
                 format!(

@@ -1,6 +1,7 @@
 //! A compiled scene with its state: what an FMU instance, the native run and the tests all drive.
 
 mod access;
+mod balance;
 mod blades;
 mod checks;
 mod compile;
@@ -17,6 +18,7 @@ mod patches;
 mod plan;
 mod pulling;
 mod slave_surface;
+mod sliding_speed;
 mod state;
 mod stepping;
 mod table;
@@ -26,10 +28,9 @@ mod watched;
 mod window;
 
 use crate::gaps::Drive;
-use crate::settings::Solver;
 use crate::system::{Growth, System};
 use crate::variables::{Quantity, Start, VariableTable};
-use crate::{Result, Scene, ranges, shown};
+use crate::{Result, Scene, ranges};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
 pub use inputs::Courses;
@@ -321,30 +322,6 @@ impl Simulation {
     /// Speeds of all structures that touch (rad/s).
     fn speeds(&self) -> Vec<f64> {
         self.inputs.rotors.iter().map(|rotor| rotor.speed.value).collect()
-    }
-
-    /// Tips that slide more slowly than they vibrate stick at times, which the sliding law does not know.
-    fn warn_of_sticking(&mut self, parameters: &limits::Parameters) {
-        for body in 0..self.compiled.bodies.len() {
-            let speed = &self.inputs.rotors[body].speed;
-            let slow = self.compiled.slow_sliding(body);
-            if self.compiled.bodies[body].translations.is_some()
-                || parameters.solver == Solver::Coulomb
-                || (parameters.friction_of(&self.compiled, body) == 0.0 && !self.compiled.cuts(body))
-                || speed.slope != 0.0
-                || speed.value.abs() >= slow
-            {
-                continue;
-            }
-            let rotor = self.compiled.rotor_name(body);
-            self.warnings.push(format!(
-                "{rotor} starts at speed {} rad/s with {}: the sliding law does not model sticking; results are \
-                 meaningful once the tips slide faster than they vibrate, which they do not below some {slow:.1e} rad/s{}",
-                shown(speed.value),
-                if self.compiled.cuts(body) { "a coating that is cut" } else { "friction" },
-                if self.compiled.cuts(body) { "" } else { " (the solver coulomb models it)" }
-            ));
-        }
     }
 
     /// The numbers of nodal diameters that the parameters give to loads.

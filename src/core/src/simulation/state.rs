@@ -11,7 +11,7 @@ use crate::variables::{Causality, Kind, Variable};
 use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
-const VERSION: u64 = 12;
+const VERSION: u64 = 13;
 const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done, tried, most });

@@ -3,18 +3,11 @@
 use super::drive::Input;
 use super::{Communication, MOST_STEPS, Phase, Progress, Simulation, TIME_TOLERANCE, same_step};
 use crate::laws::coating::Coating;
-use crate::settings::Scheme;
 use crate::system::StepFailure;
 use crate::{Error, Result, ranges, shown};
 
 /// A run is warned of once u_θ²/2r is this share of the clearance.
 const CURVED_SHARE: f64 = 0.05;
-/// Energy of the instant may be so many times what was put in: that of modal-exact is cos²(ωh/2) of it, a fourth at ωh = 2π/3, the end of
-/// what a step resolves; that of central differences at least 1 − (ωh/2)². What is beyond is in modes that the step passes over.
-const ENERGY_FACTOR: f64 = 4.0;
-/// And a share of all work exchanged, for rounding.
-const ENERGY_SLACK: f64 = 0.01;
-
 impl Simulation {
     /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
     ///
@@ -306,6 +299,7 @@ impl Simulation {
         }
         self.check_pulling(time)?;
         self.note_curved(time);
+        self.note_curvature(time);
         self.note_missed(time);
         self.most_tried = self.most_tried.max(self.system.steps_tried() - self.communication.tried);
         for (angle, rotor) in self.rotors.iter_mut().zip(&self.inputs.rotors) {
@@ -343,81 +337,6 @@ impl Simulation {
                 100.0 * most.share()
             ));
         }
-    }
-
-    /// Vibration has no more energy than forces times speeds put in: what the scheme conserves leaves out what modes beyond the step
-    /// hold. With massless-boundary quasi-static modes hold energy one step before its work is known; its own limit keeps it.
-    fn check_energy(&mut self, time: f64) -> Result<()> {
-        let settings = self.system.settings();
-        if !settings.ledger || settings.scheme == Scheme::MasslessBoundary {
-            return Ok(());
-        }
-        if self.is_marched() {
-            self.check_friction(time)?;
-        }
-        let Some(set) = (0..self.energies.len()).find(|set| !self.has_its_energy(*set)) else { return Ok(()) };
-        self.phase = Phase::Failed;
-        Err(Error::Unstable {
-            problem: format!(
-                "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, where it was {:.4e} J at the start \
-                 and work less friction and damping supplied {:.4e} J: modes that the internal step of {:.3e} s does not resolve \
-                 have taken energy that is not there",
-                shown(time),
-                shown(self.time),
-                self.of_set(set),
-                self.energies[set].now,
-                self.initial_energies[set],
-                self.supplied(set),
-                self.system.step_size()
-            ),
-            remedy: "Use a smaller internal step (internal_step_max). Restore a saved state or reset first".to_owned(),
-        })
-    }
-
-    /// Friction takes. Along contact nodes without mass, whose way is not that of sliding alone, it can put energy in where sliding stops or
-    /// turns round: the ledger then closes over nonsense.
-    fn check_friction(&mut self, time: f64) -> Result<()> {
-        let gained = |set: &usize| {
-            let ledger = &self.system.ledgers()[*set];
-            ledger.friction_loss.value() < -ENERGY_SLACK * ledger.scale()
-        };
-        let Some(set) = (0..self.energies.len()).find(gained) else { return Ok(()) };
-        self.phase = Phase::Failed;
-        let ledger = &self.system.ledgers()[set];
-        Err(Error::Unstable {
-            problem: format!(
-                "at t = {} s (last good time {} s) friction{} has put {:.3e} J in, where it can only take, of {:.3e} J exchanged: sliding \
-                 stops or turns round, and this law knows no sticking",
-                shown(time),
-                shown(self.time),
-                self.of_set(set),
-                -ledger.friction_loss.value(),
-                ledger.scale()
-            ),
-            remedy: "Use the solver coulomb, less friction, or a motion that keeps sliding. Restore a saved state or \
-                     reset first"
-                .to_owned(),
-        })
-    }
-
-    /// Whether structures that can feel each other have no more energy than they can have.
-    fn has_its_energy(&self, set: usize) -> bool {
-        let step = self.system.step_size();
-        let factor = match self.system.settings().scheme {
-            Scheme::CentralDifference => {
-                1.0 / (1.0 - self.compiled.largest_product(self.system.sets().members(set), step).powi(2) / 4.0)
-            }
-            _ => ENERGY_FACTOR,
-        };
-        let bound = factor.max(ENERGY_FACTOR) * (self.initial_energies[set] + self.supplied(set))
-            + ENERGY_SLACK * self.system.ledgers()[set].scale();
-        self.energies[set].now <= bound
-    }
-
-    /// Energy that forces times speeds have put into a set (J).
-    fn supplied(&self, set: usize) -> f64 {
-        let ledger = &self.system.ledgers()[set];
-        ledger.supplied().max(self.energies[set].conserved - ledger.initial).max(0.0)
     }
 
     /// End the communication step here, before its end (early return): outputs cover the part done.

@@ -139,12 +139,13 @@ impl System {
         Ok(())
     }
 
-    /// Whether curvature work, which no input does, is still small beside what was exchanged, set by set; at the end of a
-    /// communication step.
+    /// Whether friction and impacts only took energy, and curvature work, which no input does, is still small beside what was exchanged,
+    /// set by set; at the end of a communication step.
     ///
     /// # Errors
-    /// It is not: [`StepFailure::Unbalanced`].
-    pub fn check_ledger(&self) -> Result<(), StepFailure> {
+    /// [`StepFailure::Gives`], [`StepFailure::Unbalanced`].
+    pub fn check_ledger(&mut self) -> Result<(), StepFailure> {
+        self.check_losses()?;
         for (set, ledger) in self.counted.ledgers.iter().enumerate() {
             let (work, exchanged) = (ledger.curvature_work.value(), ledger.exchanged());
             if work.abs() > MOST_CURVATURE * exchanged {

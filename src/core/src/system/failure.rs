@@ -1,6 +1,7 @@
 //! Why a step fails.
 
 use super::Curved;
+use super::losses::Loss;
 
 /// Why a step failed. Structures, sectors and nodes count from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +42,17 @@ pub enum StepFailure {
         /// All energy exchanged (J).
         exchanged: f64,
     },
+    /// Friction or impacts, which can only take energy, have given some.
+    Gives {
+        /// Set of structures that can feel each other.
+        set: usize,
+        /// Which of the two.
+        loss: Loss,
+        /// What it has given since it had taken most (J).
+        given: f64,
+        /// What that is held against (J).
+        exchanged: f64,
+    },
     /// A node moves so far around the axis that what linear kinematics misses is as large as its clearance.
     Curved(Curved),
     /// A node has left a surface around an axis over its edge, further than the surface goes on.
@@ -72,6 +84,15 @@ pub enum StepFailure {
         /// Contact node most pulled at.
         node: usize,
         /// Its impulse as a share of that of the node most pushed.
+        share: f64,
+    },
+    /// A law that looks once for penetration leaves a node deep inside the surface.
+    LeftInside {
+        /// Structure.
+        structure: usize,
+        /// Contact node that was deepest inside.
+        node: usize,
+        /// How deep, as a share of its clearance.
         share: f64,
     },
     /// More steps would have to be tried than are allowed.

@@ -8,6 +8,7 @@ mod facing;
 mod failure;
 mod group;
 mod growth;
+mod losses;
 mod march;
 mod pair;
 mod posed;
@@ -34,6 +35,8 @@ pub use failure::StepFailure;
 use group::Reach;
 pub(crate) use group::{Found, Group};
 pub use growth::Growth;
+pub use losses::Loss;
+use losses::Taken;
 use march::together::Together;
 pub use pair::{Carrier, Pair, PairParts};
 pub(crate) use posed::Bodies;
@@ -74,9 +77,18 @@ pub(crate) struct Counted {
     pub witnessed: u64,
     /// Of each set.
     pub ledgers: Vec<Ledger>,
+    /// Most that contact of each set has taken so far.
+    taken: Vec<Taken>,
 }
 
-persist_fields!(Counted { steps, effort, factorisations, witnessed, ledgers });
+persist_fields!(Counted { steps, effort, factorisations, witnessed, ledgers, taken });
+
+impl Counted {
+    /// Nothing has been done yet.
+    fn new(ledgers: Vec<Ledger>) -> Self {
+        Self { taken: vec![Taken::default(); ledgers.len()], ledgers, ..Self::default() }
+    }
+}
 
 /// Structures, the contact pairs between them, and which of the contacts can push each other.
 #[derive(Debug, Clone)]
@@ -144,7 +156,7 @@ impl System {
             groups,
             settings,
             events: Two { now: room(), before: room() },
-            counted: Counted { ledgers: vec![Ledger::default(); sets.count()], ..Counted::default() },
+            counted: Counted::new(vec![Ledger::default(); sets.count()]),
             mechanical: vec![0.0; sets.count()],
             together: Vec::new(),
             most_tried: u64::MAX,
@@ -306,8 +318,7 @@ impl System {
             structure.remember_start();
         }
         let initial = |set| Ledger { initial: self.mechanical_energy(set), ..Ledger::default() };
-        let ledgers = (0..self.sets.count()).map(initial).collect();
-        self.counted = Counted { ledgers, ..Counted::default() };
+        self.counted = Counted::new((0..self.sets.count()).map(initial).collect());
     }
 
     /// Kinetic plus strain energy of a set (J), in the quantity the scheme conserves.

@@ -1,4 +1,5 @@
-//! How much contact nodes are pulled at: what a law that looks once for penetration makes of nodes that push each other apart.
+//! How much contact nodes are pulled at, and how deep they are left inside: what a law that looks once for penetration makes of nodes that
+//! push each other.
 
 use super::System;
 use crate::persist::persist_fields;
@@ -11,14 +12,16 @@ pub struct Pulling {
     /// Of forces that push, and of those that pull, for each node (N s).
     pushed: Vec<f64>,
     pulled: Vec<f64>,
+    /// How deep each node has been inside at the end of a step, as a share of its clearance.
+    inside: Vec<f64>,
 }
 
-persist_fields!(Pulling { touched, pushed, pulled });
+persist_fields!(Pulling { touched, pushed, pulled, inside });
 
 impl Pulling {
     /// Of so many nodes.
     pub(super) fn new(nodes: usize) -> Self {
-        Self { touched: 0, pushed: vec![0.0; nodes], pulled: vec![0.0; nodes] }
+        Self { touched: 0, pushed: vec![0.0; nodes], pulled: vec![0.0; nodes], inside: vec![0.0; nodes] }
     }
 
     /// Nothing has touched yet.
@@ -26,6 +29,7 @@ impl Pulling {
         self.touched = 0;
         self.pushed.fill(0.0);
         self.pulled.fill(0.0);
+        self.inside.fill(0.0);
     }
 
     fn add(&mut self, node: usize, impulse: f64) {
@@ -55,6 +59,22 @@ impl System {
             last = event.structure;
             pulling.add(event.node, event.normal * step);
         }
+        for pair in self.pairs.iter().filter(|pair| pair.gap().layout().is_some()) {
+            let structure = &mut self.structures[pair.structure()];
+            let (clearance, lanes) = (pair.gap().clearance(), structure.lanes());
+            for &node in pair.nodes() {
+                let gaps = &structure.history.gap.now[node * lanes..(node + 1) * lanes];
+                let lowest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+                let inside = &mut structure.pulling.inside[node];
+                *inside = inside.max(-lowest / clearance);
+            }
+        }
+    }
+
+    /// Of a structure that touches a surface around an axis: the node that was deepest inside at the end of a step, and how deep, as a
+    /// share of its clearance.
+    pub fn left_inside(&self, structure: usize) -> Option<(usize, f64)> {
+        self.structures[structure].pulling.inside.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Of a structure that touches: the node most pulled at and the share of its impulse in that of the node most pushed, once contact

@@ -71,7 +71,7 @@ fn scene_with(feature: Feature, scheme: Scheme, solver: Solver) -> Scene {
 /// What is refused, as documented: every other combination of scheme, solver and feature runs.
 fn is_refused(feature: &str, scheme: Scheme, solver: Solver) -> bool {
     (feature.contains("coating") && solver != Solver::Lcp)
-        || (feature == "coriolis" && scheme == Scheme::MasslessBoundary)
+        || (scheme == Scheme::MasslessBoundary && (feature == "coriolis" || solver == Solver::Film))
 }
 
 /// Every combination that is not refused, by its name; what is refused says so at once.

@@ -102,7 +102,8 @@ fn compare(
 fn every_pair(mut check: impl FnMut(&Disk, [Simulation; 2], String)) {
     for (sectors, nodes, order) in [(5, 1, 5), (6, 1, 5), (8, 1, 5), (6, 2, 8), (3, 1, 5), (2, 2, 8)] {
         for scheme in SCHEMES {
-            for solver in SOLVERS {
+            let excluded = |solver: &Solver| scheme == Scheme::MasslessBoundary && *solver == Solver::Film;
+            for solver in SOLVERS.into_iter().filter(|solver| !excluded(solver)) {
                 for friction in [0.0, 0.15] {
                     let disk = Disk::random(sectors, nodes, order, 0.2, 3 + sectors as u64);
                     let both = pair(&disk, scheme, solver, friction);

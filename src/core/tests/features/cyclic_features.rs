@@ -49,7 +49,9 @@ const FEATURES: [Feature; 9] = [
 
 /// What is refused, as documented.
 fn is_refused(scene: &Scene) -> bool {
-    scene.settings.contacts[0].coating.is_some() && scene.settings.contacts[0].solver != Solver::Lcp
+    let (contact, scheme) = (&scene.settings.contacts[0], scene.settings.time.scheme);
+    (contact.coating.is_some() && contact.solver != Solver::Lcp)
+        || (contact.solver == Solver::Film && scheme == Scheme::MasslessBoundary)
 }
 
 fn scene_with(rom: Rom, feature: Feature, scheme: Scheme, solver: Solver) -> Scene {

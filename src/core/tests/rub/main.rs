@@ -5,6 +5,7 @@ mod guide;
 
 mod blades;
 mod extremes;
+mod gains;
 mod inputs;
 mod limits;
 mod pulling;

@@ -346,6 +346,9 @@ fn without_friction_more_contact_nodes_than_modes_are_no_end_of_a_run() {
             for (solver, coated) in
                 [(Solver::Film, false), (Solver::Lcp, false), (Solver::Coulomb, false), (Solver::Lcp, true)]
             {
+                if scheme == Scheme::MasslessBoundary && solver == Solver::Film {
+                    continue;
+                }
                 let modes = if scheme == Scheme::MasslessBoundary { 3 * nodes + 4 } else { nodes / 2 };
                 let mut scene = crowded(nodes, modes, seed);
                 scene.settings.time.scheme = scheme;

@@ -42,6 +42,8 @@ pub(crate) fn trial(seed: u64) -> Trial {
         Scheme::Galerkin if chance(&mut random, 0.9) => random.of(&[Solver::Lcp, Solver::Coulomb]),
         _ => random.of(&[Solver::Film, Solver::Lcp, Solver::Coulomb]),
     };
+    // The two exclude each other.
+    let solver = if scheme == Scheme::MasslessBoundary && solver == Solver::Film { Solver::Lcp } else { solver };
     let free = chance(&mut random, if scheme == Scheme::MasslessBoundary { 0.02 } else { 0.12 });
     let (settings, roms, gap) = if free {
         bodies::scene(&mut random, scheme, solver)

@@ -234,6 +234,10 @@ const OF_ROTORS: &[(&str, Change)] = &[
         galerkin(&mut scene.settings);
         scene.settings.contacts[0].solver = Solver::Film;
     }),
+    ("time.scheme: `massless-boundary` excludes `contact.solver", |scene| {
+        scene.settings.time.scheme = Scheme::MasslessBoundary;
+        scene.settings.contacts[0].solver = Solver::Film;
+    }),
     ("time.scheme: `galerkin` needs a clearance", |scene| {
         galerkin(&mut scene.settings);
         scene.settings.contacts[0].gap = 0.0;

@@ -34,6 +34,10 @@ pub struct Told {
     pub(in crate::simulation) pulls: Vec<bool>,
     /// Turn of the excitation per internal step (rad) that was warned of, of each structure that touches.
     turned: Vec<f64>,
+    /// Whether contact nodes were left deep inside, of each structure that touches.
+    pub(in crate::simulation) inside: Vec<bool>,
+    /// Whether curvature work was large beside the net work of inputs.
+    pub(in crate::simulation) curvature: bool,
     /// Whether a tolerance was missed.
     pub(in crate::simulation) missed: bool,
 }
@@ -49,6 +53,8 @@ impl Told {
             curved: vec![false; bodies],
             pulls: vec![false; bodies],
             turned: vec![RESOLVED_TURN / MATERIAL; bodies],
+            inside: vec![false; bodies],
+            curvature: false,
             missed: false,
         }
     }

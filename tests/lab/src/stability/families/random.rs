@@ -25,6 +25,8 @@ pub(crate) fn cases() -> Vec<Case> {
                 &["is displaced by", "u²/2r", "Check casing shape"],
                 &["µ", "Use"],
                 &["internal step", "below"],
+                &["massless-boundary", "film"],
+                &["friction has put", "no sticking"],
             ],
         );
         Case::new(format!("random/{index:03}"), expected, move |_| happened(index))

@@ -1,0 +1,158 @@
+//! Whether the energy of a run is there: at every communication point, and what is said where it is not.
+
+use super::{Phase, Simulation};
+use crate::ledger::Ledger;
+use crate::settings::{Scheme, Solver};
+use crate::system::Loss;
+use crate::{Error, Result, shown};
+
+/// Energy of the instant may be so many times what was put in: that of modal-exact is cos²(ωh/2) of it, a fourth at ωh = 2π/3, the end of
+/// what a step resolves; that of central differences at least 1 − (ωh/2)². What is beyond is in modes that the step passes over.
+const ENERGY_FACTOR: f64 = 4.0;
+/// And a share of all work exchanged, for rounding.
+const ENERGY_SLACK: f64 = 0.01;
+
+/// Curvature work is told once it is as large as the net work of inputs, or as that of the shaft alone: users read these, and not the magnitudes
+/// that were exchanged, and their sign is then unknown.
+const CURVATURE_OF_NET: f64 = 1.0;
+/// And from this share of all that was exchanged on: where next to nothing is left of the net, any error is as large.
+const CURVATURE_OF_ALL: f64 = 0.1;
+
+impl Simulation {
+    /// Tell of the first curvature work that is large beside the net work of inputs.
+    pub(super) fn note_curvature(&mut self, time: f64) {
+        if self.told.curvature {
+            return;
+        }
+        let found = self.system.ledgers().iter().enumerate().find_map(|(set, ledger)| Some((set, misled(ledger)?)));
+        let Some((set, (who, work))) = found else { return };
+        let curvature = self.system.ledgers()[set].curvature_work.value();
+        let text = format!(
+            "up to t = {} s normals that turn and surfaces that curve within internal steps have added {curvature:.3e} J that no input brings \
+             (curvature work){}, beside {work:.3e} J of net work of {who}: that may be wrong by as much, and in its sign. Use a smaller \
+             internal step",
+            shown(time),
+            self.of_set(set)
+        );
+        self.told.curvature = true;
+        self.note(text);
+    }
+
+    /// Vibration has no more energy than forces times speeds put in: what the scheme conserves leaves out what modes beyond the step
+    /// hold. With massless-boundary quasi-static modes hold energy one step before its work is known; its own limit keeps it.
+    pub(super) fn check_energy(&mut self, time: f64) -> Result<()> {
+        let settings = self.system.settings();
+        if !settings.ledger || settings.scheme == Scheme::MasslessBoundary {
+            return Ok(());
+        }
+        let Some(set) = (0..self.energies.len()).find(|set| !self.has_its_energy(*set)) else { return Ok(()) };
+        self.phase = Phase::Failed;
+        Err(Error::Unstable {
+            problem: format!(
+                "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, where it was {:.4e} J at the start \
+                 and work less friction and damping supplied {:.4e} J: modes that the internal step of {:.3e} s does not resolve \
+                 have taken energy that is not there",
+                shown(time),
+                shown(self.time),
+                self.of_set(set),
+                self.energies[set].now,
+                self.initial_energies[set],
+                self.supplied(set),
+                self.system.step_size()
+            ),
+            remedy: "Use a smaller internal step (internal_step_max). Restore a saved state or reset first".to_owned(),
+        })
+    }
+
+    /// Whether structures that can feel each other have no more energy than they can have.
+    fn has_its_energy(&self, set: usize) -> bool {
+        let step = self.system.step_size();
+        let factor = match self.system.settings().scheme {
+            Scheme::CentralDifference => {
+                1.0 / (1.0 - self.compiled.largest_product(self.system.sets().members(set), step).powi(2) / 4.0)
+            }
+            _ => ENERGY_FACTOR,
+        };
+        let bound = factor.max(ENERGY_FACTOR) * (self.initial_energies[set] + self.supplied(set))
+            + ENERGY_SLACK * self.system.ledgers()[set].scale();
+        self.energies[set].now <= bound
+    }
+
+    /// Energy that forces times speeds have put into a set (J).
+    fn supplied(&self, set: usize) -> f64 {
+        let ledger = &self.system.ledgers()[set];
+        ledger.supplied().max(self.energies[set].conserved - ledger.initial).max(0.0)
+    }
+
+    /// Friction or impacts have given energy (J): what happened, and what helps.
+    pub(super) fn told_gain(&self, set: usize, loss: Loss, [given, exchanged]: [f64; 2]) -> (String, String) {
+        let (of, settings) = (self.of_set(set), self.system.settings());
+        match loss {
+            Loss::Friction => (
+                format!(
+                    "friction{of} has put {given:.3e} J in, where it can only take, of {exchanged:.3e} J exchanged: tips vibrate faster than \
+                     they slide, and this law knows no sticking"
+                ),
+                self.against_sliding(settings.scheme),
+            ),
+            Loss::Impact => (
+                format!(
+                    "impacts{of} have put {given:.3e} J in, where they can only take, of {exchanged:.3e} J that contact forces have worked"
+                ),
+                match (settings.solver, settings.scheme) {
+                    (Solver::Film, _) => "Use solver = \"lcp\": film leaves nodes inside the surface for a step",
+                    (_, Scheme::Galerkin) => "Use a smaller `tolerance`",
+                    (_, Scheme::MasslessBoundary) => {
+                        "Use a smaller internal step or more damping, or the scheme modal-exact"
+                    }
+                    _ => "Use a smaller internal step",
+                }
+                .to_owned(),
+            ),
+        }
+    }
+
+    /// What helps where tips do not only slide: the law that knows sticking, if this scene may have it.
+    fn against_sliding(&self, scheme: Scheme) -> String {
+        let scene = &self.compiled.scene;
+        let coulomb = match scene.check_methods(scheme, Solver::Coulomb) {
+            Ok(()) => "Use the solver coulomb, ",
+            Err(_) if scene.settings.contacts.iter().all(|contact| contact.coating.is_none()) => {
+                "Set contact.solver = \"coulomb\" in the scene, or use "
+            }
+            Err(_) => "Use ",
+        };
+        format!("{coulomb}less friction, or a motion that keeps sliding")
+    }
+}
+
+/// Whose net work (J) users are misled about by curvature work that is large beside it.
+fn misled(ledger: &Ledger) -> Option<(&'static str, f64)> {
+    let (all, shaft) = (ledger.external_work(), ledger.shaft_work.value());
+    let net = if shaft != 0.0 && shaft.abs() < all.abs() { ("the shaft", shaft) } else { ("all inputs", all) };
+    let work = ledger.curvature_work.value().abs();
+    (work > CURVATURE_OF_NET * net.1.abs() && work > CURVATURE_OF_ALL * ledger.exchanged()).then_some(net)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curvature_work_is_held_against_the_net_that_users_read() {
+        let ledger = |shaft: f64, casing: f64, curvature: f64, turnover: f64| {
+            let mut ledger = Ledger::default();
+            ledger.shaft_work.add(shaft);
+            ledger.casing_work.add(casing);
+            ledger.curvature_work.add(curvature);
+            ledger.turnover.add(turnover);
+            ledger
+        };
+        // What goes in and comes back leaves a net whose sign curvature work decides, though it is a third of the exchange.
+        assert_eq!(misled(&ledger(-5.85, 0.0, 7.03, 20.0)), Some(("all inputs", -5.85)));
+        assert_eq!(misled(&ledger(0.5, 90.0, 15.0, 100.0)), Some(("the shaft", 0.5)));
+        // A small error of a large net, and one that is small beside all that was exchanged.
+        assert_eq!(misled(&ledger(90.0, 0.0, 2.0, 100.0)), None);
+        assert_eq!(misled(&ledger(0.01, 0.0, 0.5, 100.0)), None);
+    }
+}

@@ -1,0 +1,90 @@
+//! Tips that slide more slowly than they vibrate: warned of at the start, where the law knows no sticking.
+
+use nalgebra::DMatrix;
+
+use super::Simulation;
+use super::compile::Compiled;
+use super::limits::Parameters;
+use crate::dynamics::modal::ModalModel;
+use crate::gaps::shape::Surface;
+use crate::settings::Solver;
+use crate::shown;
+
+/// Angles at which a shape is looked at.
+const ANGLES: u32 = 720;
+
+impl Simulation {
+    /// Tips that slide more slowly than they vibrate stick at times, which the sliding law does not know.
+    pub(super) fn warn_of_sticking(&mut self, parameters: &Parameters) {
+        for body in 0..self.compiled.bodies.len() {
+            let (speed, friction) = (&self.inputs.rotors[body].speed, parameters.friction_of(&self.compiled, body));
+            if self.compiled.bodies[body].translations.is_some()
+                || parameters.solver == Solver::Coulomb
+                || (friction == 0.0 && !self.compiled.cuts(body))
+                || speed.slope != 0.0
+            {
+                continue;
+            }
+            let slow = self.compiled.slow_sliding(body, friction);
+            if speed.value.abs() >= slow {
+                continue;
+            }
+            let rotor = self.compiled.rotor_name(body);
+            self.warnings.push(format!(
+                "{rotor} starts at speed {} rad/s with {}: the sliding law does not model sticking; results are \
+                 meaningful once the tips slide faster than they vibrate, which they may not below some {slow:.1e} rad/s. A run in \
+                 which friction puts energy in ends{}",
+                shown(speed.value),
+                if self.compiled.cuts(body) { "a coating that is cut" } else { "friction" },
+                if self.compiled.cuts(body) { "" } else { " (the solver coulomb models sticking)" }
+            ));
+        }
+    }
+}
+
+impl Compiled {
+    /// Speed (rad/s) below which tips may vibrate faster than they slide: those that swing by their clearance, or by how far the shape of
+    /// the casing reaches in, in the lowest mode, or that are let go after they were pressed in as far with this friction coefficient.
+    pub(super) fn slow_sliding(&self, body: usize, friction: f64) -> f64 {
+        let parts = &self.bodies[body];
+        let lowest = parts.lowest_frequency();
+        let radius = self.body(body).1.contact_nodes.iter().fold(0.0, |most: f64, node| most.max(node.position[0]));
+        if !lowest.is_finite() {
+            return 0.0;
+        }
+        let reach = self.plan.pairs_of(body).map(|(pair, _)| self.reach_of(pair)).fold(0.0, f64::max);
+        let rate = match &parts.disk {
+            Some(disk) => (0..disk.diameters.len())
+                .map(|diameter| released(&disk.paired(diameter), friction))
+                .fold(lowest, f64::max),
+            None => released(&parts.model, friction).max(lowest),
+        };
+        reach * rate / radius
+    }
+
+    /// Clearance of a pair, or how far the shape of its surface reaches in where that is more (m).
+    fn reach_of(&self, pair: usize) -> f64 {
+        let gap = self.contact(pair).nominal_gap();
+        let shape = &self.plan.surface(&self.scene.settings, pair).shape;
+        let Ok(shape) = Surface::new(shape, gap) else { return gap };
+        let angle = |place: u32| std::f64::consts::TAU * f64::from(place) / f64::from(ANGLES);
+        (0..ANGLES).fold(gap, |most, place| most.max(-shape.evaluate(angle(place)).0))
+    }
+}
+
+/// Velocity around the axis per depth (1/s) of the node that is fastest when let go: a force λ along its normal and µλ around the axis presses
+/// it in by λΣφ_n²/ω², and every mode then swings with ω times its share. The phases of modes differ: their squares add up.
+fn released(model: &ModalModel, friction: f64) -> f64 {
+    let modes = || (0..model.len()).filter(|mode| model.frequencies[*mode] > 0.0);
+    let row = |shapes: &DMatrix<f64>, row: usize, mode: usize| shapes[(row, mode)].abs();
+    let node = |node: usize| {
+        let of = |mode: usize| [0, 1].map(|axis| row(&model.contact_modes, 3 * node + axis, mode));
+        let pressed: f64 = modes().map(|mode| (of(mode)[0] / model.frequencies[mode]).powi(2)).sum();
+        let speeds = modes().map(|mode| {
+            let [across, around] = of(mode);
+            (around * (across + friction * around) / model.frequencies[mode]).powi(2)
+        });
+        if pressed > 0.0 { speeds.sum::<f64>().sqrt() / pressed } else { 0.0 }
+    };
+    (0..model.contact_modes.nrows() / 3).map(node).fold(0.0, f64::max)
+}
