@@ -92,12 +92,15 @@ pub fn in_total(scenes: &[(&dyn Case, &Measured)]) -> Table {
     table
 }
 
+/// Total error of a run from its figures.
+type TotalError = Box<dyn Fn(&Figures) -> f64>;
+
 /// How the total error of a run follows from its figures; `None` where a case has no finer model and no known errors.
-fn total_error(case: &dyn Case) -> Option<Box<dyn Fn(&Figures) -> f64>> {
+fn total_error(case: &dyn Case) -> Option<TotalError> {
     if let Some(left) = case.model_error() {
         return Some(Box::new(move |figures| figures.of_own + left));
     }
-    super::sheets::has_total(case).then(|| Box::new(|figures: &Figures| figures.total) as Box<dyn Fn(&Figures) -> f64>)
+    super::sheets::has_total(case).then(|| Box::new(|figures: &Figures| figures.total) as TotalError)
 }
 
 fn beside(case: &dyn Case, target: f64, cells: Vec<String>) -> Vec<String> {
