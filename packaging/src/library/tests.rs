@@ -116,7 +116,8 @@ fn a_library_of_another_release_is_refused_by_name_and_version() {
         let mut bytes = elf(62);
         bytes.truncate(64);
         std::fs::write(&path, [&bytes, FUNCTIONS, told.as_bytes()].concat()).unwrap();
-        let refused = load(Unit::Scene, &arguments(std::slice::from_ref(&path), &[]), &Console::new(true, false)).unwrap_err();
+        let refused =
+            load(Unit::Scene, &arguments(std::slice::from_ref(&path), &[]), &Console::new(true, false)).unwrap_err();
         assert!(refused.what.ends_with("old.so") && refused.problem.contains(named), "{refused}");
         assert!(refused.problem.ends_with(LIBRARY_RELEASE), "{refused}");
     }

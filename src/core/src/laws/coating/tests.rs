@@ -277,7 +277,7 @@ fn width_of_patches_is_their_thickness_over_the_cosine_of_the_stagger() {
     for (stagger, radius) in [(0.0_f64, 0.25), (1.0, 0.25), (-1.0, 0.25), (1.0, 2.5)] {
         let (chord, thickness) = (0.06, 2e-3);
         let node = |index: usize| {
-            let (along, share) = (chord * number(index) / 4.0, if index % 4 == 0 { 0.125 } else { 0.25 });
+            let (along, share) = (chord * number(index) / 4.0, if index.is_multiple_of(4) { 0.125 } else { 0.25 });
             // On both sides of the angle where counting starts anew.
             let angle = (along * stagger.sin() / radius).rem_euclid(TAU);
             let (area, length) = (share * chord * thickness, share * chord);
