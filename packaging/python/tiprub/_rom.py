@@ -19,7 +19,8 @@ ENTRIES = {"origin", "contact_names", "largest_speed", "contact_grid", "watched_
            "rub_errors", "rub_errors_found_on", "units"}
 #: Needs format 2.
 SECOND = {"contact_areas", "contact_lengths", "flexibility_deviation", "response_frequencies", "response_deviation", "watched_map",
-          "watched_positions", "watched_names", "stress_map", "stress_positions", "stress_names", "basis", "contact_rows", "rub_errors", "rub_errors_found_on"}
+          "watched_positions", "watched_names", "stress_map", "stress_positions", "stress_names", "stress_thermal", "stress_centrifugal", "support_stiffness", "support_mass",
+          "support_thermal", "basis", "contact_rows", "rub_errors", "rub_errors_found_on"}
 
 
 def rom(

@@ -174,6 +174,11 @@ pub struct RomExtras {
     pub watched: Option<Watched>,
     /// Places whose stress is recovered.
     pub stress: Option<Watched>,
+    /// Static stress of the full model at these places per kelvin of each patch, 6·places × patches (Pa/K), held where the structure is
+    /// held and free of contact.
+    pub stress_thermal: Option<DMatrix<f64>>,
+    /// The same per Ω² of the centrifugal load on the structure at rest, 6·places × 1 (Pa s²).
+    pub stress_centrifugal: Option<DMatrix<f64>>,
     /// What its held nodes feel.
     pub support: Option<Support>,
     /// What the coordinates stand for.

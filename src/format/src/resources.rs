@@ -110,6 +110,9 @@ fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) ->
         // Its displacements are outputs of watched sectors.
         watched: rom.extras.watched.clone().filter(|_| !settings.outputs.watched_sectors.is_empty()),
         stress: rom.extras.stress.clone().filter(|_| settings.outputs.stress),
+        stress_thermal: rom.extras.stress_thermal.clone().filter(|_| settings.outputs.stress && structure.thermal),
+        stress_centrifugal: (rom.extras.stress_centrifugal.clone())
+            .filter(|_| settings.outputs.stress && structure.spin.growth),
         support: rom.extras.support.clone().filter(|_| carries && settings.outputs.support_reaction).map(|support| {
             Support {
                 // Its columns are the patches.

@@ -6,7 +6,7 @@ pub(crate) const ROM_FORMAT: &str = "tiprub-rom";
 /// written in the first form that holds it, for older readers.
 pub(crate) const ROM_FORMAT_VERSIONS: [&str; 2] = ["1", "2"];
 /// Arrays and metadata of format 2.
-pub(crate) const SECOND_RELEASE: [&str; 18] = [
+pub(crate) const SECOND_RELEASE: [&str; 20] = [
     "support_stiffness",
     "support_mass",
     "support_thermal",
@@ -21,6 +21,8 @@ pub(crate) const SECOND_RELEASE: [&str; 18] = [
     "stress_map",
     "stress_positions",
     "stress_names",
+    "stress_thermal",
+    "stress_centrifugal",
     "basis",
     "contact_rows",
     "rub_errors",
@@ -68,7 +70,7 @@ const fn array(
 const GENERAL_ARRAYS: usize = 9;
 
 /// Every array.
-pub const ARRAYS: [ArrayLayout; 32] = [
+pub const ARRAYS: [ArrayLayout; 34] = [
     array("mass", "[n, n]", "kg", true, "Reduced mass matrix of one sector: symmetric, positive definite."),
     array("stiffness", "[n, n]", "N/m", true, "Reduced stiffness matrix: symmetric, positive semidefinite."),
     array(
@@ -227,6 +229,23 @@ pub const ARRAYS: [ArrayLayout; 32] = [
         "Undeformed positions of these places, as for contact nodes.",
     ),
     array(
+        "stress_thermal",
+        "[places, 6, patches]",
+        "Pa/K",
+        false,
+        "Static stress of the full structure at these places per kelvin of each patch, without contact: D(Bu - alpha) of its \
+         displacements u under the thermal load. With `stress_map` and `thermal_loads`; a scene that asks for the stress of a heated \
+         rotor needs it.",
+    ),
+    array(
+        "stress_centrifugal",
+        "[places, 6]",
+        "Pa s^2",
+        false,
+        "Static stress of the full structure at these places per square of the speed, without contact and stiffening. With `stress_map` and \
+         `centrifugal_load`; a scene that asks for the stress of a rotor with growth needs it.",
+    ),
+    array(
         "support_stiffness",
         "[6, n]",
         "N or N m per unit coordinate",
@@ -257,6 +276,9 @@ pub(crate) const SPIN_ARRAYS: [&str; 5] =
 pub(crate) const WATCHED_ARRAYS: [&str; 2] = ["watched_map", "watched_positions"];
 /// The arrays of places with stress: both or none.
 pub(crate) const STRESS_ARRAYS: [&str; 2] = ["stress_map", "stress_positions"];
+/// Static stress of a structure that heats up, and of one that spins.
+pub(crate) const STRESS_THERMAL: &str = "stress_thermal";
+pub(crate) const STRESS_CENTRIFUGAL: &str = "stress_centrifugal";
 /// The arrays of a support: both or none; the third comes with thermal loads.
 pub(crate) const SUPPORT_ARRAYS: [&str; 2] = ["support_stiffness", "support_mass"];
 pub(crate) const SUPPORT_THERMAL: &str = "support_thermal";

@@ -7,7 +7,7 @@ mod response;
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{Basis, Frame, RomChecks, Thermal, Watched};
+use tiprub_core::rom::{Basis, Frame, RomChecks, Watched};
 use tiprub_core::shown;
 
 use crate::assembly::{Assembled, free_dofs};
@@ -20,16 +20,17 @@ use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report, silent};
 use crate::sparse::{Factor, SparseMatrix, principal_pair, tall_product};
-use crate::spin::{ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, reduced_spin};
-use crate::stress::{StressPlaces, all_places, stress_rows};
-use crate::thermal::{patch_loads, whole_mesh};
+use crate::spin::{
+    ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, centrifugal_load, reduced_spin,
+};
+use crate::stress::{StressPlaces, recovered_stress};
+use crate::thermal::uniform_heat;
 use crate::{Error, Result};
 
 pub use crate::contact_point::ContactPoint;
 pub(crate) use held::Held;
-pub(crate) use outcome::direction;
-use outcome::{build_rom, contact_node};
-pub(crate) use outcome::{description, element_names, interface, responses};
+use outcome::build_rom;
+pub(crate) use outcome::{contact_node, description, direction, element_names, interface, responses};
 use response::{Seen, with_responses};
 
 /// How the motion of a structure is described beside its static responses to contact forces.
@@ -195,9 +196,18 @@ pub fn reduce_model(
     let (spin, spin_checks) = spin.map_or((None, Vec::new()), |ReducedSpin { spin, checks }| (Some(spin), checks));
     let mut rom = build_rom(&model, clamped.len(), contact, options, &craig_bampton, checks);
     rom.extras.spin = spin;
-    rom.extras.thermal = uniform_heat(&model, &free, &craig_bampton.transformation)?;
+    let heat = uniform_heat(&model, &free)?;
+    rom.extras.thermal = heat.as_ref().map(|heat| heat.reduced(&craig_bampton.transformation));
     rom.extras.watched = watched(&model, &free, &craig_bampton.transformation, options)?;
-    rom.extras.stress = stress(&model, &free, &craig_bampton.transformation, &full.modes.shapes, options)?;
+    if let Some(places) = recovered_stress(&model, &free, &full.modes.shapes, options)? {
+        rom.extras.stress = Some(places.reduced(&craig_bampton.transformation));
+        // What nothing holds expands without stress.
+        let moved = heat.map(|heat| if clamped.is_empty() { None } else { Some(full.responses(heat.forces)) });
+        rom.extras.stress_thermal = moved.map(|moved| places.thermal(moved));
+        if rom.extras.spin.is_some() {
+            rom.extras.stress_centrifugal = Some(places.elastic(&full.responses(centrifugal_load(&model, &free))));
+        }
+    }
     let fixed_interface_frequencies = craig_bampton.fixed_interface_frequencies;
     let reduction = Reduction::new(rom, &full.modes, &free, &squares, (model.nodes.len(), model.mesh))?;
     Ok(Reduction { spin_checks, fixed_interface_frequencies, ..reduction })
@@ -355,19 +365,6 @@ fn contact_loads(free: &[usize], nodes: &[[f64; 3]], contact: &[ContactPoint], f
     Ok(loads)
 }
 
-/// Load per kelvin of the whole structure in reduced coordinates, of a mesh of one material that expands. Static responses to contact
-/// forces are among these coordinates, so that the free expansion of the contact nodes is that of the full model.
-fn uniform_heat(model: &FeModel, free: &[usize], transformation: &Mat<f64>) -> Result<Option<Thermal>> {
-    let Some((mesh, material)) = model.mesh.as_ref().filter(|(_, material)| material.expansion != 0.0) else {
-        return Ok(None);
-    };
-    let patches = vec![whole_mesh(mesh)];
-    let forces = patch_loads(mesh, material, &patches)?;
-    let forces = Mat::from_fn(free.len(), 1, |row, _| forces[(free[row], 0)]);
-    let loads = tall_product(transformation.as_ref(), forces.as_ref());
-    Ok(Some(Thermal { loads: DMatrix::from_fn(loads.nrows(), 1, |i, j| loads[(i, j)]), patches }))
-}
-
 /// Displacements of the watched points per reduced coordinate, in the directions of the contact nodes.
 fn watched(
     model: &FeModel,
@@ -381,30 +378,5 @@ fn watched(
     let rows = contact_loads(free, &model.nodes, &options.watched, options.frame)?;
     let map = tall_product(rows.as_ref(), transformation.as_ref());
     let points = options.watched.iter().map(|point| contact_node(&model.nodes, point, options.frame));
-    Ok(Some(Watched { map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]), points: points.collect() }))
-}
-
-/// Stress at chosen places per reduced coordinate, in the directions of the contact nodes.
-fn stress(
-    model: &FeModel,
-    free: &[usize],
-    transformation: &Mat<f64>,
-    modes: &Mat<f64>,
-    options: &ReductionOptions,
-) -> Result<Option<Watched>> {
-    if options.stress.is_empty() {
-        return Ok(None);
-    }
-    let Some((mesh, material)) = &model.mesh else {
-        let problem = "the model has no mesh of one material, whose elements know it";
-        return Err(Error::invalid("stress", problem, "Leave it out, or give a mesh file of one material"));
-    };
-    let places = all_places((mesh, material), free, modes, &options.stress)?;
-    let nodes: Vec<usize> = places.iter().map(|(_, node)| *node).collect();
-    let rows = stress_rows((mesh, material), free, &nodes, options.frame)?;
-    let map = tall_product(rows.as_ref(), transformation.as_ref());
-    let points = places
-        .into_iter()
-        .map(|(name, node)| contact_node(&model.nodes, &ContactPoint::at(name, node, 0.0), options.frame));
     Ok(Some(Watched { map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]), points: points.collect() }))
 }

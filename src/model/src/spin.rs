@@ -22,11 +22,21 @@ pub use equilibrium::{Rotating, SpinningState, turned_about_axis, without_axial}
 pub use reduced::SpinCheck;
 pub(crate) use reduced::{ReducedSpin, Resting, SPARE_MODES, SpinningStates, reduced_spin};
 
+use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{Rom, rom::Spin};
 
 use crate::craig_bampton::dense_modes;
+use crate::fe_model::FeModel;
 use crate::{Error, Result};
+
+/// Centrifugal force on the free dofs of the resting structure per Ω², ∫ρ Nᵀ(x, y, 0), one column (kg m).
+pub(crate) fn centrifugal_load(model: &FeModel, free: &[usize]) -> Mat<f64> {
+    let radial =
+        Mat::from_fn(3 * model.nodes.len(), 1, |dof, _| if dof % 3 == 2 { 0.0 } else { model.nodes[dof / 3][dof % 3] });
+    let load = model.mass.times(radial.as_ref());
+    Mat::from_fn(free.len(), 1, |row, _| load[(free[row], 0)])
+}
 
 /// Stiffness of a reduced model at a speed (rad/s): K₀ + Ω²K₁ + Ω⁴K₂.
 pub fn stiffness_at(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> DMatrix<f64> {

@@ -3,13 +3,15 @@
 //! The stress at a node is the mean of what the elements around it have there, see [`crate::element::nodal_stress`].
 
 use faer::Mat;
-use nalgebra::Matrix3;
-use tiprub_core::rom::{Frame, STRESSES, von_mises};
+use nalgebra::{DMatrix, Matrix3};
+use tiprub_core::rom::{ContactNode, Frame, STRESSES, Watched, von_mises};
 
 use crate::element::nodal_stress;
+use crate::fe_model::FeModel;
 use crate::material::Material;
 use crate::mesh::Mesh;
-use crate::reduce::direction;
+use crate::reduce::{ContactPoint, ReductionOptions, contact_node, direction};
+use crate::sparse::tall_product;
 use crate::{Error, Result};
 
 /// Where stress is recovered.
@@ -60,7 +62,7 @@ fn rows(mesh: &Mesh, material: &Material, nodes: &[usize]) -> Result<Vec<Rows>> 
 ///
 /// # Errors
 /// Those of [`nodal_stress`].
-pub(crate) fn stress_rows(
+fn stress_rows(
     (mesh, material): (&Mesh, &Material),
     free: &[usize],
     nodes: &[usize],
@@ -80,6 +82,13 @@ pub(crate) fn stress_rows(
     Ok(loads)
 }
 
+/// Stress per kelvin of an isotropic body that is heated evenly and does not move, in any directions (Pa/K).
+fn held_thermal_stress(material: &Material) -> [f64; STRESSES] {
+    let (lambda, shear) = material.lame();
+    let normal = -material.expansion * (3.0 * lambda + 2.0 * shear);
+    [normal, normal, normal, 0.0, 0.0, 0.0]
+}
+
 /// The same stress in axes turned about z.
 fn turned([xx, yy, zz, xy, yz, zx]: [f64; STRESSES], cos: f64, sin: f64) -> [f64; STRESSES] {
     let tensor = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz);
@@ -93,7 +102,7 @@ fn turned([xx, yy, zz, xy, yz, zx]: [f64; STRESSES], cos: f64, sin: f64) -> [f64
 ///
 /// # Errors
 /// A node that does not exist, a name that is there twice, more modes than are known.
-pub(crate) fn all_places(
+fn all_places(
     (mesh, material): (&Mesh, &Material),
     free: &[usize],
     modes: &Mat<f64>,
@@ -159,4 +168,62 @@ fn largest(
         stress.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(node, _)| node)
     };
     Ok((0..count).map(place).collect())
+}
+
+/// Places whose stress is recovered.
+pub(crate) struct RecoveredStress {
+    points: Vec<ContactNode>,
+    /// Stress per displacement, free dofs × 6·places, in the directions of the contact nodes (Pa/m).
+    rows: Mat<f64>,
+    /// Stress per kelvin of what is held everywhere (Pa/K).
+    held: [f64; STRESSES],
+}
+
+/// The places that `options` name and those of the largest stress of modes (free dofs × modes); `None` where it asks for none.
+///
+/// # Errors
+/// A model without a mesh of one material, and those of [`all_places`].
+pub(crate) fn recovered_stress(
+    model: &FeModel,
+    free: &[usize],
+    modes: &Mat<f64>,
+    options: &ReductionOptions,
+) -> Result<Option<RecoveredStress>> {
+    if options.stress.is_empty() {
+        return Ok(None);
+    }
+    let Some((mesh, material)) = &model.mesh else {
+        let problem = "the model has no mesh of one material, whose elements know it";
+        return Err(Error::invalid("stress", problem, "Leave it out, or give a mesh file of one material"));
+    };
+    let places = all_places((mesh, material), free, modes, &options.stress)?;
+    let nodes: Vec<usize> = places.iter().map(|(_, node)| *node).collect();
+    let rows = stress_rows((mesh, material), free, &nodes, options.frame)?;
+    let point = |(name, node)| contact_node(&model.nodes, &ContactPoint::at(name, node, 0.0), options.frame);
+    let points = places.into_iter().map(point).collect();
+    Ok(Some(RecoveredStress { points, rows, held: held_thermal_stress(material) }))
+}
+
+impl RecoveredStress {
+    /// Per reduced coordinate.
+    pub(crate) fn reduced(&self, transformation: &Mat<f64>) -> Watched {
+        let map = tall_product(self.rows.as_ref(), transformation.as_ref());
+        let map = DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]);
+        Watched { map, points: self.points.clone() }
+    }
+
+    /// Of displacements (free dofs × 1), 6·places × 1.
+    pub(crate) fn elastic(&self, moved: &Mat<f64>) -> DMatrix<f64> {
+        let stress = tall_product(self.rows.as_ref(), moved.as_ref());
+        DMatrix::from_fn(stress.nrows(), 1, |row, _| stress[(row, 0)])
+    }
+
+    /// Static stress per kelvin, 6·places × 1 (Pa/K), of the displacements per kelvin under the thermal load (free dofs × 1); none of a
+    /// structure that nothing holds, whose expansion is free of stress.
+    pub(crate) fn thermal(&self, moved: Option<Mat<f64>>) -> DMatrix<f64> {
+        let Some(moved) = moved else { return DMatrix::zeros(self.rows.ncols(), 1) };
+        let mut stress = self.elastic(&moved);
+        stress.iter_mut().enumerate().for_each(|(row, stress)| *stress += self.held[row % STRESSES]);
+        stress
+    }
 }

@@ -8,11 +8,14 @@
 use core::f64::consts::TAU;
 
 use faer::Mat;
-use tiprub_core::rom::Patch;
+use nalgebra::DMatrix;
+use tiprub_core::rom::{Patch, Thermal};
 
 use crate::element::thermal_load;
+use crate::fe_model::FeModel;
 use crate::material::Material;
 use crate::mesh::{Element, Mesh};
+use crate::sparse::tall_product;
 use crate::{Error, Result};
 
 /// Centroids this close to the edge between two patches (share of a turn, of the mesh's axial extent) belong to the
@@ -94,6 +97,32 @@ pub fn patch_loads(mesh: &Mesh, material: &Material, patches: &[Patch]) -> Resul
         }
     }
     Ok(loads)
+}
+
+/// Thermal load of the whole structure.
+pub(crate) struct UniformHeat {
+    /// Nodal forces per kelvin, free dofs × 1 (N/K).
+    pub(crate) forces: Mat<f64>,
+    patches: Vec<Patch>,
+}
+
+/// Load per kelvin of the whole structure, of a mesh of one material that expands.
+pub(crate) fn uniform_heat(model: &FeModel, free: &[usize]) -> Result<Option<UniformHeat>> {
+    let Some((mesh, material)) = model.mesh.as_ref().filter(|(_, material)| material.expansion != 0.0) else {
+        return Ok(None);
+    };
+    let patches = vec![whole_mesh(mesh)];
+    let forces = patch_loads(mesh, material, &patches)?;
+    Ok(Some(UniformHeat { forces: Mat::from_fn(free.len(), 1, |row, _| forces[(free[row], 0)]), patches }))
+}
+
+impl UniformHeat {
+    /// In reduced coordinates. Static responses to contact forces are among these, so that the free expansion of the contact nodes is
+    /// that of the full model.
+    pub(crate) fn reduced(&self, transformation: &Mat<f64>) -> Thermal {
+        let loads = tall_product(transformation.as_ref(), self.forces.as_ref());
+        Thermal { loads: DMatrix::from_fn(loads.nrows(), 1, |i, j| loads[(i, j)]), patches: self.patches.clone() }
+    }
 }
 
 fn centroid(mesh: &Mesh, element: &Element) -> [f64; 3] {

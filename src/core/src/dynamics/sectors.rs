@@ -159,8 +159,29 @@ impl Sectors {
         }
     }
 
-    /// Follow the speed of the rotor (rad/s) and its temperature (K) where modes are coupled by them; returns the change of strain
-    /// energy (J).
+    /// Load uncoupled sectors in the next step by the free expansion of a temperature (K), after [`Sectors::loads_mut`].
+    pub fn expand(&mut self, temperature: f64) {
+        if let Self::Uncoupled(bank) = self {
+            bank.expand(temperature);
+        }
+    }
+
+    /// Move uncoupled sectors that are at rest by the free expansion of a temperature (K), after [`Sectors::settle`].
+    pub fn settle_expansion(&mut self, temperature: f64) {
+        if let Self::Uncoupled(bank) = self {
+            bank.settle_expansion(temperature);
+        }
+    }
+
+    /// Work of heat on quasi-static modes over the step just done (J), beyond what [`Sectors::set_speed`] returned before it.
+    pub fn finish_stiffening(&mut self) -> f64 {
+        match self {
+            Self::Uncoupled(bank) => bank.finish_stiffening(),
+            Self::Coupled(_) => 0.0,
+        }
+    }
+
+    /// Follow the speed of the rotor (rad/s) and its temperature (K) where modes are coupled by them; returns the change of energy (J).
     pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         match self {
             Self::Uncoupled(bank) => bank.set_speed(speed, temperature),

@@ -27,7 +27,30 @@ pub fn von_mises([xx, yy, zz, xy, yz, zx]: [f64; STRESSES]) -> f64 {
 impl Rom {
     pub(super) fn validate_watched(&self, remedy: &str) -> Result<()> {
         self.validate_points("watched", self.extras.watched.as_ref(), (3, ranges::MAP), remedy)?;
-        self.validate_points("stress", self.extras.stress.as_ref(), (STRESSES, ranges::STRESS_MAP), remedy)
+        self.validate_points("stress", self.extras.stress.as_ref(), (STRESSES, ranges::STRESS_MAP), remedy)?;
+        self.validate_static_stress(remedy)
+    }
+
+    fn validate_static_stress(&self, remedy: &str) -> Result<()> {
+        let extras = &self.extras;
+        let patches = extras.thermal.as_ref().map(|thermal| thermal.patches.len());
+        for (name, array, load, columns) in [
+            ("stress_thermal", &extras.stress_thermal, "thermal_loads", patches),
+            ("stress_centrifugal", &extras.stress_centrifugal, "centrifugal_load", extras.spin.as_ref().map(|_| 1)),
+        ] {
+            let Some(array) = array else { continue };
+            let (Some(stress), Some(columns)) = (&extras.stress, columns) else {
+                let problem = format!("given without `stress_map` and `{load}`");
+                return Err(Error::invalid(format!("ROM array `{name}`"), problem, "Add these arrays, or remove it"));
+            };
+            let expected = (STRESSES * stress.points.len(), columns);
+            if array.shape() != expected {
+                let problem = format!("shape {:?}, {expected:?} expected", array.shape());
+                return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
+            }
+            entries(name, array, ranges::STRESS_MAP, remedy)?;
+        }
+        Ok(())
     }
 
     /// Points whose arrays are named `of`, with so many components each, up to the largest.

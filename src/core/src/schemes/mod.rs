@@ -164,6 +164,19 @@ impl ModeCoefficients {
         }
     }
 
+    /// The same recurrence of a mode whose stiffness, inertia and damping are a share of these.
+    #[must_use]
+    pub fn with_stiffness(self, share: f64) -> Self {
+        Self {
+            compliance: self.compliance / share,
+            delayed: self.delayed / share,
+            loss: self.loss * share,
+            inertia: self.inertia * share,
+            spring: self.spring * share,
+            ..self
+        }
+    }
+
     /// Displacement per unit of a modal force that is known beforehand (s²).
     pub fn load_compliance(&self) -> f64 {
         self.compliance + self.delayed

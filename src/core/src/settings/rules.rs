@@ -361,6 +361,22 @@ static ROMS: &[Rule] = &[
         "stress comes from the finite elements that the ROM was reduced from",
         "Reduce the blade with --stress-modes or --stress-set, or remove the line",
     ),
+    needs(
+        &[HEATED_STRESS],
+        ("static thermal stress in that ROM (array `stress_thermal`)", |at| {
+            at.stressed(|own| own.thermal).all(|rom| rom.extras.stress_thermal.is_some())
+        }),
+        "the expansion of a free blade causes no stress, and the reduced coordinates alone do not know that",
+        "Reduce the blade again, add the array, or remove `thermal` or the line",
+    ),
+    needs(
+        &[GROWN_STRESS],
+        ("static centrifugal stress in that ROM (array `stress_centrifugal`)", |at| {
+            at.stressed(|own| own.spin.growth).all(|rom| rom.extras.stress_centrifugal.is_some())
+        }),
+        "few modes do not resolve the stress of a load that acts in the whole blade",
+        "Reduce the blade again, add the array, or remove `spin.growth` or the line",
+    ),
     excludes(
         &[MODES],
         ("a rotor whose sectors are coupled by harmonics", |at| {

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::compile::Compiled;
+use super::compile::{Body, Compiled};
 use super::drive::Input;
 use super::{Quantity, Simulation};
 use crate::dynamics::bank::BankOptions;
@@ -10,39 +10,68 @@ use crate::dynamics::excitation::{Excitation, most_moved};
 use crate::dynamics::modal::{ModalModel, ModalSpin};
 use crate::dynamics::sectors::Sectors;
 use crate::ranges::SOFTENED;
+use crate::rom::Watched;
 use crate::settings::{InitialSettings, Scheme, StructureSettings};
 use crate::{Error, Result, Rom, shown};
 
-/// Modal loads by the temperature of the blades, per kelvin: what softens with the blade, and what Ω² and Ω⁴ add to it with
-/// stiffening; of coupled sectors on nodal diameter 0. Empty where a scene does not ask for it.
-///
-/// Expansion strains nothing but what is held, so that a blade that turns expands as it does at rest: the load at speed is that
-/// which K(Ω) takes to the free expansion K⁻¹f. The load f of the shape at rest would bend the stretched blade.
+/// Modal load per kelvin of coupled sectors, on nodal diameter 0; empty where a scene does not heat them.
+pub fn disk_heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
+    let Some(load) = whole_load(structure, rom).filter(|_| rom.is_cyclic()) else { return Vec::new() };
+    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
+    let all = libm::sqrt(rom.sectors as f64);
+    model.modal_load(&load).into_iter().map(|load| all * load).collect()
+}
+
+/// Load on the reduced coordinates per kelvin of a structure that a scene heats, which has one temperature (N/K).
+fn whole_load(structure: &StructureSettings, rom: &Rom) -> Option<Vec<f64>> {
+    let thermal = rom.extras.thermal.as_ref().filter(|_| structure.thermal)?;
+    Some(thermal.loads.row_iter().map(|row| row.iter().sum()).collect())
+}
+
+/// Free expansion K⁻¹f of uncoupled blades per kelvin, in coordinates of the modes of `model` at this temperature (K); empty where a scene
+/// does not heat them. Expansion strains nothing but what is held, so that it is the same at every speed and temperature.
 ///
 /// # Errors
 /// Stiffening of a blade that nothing holds: it has no free expansion.
-pub fn heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Result<Vec<[f64; 3]>> {
-    let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) else { return Ok(Vec::new()) };
-    let whole: Vec<f64> = thermal.loads.row_iter().map(|row| row.iter().sum()).collect();
-    #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
-    let all = if rom.is_cyclic() { libm::sqrt(rom.sectors as f64) } else { 1.0 };
-    let mut loads: Vec<[f64; 3]> = model.modal_load(&whole).into_iter().map(|load| [all * load, 0.0, 0.0]).collect();
-    if let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin.stiffening) {
-        let held = rom.stiffness.clone().cholesky().ok_or_else(|| {
-            let remedy = "Use a ROM whose root is held, or leave `thermal` or `spin.stiffening` out";
-            Error::invalid(
-                "ROM array `stiffness`",
-                "not positive definite: what nothing holds has no free expansion",
-                remedy,
-            )
-        })?;
-        let expansion = held.solve(&DVector::from_vec(whole));
-        for (power, stiffness) in [(1, &spin.stiffness_speed2), (2, &spin.stiffness_speed4)] {
-            let added = model.modal_load((stiffness * &expansion).as_slice());
-            loads.iter_mut().zip(added).for_each(|(load, added)| load[power] = added);
-        }
+pub fn expansion(structure: &StructureSettings, rom: &Rom, model: &ModalModel, temperature: f64) -> Result<Vec<f64>> {
+    let Some(load) = whole_load(structure, rom).filter(|_| !rom.is_cyclic()) else { return Ok(Vec::new()) };
+    if !structure.spin.stiffening {
+        let left = softened(structure, temperature);
+        let modes = model.modal_load(&load).into_iter().zip(&model.frequencies);
+        return Ok(modes.map(|(load, w)| if *w > 0.0 { left * load / (w * w) } else { 0.0 }).collect());
     }
-    Ok(loads)
+    let held = rom.stiffness.clone().cholesky().ok_or_else(|| {
+        let remedy = "Use a ROM whose root is held, or leave `thermal` or `spin.stiffening` out";
+        let problem = "not positive definite: what nothing holds has no free expansion";
+        Error::invalid("ROM array `stiffness`", problem, remedy)
+    })?;
+    Ok(model.modal_load((&rom.mass * held.solve(&DVector::from_vec(load))).as_slice()))
+}
+
+/// Static stress of the full model at the places of `stress` beyond that of the reduced coordinates, by heat (Pa/K) and by growth (Pa s²):
+/// 6·places values each, none where a scene has no such load. Modes leave a part of loads that act in the whole blade; this part is at rest.
+///
+/// # Errors
+/// A ROM without modes.
+pub fn static_stress(
+    structure: &StructureSettings,
+    rom: &Rom,
+    stress: &Watched,
+    body: &Body,
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    let beyond = |whole: DVector<f64>, modes: DVector<f64>| (whole - modes).as_slice().to_vec();
+    let heat = rom.extras.stress_thermal.as_ref().filter(|_| structure.thermal);
+    let heat = heat.map(|heat| beyond(heat.column_sum(), &body.stress * DVector::from_column_slice(&body.expansion)));
+    let spin = rom.extras.spin.as_ref().filter(|_| structure.spin.growth);
+    let growth = rom.extras.stress_centrifugal.as_ref().zip(spin).map(|(growth, spin)| {
+        // Of the structure at rest, as the static stress is.
+        let modes = ModalModel::from_rom(rom, 0.0)?;
+        let load = modes.modal_load(&spin.centrifugal_load).into_iter().zip(&modes.frequencies);
+        let moved = load.map(|(load, w)| if *w > 0.0 { load / (w * w) } else { 0.0 });
+        let moved = &modes.shapes * DVector::from_iterator(modes.len(), moved);
+        Ok(beyond(growth.column_sum(), &stress.map * moved))
+    });
+    Ok((heat.unwrap_or_default(), growth.transpose()?.unwrap_or_default()))
 }
 
 /// Share of the elastic stiffness that is left at a temperature (K).
@@ -51,28 +80,36 @@ pub fn softened(structure: &StructureSettings, temperature: f64) -> f64 {
 }
 
 impl Compiled {
-    /// Modal loads of blades by growth and heat.
+    /// Modal loads of blades by growth, and of coupled sectors by heat.
     pub fn fill_loads(&self, body: usize, speed: f64, temperature: f64, loads: &mut [f64]) {
-        let (structure, parts) = (self.body(body).0, &self.bodies[body]);
+        let parts = &self.bodies[body];
         if parts.centrifugal.is_empty() {
             loads.fill(0.0);
         } else {
             super::loads::fill_centrifugal(&parts.centrifugal, speed, loads);
         }
-        // What is softer pushes less: its free expansion stays.
-        let strength = temperature * softened(structure, temperature);
-        if structure.spin.stiffening {
-            let square = speed * speed;
-            for (load, [_, second, fourth]) in loads.iter_mut().zip(&parts.heat) {
-                *load += temperature * square * (second + square * fourth);
-            }
-        }
-        loads.iter_mut().zip(&parts.heat).for_each(|(load, [heat, ..])| *load += strength * heat);
+        loads.iter_mut().zip(&parts.disk_heat).for_each(|(load, heat)| *load += temperature * heat);
+    }
+
+    /// Put blades into equilibrium with growth and heat.
+    pub fn settle(&self, body: usize, speed: f64, temperature: f64, modes: &mut Sectors) {
+        let mut load = vec![0.0; self.bodies[body].model.len()];
+        self.fill_loads(body, speed, temperature, &mut load);
+        modes.settle(&load);
+        modes.settle_expansion(temperature);
     }
 
     /// Whether blades are loaded by growth or heat.
     pub fn loads_blades(&self, body: usize) -> bool {
-        !self.bodies[body].centrifugal.is_empty() || !self.bodies[body].heat.is_empty()
+        let parts = &self.bodies[body];
+        [parts.centrifugal.is_empty(), parts.disk_heat.is_empty(), parts.expansion.is_empty()].contains(&false)
+    }
+
+    /// Factor on the elastic stiffness of a sector at a temperature (K): that of mistuning, squared, and what softening leaves.
+    pub fn stiffness_factor(&self, body: usize, sector: usize, temperature: f64) -> f64 {
+        let structure = self.body(body).0;
+        let factor = structure.frequency_factors.get(sector).copied().unwrap_or(1.0);
+        factor * factor * softened(structure, temperature)
     }
 
     /// The excitation of a structure, which acts on its ROM.
@@ -196,6 +233,7 @@ impl Compiled {
         BankOptions {
             frequency_factors: structure.frequency_factors.clone(),
             loads: self.loads_blades(body),
+            expansion: parts.expansion.clone(),
             coupling,
             excitation,
             ..BankOptions::default()
@@ -314,15 +352,11 @@ impl Simulation {
             let [displacements, velocities] =
                 [Quantity::InitialDisplacement, Quantity::InitialRate].map(|quantity| self.values_of(quantity, body));
             let [speed, temperature] = self.references()[body];
-            let loaded = self.compiled.loads_blades(body).then(|| {
-                let mut load = vec![0.0; self.compiled.bodies[body].model.len()];
-                self.compiled.fill_loads(body, speed, temperature, &mut load);
-                load
-            });
             let modes = self.system.structures_mut()[body].modes_mut();
-            match loaded {
-                Some(load) => modes.settle(&load),
-                None => modes.rest(),
+            if self.compiled.loads_blades(body) {
+                self.compiled.settle(body, speed, temperature, modes);
+            } else {
+                modes.rest();
             }
             for ((one, displacement), velocity) in initial.iter().zip(displacements).zip(velocities) {
                 launch(modes, one, displacement, velocity);

@@ -18,12 +18,12 @@ use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene, shown};
 use nalgebra::DMatrix;
 
-use super::blades::{heat, softened};
 use super::contour::check_contour;
+use super::blades::{disk_heat, expansion, softened, static_stress};
 use super::loads::{CarrierLoads, centrifugal};
 use super::patches::Patches;
 use super::plan::{PairPlan, Plan, prefix};
-use super::slave_surface::{CarrierModes, Share, spline_gap};
+use super::slave_surface::{CarrierModes, Lining, Share, spline_gap};
 
 /// Most contact nodes of all sectors together that a flexible slave or the disk couples: their Delassus matrix is dense.
 pub const MOST_COUPLED: usize = 2000;
@@ -56,12 +56,18 @@ pub struct Body {
     pub stiffness_range: Option<[[f64; 2]; 2]>,
     /// Modal load by growth, per Ω² and, with stiffening, per Ω⁴; empty without.
     pub centrifugal: Vec<[f64; 2]>,
-    /// Modal load per kelvin, and what Ω² and Ω⁴ add to it with stiffening; empty without.
-    pub heat: Vec<[f64; 3]>,
+    /// Modal load of coupled sectors per kelvin; empty without.
+    pub disk_heat: Vec<f64>,
+    /// Free expansion of uncoupled blades per kelvin in modal coordinates; empty without.
+    pub expansion: Vec<f64>,
     /// Displacement of watched points per unit of each mode, 3·points × modes; empty without.
     pub watched: DMatrix<f64>,
     /// Stress at places per unit of each mode, 6·places × modes (Pa); empty where the scene does not ask for it.
     pub stress: DMatrix<f64>,
+    /// Static stress there per kelvin beyond that of the expansion of the modes, 6·places (Pa/K); empty without.
+    pub stress_heat: Vec<f64>,
+    /// The same per Ω² by growth (Pa s²); empty without.
+    pub stress_growth: Vec<f64>,
     /// 1 or −1 per mode, so that the contact node it moves most goes along the positive direction; empty unless asked for.
     pub senses: Vec<f64>,
 }
@@ -91,6 +97,8 @@ pub struct Compiled {
     pub carriers: Vec<CarrierParts>,
     /// Where friction heat is counted, per pair.
     pub patches: Vec<Option<Patches>>,
+    /// Between surface and mesh, per pair; empty where no support is asked for.
+    pub linings: Vec<Option<Lining>>,
     /// Hash of settings and ROMs; saved states carry it.
     pub fingerprint: u64,
     pub references: References,
@@ -117,9 +125,12 @@ impl Body {
             reference_temperature: 0.0,
             stiffness_range,
             centrifugal,
-            heat: Vec::new(),
+            disk_heat: Vec::new(),
+            expansion: Vec::new(),
             watched,
             stress,
+            stress_heat: Vec::new(),
+            stress_growth: Vec::new(),
             senses: Vec::new(),
         })
     }
@@ -174,6 +185,7 @@ impl Compiled {
         let mut compiled = Self {
             fingerprint: super::fingerprint::of_scene(scene),
             patches: plan.pairs.iter().map(|pair| Patches::new(scene, &plan, pair)).collect(),
+            linings: Vec::new(),
             scene: scene.clone(),
             plan,
             bodies,
@@ -188,7 +200,25 @@ impl Compiled {
             compiled.set_reference_speed(body, [compiled.body(body).0.speed, 0.0])?;
         }
         compiled.check_blades()?;
+        if compiled.scene.settings.outputs.support_reaction {
+            compiled.linings =
+                (0..compiled.plan.pairs.len()).map(|pair| compiled.lining(pair)).collect::<Result<_>>()?;
+        }
         Ok(compiled)
+    }
+
+    /// Between the surface of a pair and the mesh of the structure whose support is asked for.
+    fn lining(&self, pair: usize) -> Result<Option<Lining>> {
+        let plan = &self.plan.pairs[pair];
+        let supported = |carrier: &usize| self.carriers[*carrier].support.is_some();
+        let Some(carrier) = plan.carrier.filter(supported).filter(|_| plan.grid.is_none()) else { return Ok(None) };
+        let master = (self.body(plan.body).1, &plan.nodes[..]);
+        Lining::new(carrier, (self.carrier(carrier).1, self.share(carrier)), master, self.contact(pair)).map(Some)
+    }
+
+    /// How much of the contact grid of a carrier a surface takes.
+    fn share(&self, carrier: usize) -> Share {
+        if self.uses(carrier) > 1 { Share::Near } else { Share::Whole }
     }
 
     /// Settings and ROM of a structure whose nodes touch.
@@ -284,12 +314,14 @@ impl Compiled {
         let body = &mut self.bodies[body];
         body.reference_speed = speed;
         body.centrifugal = centrifugal(structure, rom, &body.model);
-        body.heat = heat(structure, rom, &body.model)?;
+        body.disk_heat = disk_heat(structure, rom, &body.model);
+        body.expansion = expansion(structure, rom, &body.model, temperature)?;
         if let Some(watched) = &rom.extras.watched {
             body.watched = &watched.map * &body.model.shapes;
         }
         if let Some(stress) = rom.extras.stress.as_ref().filter(|_| asked) {
             body.stress = &stress.map * &body.model.shapes;
+            (body.stress_heat, body.stress_growth) = static_stress(structure, rom, stress, body)?;
         }
         if modes_told {
             let largest = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
@@ -456,8 +488,7 @@ impl Compiled {
             return Ok(GapLaw::Revolution(gap));
         }
         let layout = Layout::new(rom, &clearances, lanes)?;
-        let share = |carrier| if self.uses(carrier) > 1 { Share::Near } else { Share::Whole };
-        let carrier = plan.carrier.map(|carrier| (self.carrier(carrier).1, share(carrier)));
+        let carrier = plan.carrier.map(|carrier| (self.carrier(carrier).1, self.share(carrier)));
         let gap = spline_gap((rom, &plan.nodes), layout, contact, settings, carrier)?;
         Ok(GapLaw::Spline(Box::new(gap)))
     }

@@ -379,10 +379,9 @@ impl Simulation {
     fn settle(&mut self) {
         let structures = self.system.structures_mut();
         for body in (0..self.compiled.bodies.len()).filter(|body| self.compiled.loads_blades(*body)) {
-            let mut load = vec![0.0; self.compiled.bodies[body].model.len()];
             let rotor = &self.inputs.rotors[body];
-            self.compiled.fill_loads(body, rotor.speed.at(0.0), rotor.temperature_at(0.0), &mut load);
-            structures[body].modes_mut().settle(&load);
+            let (speed, temperature) = (rotor.speed.at(0.0), rotor.temperature_at(0.0));
+            self.compiled.settle(body, speed, temperature, structures[body].modes_mut());
         }
         let under = structures.iter_mut().skip(self.compiled.bodies.len());
         for ((carrier, inputs), structure) in self.compiled.carriers.iter().zip(&self.inputs.carriers).zip(under) {

@@ -284,7 +284,8 @@ impl View<'_> {
         let temperatures = self.simulation.inputs.carriers[carrier].temperatures.iter().enumerate();
         let heated = temperatures.map(|(patch, input)| rows.thermal[(row, patch)] * input.at(0.5 * self.elapsed));
         let heat: f64 = heated.sum();
-        self.mean * (sum - self.elapsed * heat)
+        let lining = row.checked_sub(3).map_or(0.0, |axis| own.lining[axis]);
+        self.mean * (sum - self.elapsed * heat + lining)
     }
 
     /// Displacement of a watched point of a sector along an axis of its frame (m).
@@ -292,10 +293,17 @@ impl View<'_> {
         self.simulation.watched_row(body, 3 * point + axis, sector)
     }
 
-    /// Component of the stress at a place of a sector (Pa).
+    /// Component of the stress at a place of a sector (Pa): that of the displacements, with static stress by heat and growth that is the
+    /// full model's. Stress of strains is in proportion to the stiffness of the sector; forces decide that of growth.
     pub fn stress(&self, body: usize, sector: usize, place: usize, component: usize) -> f64 {
-        let shapes = &self.simulation.compiled.bodies[body].stress;
-        self.simulation.observed(body, shapes, STRESSES * place + component, sector)
+        let (compiled, row) = (&self.simulation.compiled, STRESSES * place + component);
+        let parts = &compiled.bodies[body];
+        let rotor = &self.simulation.inputs.rotors[body];
+        let (temperature, speed) = (rotor.temperature_at(self.elapsed), rotor.spin.at(self.elapsed));
+        let heat = parts.stress_heat.get(row).map_or(0.0, |heat| heat * temperature);
+        let growth = parts.stress_growth.get(row).map_or(0.0, |growth| growth * speed * speed);
+        let moved = self.simulation.observed(body, &parts.stress, row, sector);
+        compiled.stiffness_factor(body, sector, temperature) * (moved + heat) + growth
     }
 
     /// Equivalent stress of von Mises at a place of a sector (Pa).

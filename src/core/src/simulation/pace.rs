@@ -132,7 +132,7 @@ impl Simulation {
         }
         self.find_drives(offset, time);
         if self.system.fly(&self.drives, &self.turns, offset) {
-            self.window.add(&self.system, &self.compiled.patches, offset);
+            self.window.add(&self.system, (&self.compiled.patches, &self.compiled.linings), offset);
             self.communication.done = last;
         }
     }

@@ -5,7 +5,8 @@ use crate::gaps::layout::Layout;
 use crate::gaps::shape::Surface;
 use crate::gaps::spline::SplineGap;
 use crate::gaps::surface_spline::SurfaceSpline;
-use crate::rom::Frame;
+use crate::gaps::wrench::cross;
+use crate::rom::{ContactNode, Frame};
 use crate::settings::{ContactSettings, SplineSettings, SurfaceSettings};
 use crate::{Error, Result, Rom};
 use nalgebra::DMatrix;
@@ -167,6 +168,51 @@ fn data(grid: &Grid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
         }
     }
     points
+}
+
+/// Rings of a contact grid that carries a surface of another radius, as an inner lining of the casing that the mesh leaves out does: it
+/// passes forces on as a rigid body, so that the support feels them with the lever of the surface.
+#[derive(Debug, Clone)]
+pub struct Lining {
+    /// Of the structure that carries it, among such structures.
+    pub carrier: usize,
+    /// Axial position, and radius of the surface less that of the mesh, ascending along z (m).
+    rings: Vec<[f64; 2]>,
+}
+
+impl Lining {
+    /// Between the grid of `rom` and the surface around the contact nodes `nodes` of `master`.
+    ///
+    /// # Errors
+    /// Contact nodes beyond the grid.
+    pub fn new(
+        carrier: usize,
+        (rom, share): (&Rom, Share),
+        (master, nodes): (&Rom, &[usize]),
+        contact: &ContactSettings,
+    ) -> Result<Self> {
+        let contour = Contour::new(master, nodes);
+        let grid = carried_grid(rom, share, &contour)?;
+        let rings = grid.rings.iter().zip(rom.contact_nodes[grid.first_node..].chunks(grid.around));
+        #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
+        let mean = |ring: &[ContactNode]| ring.iter().map(|node| node.position[0]).sum::<f64>() / grid.around as f64;
+        let rings = rings.map(|(z, ring)| [*z, contour.radius(*z) + contact.nominal_gap() - mean(ring)]);
+        Ok(Self { carrier, rings: rings.collect() })
+    }
+
+    /// Radius of the surface less that of the mesh at an axial position (m).
+    fn thickness(&self, z: f64) -> f64 {
+        let upper = self.rings.iter().position(|ring| z <= ring[0]).unwrap_or(self.rings.len() - 1).max(1);
+        let ([from, first], [to, last]) = (self.rings[upper - 1], self.rings[upper]);
+        first + (last - first) * ((z - from) / (to - from)).clamp(0.0, 1.0)
+    }
+
+    /// Moment (N·m) that a force (N) at a point of the surface has beyond that of the same force on the mesh.
+    pub fn moment(&self, point: [f64; 3], force: [f64; 3]) -> [f64; 3] {
+        let radius = libm::hypot(point[0], point[1]);
+        let share = self.thickness(point[2]) / radius;
+        cross([share * point[0], share * point[1], 0.0], force)
+    }
 }
 
 fn check_radii(rom: &Rom, first: usize, points: &[[f64; 3]]) -> Result<()> {

@@ -253,7 +253,8 @@ impl Simulation {
             Err(StepFailure::Exhausted) => return Err(self.give_up()),
             Err(failure) => return Err(self.fail(failure, time)),
         }
-        self.window.add(&self.system, &self.compiled.patches, self.system.step_size());
+        let places = (&self.compiled.patches[..], &self.compiled.linings[..]);
+        self.window.add(&self.system, places, self.system.step_size());
         self.communication.done = next;
         let finished = next == self.communication.count;
         if finished {
@@ -270,16 +271,17 @@ impl Simulation {
         for body in 0..self.compiled.bodies.len() {
             let rotor = &self.inputs.rotors[body];
             let (speed, temperature) = (rotor.spin.at(offset), rotor.temperature_at(offset));
+            if !hold && self.compiled.varies(body) {
+                self.system.set_speed(body, speed, temperature);
+            }
             if self.compiled.loads_blades(body) {
-                let loads = self.system.structures_mut()[body].modes_mut().loads_mut();
-                self.compiled.fill_loads(body, speed, temperature, loads);
+                let modes = self.system.structures_mut()[body].modes_mut();
+                self.compiled.fill_loads(body, speed, temperature, modes.loads_mut());
+                modes.expand(temperature);
             }
             if let Some([amplitude, phase]) = self.excitation_at(body, offset) {
                 let factor = scheme.harmonic_factor(step * self.excitation_rate(body, offset));
                 self.system.structures_mut()[body].modes_mut().excite(factor * amplitude, phase);
-            }
-            if !hold && self.compiled.varies(body) {
-                self.system.set_speed(body, speed, temperature);
             }
         }
         let under = self.system.structures_mut().iter_mut().skip(self.compiled.bodies.len());

@@ -1,6 +1,7 @@
 //! What is gathered over one communication step: impulses, extremes, friction heat.
 
 use super::patches::Patches;
+use super::slave_surface::Lining;
 use crate::dynamics::bank::ModalBank;
 use crate::gaps::wrench::cross;
 use crate::persist::persist_fields;
@@ -44,6 +45,8 @@ pub struct SupportWindow {
     pub moved: Vec<f64>,
     /// Velocity when the communication step began.
     pub speeds: Vec<f64>,
+    /// ∫M dt of the contact forces on what touches, beyond that of the same forces on the mesh (N·m·s).
+    pub lining: [f64; 3],
 }
 
 /// Sums and extremes since the communication step began.
@@ -63,7 +66,7 @@ pub struct Window {
 
 persist_fields!(BodyWindow { lowest, normal_impulse, tangential_impulse, force_impulse, moment_impulse });
 persist_fields!(PairWindow { force_impulse, moment_impulse, friction_heat, patch_heat, casing_moment });
-persist_fields!(SupportWindow { moved, speeds });
+persist_fields!(SupportWindow { moved, speeds, lining });
 persist_fields!(Window { bodies, pairs, supports, friction_heat, normal_peak });
 
 impl Window {
@@ -88,7 +91,7 @@ impl Window {
         };
         let support = |structure: &Structure| {
             let modes = structure.modes().uncoupled().map_or(0, ModalBank::modes);
-            SupportWindow { moved: vec![0.0; modes], speeds: vec![0.0; modes] }
+            SupportWindow { moved: vec![0.0; modes], speeds: vec![0.0; modes], lining: [0.0; 3] }
         };
         let carriers = structures.iter().filter(|structure| outputs.support_reaction && structure.nodes() == 0);
         Self {
@@ -117,6 +120,7 @@ impl Window {
         let carriers = structures.iter().filter(|structure| structure.nodes() == 0);
         for (support, structure) in self.supports.iter_mut().zip(carriers) {
             support.moved.fill(0.0);
+            support.lining = [0.0; 3];
             for (mode, speed) in support.speeds.iter_mut().enumerate() {
                 *speed = speed_of(structure, mode);
             }
@@ -125,7 +129,7 @@ impl Window {
     }
 
     /// Add the internal step just done, of length `step` (s).
-    pub fn add(&mut self, system: &System, patches: &[Option<Patches>], step: f64) {
+    pub fn add(&mut self, system: &System, (patches, linings): (&[Option<Patches>], &[Option<Lining>]), step: f64) {
         for (body, structure) in self.bodies.iter_mut().zip(system.structures()) {
             for (lowest, gap) in body.lowest.iter_mut().zip(structure.lowest_gaps()) {
                 *lowest = if *gap < *lowest { *gap } else { *lowest };
@@ -158,6 +162,11 @@ impl Window {
             if !pair.casing_moment.is_empty() {
                 let moment = cross(event.wrench.point, event.wrench.force);
                 pair.casing_moment.iter_mut().zip(moment).for_each(|(sum, term)| *sum += step * term);
+            }
+            if let Some(lining) = linings.get(event.pair).and_then(Option::as_ref) {
+                let moment = lining.moment(event.wrench.point, event.wrench.force);
+                let sum = &mut self.supports[lining.carrier].lining;
+                *sum = std::array::from_fn(|i| sum[i] + step * moment[i]);
             }
             self.friction_heat += event.friction_heat;
             pair.friction_heat += event.friction_heat;

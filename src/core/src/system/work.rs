@@ -145,10 +145,15 @@ impl System {
 
     fn enter_loads(&mut self) {
         for (set, ledger) in self.counted.ledgers.iter_mut().enumerate() {
-            let (mut work, mut excitation) = (0.0, 0.0);
+            let (mut work, mut excitation, mut stiffening) = (0.0, 0.0, 0.0);
             for member in self.sets.members(set) {
                 work += self.structures[*member].modes_mut().finish_loads();
                 excitation += self.structures[*member].modes_mut().finish_excitation();
+                stiffening += self.structures[*member].modes_mut().finish_stiffening();
+            }
+            if stiffening != 0.0 {
+                ledger.stiffening_work.add(stiffening);
+                ledger.turnover.add(stiffening.abs());
             }
             if excitation != 0.0 {
                 ledger.excitation_work.add(excitation);

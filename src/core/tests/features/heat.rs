@@ -227,3 +227,178 @@ fn temperatures_beyond_all_stiffness_are_refused() {
     set(&mut hot, "rotor_temperature", 950.0);
     assert!(hot.initialise(0.0).is_err());
 }
+
+/// Displacements of all blades as far as they go by themselves: `rows` of each, in the lanes of a run.
+fn in_lanes(run: &Simulation, rows: &DMatrix<f64>) -> Vec<f64> {
+    let (lanes, sectors) = (run.system().bank().lanes(), run.system().bank().sectors());
+    rows.iter().flat_map(|row| (0..lanes).map(move |lane| if lane < sectors { *row } else { 0.0 })).collect()
+}
+
+/// α T L for any stiffness: blades of other frequencies rest where the others do, at the start and once they are warmed up, also where
+/// speed and heat change their stiffness.
+#[test]
+fn mistuned_blades_expand_alike() {
+    let factors = vec![0.9, 1.0, 1.1];
+    for (softening, stiffening, scheme) in [
+        (0.0, false, Scheme::ModalExact),
+        (SOFTENING, false, Scheme::ModalExact),
+        (SOFTENING, true, Scheme::ModalExact),
+        (SOFTENING, false, Scheme::CentralDifference),
+        (SOFTENING, true, Scheme::MasslessBoundary),
+    ] {
+        let mut rom = if scheme.is_massless() { models::rich_blade(3) } else { models::blade(3) };
+        rom.extras.spin = Some(models::spin(rom.order()));
+        let load = heated(rom.clone()).extras.thermal.unwrap().loads;
+        let free = &rom.contact_map * rom.stiffness.clone().cholesky().unwrap().solve(&load) * 250.0;
+        let mut given = scene(rom);
+        let structure = &mut given.settings.structures[0];
+        (structure.frequency_factors, structure.softening) = (factors.clone(), softening);
+        (structure.spin.stiffening, structure.damping_ratio) = (stiffening, Some(0.3));
+        (given.settings.time.scheme, given.settings.time.step) = (scheme, 5e-7);
+        let mut run = warm(&given, 250.0);
+        let expected = in_lanes(&run, &free);
+        let off = apart(&displacements(&run), &expected);
+        assert!(off < 1e-12, "{} {softening} {stiffening}: {off:e} at the start", scheme.name());
+        go(&mut run, 1e-3);
+        assert!(apart(&displacements(&run), &expected) < 1e-9, "rest stays rest");
+        let mut run = started(&given);
+        for step in 1..=200 {
+            set(&mut run, "rotor_temperature", 2.5 * f64::from(step).min(100.0));
+            go(&mut run, 2e-4);
+        }
+        let (off, residual) = (apart(&displacements(&run), &expected), real(&run, "energy_residual_relative"));
+        println!("{} {softening} {stiffening}: {off:.1e}, residual {residual:.1e}", scheme.name());
+        assert!(off < 1e-6 && residual.abs() < 1e-11, "{off:e} {residual:e}");
+    }
+}
+
+/// Modes that a step does not resolve, and quasi-static ones, soften as the others do: free expansion is that of any temperature, and a
+/// force moves the blade as far as the softened one.
+#[test]
+fn unresolved_and_quasi_static_modes_soften_too() {
+    for (scheme, step) in
+        [(Scheme::ModalExact, 1e-5), (Scheme::MasslessBoundary, 1e-6), (Scheme::MasslessBoundary, 4e-6)]
+    {
+        for stiffening in [false, true] {
+            let mut rom = models::rich_blade(3);
+            rom.extras.spin = Some(models::spin(rom.order()));
+            let load = heated(rom.clone()).extras.thermal.unwrap().loads;
+            let temperature = 300.0;
+            let solved = rom.stiffness.clone().cholesky().unwrap();
+            let free = &rom.contact_map * solved.solve(&load) * temperature;
+            let mut given = scene(rom.clone());
+            let structure = &mut given.settings.structures[0];
+            (structure.softening, structure.damping_ratio) = (SOFTENING, Some(0.3));
+            (structure.spin.stiffening, structure.spin.growth) = (stiffening, !stiffening);
+            (given.settings.time.scheme, given.settings.time.step) = (scheme, step);
+            let mut run = started(&given);
+            for step in 1..=200 {
+                set(&mut run, "rotor_temperature", 0.01 * temperature * f64::from(step).min(100.0));
+                go(&mut run, 2e-4);
+            }
+            let mut moved = free.clone();
+            if !stiffening {
+                let spin = rom.extras.spin.as_ref().unwrap();
+                let pull = DVector::from_fn(rom.order(), |row, _| 1300.0 * 1300.0 * spin.centrifugal_load[row]);
+                moved += &rom.contact_map * solved.solve(&pull) / (1.0 - SOFTENING * temperature);
+            }
+            let off = apart(&displacements(&run), &in_lanes(&run, &moved));
+            let residual = real(&run, "energy_residual_relative");
+            println!("{} {step:e} {stiffening}: {off:.1e}, residual {residual:.1e}", scheme.name());
+            assert!(off < 1e-6 && residual.abs() < 1e-11, "{off:e} {residual:e}");
+        }
+    }
+}
+
+/// The factor of a blade is one on its frequencies at every temperature and speed, wherever it started.
+#[test]
+fn mistuned_blades_soften_and_stiffen_by_their_own_stiffness() {
+    let factor = 1.2;
+    let mut rom = models::blade(2);
+    rom.extras.spin = Some(models::spin(rom.order()));
+    rom.extras.spin.as_mut().unwrap().stiffness_speed2 *= 20.0;
+    let rings = |starts_there: bool, sector: usize| {
+        let mut given = scene(rom.clone());
+        given.roms[0].extras.thermal.as_mut().unwrap().loads.fill(0.0);
+        let structure = &mut given.settings.structures[0];
+        (structure.frequency_factors, structure.softening) = (vec![1.0, factor], SOFTENING);
+        (structure.spin.stiffening, structure.damping_ratio) = (true, Some(0.0));
+        structure.speed = if starts_there { 1600.0 } else { 800.0 };
+        structure.initial = vec![InitialSettings {
+            mode: 1,
+            sector: None,
+            nodal_diameter: None,
+            phase: 0.0,
+            displacement: 1e-5,
+            velocity: 0.0,
+        }];
+        given.settings.time.step = 5e-7;
+        let mut run = warm(&given, if starts_there { 300.0 } else { 0.0 });
+        for step in 1..=20 {
+            if !starts_there {
+                set(&mut run, "rotor_temperature", 15.0 * f64::from(step));
+                set(&mut run, "speed", 800.0 + 40.0 * f64::from(step));
+            }
+            go(&mut run, 1e-4);
+        }
+        assert!(real(&run, "energy_residual_relative").abs() < 1e-11);
+        // Zero crossings of the mode of the start.
+        let mut crossings = Vec::new();
+        let q = |run: &Simulation| run.system().bank().modal_state(0, sector).0;
+        let mut before = q(&run);
+        while crossings.len() < 13 {
+            go(&mut run, 1e-5);
+            let now = q(&run);
+            if (before < 0.0) != (now < 0.0) {
+                crossings.push(run.time() - 1e-5 * now / (now - before));
+            }
+            before = now;
+        }
+        6.0 / (crossings[12] - crossings[0])
+    };
+    let tuned = rings(true, 0);
+    for starts_there in [true, false] {
+        let found = rings(starts_there, 1) / tuned;
+        println!("{starts_there}: {found:.5} times");
+        assert!((found / factor - 1.0).abs() < 1e-3, "{found}");
+        let found = rings(starts_there, 0) / tuned;
+        assert!((found - 1.0).abs() < 1e-3, "{found}");
+    }
+}
+
+/// A rub while speed and temperature move, with everything that changes stiffness or loads at once: books close, states go on.
+#[test]
+fn the_energy_balance_closes_in_a_rub_that_warms_up() {
+    for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary] {
+        let mut rom = models::rich_blade(4);
+        rom.extras.spin = Some(models::spin(rom.order()));
+        let mut given = models::bumps(heated(rom));
+        let structure = &mut given.settings.structures[0];
+        (structure.thermal, structure.softening) = (true, SOFTENING);
+        structure.frequency_factors = vec![0.97, 1.0, 1.03, 1.0];
+        (structure.spin.stiffening, structure.spin.growth) = (true, true);
+        structure.spin.coriolis = !scheme.is_massless();
+        (given.settings.time.scheme, given.settings.time.step) = (scheme, 5e-7);
+        let mut run = started(&given);
+        let mut other = None;
+        for step in 1..=100 {
+            set(&mut run, "rotor_temperature", 1.5 * f64::from(step));
+            set(&mut run, "speed", 1300.0 + f64::from(step));
+            go(&mut run, 5e-5);
+            if step == 50 {
+                let mut copy = Simulation::new(&given).unwrap();
+                copy.restore_state(&saved(&run)).unwrap();
+                other = Some(copy);
+            } else if let Some(other) = &mut other {
+                set(other, "rotor_temperature", 1.5 * f64::from(step));
+                set(other, "speed", 1300.0 + f64::from(step));
+                go(other, 5e-5);
+            }
+        }
+        let residual = real(&run, "energy_residual_relative");
+        let heat = real(&run, "friction_loss");
+        println!("{}: {heat:.1} J, residual {residual:.1e}", scheme.name());
+        assert!(heat > 0.1 && residual.abs() < 1e-10, "{heat} J, {residual:e}");
+        assert_eq!(bits(&run), bits(&other.unwrap()), "{}", scheme.name());
+    }
+}

@@ -15,6 +15,7 @@ mod cyclic_features;
 mod excitation;
 mod heat;
 mod initial;
+mod load_pairs;
 mod pairs;
 mod stress;
 mod support;

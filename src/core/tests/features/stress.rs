@@ -1,9 +1,12 @@
 //! Stress at chosen places, against the rows of the ROM and the definition of von Mises.
 
+use std::f64::consts::TAU;
+
 use nalgebra::DMatrix;
-use tiprub_core::rom::{STRESSES, Watched};
+use tiprub_core::rom::{Patch, STRESSES, Thermal, Watched};
+use tiprub_core::settings::Shape;
 use tiprub_core::{Scene, Simulation};
-use tiprub_test_models::{self as models, element, go, started};
+use tiprub_test_models::{self as models, element, go, set, started};
 
 /// A blade whose stresses are known functions of its contact displacements, ready to rub.
 fn scene() -> Scene {
@@ -93,4 +96,126 @@ fn stress_without_places_is_refused() {
     assert!(short.contains("`stress_map`"), "{short}");
     let broken = told(|scene| scene.roms[0].extras.stress.as_mut().unwrap().map[(1, 1)] = f64::NAN);
     assert!(broken.contains("`stress_map`: non-finite entry at (1, 1)"), "{broken}");
+}
+
+/// Blades with a load per kelvin and by the speed, whose static thermal stress is given.
+fn heated(thermal: fn(usize) -> f64) -> Scene {
+    let mut scene = scene();
+    (scene.settings.surfaces[0].shape, scene.settings.contacts[0].gap) = (Shape::Circular {}, 5e-3);
+    let rom = &mut scene.roms[0];
+    let loads = DMatrix::from_fn(rom.order(), 1, |row, _| 2.0 + 1.5 * (row as f64).sin());
+    rom.extras.thermal = Some(Thermal { loads, patches: vec![Patch { angle: [0.0, TAU], axial: [-1.0, 1.0] }] });
+    rom.extras.stress_thermal = Some(DMatrix::from_fn(2 * STRESSES, 1, |row, _| thermal(row)));
+    rom.extras.spin = Some(models::spin(rom.order()));
+    scene.settings.structures[0].thermal = true;
+    scene
+}
+
+fn stress_of(run: &Simulation, sector: usize) -> Vec<f64> {
+    let names = ["radial", "tangential", "axial", "radial_tangential", "tangential_axial", "axial_radial"];
+    let told = |place: u32, name: &str| element(run, &format!("blade[{sector}].{name}_stress"), place);
+    (0..2).flat_map(|place| names.map(|name| told(place, name))).collect()
+}
+
+fn warm(scene: &Scene, temperature: f64) -> Simulation {
+    let mut run = Simulation::new(scene).unwrap();
+    set(&mut run, "rotor_temperature", temperature);
+    run.initialise(0.0).unwrap();
+    run
+}
+
+/// At rest it is the static stress of the full model, none where that expands freely; with softening as much less as there is stiffness,
+/// and of a stiffer blade as much more.
+#[test]
+fn a_warm_blade_has_the_thermal_stress_of_the_full_model() {
+    for thermal in [(|_| 0.0) as fn(usize) -> f64, |row| 1e5 * (row as f64 - 4.5)] {
+        for (softening, stiffening, factor) in
+            [(0.0, false, 1.0), (3e-4, false, 1.0), (3e-4, true, 1.0), (3e-4, false, 1.1), (0.0, true, 0.9)]
+        {
+            let mut scene = heated(thermal);
+            let structure = &mut scene.settings.structures[0];
+            (structure.softening, structure.spin.stiffening, structure.damping_ratio) =
+                (softening, stiffening, Some(0.3));
+            structure.frequency_factors = vec![1.0, factor, 1.0, 1.0];
+            let temperature = 300.0;
+            let share = (1.0 - softening * temperature) * factor * factor;
+            let expected: Vec<f64> = (0..2 * STRESSES).map(|row| share * temperature * thermal(row)).collect();
+            let mut moving = started(&scene);
+            for step in 1..=200 {
+                set(&mut moving, "rotor_temperature", 0.01 * temperature * f64::from(step).min(100.0));
+                go(&mut moving, 2e-4);
+            }
+            for (run, tolerance) in [(warm(&scene, temperature), 1e-9), (moving, 1e-5)] {
+                // What the modes alone say is up to 4e9 Pa.
+                for (found, expected) in stress_of(&run, 2).iter().zip(&expected) {
+                    assert!((found - expected).abs() < 1e9 * tolerance, "{softening} {factor}: {found:e} {expected:e}");
+                }
+            }
+        }
+    }
+}
+
+/// Forces decide the stress of what is held one way only: pulled by its own weight as it turns, a blade has the static stress of the full
+/// model whatever heat and mistuning leave of its stiffness, although it stretches by 13.6 % more.
+#[test]
+fn stress_that_forces_decide_does_not_depend_on_the_stiffness() {
+    let mut scene = heated(|_| 0.0);
+    let growth = |row: usize| 3.0 * (row as f64 - 4.5);
+    scene.roms[0].extras.stress_centrifugal = Some(DMatrix::from_fn(2 * STRESSES, 1, |row, _| growth(row)));
+    scene.roms[0].extras.thermal.as_mut().unwrap().loads.fill(0.0);
+    scene.settings.structures[0].spin.growth = true;
+    let stretch = |run: &Simulation| element(run, "blade[2].radial_displacement", 0);
+    let longer = stretch(&started(&scene)) / 0.88;
+    scene.settings.structures[0].softening = 3e-4;
+    scene.settings.structures[0].frequency_factors = vec![1.0, 1.2, 0.8, 1.0];
+    for (sector, factor) in [(1, 1.0), (2, 1.2), (3, 0.8)] {
+        scene.settings.outputs.watched_sectors = vec![sector];
+        for temperature in [0.0, 400.0] {
+            let run = warm(&scene, temperature);
+            let moved = element(&run, &format!("blade[{sector}].radial_displacement"), 0) * factor * factor;
+            let expected = if temperature > 0.0 { longer } else { 0.88 * longer };
+            assert!((moved / expected - 1.0).abs() < 1e-12, "{moved} {expected}");
+            for (row, found) in stress_of(&run, sector).into_iter().enumerate() {
+                // What the modes alone say is up to 1e9 Pa.
+                let expected = 1300.0 * 1300.0 * growth(row);
+                assert!((found - expected).abs() < 1e-2, "blade {sector}: {found:e} {expected:e}");
+            }
+        }
+    }
+    scene.roms[0].extras.stress_centrifugal = None;
+    let refused = Simulation::new(&scene).map(|_| ()).unwrap_err().to_string();
+    assert!(
+        refused.starts_with("outputs.stress: with `structure.spin.growth` needs static centrifugal stress"),
+        "{refused}"
+    );
+    assert!(refused.contains("`stress_centrifugal`"), "{refused}");
+}
+
+/// Displacements alone say nothing of the stress of what expands: it is refused by name, and never told wrongly.
+#[test]
+fn stress_of_a_heated_blade_needs_its_static_thermal_stress() {
+    let mut scene = heated(|_| 0.0);
+    scene.roms[0].extras.stress_thermal = None;
+    let told = |scene: &Scene| Simulation::new(scene).map(|_| ()).unwrap_err().to_string();
+    let refused = told(&scene);
+    assert!(
+        refused.starts_with("outputs.stress: with `structure.thermal` of a rotor needs static thermal stress"),
+        "{refused}"
+    );
+    assert!(refused.contains("`stress_thermal`"), "{refused}");
+    scene.settings.structures[0].thermal = false;
+    started(&scene);
+    let changed = |change: fn(&mut Scene)| {
+        let mut scene = heated(|_| 0.0);
+        change(&mut scene);
+        told(&scene)
+    };
+    let shape = changed(|scene| scene.roms[0].extras.stress_thermal = Some(DMatrix::zeros(6, 1)));
+    assert!(shape.contains("`stress_thermal`: shape (6, 1), (12, 1) expected"), "{shape}");
+    let broken = changed(|scene| scene.roms[0].extras.stress_thermal.as_mut().unwrap()[(3, 0)] = f64::NAN);
+    assert!(broken.contains("`stress_thermal`: non-finite entry at (3, 0)"), "{broken}");
+    let alone = changed(|scene| {
+        (scene.roms[0].extras.thermal, scene.settings.structures[0].thermal) = (None, false);
+    });
+    assert!(alone.contains("`stress_thermal`: given without `stress_map` and `thermal_loads`"), "{alone}");
 }

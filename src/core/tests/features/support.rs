@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 use tiprub_core::rom::{SUPPORT_ROWS, Support};
-use tiprub_core::settings::Scheme;
+use tiprub_core::settings::{Scheme, Shape};
 use tiprub_core::{Scene, Simulation};
-use tiprub_test_models::{self as models, element, go, move_on, real, started};
+use tiprub_test_models::{self as models, element, go, move_on, real, set, started};
 
 /// Frequency of the ring on its support (Hz); its modes have the amplitude 0.5 per unit.
 const SWING: f64 = 900.0;
@@ -134,6 +134,45 @@ fn at_rest_the_support_takes_the_contact_force() {
     let [contact, support] = ["casing_force_x", "support_force_x"].map(|name| real(&run, name));
     println!("at rest: {contact} N on the casing, {support} N of the support");
     assert!(contact.abs() > 10.0 && (contact + support).abs() < 1e-6 * contact.abs(), "{contact} {support}");
+}
+
+/// Friction turns the casing: its support takes the moment of the contact, also where the mesh is larger than the surface, since a lining
+/// lies between them.
+#[test]
+fn at_rest_the_support_takes_the_contact_moment() {
+    for larger in [0.0, 0.07] {
+        let mut scene = scene(Scheme::ModalExact);
+        scene.settings.surfaces[0].shape = Shape::Circular {};
+        scene.settings.surfaces[0].moving = true;
+        scene.settings.structures[0].damping_ratio = Some(0.5);
+        scene.settings.structures[1].damping_ratio = Some(0.5);
+        scene.settings.contacts[0].friction = 0.3;
+        scene.settings.time.step = 1e-6;
+        let rom = &mut scene.roms[1];
+        // The ring turns as a whole on springs, beside its other modes: v = q/2 of a mass of 4 kg.
+        let radius = (1.0 + larger) * (models::RADIUS + models::GAP);
+        rom.contact_nodes.iter_mut().for_each(|node| node.position[0] = radius);
+        let (mode, square) = (rom.order(), (std::f64::consts::TAU * SWING).powi(2));
+        rom.mass = DMatrix::identity(mode + 1, mode + 1);
+        rom.stiffness = rom.stiffness.clone().resize(mode + 1, mode + 1, 0.0);
+        rom.stiffness[(mode, mode)] = square;
+        rom.contact_map = rom.contact_map.clone().insert_column(mode, 0.0);
+        (0..rom.contact_nodes.len()).for_each(|node| rom.contact_map[(3 * node + 1, mode)] = 0.5);
+        let thermal = rom.extras.thermal.as_mut().unwrap();
+        thermal.loads = thermal.loads.clone().insert_row(mode, 0.0);
+        let support = rom.extras.support.as_mut().unwrap();
+        support.stiffness = support.stiffness.clone().insert_column(mode, 0.0);
+        support.stiffness[(5, mode)] = -4.0 * square * 0.5 * radius;
+        support.mass = DMatrix::zeros(SUPPORT_ROWS, mode + 1);
+        let mut run = started(&scene);
+        for _ in 0..200 {
+            set(&mut run, "gap_offset", -3.7e-4);
+            go(&mut run, 2e-4);
+        }
+        let [contact, support] = ["casing_moment_z", "support_moment_z"].map(|name| real(&run, name));
+        println!("mesh {larger} larger: {contact} N m on the casing, {support} N m of the support");
+        assert!(contact.abs() > 10.0 && (contact + support).abs() < 1e-3 * contact.abs(), "{contact} {support}");
+    }
 }
 
 /// Contact displacements are the modes' sum, of modes with unit modal mass.

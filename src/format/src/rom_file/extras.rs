@@ -7,7 +7,10 @@ use tiprub_core::rom::{
 };
 
 use super::{Array, Arrays, Metadata, Reader, WRITE_AGAIN, list, matrix, names};
-use crate::rom_layout::{SPIN_ARRAYS, STRESS_ARRAYS, SUPPORT_ARRAYS, SUPPORT_THERMAL, THERMAL_ARRAYS, WATCHED_ARRAYS};
+use crate::rom_layout::{
+    SPIN_ARRAYS, STRESS_ARRAYS, STRESS_CENTRIFUGAL, STRESS_THERMAL, SUPPORT_ARRAYS, SUPPORT_THERMAL, THERMAL_ARRAYS,
+    WATCHED_ARRAYS,
+};
 use crate::{Result, suggestion};
 
 /// Third word of a contact grid with free edges all around.
@@ -33,6 +36,8 @@ impl Reader<'_> {
             harmonics: Vec::new(),
             watched: self.watched((arrays, metadata), (&WATCHED_ARRAYS, 3), order)?,
             stress: self.watched((arrays, metadata), (&STRESS_ARRAYS, STRESSES), order)?,
+            stress_thermal: self.static_stress(arrays, STRESS_THERMAL, true)?,
+            stress_centrifugal: self.static_stress(arrays, STRESS_CENTRIFUGAL, false)?,
             support: self.support(arrays, order)?,
             basis: self.basis(metadata)?,
             rows: self.rows(metadata)?,
@@ -148,6 +153,18 @@ impl Reader<'_> {
         Ok(Some(Thermal { loads, patches: places.iter().map(patch).collect() }))
     }
 
+    /// Static stress of one load, or of `several`; the validation of the ROM compares its shape with that of other arrays.
+    fn static_stress(&self, arrays: &Arrays, name: &str, several: bool) -> Result<Option<DMatrix<f64>>> {
+        if !arrays.contains_key(name) {
+            return Ok(None);
+        }
+        let array = self.required(arrays, name, if several { 3 } else { 2 })?;
+        let (places, loads) = (array.shape[0], array.shape.get(2).copied());
+        let expected: Vec<usize> = [places, STRESSES].into_iter().chain(loads).collect();
+        self.shape(name, array, &expected, "six components per place")?;
+        Ok(Some(DMatrix::from_row_slice(STRESSES * places, loads.unwrap_or(1), &array.values)))
+    }
+
     fn support(&self, arrays: &Arrays, order: usize) -> Result<Option<Support>> {
         if !self.group(arrays, &SUPPORT_ARRAYS)? {
             if arrays.contains_key(SUPPORT_THERMAL) {
@@ -220,6 +237,12 @@ pub(super) fn arrays(extras: &RomExtras) -> Vec<(&'static str, Array)> {
         let shape = vec![count, watched.map.nrows() / count, watched.map.ncols()];
         let places = watched.points.iter().flat_map(|point| point.position).collect();
         arrays.extend([(map, Array { shape, ..matrix(&watched.map) }), (positions, list(places, vec![count, 3]))]);
+    }
+    for (name, stress) in [(STRESS_THERMAL, &extras.stress_thermal), (STRESS_CENTRIFUGAL, &extras.stress_centrifugal)] {
+        let Some(stress) = stress else { continue };
+        let loads = (name == STRESS_THERMAL).then(|| stress.ncols());
+        let shape = [stress.nrows() / STRESSES, STRESSES].into_iter().chain(loads).collect();
+        arrays.push((name, Array { shape, ..matrix(stress) }));
     }
     if let Some(support) = &extras.support {
         let [stiffness, mass] = SUPPORT_ARRAYS;

@@ -5,9 +5,7 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{
-    Basis, ContactGrid, ContactNode, Frame, Patch, RomExtras, RubErrors, Spin, Support, Thermal, Watched,
-};
+use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Frame, Patch, RubErrors, Spin, Support, Thermal, Watched};
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
 
@@ -67,6 +65,8 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
     let points: Vec<ContactNode> = ["leading_edge", "mid_chord"].into_iter().enumerate().map(point).collect();
     rom.extras.watched = Some(Watched { map: DMatrix::from_fn(6, order, |_, _| value()), points: points.clone() });
     rom.extras.stress = Some(Watched { map: DMatrix::from_fn(12, order, |_, _| value()), points });
+    rom.extras.stress_thermal = Some(DMatrix::from_fn(12, patches, |_, _| value()));
+    rom.extras.stress_centrifugal = Some(DMatrix::from_fn(12, 1, |_, _| value()));
     rom.extras.support = Some(Support {
         stiffness: DMatrix::from_fn(6, order, |_, _| value()),
         mass: DMatrix::from_fn(6, order, |_, _| value()),
@@ -85,7 +85,7 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
 fn of_the_first_format(rom: &Rom) -> Rom {
     let mut rom = rom.clone();
     (rom.extras.watched, rom.extras.stress, rom.extras.basis) = (None, None, Basis::default());
-    rom.extras.support = None;
+    (rom.extras.stress_thermal, rom.extras.stress_centrifugal, rom.extras.support) = (None, None, None);
     rom.checks.response_frequencies.clear();
     rom.checks.response_deviation.clear();
     rom.checks.flexibility_deviation.clear();
@@ -133,9 +133,17 @@ fn a_file_is_of_the_first_format_that_holds_it() {
     let plain = of_the_first_format(&full);
     let version = |rom: &Rom| Loose::of(rom).entries["format_version"].clone();
     assert_eq!(version(&plain), "1");
-    let with: [fn(&mut Rom, &Rom); 10] = [
+    let with: [fn(&mut Rom, &Rom); 12] = [
         |rom, full| rom.extras.support.clone_from(&full.extras.support),
         |rom, full| rom.extras.stress.clone_from(&full.extras.stress),
+        |rom, full| {
+            rom.extras.stress.clone_from(&full.extras.stress);
+            rom.extras.stress_thermal.clone_from(&full.extras.stress_thermal);
+        },
+        |rom, full| {
+            rom.extras.stress.clone_from(&full.extras.stress);
+            rom.extras.stress_centrifugal.clone_from(&full.extras.stress_centrifugal);
+        },
         |rom, full| rom.extras.watched.clone_from(&full.extras.watched),
         |rom, full| rom.extras.basis = full.extras.basis,
         |rom, full| rom.checks.response_frequencies.clone_from(&full.checks.response_frequencies),
@@ -189,12 +197,20 @@ pub fn with_extras() -> impl Strategy<Value = Rom> {
     (0..u64::MAX / 2, 1..7usize, 1..5usize, prop::array::uniform5(any::<bool>())).prop_map(
         |(seed, order, patches, has)| {
             let mut rom = complete(seed, order, patches);
-            let RomExtras { spin, thermal, grid, harmonics, watched, stress, support, basis, rows } = rom.extras;
-            let (spin, thermal) = (spin.filter(|_| has[0]), thermal.filter(|_| has[1]));
-            // Its columns are the patches.
-            let support = support.filter(|_| has[1]);
-            let (grid, watched) = (grid.filter(|_| has[2]), watched.filter(|_| has[3]));
-            rom.extras = RomExtras { spin, thermal, grid, harmonics, watched, stress, support, basis, rows };
+            let extras = &mut rom.extras;
+            if !has[0] {
+                (extras.spin, extras.stress_centrifugal) = (None, None);
+            }
+            if !has[1] {
+                // The patches are columns of the others.
+                (extras.thermal, extras.stress_thermal, extras.support) = (None, None, None);
+            }
+            if !has[2] {
+                extras.grid = None;
+            }
+            if !has[3] {
+                extras.watched = None;
+            }
             if has[4] { of_the_first_format(&rom) } else { rom }
         },
     )

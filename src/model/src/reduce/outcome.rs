@@ -47,7 +47,7 @@ pub(super) fn rotated(
     model
 }
 
-pub(super) fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
+pub(crate) fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
     let position = match frame {
         Frame::Cartesian => point.cartesian(nodes),
         Frame::Cylindrical => point.cylindrical(nodes),

@@ -3,8 +3,8 @@
 use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
 use crate::guide::{self, told};
 use nalgebra::{DMatrix, DVector};
+use tiprub_core::Simulation;
 use tiprub_core::rom::{Frame, STRESSES, von_mises};
-use tiprub_model::Mesh;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::{ElementKind, nodal_stress};
@@ -13,6 +13,9 @@ use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
 use tiprub_model::sparse::principal_pair;
 use tiprub_model::stress::StressPlaces;
+use tiprub_model::thermal::{patch_loads, whole_mesh};
+use tiprub_model::{Material, Mesh};
+use tiprub_test_models as models;
 
 const SIZE: [f64; 3] = [0.3, 0.02, 0.06];
 
@@ -192,20 +195,7 @@ fn stress_under_the_same_forces_converges_to_that_of_the_full_model() {
     let assembled = assemble(&mesh, &steel(), &silent).unwrap();
     let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
     let (squares, shapes) = dense_modes(&dense(&stiffness), &dense(&mass)).unwrap();
-    let mut rows = DMatrix::zeros(STRESSES * nodes.len(), free.len());
-    for (place, node) in nodes.iter().enumerate() {
-        let around: Vec<usize> = (0..mesh.elements.len()).filter(|e| mesh.elements[*e].nodes.contains(node)).collect();
-        for number in &around {
-            let element = &mesh.elements[*number];
-            let local = element.nodes.iter().position(|own| own == node).unwrap();
-            let one = nodal_stress(element.kind, &mesh.coordinates(element), &steel(), local, *number).unwrap();
-            for (index, column) in one.column_iter().enumerate() {
-                if let Ok(dof) = free.binary_search(&(3 * element.nodes[index / 3] + index % 3)) {
-                    (0..STRESSES).for_each(|i| rows[(STRESSES * place + i, dof)] += column[i] / around.len() as f64);
-                }
-            }
-        }
-    }
+    let rows = full_rows(&mesh, &steel(), &free, &nodes);
     let mut push = DMatrix::zeros(free.len(), 9);
     for (index, point) in tip.iter().enumerate() {
         for (node, weight) in point.weights() {
@@ -245,4 +235,140 @@ fn stress_under_the_same_forces_converges_to_that_of_the_full_model() {
     }
     assert!(errors[4][1] < 1e-3, "{errors:?}");
     guide::hold("cargo test -p tiprub-model --test reduction");
+}
+
+/// Stress per displacement of the free dofs at these nodes, 6·nodes × free, and the mean of the elements around is taken here.
+fn full_rows(mesh: &Mesh, material: &Material, free: &[usize], nodes: &[usize]) -> DMatrix<f64> {
+    let mut rows = DMatrix::zeros(STRESSES * nodes.len(), free.len());
+    for (place, node) in nodes.iter().enumerate() {
+        let around: Vec<usize> = (0..mesh.elements.len()).filter(|e| mesh.elements[*e].nodes.contains(node)).collect();
+        for number in &around {
+            let element = &mesh.elements[*number];
+            let local = element.nodes.iter().position(|own| own == node).unwrap();
+            let one = nodal_stress(element.kind, &mesh.coordinates(element), material, local, *number).unwrap();
+            for (index, column) in one.column_iter().enumerate() {
+                if let Ok(dof) = free.binary_search(&(3 * element.nodes[index / 3] + index % 3)) {
+                    (0..STRESSES).for_each(|i| rows[(STRESSES * place + i, dof)] += column[i] / around.len() as f64);
+                }
+            }
+        }
+    }
+    rows
+}
+
+/// D(Bu − αT) per kelvin at these nodes, with u of the full matrices under the thermal load; `steel` expands by `alpha`.
+fn full_thermal_stress(mesh: &Mesh, clamped: &[usize], nodes: &[usize], alpha: f64) -> DMatrix<f64> {
+    let material = Material { expansion: alpha, ..steel() };
+    let free = free_dofs(mesh.nodes.len(), clamped);
+    let assembled = assemble(mesh, &material, &silent).unwrap();
+    let (stiffness, _) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
+    let load = patch_loads(mesh, &material, &[whole_mesh(mesh)]).unwrap();
+    let load = DVector::from_fn(free.len(), |row, _| load[(free[row], 0)]);
+    let moved = dense(&stiffness).cholesky().unwrap().solve(&load);
+    let strained = full_rows(mesh, &material, &free, nodes) * moved;
+    // An even expansion that is held: −EαT/(1 − 2ν) in all directions.
+    let held = material.young_modulus * alpha / (1.0 - 2.0 * material.poisson_ratio);
+    DMatrix::from_fn(strained.nrows(), 1, |row, _| strained[row] - if row % STRESSES < 3 { held } else { 0.0 })
+}
+
+/// The array for heated structures is the static stress of the full model. A cantilever is free of stress away from its root, a bar held at
+/// both ends has −EαT along it, and a structure that nothing holds has none.
+#[test]
+fn a_heated_structure_has_the_thermal_stress_of_the_full_model() {
+    let mesh = straight_box(ElementKind::Hex20, [12, 1, 2], SIZE);
+    let alpha = 12e-6;
+    let material = Material { expansion: alpha, ..steel() };
+    let largest = material.young_modulus * alpha;
+    let tip = contact_patches(&mesh, &nodes_at(&mesh, 1, SIZE[1]), 2, |index| format!("patch_{index}")).unwrap();
+    let nodes = [[0.15, 0.0, 0.03], [0.0125, 0.02, 0.03], [0.025, 0.0, 0.0]].map(|point| nearest(&mesh, point));
+    let [left, right] = [0.0, SIZE[0]].map(|x| nodes_at(&mesh, 0, x));
+    let tip: Vec<ContactPoint> = tip
+        .into_iter()
+        .map(|point| {
+            let free = |node: usize| !left.contains(&node) && !right.contains(&node);
+            let node = (0..mesh.nodes.len())
+                .filter(|node| point.weights().any(|(own, _)| own == *node))
+                .find(|node| free(*node));
+            ContactPoint::at(point.name.clone(), node.unwrap(), 0.0)
+        })
+        .collect();
+    for (clamped, along) in [(left.clone(), 0.0), ([left, right].concat(), -largest), (Vec::new(), 0.0)] {
+        for kind in [ReductionKind::FixedInterface, ReductionKind::FreeInterface] {
+            let places = nodes.iter().enumerate().map(|(index, node)| (format!("at_{index}"), *node)).collect();
+            let options = ReductionOptions {
+                name: "bar".into(),
+                kind,
+                modes: if clamped.is_empty() { 12 } else { 4 },
+                checked_modes: 4,
+                sectors: 1,
+                frame: Frame::Cartesian,
+                watched: Vec::new(),
+                stress: StressPlaces { nodes: places, modes: 0 },
+                damping_ratio: 0.0,
+            };
+            let rom = reduce(mesh.clone(), &material, &clamped, &tip, &options, &silent).unwrap().rom;
+            let found = rom.extras.stress_thermal.unwrap();
+            let expected = if clamped.is_empty() {
+                DMatrix::zeros(STRESSES * nodes.len(), 1)
+            } else {
+                full_thermal_stress(&mesh, &clamped, &nodes, alpha)
+            };
+            let off = (&found - &expected).amax() / largest;
+            let middle = (found[0] - along).abs() / largest;
+            println!("{} clamped, {kind:?}: off {off:.1e}, in the middle {middle:.1e}", clamped.len());
+            assert!(off < 1e-8 && middle < 1e-2, "{off:e} {middle:e}");
+            assert!(clamped.is_empty() || found.rows(STRESSES, 12).amax() > 0.05 * largest, "the root is held");
+        }
+    }
+}
+
+/// In a scene the stress of a warm blade is that of the full model at rest, however few modes the ROM has, and not that which the
+/// displacements have alone: −EαT/(1 − 2ν) more than none.
+#[test]
+fn a_warm_blade_in_a_scene_has_the_stress_of_the_full_model() {
+    let mut mesh = straight_box(ElementKind::Hex20, [10, 1, 2], [0.07, 0.006, 0.012]);
+    mesh.nodes.iter_mut().for_each(|x| *x = [x[0] + 0.18, x[1] - 0.003, x[2] - 0.006]);
+    let clamped = nodes_at(&mesh, 0, 0.18);
+    let middle = nearest(&mesh, [0.25, 0.003, 0.0]);
+    let contact = [ContactPoint::at("tip", middle, 0.0)];
+    let (alpha, temperature) = (12e-6, 300.0);
+    let material = Material { expansion: alpha, ..steel() };
+    // On the middle plane, where directions of a place are those of the mesh.
+    let nodes = [[0.215, 0.0, 0.006], [0.187, 0.0, 0.006], [0.18, 0.0, -0.006]].map(|point| nearest(&mesh, point));
+    assert!(nodes.iter().all(|node| mesh.nodes[*node][1].abs() < 1e-12), "{nodes:?}");
+    let expected = full_thermal_stress(&mesh, &clamped, &nodes, alpha) * temperature;
+    for kind in [ReductionKind::FixedInterface, ReductionKind::FreeInterface] {
+        let places = nodes.iter().enumerate().map(|(index, node)| (format!("at_{index}"), *node)).collect();
+        let options = ReductionOptions {
+            name: "bar".into(),
+            kind,
+            modes: 3,
+            checked_modes: 4,
+            sectors: 2,
+            frame: Frame::Cylindrical,
+            watched: Vec::new(),
+            stress: StressPlaces { nodes: places, modes: 0 },
+            damping_ratio: 0.01,
+        };
+        let rom = reduce(mesh.clone(), &material, &clamped, &contact, &options, &silent).unwrap().rom;
+        let mut scene = models::round(rom);
+        (scene.settings.structures[0].thermal, scene.settings.contacts[0].gap) = (true, 2e-3);
+        (scene.settings.outputs.stress, scene.settings.outputs.watched_sectors) = (true, vec![1]);
+        let mut run = Simulation::new(&scene).unwrap();
+        models::set(&mut run, "rotor_temperature", temperature);
+        run.initialise(0.0).unwrap();
+        models::go(&mut run, 1e-4);
+        let names = ["radial", "tangential", "axial", "radial_tangential", "tangential_axial", "axial_radial"];
+        for (place, _) in nodes.iter().enumerate() {
+            for (component, name) in names.into_iter().enumerate() {
+                let found = models::element(&run, &format!("blade[1].{name}_stress"), u32::try_from(place).unwrap());
+                let expected = expected[STRESSES * place + component];
+                assert!((found - expected).abs() < 1e3, "{kind:?}, place {place}, {name}: {found:e} {expected:e}");
+            }
+            let found = models::element(&run, "blade[1].von_mises_stress", u32::try_from(place).unwrap());
+            println!("{kind:?}, place {place}: {:.3} MPa", 1e-6 * found);
+        }
+        assert!(models::element(&run, "blade[1].von_mises_stress", 0) < 1e6);
+        assert!(models::element(&run, "blade[1].von_mises_stress", 2) > 1e8, "the root is held");
+    }
 }

@@ -27,7 +27,7 @@ impl ModalBank {
         self.refresh_coupling();
     }
 
-    fn spread_coefficients(&mut self) {
+    pub(super) fn spread_coefficients(&mut self) {
         for sector in 0..self.sectors {
             for mode in 0..self.modes() {
                 let k = self.coefficients(sector)[mode];
@@ -42,8 +42,13 @@ impl ModalBank {
         if let Some(coupling) = &mut self.coupling {
             let dynamic = self.model.dynamic_modes(self.scheme);
             let state = [self.state.speed, self.state.temperature];
-            coupling.refresh(state, self.step, dynamic, &self.coefficients);
+            coupling.refresh(state, self.step, dynamic, &self.model.frequencies);
         }
+        self.relax();
+        if let Some(coupling) = &mut self.coupling {
+            coupling.invert_all(&self.coefficients);
+        }
+        self.fill_heat();
         for set in 0..self.flexibility.len() {
             self.fill_flexibility(set);
         }
@@ -73,30 +78,34 @@ impl ModalBank {
         for mode in 0..self.modes() {
             (self.gathered[0][mode], self.gathered[1][mode]) = self.modal_state(mode, sector);
         }
-        coupling.force(&self.gathered[0], &self.gathered[1], &mut self.correction);
+        let set = self.set_of(sector);
+        coupling.force(set, &self.gathered[0], &self.gathered[1], &mut self.correction);
         // q̇ = d/h + ½hq̈: the velocity of the middle of the step would leave an error that adds up.
         for mode in 0..self.modes() {
             let square = self.frequency(mode, sector) * self.frequency(mode, sector);
             let force = self.modal_force[mode] + self.correction[mode] - square * self.gathered[0][mode];
             self.gathered[1][mode] += (0.5 * self.step * self.step).min(2.0 / square) * force;
         }
-        coupling.force(&self.gathered[0], &self.gathered[1], &mut self.correction);
+        coupling.force(set, &self.gathered[0], &self.gathered[1], &mut self.correction);
         self.modal_force.iter_mut().zip(&self.correction).for_each(|(force, spin)| *force += spin);
         self.coupling = Some(coupling);
     }
 
     /// Follow the speed of the rotor (rad/s) and its temperature (K) where modes are coupled by them; only between steps. Returns
-    /// the change of strain energy (J), which is work of the shaft and of heat.
+    /// the change of energy (J), which is work of the shaft and of heat.
     pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         let Some(coupling) = &self.coupling else { return 0.0 };
         let same = |one: f64, other: f64| one.to_bits() == other.to_bits();
         if same(coupling.speed(), speed) && same(coupling.temperature(), temperature) {
             return 0.0;
         }
-        let before = self.energies().1;
+        let before = self.energies();
+        self.count_stiffness(-1.0);
         (self.state.speed, self.state.temperature) = (speed, temperature);
         self.refresh_coupling();
-        self.energies().1 - before
+        self.count_stiffness(1.0);
+        let now = self.energies();
+        (now.1 - before.1) + (now.0 - before.0)
     }
 
     /// Modal damping ratio of all modes but the first, which have their `own` (takes effect with the next [`ModalBank::set_step`]).
@@ -118,8 +127,15 @@ impl ModalBank {
             if let Some(loads) = &self.excitation {
                 self.modal_force[mode] += loads.load[mode] * loads.before[sector];
             }
+            if self.heat.is_some() {
+                self.modal_force[mode] += self.heat_before(mode, sector);
+            }
         }
         self.add_coupling_force(sector);
+        if let Some(coupling) = self.coupling.as_ref().filter(|coupling| coupling.softens()) {
+            // As forces on the cold mode, whose motion is the same.
+            self.modal_force.iter_mut().enumerate().for_each(|(mode, force)| *force /= coupling.share(mode));
+        }
     }
 
     /// Carry the state from the step size in use to `new_step`, each sector under its last contact force

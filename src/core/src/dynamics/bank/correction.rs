@@ -173,6 +173,6 @@ impl ModalBank {
             }
         }
         self.state.modal_load_before.copy_from_slice(&self.modal_load);
-        work
+        work + self.finish_heat()
     }
 }

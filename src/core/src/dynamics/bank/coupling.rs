@@ -26,13 +26,20 @@ pub struct Coupling {
     gyroscopic: Vec<f64>,
     /// T of every set of coefficients, row by row.
     transforms: Vec<Vec<f64>>,
+    /// Square of the frequency factor of every set: ΔK of a mistuned sector is so many times that of the others.
+    squares: Vec<f64>,
+    /// Number of modes, from the lowest, that ΔK couples.
+    coupled: usize,
+    /// Stiffness of each mode as a share of that at the reference, where it softens without being coupled; else 1.
+    shares: Vec<f64>,
     work: Vec<f64>,
     result: Vec<f64>,
 }
 
 impl Coupling {
-    /// Room for `sets` sets of coefficients.
-    pub fn new(spin: ModalSpin, stiffening: bool, coriolis: bool, sets: usize) -> Self {
+    /// For sectors with these factors on their frequencies; one set of coefficients where there are none.
+    pub fn new(spin: ModalSpin, stiffening: bool, coriolis: bool, factors: &[f64]) -> Self {
+        let squares = if factors.is_empty() { vec![1.0] } else { factors.iter().map(|one| one * one).collect() };
         let modes = spin.coriolis.nrows();
         let square = |on: bool| vec![0.0; if on { modes * modes } else { 0 }];
         Self {
@@ -42,7 +49,10 @@ impl Coupling {
             coriolis,
             stiffness: square(stiffening || spin.softening.is_some()),
             gyroscopic: square(coriolis),
-            transforms: vec![square(coriolis); sets],
+            transforms: vec![square(coriolis); squares.len()],
+            squares,
+            coupled: 0,
+            shares: vec![1.0; modes],
             work: vec![0.0; 2 * modes * modes],
             result: vec![0.0; modes],
             spin,
@@ -69,38 +79,55 @@ impl Coupling {
             && (self.speed.abs().to_bits() != self.spin.reference_speed.abs().to_bits() || self.heated() != 0.0)
     }
 
+    /// Whether heat softens the modes.
+    pub fn softens(&self) -> bool {
+        self.spin.softening.is_some()
+    }
+
+    /// Number of modes, from the lowest, that ΔK couples.
+    pub fn coupled_modes(&self) -> usize {
+        self.coupled
+    }
+
+    /// Stiffness of a mode that ΔK does not couple, as a share of that at the reference; else 1.
+    pub fn share(&self, mode: usize) -> f64 {
+        self.shares[mode]
+    }
+
     /// Kelvin above the temperature of the modes, where these soften.
     fn heated(&self) -> f64 {
         if self.spin.softening.is_some() { self.temperature - self.spin.reference_temperature } else { 0.0 }
     }
 
-    /// Use the speed Ω (rad/s) and the temperature (K) with the coefficients of a step size h (s), one slice per set.
-    pub fn refresh(
-        &mut self,
-        [speed, temperature]: [f64; 2],
-        step: f64,
-        dynamic: usize,
-        coefficients: &[ModeCoefficients],
-    ) {
+    /// Use the speed Ω (rad/s) and the temperature (K) with a step size h (s) for modes of these `frequencies` at the reference (rad/s),
+    /// the first `dynamic` of which have inertia.
+    pub fn refresh(&mut self, [speed, temperature]: [f64; 2], step: f64, dynamic: usize, frequencies: &[f64]) {
         let modes = self.result.len();
         (self.speed, self.temperature) = (speed, temperature);
         let heated = self.heated();
         // Modes without inertia, and those that the step does not resolve, keep the stiffness of the reference speed: ΔK
-        // is explicit, and at ωh ≈ π the least of it would make them grow.
-        let dynamic = dynamic.min(resolved(step, modes, coefficients));
+        // is explicit, and at ωh ≈ π the least of it would make them grow. With heat they soften by `shares`.
+        self.coupled = dynamic.min(self.resolved(step, frequencies));
+        let dynamic = self.coupled;
         if self.stiffening {
             let (square, reference) = (speed * speed, self.spin.reference_speed * self.spin.reference_speed);
             let (second, fourth) = (square - reference, square * square - reference * reference);
+            let entry = |spin: &ModalSpin, row: usize, column: usize| {
+                let at = (row, column);
+                let stiffened = second * spin.stiffness_speed2[at] + fourth * spin.stiffness_speed4[at];
+                spin.softening.as_ref().map_or(stiffened, |softening| stiffened + heated * softening[at])
+            };
             for row in 0..modes {
                 for column in 0..modes {
-                    let entries =
-                        (self.spin.stiffness_speed2[(row, column)], self.spin.stiffness_speed4[(row, column)]);
                     let both = row < dynamic && column < dynamic;
-                    self.stiffness[row * modes + column] =
-                        if both { second * entries.0 + fourth * entries.1 } else { 0.0 };
-                    if let Some(softening) = self.spin.softening.as_ref().filter(|_| both) {
-                        self.stiffness[row * modes + column] += heated * softening[(row, column)];
-                    }
+                    self.stiffness[row * modes + column] = if both { entry(&self.spin, row, column) } else { 0.0 };
+                }
+            }
+            if self.softens() {
+                for (mode, (share, frequency)) in self.shares.iter_mut().zip(frequencies).enumerate() {
+                    let alone = mode >= dynamic && *frequency > 0.0;
+                    let change = if alone { entry(&self.spin, mode, mode) } else { 0.0 };
+                    *share = if alone { 1.0 + change / (frequency * frequency) } else { 1.0 };
                 }
             }
         }
@@ -110,9 +137,28 @@ impl Coupling {
                     self.gyroscopic[row * modes + column] = speed / step * self.spin.coriolis[(row, column)];
                 }
             }
-            for (set, coefficients) in coefficients.chunks_exact(modes).enumerate() {
+        }
+    }
+
+    /// T of every set, from its coefficients of the step in use.
+    pub fn invert_all(&mut self, coefficients: &[ModeCoefficients]) {
+        if self.coriolis {
+            for (set, coefficients) in coefficients.chunks_exact(self.shares.len()).enumerate() {
                 self.invert(set, coefficients);
             }
+        }
+    }
+
+    /// Add ΔK of a sector without a factor times modal coordinates to forces; forces of modes that soften by themselves become those of
+    /// their shares.
+    pub fn add_stiffness(&self, position: &[f64], forces: &mut [f64]) {
+        if !self.is_stiffened() {
+            return;
+        }
+        let modes = position.len();
+        for (row, force) in forces.iter_mut().enumerate() {
+            let entries = self.stiffness[row * modes..][..modes].iter().zip(position);
+            *force = self.shares[row] * *force + entries.map(|(entry, value)| entry * value).sum::<f64>();
         }
     }
 
@@ -168,6 +214,8 @@ impl Coupling {
         self.result.fill(0.0);
         if self.is_stiffened() {
             multiply(&self.stiffness, position, &mut self.result);
+            let square = self.squares[set];
+            self.result.iter_mut().for_each(|value| *value *= square);
         }
         if self.coriolis {
             for (row, sum) in self.result.iter_mut().enumerate() {
@@ -190,7 +238,7 @@ impl Coupling {
     }
 
     /// −ΔKq − 2ΩGq̇ with q̇ = d/h: what constant spin adds to the modal forces of a motion.
-    pub fn force(&self, position: &[f64], increment: &[f64], forces: &mut [f64]) {
+    pub fn force(&self, set: usize, position: &[f64], increment: &[f64], forces: &mut [f64]) {
         let modes = self.result.len();
         forces.fill(0.0);
         for (row, force) in forces.iter_mut().enumerate() {
@@ -198,7 +246,7 @@ impl Coupling {
                 matrix[row * modes..][..modes].iter().zip(vector).map(|(entry, value)| entry * value).sum()
             };
             if self.is_stiffened() {
-                *force -= product(&self.stiffness, position);
+                *force -= self.squares[set] * product(&self.stiffness, position);
             }
             if self.coriolis {
                 *force -= 2.0 * product(&self.gyroscopic, increment);
@@ -207,7 +255,7 @@ impl Coupling {
     }
 
     /// ½ qᵀΔK(q − d): part of the strain energy (J).
-    pub fn strain(&self, position: impl Fn(usize) -> f64, before: impl Fn(usize) -> f64) -> f64 {
+    pub fn strain(&self, set: usize, position: impl Fn(usize) -> f64, before: impl Fn(usize) -> f64) -> f64 {
         if !self.is_stiffened() {
             return 0.0;
         }
@@ -217,15 +265,14 @@ impl Coupling {
             let sum: f64 = entries.iter().enumerate().map(|(column, entry)| entry * before(column)).sum();
             0.5 * position(row) * sum
         };
-        (0..modes).map(row).sum()
+        self.squares[set] * (0..modes).map(row).sum::<f64>()
     }
-}
 
-/// Number of modes, from the lowest, with ωh ≤ 2 in every set of coefficients.
-fn resolved(step: f64, modes: usize, coefficients: &[ModeCoefficients]) -> usize {
-    let within = |k: &ModeCoefficients| 2.0 * k.spring * step * step <= 4.0;
-    let count = |set: &[ModeCoefficients]| set.iter().take_while(|k| within(k)).count();
-    coefficients.chunks_exact(modes).map(count).min().unwrap_or(0)
+    /// Number of modes, from the lowest, with ωh ≤ 2 in every sector.
+    fn resolved(&self, step: f64, frequencies: &[f64]) -> usize {
+        let largest = self.squares.iter().fold(0.0_f64, |most, square| most.max(*square));
+        frequencies.iter().take_while(|frequency| largest * *frequency * *frequency * step * step <= 4.0).count()
+    }
 }
 
 fn multiply(matrix: &[f64], vector: &[f64], result: &mut [f64]) {

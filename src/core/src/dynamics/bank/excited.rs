@@ -23,18 +23,23 @@ impl ModalBank {
     pub(super) fn act_excited(&mut self, with_loss: bool) {
         let Some(loads) = self.excitation.take() else { return };
         for (sector, force) in loads.now.iter().enumerate().filter(|(_, force)| **force != 0.0) {
-            let (modes, set) = (self.modes(), self.set_of(sector));
-            let coefficients = &self.coefficients[set * modes..][..modes];
-            for ((correction, load), k) in self.correction.iter_mut().zip(&loads.load).zip(coefficients) {
-                *correction = k.load_compliance() * load * force;
-            }
-            if let Some(coupling) = &mut self.coupling {
-                coupling.transform(set, &mut self.correction);
-            }
-            self.move_modes(sector, with_loss);
-            self.move_rows(sector);
+            self.act_on_modes(sector, &loads.load, *force, with_loss);
         }
         self.excitation = Some(loads);
+    }
+
+    /// Add what `factor` times modal loads that are known beforehand do to the step predicted of one sector.
+    pub(super) fn act_on_modes(&mut self, sector: usize, loads: &[f64], factor: f64, with_loss: bool) {
+        let (modes, set) = (self.modes(), self.set_of(sector));
+        let coefficients = &self.coefficients[set * modes..][..modes];
+        for ((correction, load), k) in self.correction.iter_mut().zip(loads).zip(coefficients) {
+            *correction = k.load_compliance() * load * factor;
+        }
+        if let Some(coupling) = &mut self.coupling {
+            coupling.transform(set, &mut self.correction);
+        }
+        self.move_modes(sector, with_loss);
+        self.move_rows(sector);
     }
 
     /// Work of the excitation over the step just done (J), once contact has corrected it; of quasi-static modes as that of the

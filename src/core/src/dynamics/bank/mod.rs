@@ -9,6 +9,7 @@ mod coefficients;
 mod correction;
 mod coupling;
 mod excited;
+mod heated;
 mod predict;
 mod span;
 
@@ -21,6 +22,7 @@ use crate::persist::{Persist, Reader, Writer, persist_fields};
 use crate::schemes::{ModeCoefficients, Velocity, free_increment};
 use crate::settings::Scheme;
 use coupling::Coupling;
+use heated::Heat;
 use predict::Predict;
 
 /// Lanes of one chunk: one 512-bit register of f64.
@@ -41,6 +43,8 @@ pub struct BankOptions {
     pub frequency_factors: Vec<f64>,
     /// Modal loads beside contact: centrifugal growth, heat, nodal-diameter loads.
     pub loads: bool,
+    /// Free expansion per kelvin in modal coordinates; empty without heat.
+    pub expansion: Vec<f64>,
     /// Spin in modal coordinates, with what of it couples the modes: (stiffening, coriolis).
     pub coupling: Option<(ModalSpin, bool, bool)>,
     /// Loads of an engine order.
@@ -51,7 +55,14 @@ pub struct BankOptions {
 
 impl Default for BankOptions {
     fn default() -> Self {
-        Self { frequency_factors: Vec::new(), loads: false, coupling: None, excitation: None, flexibility: true }
+        Self {
+            frequency_factors: Vec::new(),
+            loads: false,
+            expansion: Vec::new(),
+            coupling: None,
+            excitation: None,
+            flexibility: true,
+        }
     }
 }
 
@@ -74,6 +85,10 @@ struct BankState {
     speed: f64,
     /// Its temperature (K).
     temperature: f64,
+    /// Loads of heat of the step before, of a sector without a factor; empty where all are equal.
+    heat_before: Vec<f64>,
+    /// What quasi-static modes have gained since the last step as shares of their stiffness; empty without softening.
+    stiffened: Vec<f64>,
 }
 
 persist_fields!(BankState {
@@ -84,7 +99,9 @@ persist_fields!(BankState {
     loss,
     modal_load_before,
     speed,
-    temperature
+    temperature,
+    heat_before,
+    stiffened
 });
 
 /// What the special pass needs per mode and lane.
@@ -120,6 +137,7 @@ pub struct ModalBank {
     flexibility: Vec<DMatrix<f64>>,
     coupling: Option<Coupling>,
     excitation: Option<SectorLoads>,
+    heat: Option<Heat>,
     scheme: Scheme,
     step: f64,
     state: BankState,
@@ -154,7 +172,9 @@ impl ModalBank {
         let coupling = options
             .coupling
             .clone()
-            .map(|(spin, stiffening, coriolis)| Coupling::new(spin, stiffening, coriolis, sets));
+            .map(|(spin, stiffening, coriolis)| Coupling::new(spin, stiffening, coriolis, &options.frequency_factors));
+        let heat = Heat::new(&options.expansion, &options.frequency_factors);
+        let softening = coupling.as_ref().is_some_and(Coupling::softens);
         Self {
             instruction_set: InstructionSet::detect(),
             sectors,
@@ -178,6 +198,8 @@ impl ModalBank {
                 modal_load_before: vec![0.0; if options.loads { modes } else { 0 }],
                 speed: coupling.as_ref().map_or(0.0, Coupling::speed),
                 temperature: coupling.as_ref().map_or(0.0, Coupling::temperature),
+                heat_before: vec![0.0; heat.as_ref().map_or(0, Heat::remembered)],
+                stiffened: vec![0.0; if softening { model.quasi_static.min(modes) } else { 0 }],
             },
             modal_load: vec![0.0; if special { modes } else { 0 }],
             increment_before: vec![0.0; state_len],
@@ -187,6 +209,7 @@ impl ModalBank {
             gathered: [vec![0.0; modes], vec![0.0; modes]],
             coupling,
             excitation: options.excitation.map(|excitation| SectorLoads::new(excitation, model, sectors)),
+            heat,
             options,
             model: model.clone(),
         }
@@ -329,6 +352,8 @@ impl ModalBank {
             &mut self.state.displacement_before,
             &mut self.state.loss,
             &mut self.state.modal_load_before,
+            &mut self.state.heat_before,
+            &mut self.state.stiffened,
             &mut self.modal_load,
         ] {
             values.fill(0.0);
@@ -339,6 +364,9 @@ impl ModalBank {
         }
         if let Some(loads) = &mut self.excitation {
             loads.rest();
+        }
+        if let Some(heat) = &mut self.heat {
+            heat.rest();
         }
     }
 
@@ -367,6 +395,9 @@ impl ModalBank {
         }
         if self.excitation.is_some() {
             self.act_excited(with_loss);
+        }
+        if self.heat.is_some() {
+            self.act_expanded(with_loss);
         }
     }
 
@@ -403,7 +434,8 @@ impl ModalBank {
             }
             if let Some(coupling) = &self.coupling {
                 let position = |mode| self.modal_state(mode, sector).0;
-                strain += coupling.strain(position, |mode| position(mode) - self.modal_state(mode, sector).1);
+                strain += coupling
+                    .strain(self.set_of(sector), position, |mode| position(mode) - self.modal_state(mode, sector).1);
             }
         }
         (kinetic, strain)
@@ -425,7 +457,7 @@ impl ModalBank {
             }
             if let Some(coupling) = &self.coupling {
                 let position = |mode| self.modal_state(mode, sector).0;
-                strain += coupling.strain(position, position);
+                strain += coupling.strain(self.set_of(sector), position, position);
             }
         }
         (kinetic, strain)

@@ -96,6 +96,12 @@ pub(super) const OTHER_SECTORS: Fact =
 pub(super) const ALL_SECTORS: Fact = fact("outputs.all_sectors", "", |at| at.outputs().all_sectors);
 pub(super) const DIAMETERS: Fact = fact("outputs.nodal_diameters", "", |at| at.outputs().nodal_diameters.is_some());
 pub(super) const STRESS: Fact = fact("outputs.stress", "", |at| at.outputs().stress);
+pub(super) const HEATED_STRESS: Fact = fact("outputs.stress", "with `structure.thermal` of a rotor", |at| {
+    at.outputs().stress && at.stressed(|own| own.thermal).next().is_some()
+});
+pub(super) const GROWN_STRESS: Fact = fact("outputs.stress", "with `structure.spin.growth`", |at| {
+    at.outputs().stress && at.stressed(|own| own.spin.growth).next().is_some()
+});
 pub(super) const MODES: Fact = fact("outputs.modal_amplitudes", "", |at| at.outputs().modal_amplitudes.is_some());
 pub(super) const TIPS: Fact = fact("outputs.tip_displacements", "", |at| at.outputs().tip_displacements);
 pub(super) const CASING_FORCES: Fact = fact("outputs.casing_forces", "", |at| at.outputs().casing_forces);

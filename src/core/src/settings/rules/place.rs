@@ -123,6 +123,12 @@ impl<'a> Place<'a> {
         self.relations.masters[self.index].map(|index| &self.roms[index])
     }
 
+    /// ROMs whose stress is recovered, of the masters with a load.
+    pub(super) fn stressed(self, is_loaded: fn(&StructureSettings) -> bool) -> impl Iterator<Item = &'a Rom> {
+        let masters = self.contacts().filter(move |at| at.settings.master_of(at.contact()).is_some_and(is_loaded));
+        masters.filter_map(|at| at.master_rom()).filter(|rom| rom.extras.stress.is_some())
+    }
+
     pub(super) fn carrier_rom(&self) -> Option<&'a Rom> {
         self.relations.carriers[self.index].map(|index| &self.roms[index])
     }

@@ -1,7 +1,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::all;
-use crate::rom::{ContactGrid, ContactNode, Frame, Harmonic, RomChecks, RomExtras};
+use crate::rom::{ContactGrid, ContactNode, Frame, Harmonic, Patch, RomChecks, RomExtras, Spin, Thermal, Watched};
 use crate::settings::*;
 use crate::{Rom, Scene};
 
@@ -55,6 +55,13 @@ fn rotor() -> Scene {
 
 fn flight() -> Scene {
     scene(Motion::Free, Frame::Cartesian)
+}
+
+/// A master whose stress is asked for.
+fn stressed(scene: &mut Scene) {
+    let points = scene.roms[0].contact_nodes.clone();
+    scene.roms[0].extras.stress = Some(Watched { map: DMatrix::zeros(6, 4), points });
+    (scene.settings.outputs.stress, scene.settings.outputs.watched_sectors) = (true, vec![1]);
 }
 
 fn cut() -> Option<CoatingSettings> {
@@ -198,6 +205,25 @@ const OF_ROTORS: &[(&str, Change)] = &[
     }),
     ("outputs.stress: needs places of stress in the ROM of a rotor", |scene| {
         scene.settings.outputs.stress = true;
+    }),
+    ("outputs.stress: with `structure.thermal` of a rotor needs static thermal stress", |scene| {
+        stressed(scene);
+        let patches = vec![Patch { angle: [0.0, 1.0], axial: [0.0, 1.0] }];
+        scene.roms[0].extras.thermal = Some(Thermal { loads: DMatrix::zeros(4, 1), patches });
+        scene.settings.structures[0].thermal = true;
+    }),
+    ("outputs.stress: with `structure.spin.growth` needs static centrifugal stress", |scene| {
+        stressed(scene);
+        let none = DMatrix::zeros(4, 4);
+        scene.roms[0].extras.spin = Some(Spin {
+            stiffness_speed2: none.clone(),
+            stiffness_speed4: none.clone(),
+            coriolis: none,
+            centrifugal_load: vec![0.0; 4],
+            centrifugal_load_speed4: vec![0.0; 4],
+            largest_speed: 1.0,
+        });
+        scene.settings.structures[0].spin.growth = true;
     }),
     ("outputs.slave_displacement: needs `surface.structure`", |scene| {
         scene.settings.surfaces[0].structure = None;
