@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tiprub_core::simulation::Courses;
-use tiprub_core::{Result, Simulation};
+use tiprub_core::{Result, Simulation, Warning};
 use tiprub_fmi_facade::{Loaded, Unit};
 
 /// A compiled scene.
@@ -25,11 +25,11 @@ pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
 impl Unit for Rub {
     tiprub_fmi_facade::delegate!(Courses);
 
-    fn warnings(&self) -> &[String] {
+    fn warnings(&self) -> &[Warning] {
         self.0.warnings()
     }
 
-    fn take_notes(&mut self) -> Vec<String> {
+    fn take_notes(&mut self) -> Vec<Warning> {
         self.0.take_notes()
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use tiprub_study::arguments::{CacheArguments, MapArguments, StabilityArguments, assignment, positive};
+use tiprub_study::arguments::{CacheArguments, MapArguments, SceneOptions, StabilityArguments, assignment, positive};
 
 use crate::{
     library::PlatformChoice,
@@ -140,6 +140,9 @@ pub struct PackageArguments {
     /// Libraries that go into the FMU.
     #[command(flatten)]
     pub libraries: LibraryArguments,
+    /// What is added to the scene.
+    #[command(flatten)]
+    pub options: SceneOptions,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
@@ -151,6 +154,9 @@ pub struct RunArguments {
     /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
+    /// Print all outputs at the end, extremes, times and whole warnings, not only the answer.
+    #[arg(long)]
+    pub all: bool,
     /// Write all outputs as CSV; `-` is stdout.
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
@@ -171,6 +177,9 @@ pub struct RunArguments {
     /// scene: some ten runs more. What the mesh leaves is told where the ROM has it (`tiprub study convergence --into`).
     #[arg(long)]
     pub estimate: bool,
+    /// What is added to the scene.
+    #[command(flatten)]
+    pub options: SceneOptions,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
@@ -182,6 +191,12 @@ pub struct InspectArguments {
     /// An .fmu, a ROM (.safetensors), a scene (.toml) or one that ships (`builtin:abradable`).
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
+    /// Of a scene, also run its first 100 communication steps with each effect that it leaves out, for the time that costs.
+    #[arg(long)]
+    pub measure: bool,
+    /// What is added to the scene.
+    #[command(flatten)]
+    pub options: SceneOptions,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,

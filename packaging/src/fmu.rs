@@ -2,7 +2,12 @@
 
 use std::{env, path::Path};
 
-use tiprub_core::{Rom, Scene, Simulation, settings::Scheme, variables::Quantity};
+use tiprub_core::{
+    Rom, Scene, Simulation,
+    settings::Scheme,
+    variables::Quantity,
+    warning::{self, Warning},
+};
 use tiprub_fmi_host::archive::{self, Entry};
 use tiprub_model_description::{
     Description, Experiment, fmi2_xml, fmi3_terminals, fmi3_xml, html, references_manifest,
@@ -82,7 +87,7 @@ pub struct Package<'a> {
     libraries: &'a [Library],
     reference_csv: String,
     reference_steps: usize,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
     generated: String,
 }
 
@@ -96,7 +101,8 @@ impl<'a> Package<'a> {
         let mut schedule = Schedule::new(&scene.settings.experiment, None, None)?;
         let mut simulation = Simulation::new(scene).map_err(in_scene)?;
         simulation.initialise(schedule.start).map_err(in_scene)?;
-        let warnings = [simulation.warnings(), &schedule.warnings()].concat();
+        let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
+        warnings.retain(|warning| !scene.settings.is_silenced(warning.topic()));
         let reference_steps = REFERENCE_STEPS.min(REFERENCE_VALUES / simulation.table().references());
         if schedule.count > reference_steps {
             schedule.count = reference_steps;
@@ -117,7 +123,7 @@ impl<'a> Package<'a> {
     }
 
     /// Warnings of the initialisation (what an FMU instance would log) and of the experiment proposed.
-    pub fn warnings(&self) -> &[String] {
+    pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
@@ -197,7 +203,7 @@ impl<'a> Package<'a> {
             structures: structures.zip(&self.roms).collect(),
             features: scene_features::features(self.scene),
             limits: scene_features::limits(self.scene),
-            warnings: self.simulation.warnings().to_vec(),
+            warnings: warning::texts(self.simulation.warnings()),
         }
     }
 }

@@ -4,17 +4,21 @@
 //!
 //! - [`cli`], [`reduce_arguments`], [`casing_arguments`], [`thermal_arguments`], [`own_arguments`], [`shared_arguments`]: what can be asked for; [`spelling`]: what was;
 //! - [`command_files`]: what each command reads and writes, looked at before any work;
+//! - [`left_out`]: what a scene leaves out, in one table;
+//! - [`answer`]: the five lines that a run is about;
 //! - [`scene_features`], [`rom_facts`]: what is to be known of a scene or a ROM before it is trusted;
 //! - [`users_model`], [`cube_models`], [`mod@reduced`]: models read, judged, reduced, and what is told of them;
 //! - [`fmu`], [`thermal_fmu`], [`library`]: what is in an FMU, and where its shared library comes from;
 //! - [`report`]: the HTML report of the demo.
 
+pub mod answer;
 pub mod casing_arguments;
 pub mod cli;
 pub mod command_files;
 pub mod commands;
 pub mod cube_models;
 pub mod fmu;
+pub mod left_out;
 pub mod library;
 pub mod own_arguments;
 pub mod reduce_arguments;

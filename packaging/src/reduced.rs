@@ -1,7 +1,7 @@
 //! A reduced model with everything that is written and told about it, whatever it was made of.
 
 use serde_json::Value;
-use tiprub_core::Rom;
+use tiprub_core::{Rom, plausibility::Slip};
 use tiprub_model::{
     Material, Mesh, Reduction,
     cyclic::CyclicReduction,
@@ -45,6 +45,8 @@ pub struct Reduced {
     pub read: (String, Value),
     /// Warnings.
     pub warnings: Vec<String>,
+    /// Values that are rarely meant.
+    pub slips: Vec<Slip>,
 }
 
 impl Reduced {
@@ -66,6 +68,7 @@ impl Reduced {
             faces: None,
             read: (String::new(), Value::Null),
             warnings: Vec::new(),
+            slips: Vec::new(),
         }
     }
 
@@ -96,6 +99,7 @@ impl Reduced {
             faces: Some(faces.map(str::to_owned)),
             read: (reduction.notes.join("\n"), Value::Null),
             warnings: Vec::new(),
+            slips: Vec::new(),
         }
     }
 

@@ -4,9 +4,11 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 use tiprub_core::{
-    Rom, plausibility,
+    Rom,
+    plausibility::{self, Slip},
     rom::{ContactNode, Frame},
     stability,
+    warning::{Topic, Warning},
 };
 use tiprub_shell::{Failure, Result};
 use tiprub_study::{
@@ -74,6 +76,11 @@ pub struct CheckRow {
     pub nodal_diameter: Option<u32>,
 }
 
+/// A value of five decimals that does not read -0.00000.
+pub fn not_negative_zero(value: f64) -> f64 {
+    if value.abs() < 5e-6 { 0.0 } else { value }
+}
+
 impl RomFacts {
     /// Work out the facts of a ROM; `sliding` is its contact, where a scene gives it.
     ///
@@ -104,7 +111,7 @@ impl RomFacts {
     }
 
     /// What its checks say against a ROM: one line per mode beyond the limits, first modes only.
-    pub fn warnings(&self) -> Vec<String> {
+    pub fn warnings(&self) -> Vec<Warning> {
         let checks = self.checks();
         // A deviation of rigid-body modes compares one rounding with another.
         let rigid = RIGID * checks.iter().map(|row| row.full.abs()).fold(0.0, f64::max);
@@ -112,14 +119,19 @@ impl RomFacts {
         let poor = |row: &CheckRow| poor(row) && !(row.full.abs() < rigid && row.reduced.abs() < rigid);
         let rows = (1..).zip(checks).take(self.first_modes()).filter(|(_, row)| poor(row));
         let poor = rows.map(|(mode, row)| {
-            format!(
+            let problem = format!(
                 "ROM `{}`: mode {mode} ({:.1} Hz) deviates by {:.3} % from the full model (eq. 13) with a residual of \
-                 {:.3} % (eq. 12); good models stay below {DEVIATION_LIMIT} % and {RESIDUAL_LIMIT} %. Keep more modes",
+                 {:.3} % (eq. 12); good models stay below {DEVIATION_LIMIT} % and {RESIDUAL_LIMIT} %",
                 self.rom.name, row.full, row.deviation, row.residual
-            )
+            );
+            Warning::new(Topic::RomAccuracy, problem, "Keep more modes")
         });
-        let frequencies = self.frequencies.iter().map(|hertz| hertz * std::f64::consts::TAU);
-        poor.chain(plausibility::of_rom(&self.rom, frequencies)).collect()
+        poor.collect()
+    }
+
+    /// What in the ROM is rarely meant.
+    pub fn slips(&self) -> Vec<Slip> {
+        plausibility::of_rom(&self.rom, self.frequencies.iter().map(|hertz| hertz * std::f64::consts::TAU))
     }
 
     /// How many of the checked modes are to be good.
@@ -318,7 +330,8 @@ impl RomFacts {
             "\n  mode{heading}    full (Hz)   reduced (Hz)   deviation eq. 13 (%)   residual eq. 12 (%)"
         );
         for (row, mode) in checks.iter().zip(1..).take(ROWS_SHOWN) {
-            let CheckRow { full, reduced, deviation, residual, nodal_diameter } = row;
+            let CheckRow { full, reduced, nodal_diameter, .. } = row;
+            let [deviation, residual] = [row.deviation, row.residual].map(not_negative_zero);
             let number = of(*nodal_diameter);
             let _ =
                 writeln!(text, "  {mode:>4}{number} {full:>12.3} {reduced:>14.3} {deviation:>22.5} {residual:>21.5}");

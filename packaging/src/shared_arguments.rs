@@ -14,6 +14,9 @@ pub struct Written {
     /// Replace files that are there already.
     #[arg(long)]
     pub force: bool,
+    /// Accept values that are rarely meant (contact nodes far inside, lengths in millimetres, overlapping sectors) with a warning.
+    #[arg(long)]
+    pub accept_implausible: bool,
     /// Also write the mesh as a CalculiX/Abaqus input file that computes its frequencies.
     #[arg(long, value_name = "FILE")]
     pub inp: Option<PathBuf>,

@@ -83,7 +83,7 @@ fn the_first_scene_of_the_reference_is_the_built_in_scene() {
 #[test]
 fn the_first_run_at_halved_steps() {
     for step in [0.5, 0.25, 0.125] {
-        let lines = run(&format!("tiprub run builtin:rotor37-one-row --set internal_step_max={step}e-6"));
+        let lines = run(&format!("tiprub run builtin:rotor37-one-row --all --set internal_step_max={step}e-6"));
         let number = |name: &str| {
             let line =
                 lines.iter().find(|line| line.trim_start().starts_with(name)).unwrap_or_else(|| panic!("{name}"));

@@ -4,7 +4,7 @@ use std::any::Any;
 use std::path::Path;
 
 use tiprub_core::variables::VariableTable;
-use tiprub_core::{Result, simulation::Progress};
+use tiprub_core::{Result, Warning, simulation::Progress};
 
 /// A unit of co-simulation: variables by reference, communication steps marched internal step by internal step, its state as
 /// bytes. Which calls are legal when is the façade's business.
@@ -96,10 +96,10 @@ pub trait Unit: Send {
     fn time(&self) -> f64;
 
     /// What is to be said of the parameters after [`Unit::initialise`].
-    fn warnings(&self) -> &[String];
+    fn warnings(&self) -> &[Warning];
 
     /// What is to be said since this was last called.
-    fn take_notes(&mut self) -> Vec<String>;
+    fn take_notes(&mut self) -> Vec<Warning>;
 
     /// Begin a communication step of length `step_size` (s), which may end early (`partial`) where the unit allows only so many
     /// internal steps.

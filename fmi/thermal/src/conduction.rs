@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tiprub_core::Result;
+use tiprub_core::{Result, Warning};
 use tiprub_fmi_facade::{Loaded, Unit};
 use tiprub_thermal::{Courses, Simulation};
 
@@ -25,11 +25,11 @@ pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
 impl Unit for Conduction {
     tiprub_fmi_facade::delegate!(Courses);
 
-    fn warnings(&self) -> &[String] {
+    fn warnings(&self) -> &[Warning] {
         &[]
     }
 
-    fn take_notes(&mut self) -> Vec<String> {
+    fn take_notes(&mut self) -> Vec<Warning> {
         self.0.take_notes()
     }
 

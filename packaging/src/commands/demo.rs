@@ -16,15 +16,12 @@ use tiprub_gallery::{
 use tiprub_model::{Reduction, Rotor37Options};
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome, shown_path},
+    console::{Console, Outcome, shown_path, warnings_json},
     native::{self, Given, NativeRun},
     output_file,
     schedule::Schedule,
 };
-use tiprub_study::{
-    error_study::{self, ErrorStudy, METHODS},
-    estimate::{self, Estimate},
-};
+use tiprub_study::estimate::{self, Estimate};
 
 use crate::{
     cli::DemoArguments,
@@ -48,6 +45,10 @@ pub const FILES: [&str; 6] = [ROM_FILE, SCENE_FILE, REPORT_FILE, CSV_FILE, "roto
 
 /// Beyond it (bytes), a scene is none that a demo wrote.
 const LARGEST_SCENE: u64 = 1 << 20;
+
+/// Where the error study is that the demo does not run.
+const STUDY: &str = "error against run time of every method: a picture in the report; measured here, in minutes, by\n  \
+                     tiprub study error builtin:rotor37 --quick\n";
 
 /// What to do about a scene in the directory that somebody changed.
 const KEEP: &str = "Give the demo another directory with --out, or copy your file elsewhere and delete it here";
@@ -86,7 +87,6 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
         let task = console.task("Native run", Some(schedule.count as u64));
         native::run(&scene, &schedule, Given::default(), &|done| task.at(done as u64))
     })?;
-    console.warn(&native.warnings);
     native.recording.write_csv(&directory.join(CSV_FILE))?;
 
     let package = Package::new(&scene, &libraries)?;
@@ -102,28 +102,11 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
         let agreement = native.recording.compare(&run.recording)?;
         imported.push(ImportedSummary { label, stepping: run.stepping.as_secs_f64(), agreement });
     }
-    let study = watch.measure("error study", || {
-        let task = console.task("Error against run time", Some(error_study::runs()));
-        let turn = std::f64::consts::TAU / scene.settings.structures[0].speed.abs();
-        let window = turn.min(schedule.stop - schedule.start);
-        error_study::study(&scene, window, &task)
-    })?;
     let estimates = watch.measure("estimating errors", || estimate::estimates(&scene, &[], schedule.count, console))?;
     let paper = watch.measure("the paper's model and method", || Paper::run(&schedule, console))?;
     let facts = scene.roms.iter().map(|rom| RomFacts::of(rom, None)).collect::<Result<Vec<_>>>()?;
-    let demo = Demo {
-        study,
-        estimates,
-        paper,
-        directory,
-        scene,
-        schedule,
-        reduction,
-        facts,
-        native,
-        imported,
-        durations: watch.0,
-    };
+    let demo =
+        Demo { estimates, paper, directory, scene, schedule, reduction, facts, native, imported, durations: watch.0 };
     demo.write_report()?;
     demo.outcome()
 }
@@ -180,7 +163,6 @@ struct Demo<'a> {
     facts: Vec<RomFacts>,
     native: NativeRun,
     imported: Vec<ImportedSummary>,
-    study: ErrorStudy,
     estimates: Vec<Estimate>,
     paper: Paper,
     durations: Vec<(String, f64)>,
@@ -202,24 +184,6 @@ impl Paper {
 }
 
 impl Demo<'_> {
-    /// Stepping time that each method needs for 1 % and 0.1 % error.
-    fn study_text(&self) -> String {
-        let mut text = format!("error against stepping time over {:.2} ms, displacements:\n", 1e3 * self.study.window);
-        for method in METHODS {
-            let cost = |error| match self.study.cheapest(method, error) {
-                Some(time) => format!("{:>7.1} ms", 1e3 * time),
-                None => "      not".into(),
-            };
-            let name = error_study::name(method);
-            text.push_str(&format!("  {name:<26} 1 %: {}   0.1 %: {}\n", cost(1e-2), cost(1e-3)));
-        }
-        let apart = 100.0 * self.study.massless_apart;
-        text.push_str(&format!(
-            "  (galerkin and massless-boundary against their own limit, {apart:.1} % from that of the others)\n"
-        ));
-        text
-    }
-
     fn write_report(&self) -> Result<()> {
         let simulation = Simulation::new(&self.scene).map_err(|error| Failure::from_core(SCENE_FILE, error))?;
         let paper =
@@ -234,7 +198,6 @@ impl Demo<'_> {
             schedule: &self.schedule,
             native: &self.native,
             imported: &self.imported,
-            study: Some(&self.study),
             files: &self.files(),
             durations: &self.durations,
         })?;
@@ -288,7 +251,7 @@ impl Demo<'_> {
             self.imported.iter().map(|run| run.label.as_str()).chain(["native"]).collect::<Vec<_>>().join(" = "),
             self.native.recording.names.len(),
             self.native.recording.rows(),
-            self.study_text(),
+            STUDY,
             estimate::told(&self.estimates),
             report.display()
         );
@@ -313,11 +276,10 @@ impl Demo<'_> {
             })).collect::<Vec<_>>(),
             "seconds": self.durations.iter().map(|(what, seconds)| (what.clone(), json!(seconds)))
                 .collect::<serde_json::Map<_, _>>(),
-            "error_study": self.study.to_json(),
             "estimated_errors": self.estimates.iter().map(Estimate::json).collect::<serde_json::Map<_, _>>(),
-            "warnings": self.native.warnings,
+            "warnings": warnings_json(&self.native.warnings)[0],
         });
-        Ok(Outcome { text, json })
+        Ok(Outcome { text, warnings: self.native.warnings.clone(), json, ..Outcome::default() })
     }
 }
 

@@ -9,18 +9,20 @@ use std::{
 use serde_json::{Value, json};
 use tiprub_core::{
     Scene, Simulation,
+    plausibility::Slip,
     settings::{ContactSettings, Motion, SceneSettings, StructureSettings},
     variables::Causality,
+    warning::{self, Warning},
 };
 use tiprub_fmi_host::{UnpackedFmu, entries, open_archive};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome},
+    console::{Console, Outcome, warnings_json},
 };
 use tiprub_study::stability::structure::Sliding;
 
-use crate::{cli::InspectArguments, rom_facts::RomFacts, scene_features};
+use crate::{cli::InspectArguments, left_out, rom_facts::RomFacts, scene_features};
 
 /// Kinds of files, told apart by name and, where that does not help, by their first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,19 +39,22 @@ enum FileKind {
 pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
     let path = arguments.file.as_path();
     match kind(path)? {
-        FileKind::Fmu => inspect_fmu(path, console),
+        FileKind::Fmu => inspect_fmu(path, arguments.measure, console),
         FileKind::Rom => {
             let facts = RomFacts::of(&scene_source::read_rom(path)?, None)?;
-            let warnings = facts.warnings();
-            console.warn(&warnings);
-            let json = json!({ "kind": "rom", "rom": facts.to_json(), "warnings": warnings });
-            Ok(Outcome { text: facts.to_text(), json })
+            let slips = facts.slips();
+            let warnings: Vec<Warning> = facts.warnings().into_iter().chain(slips.iter().map(Slip::warning)).collect();
+            let [texts, details] = warnings_json(&warnings);
+            let json = json!({ "kind": "rom", "rom": facts.to_json(), "warnings": texts, "warning_details": details });
+            Ok(Outcome { text: facts.to_text(), warnings, json, ..Outcome::default() })
         }
         FileKind::Scene => {
-            let scene = scene_source::load(path, &arguments.cache.cache(), console)?;
-            let described = describe_scene(&scene, console);
-            let (text, json) = described.map_err(|failure| scene_source::located(path, failure))?;
-            Ok(Outcome { text, json: json!({ "kind": "scene", "scene": json }) })
+            let scene = arguments.options.load(path, &arguments.cache.cache(), console)?;
+            let described = describe_scene(&scene, arguments.measure, console);
+            let Described { text, warnings, json } =
+                described.map_err(|failure| scene_source::located(path, failure))?;
+            let json = json!({ "kind": "scene", "scene": json });
+            Ok(Outcome { text, warnings, json, ..Outcome::default() })
         }
     }
 }
@@ -78,7 +83,7 @@ fn kind(path: &Path) -> Result<FileKind> {
     }
 }
 
-fn inspect_fmu(path: &Path, console: &Console) -> Result<Outcome> {
+fn inspect_fmu(path: &Path, measure: bool, console: &Console) -> Result<Outcome> {
     let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
     let files = entries(&mut open_archive(path)?).map_err(in_file)?;
     let resource = |name: &str| name.strip_prefix("resources/").and_then(tiprub_format::largest_resource);
@@ -109,9 +114,11 @@ fn inspect_fmu(path: &Path, console: &Console) -> Result<Outcome> {
         let name = format!("{}{elements}", variable.name);
         let _ = writeln!(text, "  {:<11} {name:<34} {unit:<8} {meaning}", variable.causality);
     }
-    let resources = inspect_resources(&fmu, console)?;
-    if let Some((scene_text, _)) = &resources {
-        let _ = write!(text, "\n{scene_text}");
+    let resources = inspect_resources(&fmu, measure, console)?;
+    let mut warnings = Vec::new();
+    if let Some(scene) = &resources {
+        let _ = write!(text, "\n{}", scene.text);
+        warnings.clone_from(&scene.warnings);
     }
     let json = json!({
         "kind": "fmu",
@@ -125,13 +132,13 @@ fn inspect_fmu(path: &Path, console: &Console) -> Result<Outcome> {
         "files": files.iter().map(|(name, size)| json!({"name": name, "bytes": size})).collect::<Vec<_>>(),
         "variables": counts.iter().map(|(causality, count)| ((*causality).to_string(), json!(count)))
             .collect::<serde_json::Map<_, _>>(),
-        "scene": resources.map(|(_, json)| json),
+        "scene": resources.map(|scene| scene.json),
     });
-    Ok(Outcome { text, json })
+    Ok(Outcome { text, warnings, json, ..Outcome::default() })
 }
 
 /// The scene inside a tiprub FMU, checked against the token; `None` for FMUs of other tools.
-fn inspect_resources(fmu: &UnpackedFmu, console: &Console) -> Result<Option<(String, Value)>> {
+fn inspect_resources(fmu: &UnpackedFmu, measure: bool, console: &Console) -> Result<Option<Described>> {
     let directory: PathBuf = fmu.resources();
     if !directory.join(tiprub_format::SCENE_FILE).is_file() {
         return Ok(None);
@@ -144,10 +151,17 @@ fn inspect_resources(fmu: &UnpackedFmu, console: &Console) -> Result<Option<(Str
             "Somebody changed one of them; make the FMU again with `tiprub package`",
         ));
     }
-    describe_scene(&resources.scene, console).map(Some)
+    describe_scene(&resources.scene, measure, console).map(Some)
 }
 
-fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
+/// What there is to know of a scene.
+struct Described {
+    text: String,
+    warnings: Vec<Warning>,
+    json: Value,
+}
+
+fn describe_scene(scene: &Scene, measure: bool, console: &Console) -> Result<Described> {
     let settings = &scene.settings;
     let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
     // Of many coupled sectors it takes long.
@@ -183,13 +197,17 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
         json["structure"] = json!(structure.name);
         roms.push(json);
     }
+    let absent = left_out::left_out(scene, measure).map_err(in_scene)?;
+    text.push_str(&left_out::text(&absent));
     drop(task);
-    console.warn(simulation.warnings());
+    let [texts, details] = warnings_json(simulation.warnings());
     let json = json!({
         "settings": serde_json::to_value(settings).unwrap_or(Value::Null),
         "features": features,
-        "warnings": simulation.warnings(),
-        "if_the_rotor_turned_the_other_way": simulation.if_reversed(),
+        "left_out": left_out::json(&absent),
+        "warnings": texts,
+        "warning_details": details,
+        "if_the_rotor_turned_the_other_way": warning::texts(&simulation.if_reversed()),
         "variables": {
             "inputs": scalars(Causality::Input),
             "parameters": scalars(Causality::Parameter),
@@ -197,7 +215,7 @@ fn describe_scene(scene: &Scene, console: &Console) -> Result<(String, Value)> {
         },
         "roms": roms,
     });
-    Ok((text, json))
+    Ok(Described { text, warnings: simulation.warnings().to_vec(), json })
 }
 
 fn gap_text(contact: &ContactSettings) -> String {
@@ -286,13 +304,21 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use tiprub_study::arguments::CacheArguments;
+    use tiprub_study::arguments::{CacheArguments, SceneOptions};
 
     fn inspect(name: &str, contents: impl AsRef<[u8]>) -> Result<Outcome> {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join(name);
         fs::write(&path, contents).unwrap();
-        run(&InspectArguments { file: path, cache: CacheArguments::default() }, &Console::new(true, false))
+        run(
+            &InspectArguments {
+                file: path,
+                cache: CacheArguments::default(),
+                options: SceneOptions::default(),
+                measure: false,
+            },
+            &Console::new(true, false),
+        )
     }
 
     #[test]
@@ -313,7 +339,12 @@ mod tests {
     #[test]
     fn a_missing_file_is_named() {
         let failure = run(
-            &InspectArguments { file: "/nowhere/x.fmu".into(), cache: CacheArguments::default() },
+            &InspectArguments {
+                file: "/nowhere/x.fmu".into(),
+                cache: CacheArguments::default(),
+                options: SceneOptions::default(),
+                measure: false,
+            },
             &Console::new(true, false),
         )
         .unwrap_err();

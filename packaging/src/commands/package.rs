@@ -6,7 +6,7 @@ use serde_json::json;
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome, shown_path},
+    console::{Console, Outcome, shown_path, warnings_json},
 };
 
 use crate::{
@@ -20,15 +20,15 @@ use crate::{
 /// # Errors
 /// A wrong scene, no library, or files that cannot be written.
 pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
-    // A wrong library is found before a model is reduced; one that has to be built waits for a scene that is right.
+    // What is wrong with the command line is said before any work; a library that has to be built waits for a scene that is right.
+    targets(arguments.fmi, &arguments.output, "model")?;
     let given = !arguments.libraries.library.is_empty();
     let libraries = given.then(|| library::load(Unit::Scene, &arguments.libraries, console)).transpose()?;
-    let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
+    let scene = arguments.options.load(&arguments.scene, &arguments.cache.cache(), console)?;
     let targets = targets(arguments.fmi, &arguments.output, &scene.settings.name)?;
     let libraries = libraries.map_or_else(|| library::load(Unit::Scene, &arguments.libraries, console), Ok)?;
     let package =
         Package::new(&scene, &libraries).map_err(|failure| scene_source::located(&arguments.scene, failure))?;
-    console.warn(package.warnings());
     let arrays = (arguments.arrays || arguments.scalars).then_some(arguments.arrays);
     for (version, path) in &targets {
         console.say(format_args!("Writing {}", path.display()));
@@ -44,9 +44,11 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
         .iter()
         .map(|(version, path)| json!({"fmi": version.digit().to_string(), "file": shown_path(path), "bytes": size(path)}))
         .collect();
-    let json =
-        json!({ "model": scene.settings.name, "fmus": files, "platforms": platforms, "warnings": package.warnings() });
-    Ok(Outcome { text: text.join("\n"), json })
+    let [warnings, details] = warnings_json(package.warnings());
+    let json = json!({
+        "model": scene.settings.name, "fmus": files, "platforms": platforms, "warnings": warnings, "warning_details": details,
+    });
+    Ok(Outcome { text: text.join("\n"), warnings: package.warnings().to_vec(), json, ..Outcome::default() })
 }
 
 pub(crate) fn size(path: &Path) -> u64 {

@@ -3,6 +3,10 @@
 use std::{fmt::Write as _, path::Path, time::Instant};
 
 use serde_json::{Value, json};
+use tiprub_core::{
+    plausibility::Slip,
+    warning::{self, Warning},
+};
 use tiprub_gallery::{builtin, reduction};
 use tiprub_model::{
     Rotor37Options,
@@ -44,6 +48,7 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     let mut reduced = reduced(&arguments.model, console)?;
     reduced.seconds = start.elapsed().as_secs_f64();
     let facts = RomFacts::of(&reduced.rom, None)?;
+    let slips = check_slips(&reduced, &facts, written.accept_implausible)?;
     let mut files = vec![(output, tiprub_format::write_rom(&reduced.rom))];
     if let Some(path) = &written.inp {
         files.push((path, reduced.calculix()?));
@@ -55,14 +60,27 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
         output_file::write(path, bytes)?;
     }
     let mut warnings = reduced.warnings.clone();
-    warnings.extend(facts.warnings());
+    warnings.extend(warning::texts(&[facts.warnings(), slips].concat()));
     if matches!(arguments.model, Model::Blade(_) | Model::Sector(_)) {
         warnings.extend(facts.sense_warning());
     }
     warnings.extend(spin_warning(&reduced.spin_checks));
-    console.warn(&warnings);
+    console.warn_texts(&warnings);
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
-    Ok(Outcome { text: text(&reduced, &facts, &paths), json: json(&reduced, &facts, written, output, &warnings) })
+    let (text, json) = (text(&reduced, &facts, &paths), json(&reduced, &facts, written, output, &warnings));
+    Ok(Outcome { text, json, ..Outcome::default() })
+}
+
+/// Refuse a model that is rarely meant, unless it `is_meant`: its slips are warnings then.
+fn check_slips(reduced: &Reduced, facts: &RomFacts, is_meant: bool) -> Result<Vec<Warning>> {
+    let slips = [reduced.slips.clone(), facts.slips()].concat();
+    match slips.first().filter(|_| !is_meant) {
+        Some(Slip { what, problem, question }) => {
+            let remedy = format!("{question} If it is meant, say so with --accept-implausible");
+            Err(Failure::new(what, problem, remedy))
+        }
+        None => Ok(slips.iter().map(Slip::warning).collect()),
+    }
 }
 
 /// Whether a file can be written there, and replaces none without being told to. Devices and pipes take whatever comes.

@@ -3,11 +3,11 @@
 use std::{path::Path, time::Instant};
 
 use serde_json::{Map, Value, json};
-use tiprub_core::Scene;
+use tiprub_core::{Scene, Warning};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome, shown_path},
+    console::{Console, Outcome, shown_path, warnings_json},
     extremes::{Extreme, extremes},
     history::History,
     native::{self, Given},
@@ -15,12 +15,9 @@ use tiprub_shell::{
     schedule::Schedule,
 };
 
-use tiprub_study::{
-    estimate::{self, Estimate},
-    stability::limits::same_reason,
-};
+use tiprub_study::estimate::{self, Estimate};
 
-use crate::{cli::RunArguments, scene_features};
+use crate::{answer, cli::RunArguments, scene_features};
 
 /// Load, run, write the CSV, sum up.
 ///
@@ -31,7 +28,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     if to_stdout && console.is_json() {
         return Err(Failure::usage("--csv -", "and --json both want stdout", "Give --csv a file"));
     }
-    let scene = scene_source::load(&arguments.scene, &arguments.cache.cache(), console)?;
+    let scene = arguments.options.load(&arguments.scene, &arguments.cache.cache(), console)?;
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
     let history = arguments.inputs.as_deref().map(History::read).transpose()?;
     let clock = Instant::now();
@@ -44,7 +41,6 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         run.map_err(|failure| if is_set { failure } else { scene_source::located(&arguments.scene, failure) })?
     };
     let wall = clock.elapsed().as_secs_f64();
-    console.warn(&run.warnings);
     if let Some(path) = arguments.csv.as_deref().filter(|_| !to_stdout) {
         run.recording.write_csv(path)?;
     }
@@ -62,6 +58,8 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     // A parameter of the command line replaces what the scene has.
     let is_set = arguments.set.iter().any(|(name, _)| name == "scheme");
     let scheme = if is_set { "set on the command line".to_owned() } else { scene_features::scheme(&scene.settings) };
+    let answer = answer::lines(&run.recording);
+    let [warnings, warning_details] = warnings_json(&run.warnings);
     let estimates = estimated(&scene, arguments, &schedule, console)?;
     let mut json = json!({
         "model": scene.settings.name,
@@ -81,21 +79,44 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         "missed_steps": run.effort.map(|effort| effort.missed),
         "internal_trials": run.effort.map(|effort| effort.tried()),
         "real_time_factor": stepping / simulated,
-        "warnings": run.warnings,
+        "warnings": warnings,
+        "warning_details": warning_details,
+        "answer": answer::json(&answer),
         "csv": arguments.csv.as_deref().map(shown_path),
         "extremes": Extreme::json(&extremes),
         "last": last,
     });
-    let text = if to_stdout {
-        run.recording.to_csv()
-    } else {
+    let rest = if arguments.all {
         let outputs = outputs(&run.recording.names, run.recording.row(rows - 1));
-        format!("{outputs}\n{}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
+        format!("\n{outputs}\n{}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
+    } else {
+        let told = if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::told(&estimates)) };
+        format!("{}{told}", where_the_rest_is(&json, !run.warnings.is_empty()))
     };
+    let (text, rest) = if to_stdout { (run.recording.to_csv(), String::new()) } else { (answer::text(&answer), rest) };
     if !estimates.is_empty() {
         json["estimated_errors"] = Value::Object(estimates.iter().map(Estimate::json).collect());
     }
-    Ok(Outcome { text, json })
+    Ok(Outcome { text, warnings: run.warnings, rest, json })
+}
+
+/// What stands behind the answer and the warnings.
+fn where_the_rest_is(json: &Value, warned: bool) -> String {
+    let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
+    let mut text = format!(
+        "\n{}: t = {} s to {} s, computed in {:.3} s ({:.3} s of computing per simulated second)\n\
+         all outputs at the end, extremes, times and whole warnings: --all; outputs over time: {}",
+        json["model"].as_str().unwrap_or_default(),
+        json["start"],
+        json["stop"],
+        number("stepping_seconds"),
+        number("real_time_factor"),
+        json["csv"].as_str().unwrap_or("--csv FILE"),
+    );
+    if warned {
+        text.push_str("\nwhat a warning means: docs/warnings.md; not to see it: --silence ID");
+    }
+    text
 }
 
 /// What the run leaves, where asked for; else what the ROM of the master says of itself.
@@ -120,7 +141,7 @@ fn lines(estimates: &[Estimate]) -> String {
 const MOST_LISTED: usize = 12;
 
 /// What a user looks for, last, where the eye is: extremes, warnings, files.
-fn summary(json: &Value, extremes: &[Extreme], warnings: &[String]) -> String {
+fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
     let per_step = |name: &str| json["milliseconds_per_communication_step"][name].as_f64().unwrap_or(f64::NAN);
     let mut text = format!(
@@ -148,29 +169,14 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[String]) -> String {
         text.extend(extremes.iter().map(|extreme| format!("  {}\n", extreme.line())));
     }
     if !warnings.is_empty() {
-        text.push_str("\nwarnings:\n");
-        text.extend(merged(warnings).iter().map(|warning| format!("  {warning}\n")));
+        text.push_str("\nwhole warnings:\n");
+        let whole = |warning: &Warning| format!("  [{}] {warning}\n", warning.topic().id());
+        text.extend(warnings.iter().map(whole));
     }
     if let Some(path) = json["csv"].as_str() {
         text.push_str(&format!("\nwritten: {path}"));
     }
     text
-}
-
-/// Warnings that differ in their numbers only are one, with how many more there are.
-fn merged(warnings: &[String]) -> Vec<String> {
-    let mut all: Vec<(&String, usize)> = Vec::new();
-    for warning in warnings {
-        match all.iter_mut().find(|(first, _)| same_reason(first, warning)) {
-            Some((_, more)) => *more += 1,
-            None => all.push((warning, 0)),
-        }
-    }
-    let told = |(warning, more): &(&String, usize)| match more {
-        0 => (*warning).clone(),
-        more => format!("{warning} (and {more} more like it, above)"),
-    };
-    all.iter().map(told).collect()
 }
 
 /// All outputs at the end of the run.
@@ -197,16 +203,4 @@ fn outputs(names: &[String], last: &[f64]) -> String {
         }
     }
     text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::merged;
-
-    #[test]
-    fn warnings_alike_but_for_numbers_are_one() {
-        let all = ["node 1 grows by 2 1/s", "the step is long", "node 7 grows by 3e4 1/s"].map(String::from);
-        assert_eq!(merged(&all), ["node 1 grows by 2 1/s (and 1 more like it, above)", "the step is long"]);
-        assert!(merged(&[]).is_empty());
-    }
 }

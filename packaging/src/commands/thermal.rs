@@ -72,7 +72,8 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
         .map(|(version, path)| json!({"fmi": version.digit().to_string(), "file": shown_path(path), "bytes": size(path)}))
         .collect();
     let platforms: Vec<&str> = libraries.iter().map(|library| library.platform.tuple()).collect();
-    Ok(Outcome { text, json: json!({"model": facts_json(&reduced), "fmus": files, "platforms": platforms}) })
+    let json = json!({"model": facts_json(&reduced), "fmus": files, "platforms": platforms});
+    Ok(Outcome { text, json, ..Outcome::default() })
 }
 
 /// For people.

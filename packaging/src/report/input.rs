@@ -3,7 +3,7 @@
 use tiprub_core::{Scene, VariableTable};
 use tiprub_model::Reduction;
 use tiprub_shell::{native::NativeRun, recording::Agreement, schedule::Schedule};
-use tiprub_study::{error_study::ErrorStudy, estimate::Estimate};
+use tiprub_study::estimate::Estimate;
 
 use crate::rom_facts::RomFacts;
 
@@ -45,8 +45,6 @@ pub struct ReportInput<'a> {
     pub native: &'a NativeRun,
     /// The runs through the C ABIs.
     pub imported: &'a [ImportedSummary],
-    /// Error against run time, where it was studied.
-    pub study: Option<&'a ErrorStudy>,
     /// What steps, modes, patches and mesh are estimated to leave; empty where nobody asked.
     pub estimates: &'a [Estimate],
     /// The same run with the paper's model and method, and its variables.

@@ -9,7 +9,7 @@ use tiprub_study::estimate;
 
 use super::input::{ReportFile, ReportInput};
 use super::sections::{Results, figures};
-use crate::rom_facts::{CheckRow, ROWS_SHOWN, RomFacts, Worst, order_text, sectors_text};
+use crate::rom_facts::{CheckRow, ROWS_SHOWN, RomFacts, Worst, not_negative_zero, order_text, sectors_text};
 
 /// The whole page.
 ///
@@ -49,9 +49,9 @@ fn header(input: &ReportInput<'_>) -> String {
     let mut cards = vec![
         ("simulated".into(), format!("{} ms", rounded(1e3 * simulated)), revolutions(&results)),
         (
-            "real-time factor".into(),
-            rounded(stepping / simulated),
-            "stepping time / simulated time, one core".to_string(),
+            "computing per simulated second".into(),
+            format!("{} s", rounded(stepping / simulated)),
+            "of stepping, on one core".to_string(),
         ),
         ("per internal step".into(), format!("{} µs", rounded(per_step)), "whole disk, native".into()),
     ];
@@ -131,7 +131,10 @@ fn checks_table(checks: &[CheckRow]) -> String {
         let _ = write!(
             html,
             "<tr><td>{mode}</td>{number}<td>{:.3}</td><td>{:.3}</td><td>{:.5}</td><td>{:.5}</td></tr>",
-            row.full, row.reduced, row.deviation, row.residual
+            row.full,
+            row.reduced,
+            not_negative_zero(row.deviation),
+            not_negative_zero(row.residual)
         );
     }
     html.push_str("</tbody></table>");
@@ -139,7 +142,10 @@ fn checks_table(checks: &[CheckRow]) -> String {
         let _ = write!(
             html,
             "<p>{} more modes up to {:.1} Hz: deviation at most {:.5} %, residual at most {:.5} %.</p>",
-            rest.count, rest.frequency, rest.deviation, rest.residual
+            rest.count,
+            rest.frequency,
+            not_negative_zero(rest.deviation),
+            not_negative_zero(rest.residual)
         );
     }
     html
@@ -155,7 +161,7 @@ fn run_section(input: &ReportInput<'_>) -> String {
         ("internal steps", native.internal_steps.to_string()),
         ("stepping time", format!("{} s", rounded(stepping))),
         ("time per internal step", format!("{} µs", rounded(1e6 * stepping / native.internal_steps as f64))),
-        ("real-time factor (stepping time / simulated time)", rounded(stepping / simulated)),
+        ("computing per simulated second", format!("{} s", rounded(stepping / simulated))),
     ];
     if let Some(step) = results.last(Quantity::InternalStep) {
         rows.insert(2, ("internal step h", format!("{} s", scientific(step))));
@@ -173,7 +179,9 @@ fn run_section(input: &ReportInput<'_>) -> String {
     }
     let mut html = format!("<section><h2>The run</h2>{}", table(&rows));
     for warning in &native.warnings {
-        let _ = write!(html, "<p class=\"warning\">{}</p>", escape(warning));
+        let [problem, remedy] = warning.lines();
+        let (word, id) = (warning.level().word(), warning.topic().id());
+        let _ = write!(html, "<p class=\"warning\"><b>{word} [{id}]</b> {}<br>{}</p>", escape(problem), escape(remedy));
     }
     if !input.estimates.is_empty() {
         let _ = write!(html, "<p>{}.</p>", escape(&estimate::told(input.estimates)));
@@ -315,6 +323,7 @@ mod tests {
     fn numbers_are_readable() {
         assert_eq!([1234.5, 0.01234, 9.876, 0.0, 123.4].map(rounded), ["1234", "0.0123", "9.88", "0", "123"]);
         assert_eq!(scientific(1.234567e-7), "1.235·10<sup>−7</sup>");
+        assert_eq!(format!("{:.5}", not_negative_zero(-1e-9)), "0.00000");
         assert_eq!(scientific(2.0), "2");
         assert_eq!(scientific(1e-5), "1·10<sup>−5</sup>");
     }

@@ -1,6 +1,6 @@
 //! What of a model that was read cannot be meant, and what is asked about.
 
-use tiprub_core::Rom;
+use tiprub_core::{Rom, plausibility::Slip};
 use tiprub_model::{
     read::{Imported, plausibility},
     reduce::ContactPoint,
@@ -44,16 +44,15 @@ pub fn judge(imported: &Imported, asked: &ModelOptions) -> Result<Vec<String>> {
 const TIPS: f64 = 0.9;
 
 /// Blades whose contact nodes lie inside: tip and root exchanged, or another axis.
-pub fn radius_warning(imported: &Imported, chosen: &Chosen) -> Option<String> {
+pub fn radius_slip(imported: &Imported, chosen: &Chosen) -> Option<Slip> {
     let radius = |[x, y, _]: [f64; 3]| x.hypot(y);
     let nodes = &imported.model.nodes;
     let outermost = nodes.iter().copied().map(radius).fold(0.0, f64::max);
     let contact = chosen.contact.iter().map(|point| radius(nodes[point.node])).fold(0.0, f64::max);
-    (chosen.grid.is_none() && contact < TIPS * outermost).then(|| {
-        format!(
-            "the contact nodes reach a radius of {contact:.6} m, the model one of {outermost:.6} m: are tip and root, and the \
-             axis of rotation, those that are meant?"
-        )
+    (chosen.grid.is_none() && contact < TIPS * outermost).then(|| Slip {
+        what: "contact nodes".into(),
+        problem: format!("they reach a radius of {contact:.6} m, the model one of {outermost:.6} m"),
+        question: "Are tip and root, and the axis of rotation, those that are meant?".into(),
     })
 }
 

@@ -148,7 +148,7 @@ fn told(
     warnings.extend(judge::judge(&imported, source.model)?);
     let chosen = choose(&imported)?;
     let read = describe::describe(&imported, source.model, &chosen);
-    warnings.extend(judge::radius_warning(&imported, &chosen));
+    let slips = judge::radius_slip(&imported, &chosen).into_iter().collect();
     warnings.extend(judge::contact_warnings(&chosen));
     warnings.extend(judge::set_warnings(source.model, &chosen));
     let mut model = imported.model;
@@ -162,7 +162,7 @@ fn told(
         let _ = write!(reduced.read.0, "\n  note: {note}");
     }
     warnings.extend(judge::frequency_warning(&reduced.rom, clamped.is_none()));
-    reduced.warnings = warnings;
+    (reduced.warnings, reduced.slips) = (warnings, slips);
     Ok(reduced)
 }
 

@@ -28,7 +28,7 @@ fn a_native_run_writes_one_row_per_communication_point() {
 #[test]
 fn the_summary_of_a_run_tells_its_extremes() {
     let project = Project::new();
-    let text = project.succeed(&["run", "scene.toml", "--csv", "out.csv", "--quiet"]);
+    let text = project.succeed(&["run", "scene.toml", "--csv", "out.csv", "--all", "--quiet"]);
     let json = project.succeed(&["run", "scene.toml", "--json", "--quiet"]);
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     let (names, rows) = columns(&fs::read_to_string(project.path("out.csv")).unwrap());
@@ -57,6 +57,24 @@ fn the_summary_of_a_run_tells_its_extremes() {
     let told = text.split("over the run:").nth(1).unwrap();
     assert!(told.contains(&format!(" N at t = {at} s")) && told.contains("smallest clearance: "), "{text}");
     assert!(told.contains("most contact nodes touching at a communication point: "), "{text}");
+}
+
+/// Five lines before all else, the same with and without `--all`, and then where the rest is.
+#[test]
+fn a_run_answers_first_in_five_lines() {
+    let project = Project::new();
+    let [short, long] = [&[][..], &["--all"]]
+        .map(|more| project.succeed(&[&["run", "scene.toml", "--csv", "out.csv", "--quiet"], more].concat()));
+    let first = |text: &str| text.lines().take(5).map(str::to_owned).collect::<Vec<_>>();
+    let names: Vec<String> = first(&short).iter().map(|line| line.split(' ').next().unwrap().to_owned()).collect();
+    assert_eq!(names, ["force", "heat", "torque", "clearance", "growth"]);
+    assert_eq!(first(&short), first(&long));
+    assert!(short.contains("--all") && short.contains("out.csv") && !short.contains("at the end:\n"), "{short}");
+    assert!(long.contains("at the end:\n") && long.contains("rotor_angle"), "{long}");
+    let (names, rows) = columns(&fs::read_to_string(project.path("out.csv")).unwrap());
+    let heat = rows.last().unwrap()[names.iter().position(|name| name == "friction_loss").unwrap()];
+    let told: f64 = first(&short)[1].split_whitespace().nth(1).unwrap().parse().unwrap();
+    assert!(heat > 0.0 && (told - heat).abs() <= 5e-6 * heat, "{told} {heat}");
 }
 
 #[test]
@@ -136,7 +154,10 @@ fn a_communication_step_longer_than_the_run_is_warned_of() {
         [&["run", "scene.toml", "-q"][..], &["package", "scene.toml", "-o", "x", "--library", "library.so", "-q"]]
     {
         let stderr = String::from_utf8(project.run(arguments).stderr).unwrap();
-        assert!(stderr.starts_with("warning: the communication step 0.1 s is longer"), "{arguments:?}: {stderr}");
+        assert!(
+            stderr.starts_with("warning [communication-step] the communication step 0.1 s is longer"),
+            "{arguments:?}: {stderr}"
+        );
     }
     assert!(project.run(&["run", "scene.toml", "-q", "--step", "0.05"]).stderr.is_empty());
 }

@@ -22,17 +22,61 @@ fn warnings_are_on_stderr_even_when_quiet_and_in_json() {
     ] {
         let output = project.run(arguments);
         let stderr = String::from_utf8(output.stderr).unwrap();
-        let shown: Vec<&str> = stderr.lines().filter_map(|line| line.strip_prefix("warning: ")).collect();
-        // What is not resolved, and what contact makes of it.
+        // What is not resolved, and what contact makes of it: two lines each.
+        let shown = warnings(&stderr);
         assert!(output.status.success() && shown.len() == 2, "{arguments:?}: {stderr}");
+        assert_eq!(stderr.lines().count(), 4, "{stderr}");
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        let warnings = if arguments[0] == "inspect" { &json["scene"]["warnings"] } else { &json["warnings"] };
-        assert_eq!(warnings, &serde_json::json!(shown), "{arguments:?}");
+        let json = if arguments[0] == "inspect" { &json["scene"] } else { &json };
+        let details = json["warning_details"].as_array().unwrap();
+        let told: Vec<String> = details
+            .iter()
+            .map(|one| {
+                let text = |key: &str| one[key].as_str().unwrap();
+                format!("{} [{}] {}\n    {}", text("level"), text("id"), text("problem"), text("remedy"))
+            })
+            .collect();
+        assert_eq!(told, shown, "{arguments:?}");
+        assert_eq!(json["warnings"].as_array().unwrap().len(), 2, "{arguments:?}");
     }
 }
 
+/// Every warning with its remedy, as they stand on stderr.
+fn warnings(stderr: &str) -> Vec<String> {
+    let lines: Vec<&str> = stderr.lines().collect();
+    let first = |line: &&[&str]| line[0].starts_with("warning [") || line[0].starts_with("note [");
+    lines.windows(2).filter(first).map(|two| two.join("\n")).collect()
+}
+
+/// A warning is found by its identifier, and silenced by it: on the command line, in a scene, and in what is packed.
 #[test]
-fn slips_are_asked_about_by_every_command() {
+fn a_warning_is_silenced_by_its_identifier() {
+    let project = Project::new();
+    let coarse = SCENE
+        .replace("step = 1e-4", "step = 2.05e-3")
+        .replace("communication_step = 1e-3", "communication_step = 4.1e-3");
+    fs::write(project.path("scene.toml"), &coarse).unwrap();
+    let ids = |words: &[&str]| -> Vec<String> {
+        let output = project.run(words);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{words:?}: {stderr}");
+        warnings(&stderr).iter().map(|text| text.split(['[', ']']).nth(1).unwrap().to_owned()).collect()
+    };
+    let all = ids(&["run", "scene.toml", "--quiet"]);
+    assert_eq!(all.len(), 2, "{all:?}");
+    assert_eq!(ids(&["run", "scene.toml", "--quiet", "--silence", &all[0]]), all[1..]);
+    let package = ["package", "scene.toml", "-o", "x", "--library", "library.so", "--quiet", "--silence", &all[1]];
+    assert_eq!(ids(&package), all[..1]);
+    assert_eq!(ids(&["inspect", "x/small_fmi3.fmu", "--quiet"]), all[..1]);
+    fs::write(project.path("scene.toml"), format!("silence = [\"{}\", \"{}\"]\n{coarse}", all[0], all[1])).unwrap();
+    assert!(ids(&["run", "scene.toml", "--quiet"]).is_empty());
+    let unknown = project.fail(&["run", "scene.toml", "--silence", "fluter"], 2);
+    assert!(unknown.contains("no warning has the identifier \"fluter\"") && unknown.contains("flutter"), "{unknown}");
+}
+
+/// Slips end with an error, unless the scene or the command line says that they are meant; an FMU then says so too.
+#[test]
+fn slips_are_refused_by_every_command_unless_they_are_meant() {
     let project = Project::new();
     fs::write(
         project.path("scene.toml"),
@@ -48,9 +92,17 @@ fn slips_are_asked_about_by_every_command() {
         "package scene.toml -o x --library library.so",
         "inspect x/small_fmi3.fmu",
     ] {
-        let output = project.run(&line.split(' ').collect::<Vec<_>>());
+        let words: Vec<&str> = line.split(' ').collect();
+        if !line.contains("fmu") {
+            let refused = project.fail(&words, 1);
+            assert!(refused.contains("rpm") && refused.contains("4297 m/s"), "{line}: {refused}");
+            assert!(refused.contains("--accept-implausible"), "{line}: {refused}");
+        }
+        // What is packed holds the key.
+        let meant = if line.contains("fmu") { words } else { [&words[..], &["--accept-implausible"]].concat() };
+        let output = project.run(&meant);
         let stderr = String::from_utf8(output.stderr).unwrap();
-        let told: Vec<_> = stderr.lines().filter(|text| text.contains("rpm")).collect();
+        let told: Vec<_> = stderr.lines().filter(|text| text.contains("[implausible]")).collect();
         assert!(output.status.success() && told.len() == 1 && told[0].contains("4297 m/s"), "{line}: {stderr}");
     }
     // A ROM by hand in millimetres.
@@ -58,10 +110,9 @@ fn slips_are_asked_about_by_every_command() {
     let mut rom = tiprub_format::read_rom(&fs::read(&path).unwrap(), "small").unwrap();
     rom.contact_nodes[0].position[0] = 250.0;
     fs::write(&path, tiprub_format::write_rom(&rom)).unwrap();
-    for line in ["inspect small.rom.safetensors", "inspect scene.toml"] {
-        let output = project.run(&line.split(' ').collect::<Vec<_>>());
-        assert!(String::from_utf8(output.stderr).unwrap().contains("millimetres"), "{line}");
-    }
+    let output = project.run(&["inspect", "small.rom.safetensors"]);
+    assert!(output.status.success() && String::from_utf8(output.stderr).unwrap().contains("millimetres"));
+    assert!(project.fail(&["inspect", "scene.toml"], 1).contains("millimetres"));
 }
 
 #[test]
@@ -118,6 +169,5 @@ fn what_comes_up_in_a_run_is_told_once() {
     let stderr = String::from_utf8(output.stderr.clone()).unwrap();
     let told: Vec<&str> = stderr.lines().filter(|line| line.contains("have missed the tolerance")).collect();
     assert!(output.status.success() && told.len() == 1, "{stderr}");
-    let shown: Vec<&str> = stderr.lines().filter_map(|line| line.strip_prefix("warning: ")).collect();
-    assert_eq!(json(&output)["warnings"], serde_json::json!(shown));
+    assert_eq!(json(&output)["warnings"].as_array().unwrap().len(), warnings(&stderr).len(), "{stderr}");
 }

@@ -338,7 +338,7 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
 }
 
 #[test]
-fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about() {
+fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_refused() {
     let project = Project::new(&["blade_hex8.inp"]);
     let line =
         "reduce blade blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";
@@ -355,12 +355,14 @@ fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_asked_about()
     // Held at the tip, touching with the root.
     let line =
         "reduce blade blade_hex8.inp --sectors 36 --units mm-t-s --material steel --modes 4 --contact-nodes 3 --force";
-    let swapped = project.succeed(&format!("{line} --contact-set ROOT --clamp-set TIP"));
-    assert!(swapped["warnings"].to_string().contains("tip and root"), "{}", swapped["warnings"]);
-    let turned = project.succeed(
-        &format!("{line} --contact-set TIP --clamp-set ROOT --axis x --sectors 400").replacen("--sectors 36 ", "", 1),
-    );
-    assert!(turned["warnings"].to_string().contains("axis"), "{}", turned["warnings"]);
+    let swapped = format!("{line} --contact-set ROOT --clamp-set TIP");
+    let refused = project.fail(&swapped, 1);
+    assert!(refused.contains("tip and root") && refused.contains("--accept-implausible"), "{refused}");
+    let meant = project.succeed(&format!("{swapped} --accept-implausible"));
+    assert!(meant["warnings"].to_string().contains("tip and root"), "{}", meant["warnings"]);
+    let turned =
+        format!("{line} --contact-set TIP --clamp-set ROOT --axis x --sectors 400").replacen("--sectors 36 ", "", 1);
+    assert!(project.fail(&turned, 1).contains("axis"));
     let right = project.succeed(&format!("{line} --contact-set TIP --clamp-set ROOT"));
     assert!(!right["warnings"].to_string().contains("axis"), "{}", right["warnings"]);
 }

@@ -26,6 +26,7 @@ pub mod stability;
 mod step;
 pub mod system;
 pub mod variables;
+pub mod warning;
 
 pub use error::{Error, Result, shown};
 pub use ledger::{Ledger, Sum};
@@ -33,3 +34,4 @@ pub use rom::Rom;
 pub use settings::Scene;
 pub use simulation::Simulation;
 pub use variables::VariableTable;
+pub use warning::Warning;

@@ -1,8 +1,41 @@
-//! What is legal and hardly meant: slips of units, axes and sets, asked about with the number that looks wrong. A warning
-//! changes no result.
+//! Values within their range that are rarely meant: slips of units, axes and sets. They are errors unless the scene says that they
+//! are meant (`accept_implausible`), and warnings then.
 
 use crate::rom::Frame;
-use crate::{Rom, shown};
+use crate::warning::{Topic, Warning};
+use crate::{Error, Rom, shown};
+
+/// What to do about a slip that is none.
+pub const IF_MEANT: &str =
+    "If it is meant, say so with `accept_implausible = true` in the scene (--accept-implausible)";
+
+/// A value that is rarely meant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Slip {
+    /// Where it stands: a variable, a field or a ROM.
+    pub what: String,
+    /// What is wrong with it, with its value.
+    pub problem: String,
+    /// What was probably meant.
+    pub question: String,
+}
+
+impl Slip {
+    fn new(what: impl Into<String>, problem: impl Into<String>, question: impl Into<String>) -> Self {
+        Self { what: what.into(), problem: problem.into(), question: question.into() }
+    }
+
+    /// The error that it is.
+    pub fn error(&self) -> Error {
+        Error::invalid(self.what.clone(), self.problem.clone(), format!("{} {IF_MEANT}", self.question))
+    }
+
+    /// The warning that it is where the scene accepts it.
+    pub fn warning(&self) -> Warning {
+        let problem = format!("{}: {}", self.what, self.problem);
+        Warning::new(Topic::Implausible, problem, self.question.clone())
+    }
+}
 
 /// Fastest tips that are not asked about (m/s): fans and compressors reach 500, the last blades of steam turbines 800, and
 /// what turns faster than 1500 bursts, whatever it is made of. A speed in rpm taken for rad/s is 9.5 times too fast.
@@ -22,17 +55,16 @@ const RIGID: f64 = 1e-6;
 /// Contact nodes up to this number are looked at for blades that cross.
 const CROSSING_UP_TO: usize = 200;
 
-/// Tips that are too fast at `speed` (rad/s).
-pub fn of_speed(rom: &Rom, speed: f64) -> Option<String> {
+/// Tips that are too fast at `speed` (rad/s), the value of the input `name`. Allocates only to say so.
+pub fn of_speed(rom: &Rom, speed: f64, name: impl FnOnce() -> String) -> Option<Slip> {
     let fastest = speed.abs() * radii(rom)[1];
     (rom.frame == Frame::Cylindrical && fastest > TIP_SPEED).then(|| {
-        format!(
-            "at speed {} rad/s the tips move at {fastest:.0} m/s, faster than any rotor endures: is the speed in rpm? {} rpm \
-             are {:.6} rad/s",
-            shown(speed),
-            shown(speed),
-            speed * std::f64::consts::PI / 30.0
-        )
+        let speed_shown = shown(speed);
+        let problem = format!(
+            "at speed {speed_shown} rad/s the tips move at {fastest:.0} m/s; above {TIP_SPEED} m/s every rotor bursts"
+        );
+        let radians = speed * std::f64::consts::PI / 30.0;
+        Slip::new(name(), problem, format!("Is the speed in rpm? {speed_shown} rpm are {radians:.6} rad/s."))
     })
 }
 
@@ -42,13 +74,16 @@ pub fn fastest(rom: &Rom) -> f64 {
 }
 
 /// A free body that is too fast at `velocity` (m/s).
-pub fn of_velocity(velocity: [f64; 3]) -> Option<String> {
+pub fn of_velocity(name: &str, velocity: [f64; 3]) -> Option<Slip> {
     let size = velocity.iter().map(|component| component * component).sum::<f64>().sqrt();
-    (size > FLIGHT).then(|| format!("the free structure starts at {size:.0} m/s: is its velocity in m/s?"))
+    (size > FLIGHT).then(|| {
+        let problem = format!("the free structure starts at {size:.0} m/s, faster than {FLIGHT} m/s");
+        Slip::new(format!("`velocity` of {name}"), problem, "Is its velocity in m/s?")
+    })
 }
 
-/// Doubts about a ROM; `frequencies` are its angular frequencies (rad/s).
-pub fn of_rom(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> Vec<String> {
+/// Slips of a ROM; `frequencies` are its angular frequencies (rad/s).
+pub fn of_rom(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> Vec<Slip> {
     let sectors = if rom.sectors > 1 && rom.extras.grid.is_none() { of_sectors(rom) } else { None };
     [of_size(rom), sectors, of_frequencies(rom, frequencies)].into_iter().flatten().collect()
 }
@@ -66,38 +101,35 @@ fn radii(rom: &Rom) -> [f64; 2] {
     [f64::INFINITY, sides.into_iter().fold(0.0, f64::max)]
 }
 
-fn of_size(rom: &Rom) -> Option<String> {
-    let ([low, high], name) = (radii(rom), &rom.name);
+fn named(rom: &Rom) -> String {
+    format!("ROM `{}`", rom.name)
+}
+
+fn of_size(rom: &Rom) -> Option<Slip> {
+    let [low, high] = radii(rom);
     let what = if rom.frame == Frame::Cylindrical { "stand at a radius of" } else { "are spread over" };
     if high > RADII[1] {
-        return Some(format!(
-            "ROM `{name}`: its contact nodes {what} {} m: are its lengths in millimetres? A ROM is in m, kg and s",
-            shown(high)
-        ));
+        let problem = format!("its contact nodes {what} {} m", shown(high));
+        return Some(Slip::new(named(rom), problem, "Are its lengths in millimetres? A ROM is in m, kg and s."));
     }
     (low < RADII[0]).then(|| {
-        format!(
-            "ROM `{name}`: contact nodes stand at a radius of {} m: is the axis of rotation right, and the length in metres?",
-            shown(low)
-        )
+        let problem = format!("contact nodes stand at a radius of {} m", shown(low));
+        Slip::new(named(rom), problem, "Is the axis of rotation right, and the length in metres?")
     })
 }
 
-fn of_frequencies(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> Option<String> {
+fn of_frequencies(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> Option<Slip> {
     let highest = frequencies.clone().fold(0.0, f64::max);
     let elastic = frequencies.filter(|frequency| *frequency > RIGID * highest);
     let lowest = elastic.fold(f64::INFINITY, f64::min) / std::f64::consts::TAU;
     (lowest.is_finite() && !(FREQUENCIES[0]..=FREQUENCIES[1]).contains(&lowest)).then(|| {
-        format!(
-            "ROM `{}`: its lowest natural frequency is {lowest:.3e} Hz: are units (m, kg, s), material and clamped nodes \
-             those that are meant?",
-            rom.name
-        )
+        let problem = format!("its lowest natural frequency is {lowest:.3e} Hz");
+        Slip::new(named(rom), problem, "Are units (m, kg, s), material and clamped nodes those that are meant?")
     })
 }
 
 /// Neighbouring sectors that lie within each other.
-fn of_sectors(rom: &Rom) -> Option<String> {
+fn of_sectors(rom: &Rom) -> Option<Slip> {
     if rom.frame != Frame::Cylindrical {
         return None;
     }
@@ -113,11 +145,9 @@ fn of_sectors(rom: &Rom) -> Option<String> {
     } else {
         return None;
     };
-    Some(format!(
-        "ROM `{}`: {how} the {pitch:.4} rad of one of {} sectors: are the number of sectors, the axis of rotation and the \
-         contact nodes those that are meant?",
-        rom.name, rom.sectors
-    ))
+    let problem = format!("{how} the {pitch:.4} rad of one of {} sectors", rom.sectors);
+    let question = "Are the number of sectors, the axis of rotation and the contact nodes those that are meant?";
+    Some(Slip::new(named(rom), problem, question))
 }
 
 /// Angle from the first contact node (rad), the short way, and axial position (m) of every node.

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::Rom;
 pub use crate::laws::Solver;
 pub use crate::schemes::Scheme;
+use crate::warning::Topic;
 pub use blades::{Direction, ExcitationSettings, InitialSettings};
 pub use coating::{CoatingSettings, CuttingSettings};
 
@@ -496,6 +497,12 @@ pub struct SceneSettings {
     /// Scheme and solver in one word.
     #[serde(default, skip_serializing_if = "is_default")]
     pub preset: Preset,
+    /// Whether values that are rarely meant ([`crate::plausibility`]) are warnings and no errors.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub accept_implausible: bool,
+    /// Identifiers of warnings that are not given ([`crate::warning::Topic::id`]).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub silence: Vec<String>,
     /// Flexible structures.
     #[serde(rename = "structure")]
     pub structures: Vec<StructureSettings>,
@@ -519,6 +526,11 @@ impl SceneSettings {
     /// Whether the importer may bound the number of internal steps: where the scene does, or where a tolerance leaves it open.
     pub fn bounds_steps(&self) -> bool {
         self.time.steps_at_most.is_some() || self.takes_a_tolerance()
+    }
+
+    /// Whether warnings about a topic are not given.
+    pub fn is_silenced(&self, topic: Topic) -> bool {
+        self.silence.iter().any(|id| id == topic.id())
     }
 
     /// Whether the importer may give a tolerance in place of a step.

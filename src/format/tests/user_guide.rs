@@ -66,7 +66,8 @@ fn the_list_of_keys_is_that_of_the_settings() {
         scene.surfaces[0].shape = shape;
         found.extend(keys(&scene));
     }
-    found.extend(keys(&SceneSettings { preset: Preset::Paper, ..scene.clone() }));
+    let silence = vec!["flutter".to_owned()];
+    found.extend(keys(&SceneSettings { preset: Preset::Paper, accept_implausible: true, silence, ..scene.clone() }));
     let time = TimeSettings { scheme_reason: Some("because".into()), ..scene.time.clone() };
     found.extend(keys(&SceneSettings { time, ..scene.clone() }));
     found.extend(keys(&features::scene_with_every_feature()));
@@ -82,6 +83,16 @@ fn the_list_of_keys_is_that_of_the_settings() {
     }
     let listed: BTreeSet<String> = FIELDS.iter().map(|field| field.path.to_owned()).collect();
     assert_eq!(listed, found);
+}
+
+/// Every identifier of a warning can be looked up.
+#[test]
+fn the_list_of_warnings_is_that_of_the_core() {
+    let mut text = String::from("\n| identifier | meaning | what to do |\n|---|---|---|\n");
+    for topic in tiprub_core::warning::Topic::ALL {
+        let _ = writeln!(text, "| `{}` | {} | {} |", topic.id(), topic.meaning(), topic.remedy());
+    }
+    compare("warnings.md", "warnings", &format!("{text}\n"));
 }
 
 /// A scene with every key that has no default.

@@ -10,6 +10,8 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use tiprub_core::warning::{self, Warning};
+
 use crate::{Failure, Result};
 
 /// Text without what a terminal would obey: control characters and marks of writing direction, which names and descriptions in
@@ -45,12 +47,39 @@ fn is_obeyed(character: char) -> bool {
 const READER_LEFT: u8 = 128 + 13;
 
 /// Result of a command, in both forms the user can ask for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outcome {
-    /// For people.
+    /// For people: the answer.
     pub text: String,
+    /// What the answer is to be read with, on stderr behind it.
+    pub warnings: Vec<Warning>,
+    /// What stands behind the warnings: where there is more.
+    pub rest: String,
     /// For programs: one object.
     pub json: serde_json::Value,
+}
+
+/// Warnings for programs: their whole texts, and their identifiers, levels and lines in the same order.
+pub fn warnings_json(warnings: &[Warning]) -> [serde_json::Value; 2] {
+    let each = |warning: &Warning| {
+        let [problem, remedy] = warning.lines();
+        let (id, level) = (warning.topic().id(), warning.level().word());
+        serde_json::json!({ "id": id, "level": level, "problem": problem, "remedy": remedy })
+    };
+    [warning::texts(warnings).into(), warnings.iter().map(each).collect()]
+}
+
+/// Two lines for every topic: its first warning, and how many more there are.
+fn warning_lines(warnings: &[Warning]) -> Vec<String> {
+    let first =
+        |(index, warning): &(usize, &Warning)| !warnings[..*index].iter().any(|other| other.topic() == warning.topic());
+    let lines = |(_, warning): (usize, &Warning)| {
+        let alike = warnings.iter().filter(|other| other.topic() == warning.topic()).count();
+        let more = if alike > 1 { format!(" ({} more of this kind: --all)", alike - 1) } else { String::new() };
+        let [problem, remedy] = warning.lines();
+        format!("{} [{}] {problem}\n    {remedy}{more}", warning.level().word(), warning.topic().id())
+    };
+    warnings.iter().enumerate().filter(first).map(lines).collect()
 }
 
 /// Where progress and results go.
@@ -80,11 +109,19 @@ impl Console {
         }
     }
 
-    /// Warnings of the work, one line each on stderr; `quiet` does not silence them.
-    pub fn warn(&self, warnings: &[String]) {
+    /// Warnings of the work without an identifier, one line each on stderr; `quiet` does not silence them.
+    pub fn warn_texts(&self, warnings: &[String]) {
         for warning in warnings {
             // A closed stderr must not stop the work.
             let _ = writeln!(std::io::stderr(), "warning: {}", printable(warning));
+        }
+    }
+
+    /// Warnings of the work, two lines for every topic on stderr; `quiet` does not silence them.
+    pub fn warn(&self, warnings: &[Warning]) {
+        for lines in warning_lines(warnings) {
+            // A closed stderr must not stop the work.
+            let _ = writeln!(std::io::stderr(), "{}", printable(&lines));
         }
     }
 
@@ -128,12 +165,12 @@ impl Console {
     fn deliver(&self, outcome: &Outcome) -> Result<ExitCode> {
         let json = self.json.then(|| format!("{:#}", outcome.json));
         let text = json.as_deref().map_or_else(|| printable(outcome.text.trim_end()), printable_json);
-        let mut stdout = std::io::stdout().lock();
-        match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
-            Ok(()) => Ok(ExitCode::SUCCESS),
-            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(ExitCode::from(READER_LEFT)),
-            Err(error) => Err(Failure::file(Path::new("stdout"), "cannot be written", &error)),
+        let code = print(&text)?;
+        self.warn(&outcome.warnings);
+        if self.json || outcome.rest.is_empty() || code != ExitCode::SUCCESS {
+            return Ok(code);
         }
+        print(&printable(outcome.rest.trim_end()))
     }
 
     /// Print a failure: text on stderr, and with `--json` the object on stdout.
@@ -147,6 +184,16 @@ impl Console {
         if self.json {
             let _ = writeln!(std::io::stdout(), "{}", printable_json(&format!("{:#}", failure.to_json())));
         }
+    }
+}
+
+/// A text on stdout, with the end of its last line.
+fn print(text: &str) -> Result<ExitCode> {
+    let mut stdout = std::io::stdout().lock();
+    match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+        Ok(()) => Ok(ExitCode::SUCCESS),
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(ExitCode::from(READER_LEFT)),
+        Err(error) => Err(Failure::file(Path::new("stdout"), "cannot be written", &error)),
     }
 }
 
@@ -187,6 +234,20 @@ impl Drop for Task {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_topic_has_two_lines_whatever_the_number_of_its_warnings() {
+        use tiprub_core::warning::{Level, Topic};
+        let slow = |name: &str| Warning::new(Topic::Sticking, "too slow", "Turn faster").named(name);
+        let flutter = Warning::new(Topic::Flutter, "contact grows", "Nothing to do").at_level(Level::Note);
+        let all = [slow("front"), flutter, slow("rear")];
+        let lines = warning_lines(&all);
+        assert_eq!(lines[0], "warning [sticking] front: too slow\n    Turn faster (1 more of this kind: --all)");
+        assert_eq!(lines[1], "note [flutter] contact grows\n    Nothing to do");
+        assert_eq!(lines.len(), 2);
+        let [texts, details] = warnings_json(&all);
+        assert_eq!((texts.as_array().unwrap().len(), &details[2]["id"]), (3, &serde_json::json!("sticking")));
+    }
 
     #[test]
     fn what_a_terminal_would_obey_is_shown_instead() {

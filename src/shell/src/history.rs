@@ -6,8 +6,9 @@ use std::{
 };
 
 use tiprub_core::{
-    Simulation,
+    Simulation, Warning,
     variables::{Causality, Kind, Quantity, Variability, Variable},
+    warning::Topic,
 };
 
 use crate::{Failure, Result, native};
@@ -135,16 +136,16 @@ impl History {
     }
 
     /// What the communication step leaves out of it, if anything.
-    pub fn warnings(&self, step: f64) -> Vec<String> {
+    pub fn warnings(&self, step: f64) -> Vec<Warning> {
         let shortest = self.times.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
         if shortest >= 0.999 * step {
             return Vec::new();
         }
-        vec![format!(
-            "{}: lines are {shortest:.3e} s apart, and only what they say at communication points counts, every {step:.3e} s: a shorter \
-             communication step (--step) sees more",
+        let problem = format!(
+            "{}: lines are {shortest:.3e} s apart, and only what they say at communication points counts, every {step:.3e} s",
             self.name
-        )]
+        );
+        vec![Warning::new(Topic::InputLines, problem, "A shorter communication step (--step) sees more")]
     }
 }
 

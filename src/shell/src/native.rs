@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use tiprub_core::{
-    Scene, Simulation, VariableTable,
+    Scene, Simulation, VariableTable, Warning,
     settings::Scheme,
     system::Effort,
     variables::{Causality, Kind, Variable},
@@ -25,7 +25,7 @@ pub struct NativeRun {
     /// What a tolerance has taken, where there is one.
     pub effort: Option<Effort>,
     /// Warnings of the initialisation, of the run and of the schedule.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// What a run is given beside its scene.
@@ -63,6 +63,7 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: Given<'_>, progress: &dyn 
     // Those of the start: what comes up in the run is told by its notes.
     let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
     warnings.extend(given.history.map(|history| history.warnings(schedule.step)).unwrap_or_default());
+    warnings.retain(|warning| !scene.settings.is_silenced(warning.topic()));
     let outputs = Outputs::of(simulation.table());
     let mut recording = Recording::with_columns(outputs.names.clone(), schedule.count + 1)?;
     let (mut stepping, mut slowest) = (Duration::ZERO, Duration::ZERO);

@@ -1,6 +1,6 @@
 //! Communication points, counted rather than accumulated.
 
-use tiprub_core::{ranges, settings::ExperimentSettings, shown};
+use tiprub_core::{Warning, ranges, settings::ExperimentSettings, shown, warning::Topic};
 
 use crate::{Failure, Result};
 
@@ -56,16 +56,16 @@ impl Schedule {
     }
 
     /// What is legal but hardly meant: a communication step longer than the whole run.
-    pub fn warnings(&self) -> Vec<String> {
+    pub fn warnings(&self) -> Vec<Warning> {
         let length = self.stop - self.start;
         let one_step = self.step > length && !is_close(self.step, length);
         let warning = || {
-            format!(
-                "the communication step {} s is longer than the run of {} s: one step covers all of it, with no \
-                 point in between; choose a shorter communication step",
+            let problem = format!(
+                "the communication step {} s is longer than the run of {} s: one step covers all of it, with no point in between",
                 shown(self.step),
                 shown(length)
-            )
+            );
+            Warning::new(Topic::CommunicationStep, problem, "Choose a shorter communication step")
         };
         one_step.then(warning).into_iter().collect()
     }

@@ -1,9 +1,11 @@
 //! What a study is asked for on a command line.
 
-use std::path::PathBuf;
+use std::{ffi::OsStr, path::PathBuf};
 
 use clap::Args;
-use tiprub_gallery::rom_cache::RomCache;
+use tiprub_core::{Scene, warning::Topic};
+use tiprub_gallery::{rom_cache::RomCache, scene_source};
+use tiprub_shell::console::Console;
 
 /// What all studies take.
 #[derive(Debug, Args)]
@@ -14,6 +16,9 @@ pub struct StudyCommon {
     /// Few and short runs: seconds instead of minutes, for a first look.
     #[arg(long)]
     pub quick: bool,
+    /// What is added to the scene.
+    #[command(flatten)]
+    pub options: SceneOptions,
     /// Where built-in models are kept.
     #[command(flatten)]
     pub cache: CacheArguments,
@@ -178,6 +183,35 @@ fn steps(text: &str) -> Result<Range, String> {
 
 /// A range of angular velocities (rad/s).
 pub type Speeds = Range;
+
+/// What a command line adds to a scene.
+#[derive(Debug, Clone, Default, Args)]
+pub struct SceneOptions {
+    /// Do not give warnings with this identifier, such as `flutter`; may be repeated. In an FMU they are not logged.
+    #[arg(long, value_name = "ID", value_parser = topic)]
+    pub silence: Vec<String>,
+    /// Accept values that are rarely meant (tips faster than 1500 m/s, lengths in millimetres) with a warning.
+    #[arg(long)]
+    pub accept_implausible: bool,
+}
+
+impl SceneOptions {
+    /// Load a scene with the keys that these options set.
+    ///
+    /// # Errors
+    /// As [`scene_source::load`].
+    pub fn load(&self, name: impl AsRef<OsStr>, cache: &RomCache, console: &Console) -> tiprub_shell::Result<Scene> {
+        let mut scene = scene_source::load(name, cache, console)?;
+        scene.settings.accept_implausible |= self.accept_implausible;
+        scene.settings.silence.extend(self.silence.iter().cloned());
+        Ok(scene)
+    }
+}
+
+/// The identifier of a warning.
+fn topic(text: &str) -> Result<String, String> {
+    Topic::find("--silence", text).map(|topic| topic.id().to_owned()).map_err(|error| error.to_string())
+}
 
 /// Whether built-in models are kept from one command to the next.
 #[derive(Debug, Clone, Default, Args)]

@@ -7,7 +7,6 @@
 pub mod arguments;
 pub mod convergence;
 pub mod error;
-pub mod error_study;
 pub mod estimate;
 pub mod machine;
 pub mod map;
@@ -17,7 +16,7 @@ pub mod stability;
 use serde_json::{Value, json};
 use tiprub_core::{Scene, settings::SceneSettings};
 use tiprub_figure::{plots::Plot, waterfall::Waterfall};
-use tiprub_shell::{Failure, Result, console::Console, recording::shortest};
+use tiprub_shell::{Failure, Result, recording::shortest};
 
 /// Index of the structure whose tips touch.
 pub fn master(scene: &Scene) -> usize {
@@ -63,25 +62,6 @@ fn several(settings: &SceneSettings, problem: String) -> Failure {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
 pub(crate) fn divisions(interval: f64, step: f64) -> u32 {
     (interval / step * (1.0 - 1e-9)).ceil().clamp(1.0, 1e8) as u32
-}
-
-/// Shorter work is not announced (s).
-const LONG: f64 = 20.0;
-
-/// Say before long work how long it will take (s), as far as is known.
-pub(crate) fn announce(console: &Console, what: &str, seconds: f64) {
-    if seconds >= LONG {
-        console.say(format_args!("{what}: about {}", duration(seconds)));
-    }
-}
-
-/// "40 s", "3 min", "2.5 h": no more digits than a forecast has.
-fn duration(seconds: f64) -> String {
-    match seconds {
-        _ if seconds < 90.0 => format!("{:.0} s", 10.0 * (seconds / 10.0).ceil()),
-        _ if seconds < 5400.0 => format!("{:.0} min", (seconds / 60.0).ceil()),
-        _ => format!("{:.1} h", seconds / 3600.0),
-    }
 }
 
 /// A finished study.
@@ -254,11 +234,6 @@ mod tests {
         let mut sheet = Sheet::new(["time (s)", "a, b"]);
         sheet.rows.push(vec![0.1, -1.0 / 3.0]);
         assert_eq!(sheet.to_csv(), "time (s),\"a, b\"\n0.1,-0.3333333333333333\n");
-    }
-
-    #[test]
-    fn forecasts_have_few_digits() {
-        assert_eq!([24.0, 89.0, 91.0, 5399.0, 9000.0].map(duration), ["30 s", "90 s", "2 min", "90 min", "2.5 h"]);
     }
 
     #[test]

@@ -30,7 +30,7 @@ pub fn write(study: &Study, directory: &Path) -> Result<Outcome> {
     output_file::write(&directory.join(PAGE), page(study))?;
     json["page"] = directory.join(PAGE).display().to_string().into();
     let text = format!("{}\nopen {}", study.to_text(), directory.join(PAGE).display());
-    Ok(Outcome { text, json })
+    Ok(Outcome { text, json, ..Outcome::default() })
 }
 
 fn page(study: &Study) -> String {

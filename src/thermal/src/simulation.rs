@@ -2,7 +2,8 @@
 
 use tiprub_core::simulation::Progress;
 use tiprub_core::variables::{Start, VariableTable};
-use tiprub_core::{Error, Result, Sum, ranges, shown};
+use tiprub_core::warning::Topic;
+use tiprub_core::{Error, Result, Sum, Warning, ranges, shown};
 
 use crate::course::Course;
 use crate::exponential::Phi;
@@ -41,7 +42,7 @@ pub struct Simulation {
     /// Whether steps shorter than elements resolve were warned of, once for all steps of the instance.
     warned: bool,
     /// Warnings since the last [`Simulation::take_notes`].
-    notes: Vec<String>,
+    notes: Vec<Warning>,
 }
 
 impl Simulation {
@@ -246,21 +247,22 @@ impl Simulation {
     }
 
     /// The warning of a communication step that ends before heat has passed an element.
-    fn unresolved(&self, step_size: f64) -> String {
-        format!(
+    fn unresolved(&self, step_size: f64) -> Warning {
+        let problem = format!(
             "{}: the communication step of {} s is shorter than the {:.3} s in which heat passes an element of the heated surface \
              (the square of its depth over the diffusivity), so that `surface_temperature` rises too slowly after `casing_heat` has \
-             changed; `casing_temperature`, means over the volume, and heat are not affected. Hand heat over as its mean over longer \
-             communication steps, or make the model with thinner elements: `tiprub thermal --mesh` with twice the elements through \
-             the thickness lets steps be a quarter as long",
+             changed; `casing_temperature`, means over the volume, and heat are not affected",
             self.model.name,
             shown(step_size),
             self.model.element_time
-        )
+        );
+        let remedy = "Hand heat over as its mean over longer communication steps, or make the model with thinner elements: `tiprub thermal --mesh` \
+                      with twice the elements through the thickness lets steps be a quarter as long";
+        Warning::new(Topic::ThermalStep, problem, remedy)
     }
 
     /// Warnings since this was asked the last time.
-    pub fn take_notes(&mut self) -> Vec<String> {
+    pub fn take_notes(&mut self) -> Vec<Warning> {
         std::mem::take(&mut self.notes)
     }
 

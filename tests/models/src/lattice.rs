@@ -178,6 +178,8 @@ pub fn scene(block: Rom, plates: &[(Side, f64)], curved: bool, velocity: [f64; 3
         name: "free_block".into(),
         description: String::new(),
         preset: Preset::None,
+        accept_implausible: false,
+        silence: Vec::new(),
         structures,
         surfaces: plates.iter().map(surface).collect(),
         contacts: plates.iter().map(contact).collect(),

@@ -14,6 +14,8 @@ pub fn round(rom: Rom) -> Scene {
         name: "written_down".into(),
         description: String::new(),
         preset: Preset::None,
+        accept_implausible: false,
+        silence: Vec::new(),
         structures: vec![StructureSettings {
             name: "rotor".into(),
             rom: "rotor".into(),

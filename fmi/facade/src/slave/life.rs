@@ -2,7 +2,7 @@
 
 use tiprub_core::variables::Causality;
 
-use super::{Experiment, Phase, Refusal, Result, Slave, Status};
+use super::{Experiment, Phase, Refusal, Result, Slave, Status, logged};
 
 impl Experiment {
     /// Check start and stop time as an importer gives them.
@@ -74,7 +74,7 @@ impl Slave {
         Ok(())
     }
 
-    /// Exit Initialization Mode. `Warning` if the core has something to say about the parameters.
+    /// Exit Initialization Mode. `Warning` if the core warns of something; notes leave the status `Ok`.
     ///
     /// # Errors
     /// The core's refusal; the instance stays in Initialization Mode and can be given other parameters.
@@ -83,8 +83,9 @@ impl Slave {
         if let Phase::Initialising { experiment, .. } = self.phase {
             self.phase = Phase::Stepping { stop: experiment.stop };
         }
-        let warnings: Vec<_> = self.unit.warnings().iter().map(|text| (Status::Warning, text.clone())).collect();
-        let status = if warnings.is_empty() { Status::Ok } else { Status::Warning };
+        let warnings: Vec<_> = self.unit.warnings().iter().map(logged).collect();
+        let warns = warnings.iter().any(|(status, _)| *status == Status::Warning);
+        let status = if warns { Status::Warning } else { Status::Ok };
         self.notes.extend(warnings);
         Ok(status)
     }

@@ -12,6 +12,9 @@ use std::ffi::CString;
 use std::fmt;
 use std::path::Path;
 
+use tiprub_core::Warning;
+use tiprub_core::warning::Level;
+
 use crate::unit::{Load, Unit};
 
 pub(crate) use access::{Request, Value};
@@ -165,11 +168,20 @@ impl Slave {
 
     /// Hand on what the unit has to say since it was last asked.
     pub(super) fn hear(&mut self) {
-        self.notes.extend(self.unit.take_notes().into_iter().map(|text| (Status::Warning, text)));
+        self.notes.extend(self.unit.take_notes().iter().map(logged));
     }
 
     /// Add a message to be handed to the importer after the call.
     pub(crate) fn note(&mut self, status: Status, message: impl Into<String>) {
         self.notes.push((status, message.into()));
     }
+}
+
+/// A warning as a message of the log: notes have the status `Ok`.
+fn logged(warning: &Warning) -> (Status, String) {
+    let status = match warning.level() {
+        Level::Note => Status::Ok,
+        Level::Warning => Status::Warning,
+    };
+    (status, warning.logged())
 }

@@ -10,6 +10,7 @@ use super::{
     SplineSettings, StructureSettings, SurfaceSettings,
 };
 use crate::ranges::{self, at_most, within};
+use crate::warning::Topic;
 use crate::{Error, Result, shown};
 
 impl SceneSettings {
@@ -33,6 +34,7 @@ impl SceneSettings {
                 ));
             }
         }
+        self.silence.iter().try_for_each(|id| Topic::find("silence", id).map(|_| ()))?;
         if self.structures.is_empty() || self.contacts.is_empty() {
             return Err(Error::invalid(
                 "scene",

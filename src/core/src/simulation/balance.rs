@@ -4,7 +4,8 @@ use super::{Phase, Simulation};
 use crate::ledger::Ledger;
 use crate::settings::{Scheme, Solver};
 use crate::system::Loss;
-use crate::{Error, Result, shown};
+use crate::warning::Topic;
+use crate::{Error, Result, Warning, shown};
 
 /// Energy of the instant may be so many times what was put in: that of modal-exact is cos²(ωh/2) of it, a fourth at ωh = 2π/3, the end of
 /// what a step resolves; that of central differences at least 1 − (ωh/2)². What is beyond is in modes that the step passes over.
@@ -27,15 +28,14 @@ impl Simulation {
         let found = self.system.ledgers().iter().enumerate().find_map(|(set, ledger)| Some((set, misled(ledger)?)));
         let Some((set, (who, work))) = found else { return };
         let curvature = self.system.ledgers()[set].curvature_work.value();
-        let text = format!(
+        let problem = format!(
             "up to t = {} s normals that turn and surfaces that curve within internal steps have added {curvature:.3e} J that no input brings \
-             (curvature work){}, beside {work:.3e} J of net work of {who}: that may be wrong by as much, and in its sign. Use a smaller \
-             internal step",
+             (curvature work){}, beside {work:.3e} J of net work of {who}: that may be wrong by as much, and in its sign",
             shown(time),
             self.of_set(set)
         );
         self.told.curvature = true;
-        self.note(text);
+        self.note(Warning::new(Topic::CurvatureWork, problem, "Use a smaller internal step"));
     }
 
     /// Vibration has no more energy than forces times speeds put in: what the scheme conserves leaves out what modes beyond the step

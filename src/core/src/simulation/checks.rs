@@ -2,9 +2,11 @@
 
 use super::Simulation;
 use super::compile::Compiled;
+use crate::plausibility::{self, Slip};
 use crate::system::StepFailure;
 use crate::variables::Causality;
-use crate::{Error, Result, plausibility, shown};
+use crate::warning::{Topic, Warning};
+use crate::{Error, Result, shown};
 
 /// How far a surface around an axis goes on ([`crate::gaps::surface_spline::REACH`]), and what to do about a node further out.
 pub const OUT_OF_REACH: &str = "a quarter of its axial extent, as far as it goes on along its tangents";
@@ -12,39 +14,69 @@ pub const OUT_OF_REACH_REMEDY: &str = "Give a casing whose contact grid covers t
                                        shift, loads and speed";
 
 impl Compiled {
-    /// What is legal in the ROMs and at the start, and hardly meant.
-    pub fn doubts(&self) -> Vec<String> {
-        let mut doubts = Vec::new();
+    /// Values of the ROMs and of the scene that are rarely meant.
+    pub fn slips(&self) -> Vec<Slip> {
+        let mut slips = Vec::new();
         for (index, body) in self.bodies.iter().enumerate() {
             let (structure, rom) = self.body(index);
-            doubts.extend(match &body.disk {
+            slips.extend(match &body.disk {
                 Some(disk) => {
                     plausibility::of_rom(rom, disk.diameters.iter().flat_map(|one| one.frequencies.iter().copied()))
                 }
                 None => plausibility::of_rom(rom, body.model.frequencies.iter().copied()),
             });
-            let fast = plausibility::of_velocity(structure.velocity);
-            doubts.extend(fast.map(|text| self.named(index, text)));
+            slips.extend(plausibility::of_velocity(&structure.name, structure.velocity));
         }
         for carrier in &self.carriers {
             let rom = &self.scene.roms[carrier.structure];
-            doubts.extend(plausibility::of_rom(rom, carrier.model.frequencies.iter().copied()));
+            slips.extend(plausibility::of_rom(rom, carrier.model.frequencies.iter().copied()));
         }
+        slips
+    }
+
+    /// Tips that are too fast at a speed (rad/s). Allocates only to say so.
+    pub fn slip_of_speed(&self, body: usize, speed: f64) -> Option<Slip> {
+        plausibility::of_speed(self.body(body).1, speed, || {
+            let structure = if self.bodies.len() > 1 { format!("{}.", self.body(body).0.name) } else { String::new() };
+            format!("`{structure}speed`")
+        })
+    }
+
+    /// Refuse tips that are too fast at a speed (rad/s), unless the scene accepts them. Allocates only to refuse.
+    pub fn check_tip_speed(&self, body: usize, speed: f64) -> Result<()> {
+        if self.scene.settings.accept_implausible {
+            return Ok(());
+        }
+        self.slip_of_speed(body, speed).map_or(Ok(()), |slip| Err(slip.error()))
+    }
+
+    /// Friction power of patches that no friction gives.
+    pub fn idle_patches(&self) -> Option<Warning> {
         let settings = &self.scene.settings;
         let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
-        let asked = settings.surfaces.iter().position(|surface| surface.patches.is_some() && !rubs);
-        doubts.extend(asked.map(|index| {
-            format!(
-                "surface[{}].patches: no contact has friction, so that there is no friction power of patches to tell: is \
-                 `contact.friction` missing?",
-                index + 1
-            )
-        }));
-        doubts
+        let index = settings.surfaces.iter().position(|surface| surface.patches.is_some() && !rubs)?;
+        let problem =
+            format!("surface[{}].patches: no contact has friction, so that no patch has friction power", index + 1);
+        Some(Warning::new(Topic::NoFrictionPower, problem, "Is `contact.friction` missing?"))
     }
 }
 
 impl Simulation {
+    /// Refuse values that are rarely meant, unless the scene accepts them.
+    ///
+    /// # Errors
+    /// The first of them, with the key that accepts it.
+    pub(super) fn check_slips(&self) -> Result<()> {
+        if self.compiled.scene.settings.accept_implausible {
+            return Ok(());
+        }
+        if let Some(slip) = self.compiled.slips().first() {
+            return Err(slip.error());
+        }
+        let mut speeds = self.speeds().into_iter().enumerate();
+        speeds.try_for_each(|(body, speed)| self.compiled.check_tip_speed(body, speed))
+    }
+
     /// Loads and speed at the start have displaced the structures already: by what small displacements can describe?
     pub(super) fn check_initial_state(&self) -> Result<()> {
         let Err(failure) = self.system.check_state() else { return Ok(()) };

@@ -15,11 +15,11 @@ use crate::rom::{ContactNode, Support};
 use crate::settings::{ContactSettings, Meridian, Motion, StructureSettings};
 use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings, joined};
 use crate::variables::Quantity;
-use crate::{Error, Result, Rom, Scene, shown};
+use crate::{Error, Result, Rom, Scene, Warning, shown};
 use nalgebra::DMatrix;
 
-use super::contour::check_contour;
 use super::blades::{disk_heat, expansion, softened, static_stress};
+use super::contour::check_contour;
 use super::loads::{CarrierLoads, centrifugal};
 use super::patches::Patches;
 use super::plan::{PairPlan, Plan, prefix};
@@ -251,6 +251,11 @@ impl Compiled {
     /// A text about a structure that touches, with its name where several do.
     pub fn named(&self, body: usize, text: String) -> String {
         if self.bodies.len() > 1 { format!("{}: {text}", self.body(body).0.name) } else { text }
+    }
+
+    /// A warning about a structure that touches, with its name where several do.
+    pub fn warning_of(&self, body: usize, warning: Warning) -> Warning {
+        if self.bodies.len() > 1 { warning.named(&self.body(body).0.name) } else { warning }
     }
 
     /// Name of a structure of the system.

@@ -14,7 +14,7 @@ use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, massless};
 use crate::system::System;
 use crate::variables::Quantity;
-use crate::{Error, Result};
+use crate::{Error, Result, Warning};
 use checking::Checking;
 use closing::Closing;
 use sliding::Sense;
@@ -61,7 +61,7 @@ pub struct Limits {
 #[derive(Debug, Clone)]
 struct BodyLimits {
     /// Warnings for the step expected, or why these parameters are refused, whatever the sense of slip.
-    outcome: Result<Vec<String>>,
+    outcome: Result<Vec<Warning>>,
     /// Slip in +θ and in −θ; of a disk, for which it takes long, only what was asked for.
     senses: [Option<Sense>; 2],
     /// How long contact stays closed.
@@ -69,11 +69,11 @@ struct BodyLimits {
     /// Steps of massless-boundary; infinite for other schemes.
     massless: MasslessLimit,
     /// Largest step of each range of step sizes, descending, and what the casing does to solvability there.
-    casing: Vec<(f64, Option<String>)>,
+    casing: Vec<(f64, Option<Warning>)>,
     /// Smallest step of modal-exact that passes over what contact acts on; infinite for other schemes.
     unresolved: f64,
     /// What grows while blades cut.
-    cutting: Option<String>,
+    cutting: Option<Warning>,
 }
 
 /// Senses of slip of a speed or of its sign: both where it is 0.
@@ -119,7 +119,7 @@ impl Simulation {
     }
 
     /// Check limits unless the same parameters were checked last; returns warnings. A refusal leaves what was known before.
-    pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<Vec<String>> {
+    pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<Vec<Warning>> {
         if let Some(limits) = self.limits.as_ref().filter(|limits| limits.cover(parameters)) {
             return limits.warnings(&parameters.speeds).map_err(|error| self.compiled.of_preset(error));
         }
@@ -331,7 +331,7 @@ impl Limits {
     }
 
     /// Warnings for the step expected at these speeds (rad/s).
-    fn warnings(&self, speeds: &[f64]) -> Result<Vec<String>> {
+    fn warnings(&self, speeds: &[f64]) -> Result<Vec<Warning>> {
         let mut warnings = Vec::new();
         for (body, speed) in self.bodies.iter().zip(speeds) {
             warnings.extend(body.warnings(*speed)?);
@@ -340,17 +340,17 @@ impl Limits {
     }
 
     /// What of a structure that turns at a speed of this sign grows by itself.
-    pub fn grows(&self, body: usize, speed: f64) -> Option<&str> {
-        if let Some(cutting) = &self.bodies[body].cutting {
-            return Some(cutting);
-        }
-        senses_of(speed).find_map(|sense| self.bodies[body].senses[sense].as_ref()?.grows.as_deref())
+    pub fn grows(&self, body: usize, speed: f64) -> Option<Warning> {
+        let BodyLimits { cutting, senses, .. } = &self.bodies[body];
+        // Whatever is held to have stayed closed.
+        let mut sliding = senses_of(speed).filter_map(|sense| senses[sense].as_ref()?.grows(f64::INFINITY).next());
+        cutting.clone().or_else(|| sliding.next())
     }
 }
 
 impl BodyLimits {
     /// Warnings for the step expected at this speed (rad/s).
-    fn warnings(&self, speed: f64) -> Result<Vec<String>> {
+    fn warnings(&self, speed: f64) -> Result<Vec<Warning>> {
         let mut warnings = self.outcome.clone()?;
         warnings.extend(self.cutting.clone());
         let closed = self.closing.time(speed);
@@ -359,7 +359,7 @@ impl BodyLimits {
         // Of a rotor that starts at rest both senses count; what grows in either is told once.
         for sense in found.collect::<Result<Vec<_>>>()? {
             for warning in sense {
-                if !warnings.iter().any(|known| sliding::are_alike(known, &warning)) {
+                if !warnings.iter().any(|known| known.topic() == warning.topic()) {
                     warnings.push(warning);
                 }
             }
@@ -369,16 +369,16 @@ impl BodyLimits {
 
     /// Texts with the name of the structure.
     fn named(mut self, name: &str) -> Self {
-        let texts = |texts: Vec<String>| texts.into_iter().map(|text| format!("{name}: {text}")).collect();
+        let texts = |texts: Vec<Warning>| texts.into_iter().map(|text| text.named(name)).collect();
         let refusal = |error: Error| match error {
             Error::Unstable { problem, remedy } => Error::Unstable { problem: format!("{name}: {problem}"), remedy },
             other => other,
         };
         self.outcome = self.outcome.map(texts).map_err(refusal);
-        self.cutting = self.cutting.map(|text| format!("{name}: {text}"));
+        self.cutting = self.cutting.map(|text| text.named(name));
         self.senses.iter_mut().flatten().for_each(|sense| sense.name(name));
         for (_, text) in &mut self.casing {
-            *text = text.take().map(|text| format!("{name}: {text}"));
+            *text = text.take().map(|text| text.named(name));
         }
         self
     }

@@ -30,7 +30,7 @@ mod window;
 use crate::gaps::Drive;
 use crate::system::{Growth, System};
 use crate::variables::{Quantity, Start, VariableTable};
-use crate::{Result, Scene, ranges};
+use crate::{Result, Scene, Warning, ranges};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
 pub use inputs::Courses;
@@ -141,9 +141,9 @@ pub struct Simulation {
     time: f64,
     initial_time: f64,
     phase: Phase,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
     /// Warnings since the last [`Simulation::take_notes`].
-    notes: Vec<String>,
+    notes: Vec<Warning>,
     /// What was told since the start.
     told: limits::Told,
     /// Parameters that the system was prepared for.
@@ -258,6 +258,7 @@ impl Simulation {
         self.warnings.clear();
         self.notes.clear();
         self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
+        self.check_slips()?;
         self.follow_load_orders()?;
         self.check_launch(parameters.scheme)?;
         self.follow_reference_speeds(&self.references())?;
@@ -265,6 +266,8 @@ impl Simulation {
         self.warn_of_sticking(&parameters);
         self.warn_of_tolerance(&parameters);
         self.begin_telling(&parameters);
+        let settings = &self.compiled.scene.settings;
+        self.warnings.retain(|warning| !settings.is_silenced(warning.topic()));
         self.rest(&parameters);
         self.apply_methods(&parameters);
         self.make_room();
@@ -394,13 +397,13 @@ impl Simulation {
     }
 
     /// Warnings collected by the last [`Simulation::initialise`] (unresolved modes and the like).
-    pub fn warnings(&self) -> &[String] {
+    pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
     /// Warnings that came up since the start or the last call, for the step taken: of another step size than the scene
     /// proposes, of another sense of rotation, of tips too fast, of other friction. Each is told once.
-    pub fn take_notes(&mut self) -> Vec<String> {
+    pub fn take_notes(&mut self) -> Vec<Warning> {
         std::mem::take(&mut self.notes)
     }
 

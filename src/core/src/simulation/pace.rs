@@ -5,7 +5,8 @@ use super::{Communication, Phase, Simulation};
 use crate::galerkin::sector::shortest;
 use crate::settings::Scheme;
 use crate::variables::Quantity;
-use crate::{Error, Result, shown};
+use crate::warning::Topic;
+use crate::{Error, Result, Warning, shown};
 
 /// What shortest steps leave, as a share of the clearance per length (1/s): where errors stop to follow the tolerance. A blade with 18
 /// modes that rubs (`core/tests/galerkin/main.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
@@ -81,13 +82,14 @@ impl Simulation {
         let step = self.compiled.expected_step(parameters.step);
         let left = LEFT * shortest(step);
         if parameters.scheme == Scheme::Galerkin && parameters.tolerance < left {
-            self.warnings.push(format!(
+            let problem = format!(
                 "tolerance {}: steps of galerkin are at least {} s long, a thousandth of the longest, which leaves errors of some \
-                 {left:.0e} where contacts open and close, whatever the tolerance. Use a smaller internal_step_max (time.step) or \
-                 communication step, or a larger tolerance",
+                 {left:.0e} where contacts open and close, whatever the tolerance",
                 shown(parameters.tolerance),
                 shown(shortest(step)),
-            ));
+            );
+            let remedy = "Use a smaller internal_step_max (time.step) or communication step, or a larger tolerance";
+            self.warnings.push(Warning::new(Topic::ToleranceLimit, problem, remedy));
         }
     }
 
@@ -97,17 +99,20 @@ impl Simulation {
         if effort.missed == 0 || std::mem::replace(&mut self.told.missed, true) {
             return;
         }
-        self.note(format!(
+        let problem = format!(
             "up to t = {} s {} of {} steps have missed the tolerance of {}: the shortest, {} s, a thousandth of the longest, were \
-             taken all the same. Use a smaller internal_step_max (time.step) than {} s or a larger tolerance; missed_steps counts \
-             those to come",
+             taken all the same",
             shown(time),
             effort.missed,
             effort.steps,
             shown(self.value_of(Quantity::Tolerance, 0)),
             shown(shortest(self.system.step_size())),
+        );
+        let remedy = format!(
+            "Use a smaller internal_step_max (time.step) than {} s or a larger tolerance; missed_steps counts those to come",
             shown(self.value_of(Quantity::StepMax, 0))
-        ));
+        );
+        self.note(Warning::new(Topic::ToleranceMissed, problem, remedy));
     }
 
     /// After the start of a communication step, for who does not look at internal steps: fly over all of them but the last, where sectors

@@ -18,7 +18,8 @@
 use super::Simulation;
 use crate::settings::{Preset, Scheme, Solver};
 use crate::system::StepFailure;
-use crate::{Result, shown};
+use crate::warning::Topic;
+use crate::{Result, Warning, shown};
 
 /// Shares from which pulling is told, and from which it ends a run that is not the paper's.
 const TOLD: f64 = 0.03;
@@ -43,7 +44,9 @@ impl Simulation {
                 }
                 if !std::mem::replace(&mut self.told.inside[structure], true) {
                     let problem = self.left_inside(structure, node, share);
-                    self.note(format!("up to t = {} s {problem}. {}", shown(time), self.against_pulling(structure)));
+                    let problem = format!("up to t = {} s {problem}", shown(time));
+                    let remedy = self.against_pulling(structure);
+                    self.note(Warning::new(Topic::FilmInside, problem, remedy));
                 }
             }
             let Some((node, share)) = self.system.pulling(structure, LASTED) else { continue };
@@ -54,7 +57,8 @@ impl Simulation {
                 let problem = self.pulls(structure, node, share);
                 let then =
                     if is_paper { String::new() } else { format!(". From {:.0} % on the run ends", 100.0 * REFUSED) };
-                self.note(format!("up to t = {} s {problem}{then}. {}", shown(time), self.against_pulling(structure)));
+                let problem = format!("up to t = {} s {problem}{then}", shown(time));
+                self.note(Warning::new(Topic::FilmPulls, problem, self.against_pulling(structure)));
             }
         }
         Ok(())

@@ -8,7 +8,8 @@ use super::limits::Parameters;
 use crate::dynamics::modal::ModalModel;
 use crate::gaps::shape::Surface;
 use crate::settings::Solver;
-use crate::shown;
+use crate::warning::Topic;
+use crate::{Warning, shown};
 
 /// Angles at which a shape is looked at.
 const ANGLES: u32 = 720;
@@ -30,14 +31,16 @@ impl Simulation {
                 continue;
             }
             let rotor = self.compiled.rotor_name(body);
-            self.warnings.push(format!(
-                "{rotor} starts at speed {} rad/s with {}: the sliding law does not model sticking; results are \
-                 meaningful once the tips slide faster than they vibrate, which they may not below some {slow:.1e} rad/s. A run in \
-                 which friction puts energy in ends{}",
+            let cuts = self.compiled.cuts(body);
+            let problem = format!(
+                "{rotor} starts at speed {} rad/s with {}: the sliding law does not model sticking, which happens below some \
+                 {slow:.1e} rad/s. A run in which friction puts energy in ends",
                 shown(speed.value),
-                if self.compiled.cuts(body) { "a coating that is cut" } else { "friction" },
-                if self.compiled.cuts(body) { "" } else { " (the solver coulomb models sticking)" }
-            ));
+                if cuts { "a coating that is cut" } else { "friction" },
+            );
+            let remedy = "Trust results once the tips slide faster than they vibrate";
+            let remedy = if cuts { remedy.to_owned() } else { format!("{remedy}, or use the solver coulomb") };
+            self.warnings.push(Warning::new(Topic::Sticking, problem, remedy));
         }
     }
 }

@@ -4,7 +4,8 @@ use super::drive::Input;
 use super::{Communication, MOST_STEPS, Phase, Progress, Simulation, TIME_TOLERANCE, same_step};
 use crate::laws::coating::Coating;
 use crate::system::StepFailure;
-use crate::{Error, Result, ranges, shown};
+use crate::warning::Topic;
+use crate::{Error, Result, Warning, ranges, shown};
 
 /// A run is warned of once u_θ²/2r is this share of the clearance.
 const CURVED_SHARE: f64 = 0.05;
@@ -100,6 +101,10 @@ impl Simulation {
             let until = rotor.temperature.first().map_or(0.0, |input| input.asked(step_size));
             if self.compiled.softens(body) {
                 self.compiled.check_temperature(body, until)?;
+            }
+            let fastest = if first.abs() > last.abs() { first } else { last };
+            if fastest.abs() > self.told.fastest[body] {
+                self.compiled.check_tip_speed(body, fastest)?;
             }
             self.check_step_size(body, step, [first, last, rotor.spin.at(0.0)], reached.min(until))?;
             let phase = rotor.excitation.get(1).map_or(0.0, |phase| {
@@ -327,17 +332,19 @@ impl Simulation {
                 continue;
             };
             self.told.curved[body] = true;
-            self.notes.push(format!(
+            let problem = format!(
                 "at t = {} s contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, \
-                 which misses u²/2r = {:.2e} m, {:.0} % of the clearance; further on it grows with the square, and at 100 % the \
-                 run ends",
+                 which misses u²/2r = {:.2e} m, {:.0} % of the clearance",
                 shown(time),
                 self.compiled.node_name(most.structure, most.node),
                 self.sector_name(most.structure, most.sector),
                 most.moved,
                 most.error,
                 100.0 * most.share()
-            ));
+            );
+            let remedy =
+                "Check loads and clearance: this grows with the square of the displacement, and at 100 % the run ends";
+            self.note(Warning::new(Topic::LargeDisplacement, problem, remedy));
         }
     }
 

@@ -18,7 +18,8 @@ use crate::gaps::dot;
 use crate::schemes::{ModeCoefficients, damped_frequency};
 use crate::settings::Scheme;
 use crate::stability::{OTHER_SCHEME, shorter};
-use crate::{Error, Result};
+use crate::warning::Topic;
+use crate::{Error, Result, Warning};
 
 /// Margin under the limit.
 const MARGIN: f64 = 1e-6;
@@ -186,12 +187,15 @@ pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
 }
 
 /// Warning for a step (s) at which contact that opens and closes gains energy unless damping takes it.
-pub fn warning(step: f64, limit: MasslessLimit) -> Option<String> {
+pub fn warning(step: f64, limit: MasslessLimit) -> Option<Warning> {
     (step >= QUIET * limit.closed).then(|| {
-        format!(
-            "massless-boundary with an internal step of {step:.3e} s: contact that opens and closes may gain energy, which a damping \
-             ratio of 1e-3 outweighs; a falling `impact_loss` tells. `time.step` below {:.2e} s avoids it",
-            QUIET * limit.closed
+        Warning::new(
+            Topic::MasslessEnergy,
+            format!(
+                "massless-boundary with an internal step of {step:.3e} s: contact that opens and closes may gain energy (a falling \
+                 `impact_loss` shows it)"
+            ),
+            format!("`time.step` below {:.2e} s avoids it, and a damping ratio of 1e-3 outweighs it", QUIET * limit.closed),
         )
     })
 }

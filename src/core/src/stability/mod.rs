@@ -24,7 +24,8 @@ use nalgebra::DMatrix;
 use crate::dynamics::modal::ModalModel;
 use crate::gaps::dot;
 use crate::settings::Scheme;
-use crate::{Error, Result, shown};
+use crate::warning::Topic;
+use crate::{Error, Result, Warning, shown};
 
 /// Margin under the limit ω_max h = 2 of central differences.
 const CENTRAL_MARGIN: f64 = 1e-9;
@@ -108,15 +109,18 @@ pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<(
 ///
 /// # Errors
 /// As there.
-pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<String>> {
+pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<Warning>> {
     check_step_allowed(frequency, scheme, step)?;
     let product = frequency * step;
     match scheme {
-        Scheme::ModalExact if product > 2.0 => Ok(Some(format!(
-            "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: free motion stays exact, contact forces \
-             on them do not; `time.step` = {:.2e} s resolves all",
-            1e-3 * 2.0 / step / std::f64::consts::TAU,
-            2.0 / frequency
+        Scheme::ModalExact if product > 2.0 => Ok(Some(Warning::new(
+            Topic::UnresolvedModes,
+            format!(
+                "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: free motion stays exact, contact \
+                 forces on them do not",
+                1e-3 * 2.0 / step / std::f64::consts::TAU
+            ),
+            format!("`time.step` = {:.2e} s resolves all", 2.0 / frequency),
         ))),
         _ => Ok(None),
     }

@@ -21,7 +21,8 @@
 
 use crate::dynamics::modal::ModalModel;
 use crate::stability::shorter;
-use crate::{Error, Result};
+use crate::warning::Topic;
+use crate::{Error, Result, Warning};
 
 /// Steps below this ω_max h are not refused.
 pub const HIGHEST: f64 = 10.0;
@@ -72,12 +73,15 @@ pub fn limit_along_axes(model: &ModalModel) -> f64 {
 }
 
 /// A warning for a step (s) near the `limit` (s): errors grow with its square, some four per cent at the limit.
-pub fn warning(step: f64, limit: f64) -> Option<String> {
+pub fn warning(step: f64, limit: f64) -> Option<Warning> {
     (step >= NEAR * limit).then(|| {
-        format!(
-            "modal-exact with an internal step of {step:.3e} s passes over much of the flexibility that contact sees: expect errors of \
-             some per cent. `time.step` below {:.2e} s avoids it",
-            NEAR * limit
+        Warning::new(
+            Topic::UnresolvedFlexibility,
+            format!(
+                "modal-exact with an internal step of {step:.3e} s passes over much of the flexibility that contact sees: expect \
+                 errors of some per cent"
+            ),
+            format!("`time.step` below {:.2e} s avoids it", NEAR * limit),
         )
     })
 }

@@ -1,7 +1,7 @@
 //! Structures that do not feel each other: what concerns one is judged and told without the others.
 
 use tiprub_core::settings::{LoadSettings, Motion, PatchSettings, Scheme, Shape, Solver, StructureSettings};
-use tiprub_core::{Rom, Scene, Simulation};
+use tiprub_core::{Rom, Scene, Simulation, Warning};
 use tiprub_test_models::{
     RADIUS, coating_of, disk, go, lattice, modal, node, real, rich_blade, ring, ring_of, round, rub, saved, set,
     several, started, try_started,
@@ -194,7 +194,7 @@ fn contacts_are_counted_where_they_push_each_other() {
     assert_eq!(simulation.system().sets().count(), 2);
 }
 
-fn flutter(texts: &[String], name: &str) -> usize {
+fn flutter(texts: &[Warning], name: &str) -> usize {
     texts.iter().filter(|text| text.starts_with(&format!("{name}: ")) && text.contains("flutter")).count()
 }
 
@@ -278,7 +278,7 @@ fn steps_that_modes_do_not_resolve_are_told_of_each_structure() {
         go(&mut simulation, length);
         simulation.take_notes()
     });
-    let of = |texts: &[String], name: &str| texts.iter().filter(|text| text.starts_with(name)).count();
+    let of = |texts: &[Warning], name: &str| texts.iter().filter(|text| text.starts_with(name)).count();
     assert_eq!(told.each_ref().map(|texts| [of(texts, "front: "), of(texts, "rear: ")]), [[0, 0], [1, 0], [1, 1]]);
 }
 
@@ -322,16 +322,23 @@ fn messages_say_which_contact_surface_or_structure_is_meant() {
         let told = told(change);
         assert!(told.starts_with(beginning), "{told}");
     }
-    let mut simulation = started(&two(|scene| {
-        scene.settings.contacts.iter_mut().for_each(|contact| contact.friction = 0.0);
-        scene.settings.structures[1].speed = 7000.0;
-        scene.settings.surfaces.iter_mut().for_each(|surface| surface.shape = Shape::Circular {});
-    }));
-    assert!(simulation.warnings().iter().any(|text| text.starts_with("rear: at speed 7000")));
+    // Tips that are too fast are refused by the name of their input, or accepted once.
+    let fast = |accept: bool| {
+        two(|scene| {
+            scene.settings.accept_implausible = accept;
+            scene.settings.contacts.iter_mut().for_each(|contact| contact.friction = 0.0);
+            scene.settings.structures[1].speed = 7000.0;
+            scene.settings.surfaces.iter_mut().for_each(|surface| surface.shape = Shape::Circular {});
+        })
+    };
+    let refused = try_started(&fast(false)).unwrap_err().to_string();
+    assert!(refused.starts_with("`rear.speed`: at speed 7000"), "{refused}");
+    let mut simulation = started(&fast(true));
+    assert!(simulation.warnings().iter().any(|text| text.starts_with("`rear.speed`: at speed 7000")));
     set(&mut simulation, "front.speed", 7000.0);
     go(&mut simulation, 1e-6);
     go(&mut simulation, 1e-6);
-    assert!(simulation.take_notes().iter().any(|text| text.starts_with("front: at speed 7000")));
+    assert!(simulation.take_notes().iter().any(|text| text.starts_with("`front.speed`: at speed 7000")));
     // Patches without friction tell nothing.
     let scene = two(|scene| {
         scene.settings.contacts.iter_mut().for_each(|contact| contact.friction = 0.0);

@@ -395,7 +395,7 @@ fn damping_is_that_of_the_parameter() {
 fn a_tolerance_that_is_missed_is_counted_and_told_once() {
     let run = |tolerance: f64| {
         let mut simulation = started(&scene(Scheme::Galerkin, 8e-5, tolerance));
-        let notes: Vec<String> = (0..40)
+        let notes: Vec<tiprub_core::Warning> = (0..40)
             .flat_map(|_| {
                 go(&mut simulation, 8e-5);
                 simulation.take_notes()

@@ -11,6 +11,7 @@ use crate::blades::refusal;
 #[test]
 fn a_rotor_that_skips_over_the_lobes_is_refused_and_can_go_on_slower() {
     let mut scene = models::rub(12);
+    scene.settings.accept_implausible = true;
     for speed in [5e5, -1e6, 1e6] {
         scene.settings.structures[0].speed = speed;
         let message = refusal(&scene);
@@ -395,7 +396,7 @@ fn flanks_steeper_than_45_degrees_are_refused() {
 }
 
 #[test]
-fn tips_that_become_too_fast_are_told_of_once() {
+fn tips_that_become_too_fast_are_refused_unless_the_scene_accepts_them() {
     let mut scene = models::rub(4);
     scene.settings.contacts[0].friction = 0.0;
     scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -403,11 +404,23 @@ fn tips_that_become_too_fast_are_told_of_once() {
         scene.settings.structures[0].speed = sense * 1300.0;
         let mut simulation = started(&scene);
         assert!(simulation.take_notes().is_empty() && simulation.warnings().is_empty(), "{:?}", simulation.warnings());
-        let told = [1300.0, 5990.0, 6010.0, 17_188.0, 1300.0, 17_188.0].map(|speed| {
-            simulation.set_real(reference(&simulation, "speed"), sense * speed).unwrap();
-            go(&mut simulation, 1e-6);
-            simulation.take_notes().len()
-        });
-        assert_eq!(told, [0, 0, 1, 0, 0, 0], "{sense}");
+        let outcomes = |simulation: &mut Simulation| {
+            [1300.0, 5990.0, 6010.0, 17_188.0, 1300.0, 17_188.0].map(|speed| {
+                simulation.set_real(reference(simulation, "speed"), sense * speed).unwrap();
+                let outcome = simulation.do_step(simulation.time(), 1e-6);
+                (outcome.map_err(|error| error.to_string()), simulation.take_notes().len())
+            })
+        };
+        let refused = outcomes(&mut simulation);
+        assert_eq!(refused.each_ref().map(|(outcome, _)| outcome.is_ok()), [true, true, false, false, true, false]);
+        let message = refused[2].0.clone().unwrap_err();
+        assert!(message.starts_with("`speed`: at speed") && message.contains("accept_implausible"), "{message}");
+        scene.settings.accept_implausible = true;
+        let accepted = outcomes(&mut started(&scene));
+        assert!(accepted.iter().all(|(outcome, _)| outcome.is_ok()));
+        assert_eq!(accepted.map(|(_, told)| told), [0, 0, 1, 0, 0, 0], "{sense}");
+        scene.settings.silence = vec!["implausible".into()];
+        assert_eq!(outcomes(&mut started(&scene)).map(|(_, told)| told), [0; 6], "{sense}");
+        (scene.settings.accept_implausible, scene.settings.silence) = (false, Vec::new());
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::rom::Frame;
 use tiprub_core::settings::{Preset, Scheme, Solver};
-use tiprub_core::{Result, Scene, Simulation};
+use tiprub_core::{Result, Scene, Simulation, Warning};
 use tiprub_test_models::{self as models, reference, saved, set, try_started};
 
 /// How far the casing closes on the tips (m).
@@ -51,7 +51,7 @@ fn pressed(scene: &Scene) -> (Simulation, Result<()>) {
     (simulation, outcome)
 }
 
-fn about_film(notes: Vec<String>) -> Vec<String> {
+fn about_film(notes: Vec<Warning>) -> Vec<Warning> {
     notes.into_iter().filter(|text| text.contains("film has pulled")).collect()
 }
 
@@ -82,7 +82,7 @@ fn a_run_ends_where_film_pulls_and_goes_on_where_it_does_not() {
             let [front, rear] = [0, 1].map(|node| simulation.system().multiplier(node, 0));
             assert!((front * FLEXIBILITY / DEPTH - 1.0).abs() < 1e-9 && rear.abs() < 1e-9 * front, "{case}");
         }
-        assert_eq!(about_film(simulation.take_notes()), Vec::<String>::new(), "{case}");
+        assert_eq!(about_film(simulation.take_notes()), Vec::<Warning>::new(), "{case}");
         // Complementarity looks again.
         scene.settings.contacts[0].solver = Solver::Lcp;
         let (simulation, outcome) = pressed(&scene);

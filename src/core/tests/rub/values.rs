@@ -120,7 +120,7 @@ fn refusals_write_numbers_of_any_size_in_short() {
 }
 
 #[test]
-fn slips_of_units_and_axes_are_asked_about_and_change_nothing() {
+fn slips_of_units_and_axes_are_refused_unless_the_scene_accepts_them() {
     type Change = fn(&mut Scene);
     let slips: [(&str, Change); 6] = [
         ("rpm", |scene| scene.settings.structures[0].speed = 17_188.0),
@@ -153,8 +153,16 @@ fn slips_of_units_and_axes_are_asked_about_and_change_nothing() {
         scene.settings.surfaces[0].shape = Shape::Circular {};
         scene.settings.surfaces[0].moving = false;
         change(&mut scene);
-        let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{word}: {error}"));
-        let outcome = simulation.initialise(0.0);
+        let start = |accept: bool| {
+            let mut scene = scene.clone();
+            scene.settings.accept_implausible = accept;
+            let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{word}: {error}"));
+            let outcome = simulation.initialise(0.0);
+            (simulation, outcome)
+        };
+        let refusal = start(false).1.unwrap_err().to_string();
+        assert!(refusal.contains(word) && refusal.contains("--accept-implausible"), "{word}: {refusal}");
+        let (simulation, outcome) = start(true);
         let told = simulation.warnings().join("; ");
         assert!(told.contains(word) && told.contains('?'), "{word}: {told} {outcome:?}");
     }

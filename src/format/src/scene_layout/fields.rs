@@ -13,7 +13,7 @@ const fn field(
 }
 
 /// Every key, in file order.
-pub const FIELDS: [SceneField; 100] = [
+pub const FIELDS: [SceneField; 102] = [
     field("name", "text", None, "letters, digits, underscore; starts with a letter", "Name of the model."),
     field("description", "text", Some("empty"), "any", "One or a few sentences for the importer's catalogue."),
     field(
@@ -22,6 +22,21 @@ pub const FIELDS: [SceneField; 100] = [
         Some("`none`"),
         "`none`, `paper`",
         "`paper`: the paper's method, central differences with solver `film`. Its kind of model is `builtin:rotor37-paper`.",
+    ),
+    field(
+        "accept_implausible",
+        "true or false",
+        Some("false"),
+        "",
+        "Accept values that are rarely meant, such as tips faster than 1500 m/s or lengths in millimetres, with a warning; without \
+         it they are errors.",
+    ),
+    field(
+        "silence",
+        "list of texts",
+        Some("empty"),
+        "identifiers of [warnings](warnings.md)",
+        "Warnings that are not given, on the command line and in the log of the FMU.",
     ),
     field("structure.name", "text", None, "as `name` of the scene", "Name by which contacts refer to it."),
     field(

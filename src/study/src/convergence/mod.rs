@@ -23,8 +23,13 @@ use limit::Limit;
 use march::{Marched, march};
 use refine::{Again, Direction, Level, Source, goes_by_tolerance};
 use tiprub_core::{Rom, Scene, rom::RubErrors};
-use tiprub_gallery::{rom_cache::RomCache, scene_source};
-use tiprub_shell::{Failure, Result, console::Console, sweep};
+use tiprub_gallery::rom_cache::RomCache;
+use tiprub_shell::{
+    Failure, Result,
+    console::Console,
+    forecast::{Forecast, Ledger},
+    sweep,
+};
 
 use super::Study;
 use crate::{
@@ -108,7 +113,7 @@ pub fn study(
 ) -> Result<(Study, Judged)> {
     refuse_compared(&arguments.set)?;
     let cache = arguments.common.cache.cache();
-    let scene = scene_source::load(&arguments.scene, &cache, console)?;
+    let scene = arguments.common.options.load(&arguments.scene, &cache, console)?;
     let asked = Asked {
         cache,
         mesh: 1.0,
@@ -175,22 +180,33 @@ pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Res
             console,
         },
     )?;
-    announce(&directions, scene, (own, seconds), &runner);
+    let ledger = planned(&directions, scene, (own, seconds), &runner);
+    let forecast = Forecast::new(console, &format!("Refining {}", scene.settings.name), ledger);
     let mut refined = Vec::new();
-    for direction in directions {
-        refined.push(runner.refined(direction)?);
+    for (number, direction) in directions.into_iter().enumerate() {
+        refined.push(runner.refined(direction, (number, scene, own), &forecast)?);
     }
+    forecast.finish();
     Ok(Found {
         names: [name.to_owned(), scene.settings.name.clone()],
         window: (interval * case.samples() as f64, case.samples()),
-        method: crate::error_study::name((scene.settings.time.scheme, scene.settings.contacts[0].solver)),
+        method: crate::error::competitor::method_name((scene.settings.time.scheme, scene.settings.contacts[0].solver)),
         refined,
         of_rom: estimate::of_rom(&scene.roms[master(scene)]),
     })
 }
 
-/// Say how long the runs will take, where that is long: as steps times sizes of the models, against the run of the scene as it stands.
-fn announce(directions: &[Direction], scene: &Scene, (own, seconds): (u32, f64), runner: &Runner) {
+/// All runs, as steps times sizes of the models, at the rate of the run of the scene as it stands.
+fn planned(directions: &[Direction], scene: &Scene, (own, seconds): (u32, f64), runner: &Runner) -> Ledger {
+    let mut ledger = Ledger::new(seconds / runner.threads as f64);
+    for (number, direction) in directions.iter().enumerate() {
+        ledger.plan(number, work(direction, scene, own));
+    }
+    ledger
+}
+
+/// Work of a direction, in runs of the scene as it stands.
+fn work(direction: &Direction, scene: &Scene, own: u32) -> f64 {
     let size = |scene: &Scene| scene.roms.iter().map(|rom| rom.total_order() as f64).sum::<f64>();
     let steps = |level: &Level| match goes_by_tolerance(scene) {
         // A decade doubles the steps.
@@ -198,11 +214,7 @@ fn announce(directions: &[Direction], scene: &Scene, (own, seconds): (u32, f64),
         false => f64::from(level.division) / f64::from(own),
     };
     let cost = |level: &Level| steps(level) * size(&level.scene) / size(scene);
-    let levels = directions.iter().flat_map(|direction| &direction.levels).filter(|level| !level.own);
-    let runs: Vec<f64> = levels.map(cost).collect();
-    let longest = runs.iter().fold(0.0, |most: f64, run| most.max(*run));
-    let expected = seconds * (runs.iter().sum::<f64>() / runner.threads as f64).max(longest);
-    crate::announce(runner.console, &format!("{} runs", runs.len()), expected);
+    direction.levels.iter().filter(|level| !level.own || direction.shorter.is_some()).map(cost).sum()
 }
 
 /// Shares of the step at which a direction is run once more where one of its levels is refused.
@@ -225,16 +237,32 @@ impl<'a> Runner<'a> {
 
     /// Run a direction with the steps that it says.
     pub(crate) fn as_it_is(&self, direction: Direction) -> Result<Refined> {
-        Ok(Refined { runs: self.runs(&direction)?, digging: vec![None; direction.levels.len()], direction })
+        let count = direction.levels.len();
+        let task = self.console.task(&format!("Refining {}", direction.title), Some(count as u64));
+        let progress = |done: usize| {
+            task.at(done as u64);
+            task.line(&format!("{done} of {count} runs"));
+        };
+        Ok(Refined { runs: self.runs(&direction, &progress)?, digging: vec![None; count], direction })
     }
 
     /// Run a direction. A ROM with more modes or nodes may ask for a shorter step than the scene's: then all of its levels take one.
-    fn refined(&self, mut direction: Direction) -> Result<Refined> {
-        let runs = self.runs(&direction)?;
+    fn refined(
+        &self,
+        mut direction: Direction,
+        (number, scene, own): (usize, &Scene, u32),
+        forecast: &Forecast,
+    ) -> Result<Refined> {
+        let counted = |direction: &Direction| {
+            let each = work(direction, scene, own) / direction.levels.len() as f64;
+            self.runs(direction, &|_| forecast.done(number, each))
+        };
+        let runs = counted(&direction)?;
         let refused = runs.iter().any(std::result::Result::is_err) && direction.name != refine::STEP;
         for shorter in SHORTER.into_iter().filter(|_| refused) {
             let finer = direction.stepped(shorter);
-            let runs = self.runs(&finer)?;
+            forecast.plan(number, work(&finer, scene, own));
+            let runs = counted(&finer)?;
             if runs.iter().all(std::result::Result::is_ok) {
                 direction = finer;
                 return Ok(Refined { digging: self.digging(&direction)?, direction, runs });
@@ -258,18 +286,16 @@ impl<'a> Runner<'a> {
         }
     }
 
-    fn runs(&self, direction: &Direction) -> Result<Vec<std::result::Result<Marched, String>>> {
-        let count = direction.levels.len();
-        let task = self.console.task(&format!("Refining {}", direction.title), Some(count as u64));
+    fn runs(
+        &self,
+        direction: &Direction,
+        progress: &dyn Fn(usize),
+    ) -> Result<Vec<std::result::Result<Marched, String>>> {
         let run = |level: &Level| {
             Ok(match &self.own {
                 Some(own) if level.own && direction.shorter.is_none() => Ok(own.clone()),
                 _ => march(&level.scene, self.settings, level.division, self.samples),
             })
-        };
-        let progress = |done: usize| {
-            task.at(done as u64);
-            task.line(&format!("{done} of {count} runs"));
         };
         sweep::sweep(&direction.levels, self.threads, run, progress)
     }

@@ -71,6 +71,11 @@ impl Family {
     }
 }
 
+/// Name of a scheme with a solver, as in scene files.
+pub fn method_name((scheme, solver): (Scheme, Solver)) -> String {
+    Competitor::Core(scheme, solver).name()
+}
+
 impl Competitor {
     /// Everyone, the product's own first.
     pub fn all() -> Vec<Self> {

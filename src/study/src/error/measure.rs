@@ -2,7 +2,10 @@
 
 use std::iter::zip;
 
-use tiprub_shell::{Failure, Result, console::Task};
+use tiprub_shell::{
+    Failure, Result,
+    forecast::{Forecast, Ledger},
+};
 
 use super::{
     case::Case,
@@ -142,7 +145,61 @@ fn sums(values: &[f64], window: usize) -> Vec<f64> {
     values.chunks(window).map(|part| part.iter().sum()).collect()
 }
 
-/// Number of runs of a scene, for progress.
+/// Kinds of work, for a forecast: references, then a kind for every competitor.
+const KINDS: usize = 64;
+
+/// The kind of a competitor's runs of the case with that number.
+pub(super) fn kind(case_number: usize, competitor: Competitor) -> usize {
+    let known = Competitor::all().iter().position(|other| *other == competitor);
+    KINDS * case_number + 1 + known.unwrap_or(KINDS - 2)
+}
+
+/// Work of a run, as internal steps of one size: a decade of a tolerance doubles the steps.
+pub(super) fn units(case: &dyn Case, size: usize, competitor: Competitor, division: u32) -> f64 {
+    let usual = || {
+        let divisions = case.divisions(size);
+        f64::from(divisions.get(divisions.len() / 2).copied().unwrap_or(1))
+    };
+    let steps = if competitor.is_by_tolerance() {
+        usual() * (f64::from(division) / USUAL_TOLERANCE).powf(0.3)
+    } else {
+        f64::from(division)
+    };
+    let elements = case.sizes().get(size).map_or(1.0, |size| *size as f64);
+    steps * case.samples() as f64 * elements
+}
+
+/// One over the tolerance at which a run is taken to cost as much as one with a usual number of steps.
+const USUAL_TOLERANCE: f64 = 1e3;
+
+/// Runs for time, beside the one that is looked at.
+fn timed(repetitions: usize) -> f64 {
+    (1 + repetitions) as f64
+}
+
+fn of_references(case: &dyn Case, size: usize) -> f64 {
+    let (division, outside) = case.reference_divisions(size);
+    let second = if case.second_trace().is_some() { 0.0 } else { units(case, size, case.second(), outside) };
+    let own = units(case, size, DEFAULT, division);
+    let tolerant = case.competitors(size).contains(&TOLERANT);
+    let finest = if tolerant { units(case, size, TOLERANT, FINEST) } else { 0.0 };
+    own * (1 + case.families(size).len()) as f64 + second + finest
+}
+
+/// Plan the runs of the case with that number.
+pub fn plan(case: &dyn Case, case_number: usize, repetitions: usize, ledger: &mut Ledger) {
+    for size in 0..case.sizes().len() {
+        ledger.plan(KINDS * case_number, of_references(case, size));
+        for competitor in case.competitors(size) {
+            for division in case.divisions_of(size, competitor) {
+                let own = timed(repetitions) * units(case, size, competitor, division);
+                ledger.plan(kind(case_number, competitor), own);
+            }
+        }
+    }
+}
+
+/// Number of runs of a scene.
 pub fn count(case: &dyn Case) -> u64 {
     let of = |size: usize| {
         let all = case.competitors(size).into_iter();
@@ -155,16 +212,11 @@ pub fn count(case: &dyn Case) -> u64 {
 ///
 /// # Errors
 /// A reference fails.
-pub fn measure(case: &dyn Case, repetitions: usize, task: &Task) -> Result<Measured> {
-    let mut done = 0;
-    let mut tick = || {
-        done += 1;
-        task.at(done);
-    };
+pub fn measure(case: &dyn Case, case_number: usize, repetitions: usize, forecast: &Forecast) -> Result<Measured> {
     let mut references = Vec::new();
     for size in 0..case.sizes().len() {
         references.push(refer(case, size)?);
-        tick();
+        forecast.done(KINDS * case_number, of_references(case, size));
     }
     let exact = case.exact();
     let truth = exact.as_ref().or(references.last().map(|last| &last.first));
@@ -176,7 +228,8 @@ pub fn measure(case: &dyn Case, repetitions: usize, task: &Task) -> Result<Measu
                 let outcome = judge(case, size, (competitor, division), own, truth, repetitions);
                 let whole = if competitor.is_by_tolerance() { 1.0 } else { case.interval() };
                 rows.push(Row { size, competitor, step: whole / f64::from(division), outcome });
-                tick();
+                forecast
+                    .done(kind(case_number, competitor), timed(repetitions) * units(case, size, competitor, division));
             }
         }
     }

@@ -29,7 +29,11 @@ use ranking::Kind;
 use serde_json::{Value, json};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_figure::table::Table;
-use tiprub_shell::{Result, console::Console};
+use tiprub_shell::{
+    Result,
+    console::Console,
+    forecast::{Forecast, Ledger},
+};
 
 use super::{Figure, Picture, Statement, Study};
 use crate::{
@@ -48,19 +52,27 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn Source>, console: &
     let case = own::Own::new(arguments, console)?;
     let (quick, cache) = (arguments.common.quick, arguments.common.cache.cache());
     let (title, all) = (case.title().to_owned(), measure::count(&case));
-    case.announce(if quick { 1 } else { run::REPETITIONS }, console);
     // First: what cannot be reduced again is told before the long work.
-    let total = total::measure(
-        &case,
-        &Again { source, cache: &cache, mesh: 1.0, finest_tip: FINEST_TIP, only: &[], quick, console },
-    )?;
+    let again = Again { source, cache: &cache, mesh: 1.0, finest_tip: FINEST_TIP, only: &[], quick, console };
+    let prepared = total::prepare(&case, &again)?;
+    let mut ledger = case.ledger();
+    measure::plan(&case, 0, repetitions(quick), &mut ledger);
+    if let Ok(prepared) = &prepared {
+        prepared.plan(&case, quick, &mut ledger);
+    }
+    let forecast = Forecast::new(console, "Error against run time", ledger);
+    let total = match prepared {
+        Ok(prepared) => total::measure(&case, prepared, &again, &forecast)?,
+        Err(why) => Err(why),
+    };
     let summary = format!(
         "Every time scheme and contact solver on {}, at steps on both sides of the one it asks for ({all} runs); and other numbers of contact \
          points, of rows of them and of modes, against {}.",
         arguments.scene,
         if total.as_ref().is_ok_and(|total| total.is_total()) { "one truth with more of all" } else { "one truth" }
     );
-    let mut study = of_cases(vec![Box::new(case)], &[], (quick, summary), console)?;
+    let mut study = of_cases(vec![Box::new(case)], &[], (quick, summary), &forecast)?;
+    forecast.finish();
     match total {
         Err(why) => study
             .statements
@@ -96,6 +108,23 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn Source>, console: &
     Ok(study)
 }
 
+/// Timed runs of a configuration.
+fn repetitions(quick: bool) -> usize {
+    if quick { 1 } else { run::REPETITIONS }
+}
+
+/// What the study of several cases plans; nothing is known of its rate.
+pub fn planned(cases: &[Box<dyn Case>], smooth: &[&dyn Case], quick: bool) -> Ledger {
+    let mut ledger = Ledger::new(0.0);
+    for (number, case) in cases.iter().enumerate() {
+        measure::plan(case.as_ref(), number, repetitions(quick), &mut ledger);
+    }
+    for (number, case) in (cases.len()..).zip(smooth) {
+        measure::plan(*case, number, 1, &mut ledger);
+    }
+    ledger
+}
+
 /// The study of several cases; `smooth` are further ones, of which only orders are told.
 ///
 /// # Errors
@@ -104,7 +133,7 @@ pub fn of_cases(
     cases: Vec<Box<dyn Case>>,
     smooth: &[&dyn Case],
     (quick, summary): (bool, String),
-    console: &Console,
+    forecast: &Forecast,
 ) -> Result<Study> {
     let mut study = Study {
         name: "error",
@@ -116,16 +145,15 @@ pub fn of_cases(
         results: Value::Null,
         files: Vec::new(),
     };
-    let repetitions = if quick { 1 } else { run::REPETITIONS };
+    let repetitions = repetitions(quick);
     let time = format!("{}, median of {repetitions} runs or more, one run at a time", clock::MEANING);
     study.facts.push(("time".into(), time));
     let mut measured = Vec::new();
-    for case in cases {
-        let task = console.task(case.title(), Some(measure::count(case.as_ref())));
-        let found = measure::measure(case.as_ref(), repetitions, &task)?;
+    for (number, case) in cases.into_iter().enumerate() {
+        let found = measure::measure(case.as_ref(), number, repetitions, forecast)?;
         measured.push((case, found));
     }
-    let orders = orders(smooth, &measured, console)?;
+    let orders = orders(smooth, &measured, forecast)?;
     let mut text = guide_page(&study.facts);
     let mut results = Vec::new();
     for (case, found) in &measured {
@@ -181,9 +209,10 @@ fn section(case: &dyn Case, tables: &[Table]) -> String {
 }
 
 /// Orders while nothing changes its contact, and in the scenes that were measured.
-fn orders(smooth: &[&dyn Case], measured: &[(Box<dyn Case>, Measured)], console: &Console) -> Result<Table> {
-    let task = console.task("Orders of convergence", None);
-    let found = smooth.iter().map(|case| measure::measure(*case, 1, &task)).collect::<Result<Vec<_>>>()?;
+fn orders(smooth: &[&dyn Case], measured: &[(Box<dyn Case>, Measured)], forecast: &Forecast) -> Result<Table> {
+    let numbered = smooth.iter().zip(measured.len()..);
+    let found =
+        numbered.map(|(case, number)| measure::measure(*case, number, 1, forecast)).collect::<Result<Vec<_>>>()?;
     let mut all: Vec<(&dyn Case, &Measured)> = zip(smooth.iter().copied(), &found).collect();
     all.extend(measured.iter().map(|(case, found)| (case.as_ref(), found)));
     Ok(ranking::orders(&all))

@@ -5,12 +5,12 @@ use tiprub_core::{
     settings::{Scheme, Solver, TOLERANCE},
     shown,
 };
-use tiprub_gallery::scene_source;
-use tiprub_shell::{Failure, Result, console::Console, schedule::Schedule};
+use tiprub_shell::{Failure, Result, console::Console, forecast::Ledger, schedule::Schedule};
 
 use super::{
     case::Case,
     competitor::{Competitor, DEFAULT, Family, TOLERANCES, TOLERANT},
+    measure::units,
     run::{Run, Seen},
     scene::SceneRun,
     window,
@@ -67,7 +67,7 @@ impl Own {
     /// The scene cannot be read or does not run; nothing touches within the window.
     pub fn new(arguments: &ErrorArguments, console: &Console) -> Result<Self> {
         refuse_compared(&arguments.set)?;
-        let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
+        let scene = arguments.common.options.load(&arguments.scene, &arguments.common.cache.cache(), console)?;
         Self::of(&arguments.scene, scene, &arguments.set, (arguments.window, arguments.common.quick), console)
     }
 
@@ -186,20 +186,17 @@ impl Own {
         Competitor::Core(self.scene.settings.time.scheme, self.scene.settings.contacts[0].solver)
     }
 
-    /// Say how long the study will take, where that is long: by a run of the scene as it stands, in internal steps.
-    pub fn announce(&self, repetitions: usize, console: &Console) {
+    /// Nothing planned, at the rate of a run of the scene as it stands.
+    pub fn ledger(&self) -> Ledger {
         let clock = std::time::Instant::now();
-        let run = self.start(0, self.method(), self.own_division(), 0.0);
-        let Ok(mut run) = run else { return };
-        if (0..self.samples).any(|_| run.advance().is_err()) {
-            return;
+        let own = (self.method(), self.own_division());
+        if let Ok(mut run) = self.start(0, own.0, own.1, 0.0) {
+            // One that ends early has a rate as well, and a row that says why.
+            let ran = (0..self.samples).take_while(|_| run.advance().is_ok()).count();
+            let share = ran as f64 / self.samples as f64;
+            return Ledger::new(clock.elapsed().as_secs_f64() / (share * units(self, 0, own.0, own.1)).max(1.0));
         }
-        // Of a tolerance as long as by steps of the base.
-        let own = clock.elapsed().as_secs_f64() / f64::from(self.base);
-        let tried: u32 = self.divisions.iter().sum();
-        let of_references = f64::from(self.reference_divisions(0).0) * (2 + self.families(0).len()) as f64;
-        let of_competitors = f64::from(tried) * (self.competitors(0).len() * (1 + repetitions)) as f64;
-        crate::announce(console, "errors of the steps", own * (of_references + of_competitors));
+        Ledger::new(0.0)
     }
 
     /// Communication steps before the first contact, at most `most`.

@@ -10,12 +10,16 @@ use tiprub_core::{
     Scene,
     settings::{Scheme, Solver},
 };
-use tiprub_shell::{Result, console::Task};
+use tiprub_shell::{
+    Result,
+    forecast::{Forecast, Ledger},
+};
 
 use super::{
     case::Case as _,
     clock,
     competitor::{Competitor, TOLERANT},
+    measure::{kind, units},
     own::Own,
     run::Run as _,
     scene::SceneRun,
@@ -111,36 +115,92 @@ pub struct Total {
     pub mesh: std::result::Result<f64, String>,
 }
 
-/// Measure a case of one's own; the inner error says why there is nothing to measure.
+/// Models that are held against each other, and the finest, which the truth is found with.
+pub struct Prepared<'a> {
+    refiner: Refiner<'a>,
+    models: Vec<Model>,
+    finer: Vec<Scene>,
+    truth: Option<Scene>,
+}
+
+/// Make the models of a case of one's own; the inner error says why there is nothing to measure.
 ///
 /// # Errors
 /// A model that is reduced again and does not give the scene's.
-pub fn measure(case: &Own, again: &Again) -> Result<std::result::Result<Total, String>> {
+pub fn prepare<'a>(case: &'a Own, again: &'a Again<'a>) -> Result<std::result::Result<Prepared<'a>, String>> {
     let scene = case.scene();
     if let Err(several) = crate::one_rotor(&scene.settings) {
         return Ok(Err(several.to_string()));
     }
     let refiner = Refiner::checked(scene, case.own_division(), again)?;
     let mut finer = refiner.finer(if again.quick { &FINER[..1] } else { &FINER });
-    let mut models = coarser(scene, again.quick);
+    let models = coarser(scene, again.quick);
     let truth = finer.pop();
-    let of_source = truth.is_some();
-    if models.len() == 1 && !of_source {
+    if models.len() == 1 && truth.is_none() {
         return Ok(Err("no coarser model follows from its ROM, and no finer one can be reduced".into()));
     }
+    Ok(Ok(Prepared { refiner, models, finer, truth }))
+}
+
+/// Kind of work of other meshes, for a forecast: beside those of competitors.
+const MESHES: usize = 1000;
+/// Meshes that are run, the scene's among them.
+const MESHES_RUN: f64 = 3.0;
+
+impl Prepared<'_> {
+    /// Plan all runs.
+    pub fn plan(&self, case: &Own, quick: bool, ledger: &mut Ledger) {
+        let own = (case.method(), case.own_division());
+        let truth = self.truth.as_ref().unwrap_or(case.scene());
+        ledger.plan(kind(0, own.0), work(case, truth, own.0, TRUE_SHARES[0].saturating_mul(own.1)));
+        let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
+        for scene in self.models.iter().map(|model| &model.scene).chain(&self.finer) {
+            for competitor in competitors(case) {
+                for division in case.tried(competitor, shares) {
+                    ledger.plan(kind(0, competitor), work(case, scene, competitor, division));
+                }
+            }
+        }
+        if !quick {
+            ledger.plan(MESHES, MESHES_RUN * units(case, 0, own.0, own.1));
+        }
+    }
+}
+
+/// Work of a run of a model, as internal steps of the scene's.
+fn work(case: &Own, scene: &Scene, competitor: Competitor, division: u32) -> f64 {
+    let order = |scene: &Scene| scene.roms.iter().map(|rom| rom.total_order() as f64).sum::<f64>();
+    units(case, 0, competitor, division) * order(scene) / order(case.scene())
+}
+
+/// Measure a case of one's own; the inner error says why nothing was measured.
+///
+/// # Errors
+/// A mesh that cannot be reduced.
+pub fn measure(
+    case: &Own,
+    prepared: Prepared<'_>,
+    again: &Again,
+    forecast: &Forecast,
+) -> Result<std::result::Result<Total, String>> {
+    let scene = case.scene();
+    let Prepared { refiner, mut models, finer, truth } = prepared;
+    let of_source = truth.is_some();
     let truth_scene = truth.unwrap_or_else(|| scene.clone());
     let (division, truth) = match true_run(case, &truth_scene) {
         Ok(found) => found,
         Err(why) => return Ok(Err(format!("the truth does not run: {why}"))),
     };
+    forecast.done(kind(0, case.method()), work(case, &truth_scene, case.method(), division));
     let before = finer.last().unwrap_or(scene);
     let before = of_source.then(|| observed(case, before, case.method(), division)).and_then(std::result::Result::ok);
     let readable = before.and_then(|(_, run)| run.displacement_change(&truth));
     models.extend(finer.into_iter().map(|scene| Model::of(scene, false)));
-    let task = again.console.task("Total errors", None);
-    let rows = rows(case, &models, &truth, &task, again.quick);
-    drop(task);
+    let rows = rows(case, &models, &truth, forecast, again.quick);
     let mesh = mesh(case, &refiner, again)?;
+    if !again.quick {
+        forecast.done(MESHES, MESHES_RUN * units(case, 0, case.method(), case.own_division()));
+    }
     let touching =
         if scene.roms[master(scene)].contact_nodes.iter().all(|node| node.area > 0.0) { "patches" } else { "nodes" };
     let own = Model::of(scene.clone(), true);
@@ -210,7 +270,7 @@ fn value(case: &Own, competitor: Competitor, division: u32) -> f64 {
     (if competitor.is_by_tolerance() { 1.0 } else { case.interval() }) / f64::from(division)
 }
 
-fn rows(case: &Own, models: &[Model], truth: &Marched, task: &Task, quick: bool) -> Vec<Row> {
+fn rows(case: &Own, models: &[Model], truth: &Marched, forecast: &Forecast, quick: bool) -> Vec<Row> {
     let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
     let own = case.own_division();
     let competitors = competitors(case);
@@ -225,9 +285,9 @@ fn rows(case: &Own, models: &[Model], truth: &Marched, task: &Task, quick: bool)
                 });
                 let own = model.own && competitor == case.method() && division == own;
                 rows.push(Row { model: index, competitor, step: value(case, competitor, division), own, outcome });
+                forecast.done(kind(0, competitor), work(case, &model.scene, competitor, division));
             }
         }
-        task.line(&format!("{} of {} models", index + 1, models.len()));
     }
     rows
 }
@@ -292,7 +352,8 @@ mod tests {
             let case = Own::of("a blade", scene(rows), &[], (Some(1.2e-3), true), &console).unwrap();
             let again =
                 Again { source, cache: &cache, mesh: 1.0, finest_tip: 4, only: &[], quick: true, console: &console };
-            measure(&case, &again).unwrap().unwrap()
+            let forecast = Forecast::new(&console, "total errors", case.ledger());
+            measure(&case, prepare(&case, &again).unwrap().unwrap(), &again, &forecast).unwrap().unwrap()
         };
         let one = total(1, Some(&Blade));
         assert!(one.truth.starts_with("5 × 2 patches and 12 modes") && one.is_total(), "{}", one.truth);

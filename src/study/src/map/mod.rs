@@ -15,7 +15,12 @@ use prediction::{Crossing, Prediction};
 use serde_json::json;
 use tiprub_core::{Scene, settings::SpinSettings};
 use tiprub_gallery::scene_source;
-use tiprub_shell::{Failure, Result, console::Console, sweep};
+use tiprub_shell::{
+    Failure, Result,
+    console::Console,
+    forecast::{Forecast, Ledger},
+    sweep,
+};
 
 use super::{Statement, Study};
 use crate::arguments::{MapArguments, Speeds};
@@ -76,7 +81,7 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     let settings = scene_source::settings(name)?;
     start::master(&settings)?;
     one_rotor_and_friction(&settings)?;
-    let scene = scene_source::load(name, &arguments.common.cache.cache(), console)?;
+    let scene = arguments.common.options.load(name, &arguments.common.cache.cache(), console)?;
     let request = Request {
         quick: arguments.common.quick,
         speeds: arguments.speeds,
@@ -86,13 +91,16 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     };
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
     let (study, warnings) = {
-        let task = console.task("Running the interaction map", None);
-        of_scene(scene, &request, threads, |done, all, steps| {
-            task.now(&format!("Running the interaction map: {done} of {all} ({steps:.1e} internal steps in all)"));
-            task.line(&format!("{done} of {all} angular velocities, {steps:.1e} internal steps in all"));
-        })?
+        // Nothing is known of its rate before the first run is done.
+        let forecast = Forecast::new(console, "Running the interaction map", Ledger::new(0.0));
+        let found = of_scene(scene, &request, threads, |done, all, steps| match done {
+            0 => forecast.plan(0, steps),
+            _ => forecast.done(0, steps / all as f64),
+        })?;
+        forecast.finish();
+        found
     };
-    console.warn(&warnings);
+    console.warn_texts(&warnings);
     Ok(study)
 }
 

@@ -344,7 +344,7 @@ impl March<'_> {
             factor,
             internal_steps: self.internal_steps,
             stepping,
-            warnings: self.simulation.warnings().to_vec(),
+            warnings: tiprub_core::warning::texts(self.simulation.warnings()),
         })
     }
 }

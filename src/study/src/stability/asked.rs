@@ -108,7 +108,7 @@ impl Asked<'_> {
             .and_then(|()| set(simulation, Quantity::Speed, place.speed))
             .and_then(|()| simulation.initialise(self.scene.settings.experiment.start))
             .map_err(|error| error.to_string())?;
-        Ok(simulation.warnings().to_vec())
+        Ok(tiprub_core::warning::texts(simulation.warnings()))
     }
 }
 

@@ -5,7 +5,7 @@ use tiprub_core::{
     dynamics::{cyclic::CyclicModel, modal::ModalModel},
     settings::{Scheme, Solver},
 };
-use tiprub_shell::{Result, console::Console, sweep};
+use tiprub_shell::{Result, forecast::Forecast, sweep};
 
 use super::{
     asked::{Answer, Asked, Method, Own, Place},
@@ -68,13 +68,12 @@ fn highest(asked: &Asked) -> f64 {
 ///
 /// # Errors
 /// A thread that is lost.
-pub fn of(asked: &Asked, own: &Own, threads: usize, quick: bool, console: &Console) -> Result<Vec<Usable>> {
+pub fn of(asked: &Asked, own: &Own, threads: usize, quick: bool, forecast: &Forecast) -> Result<Vec<Usable>> {
     let place = [Place { friction: own.friction, speed: own.speed }];
     let highest = highest(asked);
     let range = TRIED.map(|product| product / highest);
     // Quickly: from the scene's own step or the resolved one, whichever is longer; below it nothing is looked at.
     let range = if quick { [range[0].max(own.step).min(range[1]), range[1]] } else { range };
-    let task = console.task("Seeking the largest accepted steps", Some(Scheme::RECURRENCES.len() as u64));
     let of_scheme = |scheme: &Scheme| {
         let ask = |solver: Solver, step: f64| -> Answer { asked.at((*scheme, solver), step, &place).remove(0) };
         let known = (*scheme == Scheme::CentralDifference).then(|| 2.0 / highest);
@@ -94,10 +93,8 @@ pub fn of(asked: &Asked, own: &Own, threads: usize, quick: bool, console: &Conso
         }
         Ok(found)
     };
-    let progress = |done: usize| {
-        task.at(done as u64);
-        task.line(&format!("{done} of {} schemes", Scheme::RECURRENCES.len()));
-    };
+    let share = ANSWERS as f64 / Scheme::RECURRENCES.len() as f64;
+    let progress = |_| forecast.done(super::LIMITS, share);
     Ok(sweep::sweep(&Scheme::RECURRENCES, threads, of_scheme, progress)?.concat())
 }
 

@@ -19,8 +19,12 @@ use tiprub_core::{
     rom::Frame,
     settings::{Meridian, Motion, Scheme},
 };
-use tiprub_gallery::scene_source;
-use tiprub_shell::{Failure, Result, console::Console, sweep};
+use tiprub_shell::{
+    Failure, Result,
+    console::Console,
+    forecast::{Forecast, Ledger},
+    sweep,
+};
 
 use super::{Study, master};
 use crate::{arguments::StabilityArguments, error::own::refuse_compared, one_rotor_and_friction};
@@ -100,7 +104,7 @@ pub struct Found {
 /// The scene cannot be read, is refused whatever is asked, or start values are wrong.
 pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study> {
     refuse_compared(&arguments.set)?;
-    let scene = scene_source::load(&arguments.scene, &arguments.common.cache.cache(), console)?;
+    let scene = arguments.common.options.load(&arguments.scene, &arguments.common.cache.cache(), console)?;
     one_rotor_and_friction(&scene.settings)?;
     let (scene, frictionless) = with_friction(scene);
     let asked = Asked { scene: &scene, settings: &arguments.set };
@@ -112,24 +116,31 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     // Ranges that are wrong are refused before the work.
     let first = Grid::new(arguments, &own, coupled, None)?;
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
-    announce(&asked, &own, first.places().len() * first.steps.len() + limits::ANSWERS, threads, console);
-    let limits = limits::of(&asked, &own, threads, arguments.common.quick, console)?;
+    let mut ledger = Ledger::new(seconds_per_answer(&asked, &own) / threads as f64);
+    ledger.plan(LIMITS, limits::ANSWERS as f64);
+    ledger.plan(GRID, (first.places().len() * first.steps.len()) as f64);
+    let forecast = Forecast::new(console, &format!("Asking {}", scene.settings.name), ledger);
+    let limits = limits::of(&asked, &own, threads, arguments.common.quick, &forecast)?;
     let usable = limits.iter().find(|usable| usable.method == own.method).and_then(limits::Usable::step);
     let grid = Grid::new(arguments, &own, coupled, usable)?;
     let structures = structures(&scene, &own, &grid)?;
     let no_rates = structures.as_ref().err().copied();
     let structures = structures.unwrap_or_default();
-    let points = points(&asked, &own, &grid, &structures, threads, console)?;
+    let points = points(&asked, &own, &grid, &structures, threads, &forecast)?;
+    forecast.finish();
     let found = Found { name: arguments.scene.clone(), own, grid, points, limits, no_rates, scene: scene.clone() };
     page::study(&found)
 }
 
-/// Say how long so many answers will take, where that is long, by the one of the scene as it stands.
-fn announce(asked: &Asked, own: &Own, answers: usize, threads: usize, console: &Console) {
+/// Kinds of work, for a forecast.
+pub(super) const LIMITS: usize = 0;
+const GRID: usize = 1;
+
+/// Time of the answer to the scene as it stands (s).
+fn seconds_per_answer(asked: &Asked, own: &Own) -> f64 {
     let clock = std::time::Instant::now();
     asked.at(own.method, own.step, &[Place { friction: own.friction, speed: own.speed }]);
-    let expected = clock.elapsed().as_secs_f64() * answers as f64 / threads as f64;
-    crate::announce(console, &format!("some {answers} answers"), expected);
+    clock.elapsed().as_secs_f64()
 }
 
 /// Where a scene has no friction, the same with the parameter, so that more than none can be asked about; and whether it had none.
@@ -173,12 +184,9 @@ fn points(
     grid: &Grid,
     structures: &[Structure],
     threads: usize,
-    console: &Console,
+    forecast: &Forecast,
 ) -> Result<Vec<Point>> {
     let places = grid.places();
-    let title =
-        format!("Asking {} about {} steps at {} places", asked.scene.settings.name, grid.steps.len(), places.len());
-    let task = console.task(&title, Some(grid.steps.len() as u64));
     let of_step = |step: &f64| {
         let answers = asked.at(own.method, *step, &places);
         let rates = |index: usize, place: &Place| {
@@ -190,10 +198,7 @@ fn points(
             .map(|(index, (place, answer))| Point { place: *place, step: *step, answer, rates: rates(index, place) })
             .collect::<Vec<_>>())
     };
-    let progress = |done: usize| {
-        task.at(done as u64);
-        task.line(&format!("{done} of {} steps", grid.steps.len()));
-    };
+    let progress = |_| forecast.done(GRID, places.len() as f64);
     let found = sweep::sweep(&grid.steps, threads, of_step, progress)?;
     let found = found.concat();
     if found.is_empty() { Err(Failure::new("stability", "nothing was asked", "")) } else { Ok(found) }

@@ -10,7 +10,7 @@ use tiprub_figure::{
 use tiprub_shell::Result;
 
 use super::{Found, Point, Verdict, seek::Sought};
-use crate::{Figure, Picture, Sheet, Statement, Study, error_study};
+use crate::{Figure, Picture, Sheet, Statement, Study, error::competitor::method_name};
 
 const VERDICTS: [Verdict; 4] = [Verdict::Right, Verdict::Warned, Verdict::Flutter, Verdict::Refused];
 
@@ -97,13 +97,13 @@ fn facts(found: &Found) -> Vec<(String, String)> {
         ("friction coefficient of the scene".into(), or_none(own.friction)),
         ("speed of the scene (rad/s)".into(), or_none(own.speed)),
         ("internal step of the scene (s)".into(), shown(own.step)),
-        ("scheme and solver of the scene".into(), error_study::name(own.method)),
+        ("scheme and solver of the scene".into(), method_name(own.method)),
         ("asked: friction coefficients".into(), range(&found.grid.frictions)),
         ("asked: speeds (rad/s)".into(), range(&found.grid.speeds)),
         ("asked: internal steps (s)".into(), steps),
     ];
     for usable in &found.limits {
-        facts.push((format!("largest accepted step, {}", error_study::name(usable.method)), usable.to_text()));
+        facts.push((format!("largest accepted step, {}", method_name(usable.method)), usable.to_text()));
     }
     facts
 }
@@ -201,7 +201,7 @@ fn answers(found: &Found) -> Figure {
         caption: format!(
             "Answers of {} with {}, a panel per speed.",
             found.scene.settings.name,
-            error_study::name(found.own.method)
+            method_name(found.own.method)
         ),
         picture: Picture { svg, html },
         sheet: sheet(found),
@@ -300,7 +300,7 @@ fn limits_table(found: &Found) -> Table {
             Sought::Below(step, _) => format!("{step:.3e}"),
             Sought::None(_) => "none".into(),
         };
-        table.rows.push(vec![error_study::name(usable.method), step, usable.why().to_owned()]);
+        table.rows.push(vec![method_name(usable.method), step, usable.why().to_owned()]);
     }
     table
 }
@@ -366,12 +366,12 @@ fn results(found: &Found) -> Value {
         "scene": found.name,
         "own": {
             "friction": found.own.friction, "speed": found.own.speed, "internal_step": found.own.step,
-            "method": error_study::name(found.own.method),
+            "method": method_name(found.own.method),
         },
         "counts": VERDICTS.iter().map(|verdict| (verdict.name().to_owned(), json!(count(*verdict)))).collect::<serde_json::Map<_, _>>(),
         "points": found.points.iter().map(point).collect::<Vec<_>>(),
         "largest_steps": found.limits.iter().map(|usable| json!({
-            "method": error_study::name(usable.method), "step": usable.step(), "refusal_beyond": usable.why(),
+            "method": method_name(usable.method), "step": usable.step(), "refusal_beyond": usable.why(),
         })).collect::<Vec<_>>(),
     })
 }

@@ -19,10 +19,10 @@ use cube::Cube;
 use rotor::{Rub, rotor};
 use tiprub_figure::table::Table;
 use tiprub_gallery::rom_cache::RomCache;
-use tiprub_shell::{Failure, Result, console::Console};
+use tiprub_shell::{Failure, Result, console::Console, forecast::Forecast};
 use tiprub_study::{
     Study,
-    error::{case, competitor, measure, of_cases, run, scene, window},
+    error::{case, competitor, measure, of_cases, planned, run, scene, window},
 };
 
 use crate::cli::{ErrorArguments, ErrorScene};
@@ -47,7 +47,9 @@ pub(crate) fn study(arguments: &ErrorArguments, console: &Console) -> Result<Stu
     let summary = "Adaptive steps, fixed steps and the paper's method on built-in scenes; every scheme and solver on standard problems, beside \
                    methods that share no code with them."
         .to_owned();
-    let mut study = of_cases(cases, &smooth, (quick, summary), console)?;
+    let forecast = Forecast::new(console, "Error against run time", planned(&cases, &smooth, quick));
+    let mut study = of_cases(cases, &smooth, (quick, summary), &forecast)?;
+    forecast.finish();
     if let Some(table) = communication {
         let text = table.to_markdown().into_bytes();
         study.files.push((COMMUNICATION.into(), "time and error by the length of the communication step".into(), text));

@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<Outc
     }
     let seeds: Vec<u64> = table.wrong().map(|row| row.seed).collect();
     if seeds.is_empty() {
-        return Ok(Outcome { text: table.to_text(), json: table.to_json() });
+        return Ok(Outcome { text: table.to_text(), json: table.to_json(), ..Outcome::default() });
     }
     console.say(table.to_text());
     let named: Vec<String> = seeds.iter().take(NAMED).map(u64::to_string).collect();
@@ -75,7 +75,7 @@ fn only(arguments: &RandomArguments, faces: Option<&Faces>, seed: u64) -> Result
         let problem = row.findings.iter().map(|one| format!("{}: {}", one.oracle, one.text)).collect::<Vec<_>>();
         return Err(Failure::new(format!("scene {seed}"), problem.join("; "), row_as_text(&row)));
     }
-    Ok(Outcome { text: row_as_text(&row), json: row_as_json(&row) })
+    Ok(Outcome { text: row_as_text(&row), json: row_as_json(&row), ..Outcome::default() })
 }
 
 /// The scene as TOML with its ROMs, as an FMU has them.

@@ -63,6 +63,9 @@ pub(crate) fn trial(seed: u64) -> Trial {
 /// Without structures.
 pub(crate) fn empty() -> SceneSettings {
     SceneSettings {
+        // Small random models have sizes and speeds that nobody means.
+        accept_implausible: true,
+        silence: Vec::new(),
         name: "random".into(),
         description: String::new(),
         preset: Preset::None,

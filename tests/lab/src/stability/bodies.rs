@@ -200,6 +200,8 @@ impl Throw {
             name: "thrown".into(),
             description: String::new(),
             preset: Preset::None,
+            accept_implausible: true,
+            silence: Vec::new(),
             structures,
             surfaces: self.plates.iter().map(surface).collect(),
             contacts: self.plates.iter().map(contact).collect(),

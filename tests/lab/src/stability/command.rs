@@ -25,7 +25,7 @@ use crate::{
 pub(crate) fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome> {
     if let Some(name) = &arguments.child {
         let json = child::answer(name)?;
-        return Ok(Outcome { text: json.to_string(), json });
+        return Ok(Outcome { text: json.to_string(), json, ..Outcome::default() });
     }
     let cases = chosen(arguments)?;
     let written = Table::FILES.map(|name| Named::new("--out", arguments.out.join(name)));

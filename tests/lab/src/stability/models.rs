@@ -112,8 +112,9 @@ pub(crate) fn on_ring(scene: &mut Scene, damping_ratio: f64) {
     tiprub_test_models::on_ring(scene, ring(36, 3), damping_ratio);
 }
 
-/// Choose scheme and solver.
+/// Choose scheme and solver. Scenes of the families are extreme, and meant.
 pub(crate) fn with_methods(mut scene: Scene, scheme: Scheme, solver: Solver) -> Scene {
+    scene.settings.accept_implausible = true;
     scene.settings.time.scheme = scheme;
     scene.settings.contacts[0].solver = solver;
     scene
@@ -121,6 +122,7 @@ pub(crate) fn with_methods(mut scene: Scene, scheme: Scheme, solver: Solver) -> 
 
 /// Choose the internal step, with communication steps as long.
 pub(crate) fn with_step(mut scene: Scene, step: f64) -> Scene {
+    scene.settings.accept_implausible = true;
     scene.settings.time.step = step;
     scene.settings.experiment.communication_step = step;
     scene

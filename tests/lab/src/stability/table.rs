@@ -148,7 +148,7 @@ impl Table {
         output_file::write(&directory.join("stability.md"), self.to_markdown())?;
         let json = self.to_json();
         output_file::write(&directory.join("results.json"), format!("{json:#}\n"))?;
-        Ok(Outcome { text: format!("{}\nopen {}", self.to_text(), page.display()), json })
+        Ok(Outcome { text: format!("{}\nopen {}", self.to_text(), page.display()), json, ..Outcome::default() })
     }
 }
 

@@ -204,7 +204,7 @@ pub(crate) fn study(arguments: &crate::cli::StageArguments, console: &Console) -
     let rigid = runs.split_off(speeds.len());
     let runs = [smooth, rigid, runs];
     let study = report(&setup, &runs)?;
-    console.warn(&warnings(runs.iter().flatten()));
+    console.warn_texts(&warnings(runs.iter().flatten()));
     Ok(study)
 }
 

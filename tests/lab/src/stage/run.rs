@@ -190,6 +190,6 @@ pub(super) fn march(setup: &Setup, scene: &Scene, casing: Casing, speed: f64) ->
         }
         run.stepping += clock.elapsed();
     }
-    run.warnings = simulation.warnings().to_vec();
+    run.warnings = tiprub_core::warning::texts(simulation.warnings());
     Ok(run)
 }

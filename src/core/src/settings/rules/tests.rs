@@ -30,6 +30,8 @@ fn scene(motion: Motion, frame: Frame) -> Scene {
     let settings = SceneSettings {
         name: "scene".into(),
         preset: Preset::None,
+        accept_implausible: false,
+        silence: Vec::new(),
         structures: vec![structure("master", motion), structure("under", Motion::Still)],
         surfaces: vec![SurfaceSettings {
             name: "surface".into(),

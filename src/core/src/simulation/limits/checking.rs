@@ -13,7 +13,8 @@ use crate::simulation::plan::PairPlan;
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, ContactDirections, massless};
 use crate::system::System;
-use crate::{Result, shown};
+use crate::warning::Topic;
+use crate::{Result, Warning, shown};
 use nalgebra::DMatrix;
 
 /// Contact nodes up to this number are looked at in every combination; beyond, alone, in neighbouring pairs, and all.
@@ -152,13 +153,13 @@ impl<'a> Checking<'a> {
     }
 
     /// All warnings at the step to expect, whatever the sense of slip; `casing` and `more` come last.
-    pub(super) fn warnings(&self, step: f64, casing: Option<String>, more: Vec<String>) -> Result<Vec<String>> {
+    pub(super) fn warnings(&self, step: f64, casing: Option<Warning>, more: Vec<Warning>) -> Result<Vec<Warning>> {
         let mut warnings = self.expected(step)?;
         for carrier in self.compiled.carriers_of(self.body) {
             let frequency = self.compiled.carriers[carrier].model.largest_frequency();
             let warning = stability::check_step(frequency, self.parameters.scheme, step)?;
             let name = self.compiled.carrier_name(self.compiled.bodies.len() + carrier);
-            warnings.extend(warning.map(|warning| format!("{name}: {warning}")));
+            warnings.extend(warning.map(|warning| warning.named(name)));
         }
         warnings.extend(casing);
         warnings.extend(more);
@@ -166,9 +167,9 @@ impl<'a> Checking<'a> {
     }
 
     /// Everything about the rotor at the step to expect; returns warnings.
-    fn expected(&self, step: f64) -> Result<Vec<String>> {
+    fn expected(&self, step: f64) -> Result<Vec<Warning>> {
         let Parameters { scheme, step: largest, .. } = *self.parameters;
-        let mut warnings: Vec<String> =
+        let mut warnings: Vec<Warning> =
             stability::check_step(self.largest_frequency(), scheme, step)?.into_iter().collect();
         warnings.extend(self.not_looked_at());
         let senses: Vec<Vec<ContactDirections>> =
@@ -182,23 +183,23 @@ impl<'a> Checking<'a> {
     }
 
     /// That growth is not looked at, with more modes than its eigenproblems are solved for.
-    pub(super) fn not_looked_at(&self) -> Option<String> {
+    pub(super) fn not_looked_at(&self) -> Option<Warning> {
         let modes = self.models.iter().map(ModalModel::len).max().unwrap_or(0);
         // No step of galerkin adds growth: what there may be is of the equations, and stays whatever the step.
         let remedy = match self.parameters.scheme {
-            Scheme::Galerkin => "ask a ROM with fewer modes whether it flutters or digs in",
-            _ => "halve the internal step and compare",
+            Scheme::Galerkin => "Ask a ROM with fewer modes whether it flutters or digs in",
+            _ => "Halve the internal step and compare",
         };
         (self.friction != 0.0 && modes > stability::GROWTH_UP_TO).then(|| {
-            format!(
-                "growth of closed, sliding contact is not looked at with {modes} modes, only up to {}: {remedy}",
-                stability::GROWTH_UP_TO
-            )
+            let most = stability::GROWTH_UP_TO;
+            let problem =
+                format!("growth of closed, sliding contact is not looked at with {modes} modes, only up to {most}");
+            Warning::new(Topic::GrowthUnchecked, problem, remedy)
         })
     }
 
     /// Vibration that grows while all contact nodes of a blade cut, sliding in either sense.
-    pub(super) fn cutting(&self) -> Option<String> {
+    pub(super) fn cutting(&self) -> Option<Warning> {
         let (pair, _) = self.compiled.plan.pairs_of(self.body).next()?;
         let coating = self.system.coating(pair)?;
         let own = coating.cut_stiffness()?;
@@ -221,16 +222,17 @@ impl<'a> Checking<'a> {
         } else {
             format!("vibration at {kilohertz:.4} kHz")
         };
-        Some(format!(
-            "cutting is physically unstable: with all contact nodes of a blade in fresh coating {motion} grows by {rate:.2e} \
-             1/s. It is in the equations, and no shorter step helps. Use a larger `normal_ratio`, a smaller \
-             `specific_energy` or more damping, or see to it that blades leave the coating sooner than that"
-        ))
+        let problem = format!(
+            "cutting is physically unstable: with all contact nodes of a blade in fresh coating {motion} grows by {rate:.2e} 1/s"
+        );
+        let remedy = "No shorter step helps: use a larger `normal_ratio`, a smaller `specific_energy` or more damping, or see to it \
+                      that blades leave the coating sooner than that";
+        Some(Warning::new(Topic::CuttingGrowth, problem, remedy))
     }
 
     /// Whether the part that the structures under the surfaces have in the contact problem can spoil solvability, at the step to
     /// expect and at all others.
-    pub(super) fn casing(&self, expected: f64) -> Vec<(f64, Option<String>)> {
+    pub(super) fn casing(&self, expected: f64) -> Vec<(f64, Option<Warning>)> {
         let carried = self.carried();
         if self.friction == 0.0 || carried.is_empty() || self.parameters.solver == Solver::Coulomb {
             return Vec::new();
@@ -252,12 +254,14 @@ impl<'a> Checking<'a> {
                 }
             }
             (worst < -1e-9).then(|| {
-                format!(
+                let problem = format!(
                     "with µ = {friction} and an internal step of {step:.3e} s the casing's part of the Delassus matrix is not \
-                     positive semidefinite (lowest eigenvalue {worst:.2e} of the largest, at θ = {at:.2} rad): where the blades \
-                     add less flexibility than that, a step may have no unique solution and is then refused",
+                     positive semidefinite (lowest eigenvalue {worst:.2e} of the largest, at θ = {at:.2} rad)",
                     friction = shown(self.friction)
-                )
+                );
+                let remedy = "Where the blades add less flexibility than that, a step may have no unique solution and ends the run; \
+                              less friction avoids it";
+                Warning::new(Topic::CasingSolvability, problem, remedy)
             })
         };
         let largest = carried.iter().map(|(_, _, modes)| modes.largest_frequency()).fold(0.0, f64::max);
@@ -267,7 +271,7 @@ impl<'a> Checking<'a> {
     }
 
     /// Largest step of massless-boundary, and a warning where many blades in contact at once may lower it.
-    pub(super) fn massless(&self, step: f64) -> Result<(Vec<String>, MasslessLimit)> {
+    pub(super) fn massless(&self, step: f64) -> Result<(Vec<Warning>, MasslessLimit)> {
         if self.parameters.scheme != Scheme::MasslessBoundary {
             return Ok((Vec::new(), MasslessLimit::NONE));
         }
@@ -297,16 +301,17 @@ impl<'a> Checking<'a> {
         if step >= limit.usable {
             return Err(massless::refusal(step, limit));
         }
-        let mut warnings: Vec<String> = massless::warning(step, limit).into_iter().collect();
+        let mut warnings: Vec<Warning> = massless::warning(step, limit).into_iter().collect();
         let sectors = self.compiled.body(self.body).1.sectors;
         let sectors = f64::from(u32::try_from(sectors).unwrap_or(u32::MAX));
         let (master, slave) = worst;
         if master + sectors * slave >= 4.0 {
-            warnings.push(format!(
+            let problem = format!(
                 "massless-boundary is shown stable for up to {:.0} blades in contact with the casing at once, not for all \
                  {sectors}",
                 ((4.0 - master) / slave).floor()
-            ));
+            );
+            warnings.push(Warning::new(Topic::MasslessBlades, problem, "A shorter `time.step` allows more of them"));
         }
         Ok((warnings, limit))
     }

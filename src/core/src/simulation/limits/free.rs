@@ -18,7 +18,8 @@ use crate::simulation::compile::Compiled;
 use crate::stability::massless::MasslessLimit;
 use crate::stability::{self, ContactDirections};
 use crate::system::System;
-use crate::{Error, Result, shown};
+use crate::warning::Topic;
+use crate::{Error, Result, Warning, shown};
 
 /// The flight is looked at in this many places, this share of the extent apart.
 const PLACES: u32 = 48;
@@ -65,7 +66,7 @@ impl Compiled {
 impl Compiled {
     /// Contact nodes without mass need flexibility of their own, or what is pressed together has nowhere to go: a warning where modes that
     /// follow contact at once leave some directions of them rigid.
-    fn rigid_directions(&self, body: usize, model: &ModalModel) -> Option<String> {
+    fn rigid_directions(&self, body: usize, model: &ModalModel) -> Option<Warning> {
         let dynamic = model.dynamic_modes(Scheme::Galerkin);
         let mut shapes = model.contact_modes.columns_range(dynamic..).into_owned();
         for (mut shape, frequency) in shapes.column_iter_mut().zip(&model.frequencies[dynamic..]) {
@@ -74,14 +75,14 @@ impl Compiled {
         let flexibility = (&shapes * shapes.transpose()).symmetric_eigenvalues();
         let rigid = flexibility.iter().filter(|value| **value <= RIGID * flexibility.max()).count();
         (rigid > 0).then(|| {
-            format!(
-                "{}: with galerkin the {} highest modes follow contact at once, and leave {rigid} of {} directions of the contact nodes no \
-                 flexibility of their own: contact that needs one of them loses energy, whatever the tolerance. A ROM of the kind \
-                 free-interface, or fewer contact nodes or patches, have it",
-                self.structure_name(body),
+            let problem = format!(
+                "with galerkin the {} highest modes follow contact at once, and leave {rigid} of {} directions of the contact nodes no \
+                 flexibility of their own: contact that needs one of them loses energy, whatever the tolerance",
                 model.len() - dynamic,
                 flexibility.len()
-            )
+            );
+            let remedy = "Use a ROM of the kind free-interface, or fewer contact nodes or patches";
+            Warning::new(Topic::RigidContact, problem, remedy).named(self.structure_name(body))
         })
     }
 }
@@ -95,15 +96,15 @@ struct Flight<'a> {
 }
 
 impl Flight<'_> {
-    fn warnings(&self, step: f64) -> Result<Vec<String>> {
+    fn warnings(&self, step: f64) -> Result<Vec<Warning>> {
         let (compiled, scheme) = (self.compiled, self.parameters.scheme);
         let largest = compiled.bodies[self.body].model.largest_frequency();
-        let mut warnings: Vec<String> = stability::check_step(largest, scheme, step)?.into_iter().collect();
+        let mut warnings: Vec<Warning> = stability::check_step(largest, scheme, step)?.into_iter().collect();
         for carrier in compiled.carriers_of(self.body) {
             let name = &compiled.carrier(carrier).0.name;
             let largest = compiled.carriers[carrier].model.largest_frequency();
             let warning = stability::check_step(largest, scheme, step)?;
-            warnings.extend(warning.map(|warning| format!("{name}: {warning}")));
+            warnings.extend(warning.map(|warning| warning.named(name)));
         }
         let friction = self.parameters.friction_of(compiled, self.body);
         if friction == 0.0 || self.parameters.solver == Solver::Coulomb {
@@ -129,12 +130,15 @@ impl Flight<'_> {
             }
         }
         if worst < ROUNDING {
-            warnings.push(format!(
+            let problem = format!(
                 "with µ = {friction} the contact problem cannot be shown to have one solution for all contacts that the flight \
                  of the undeformed structure leads to (the symmetric part of the Delassus matrix has the eigenvalue \
-                 {worst:.2e} of its diagonal); a step whose problem is not solved is refused",
+                 {worst:.2e} of its diagonal)",
                 friction = shown(friction)
-            ));
+            );
+            let remedy =
+                "A step whose problem is not solved ends the run; less friction or the solver coulomb avoids that";
+            warnings.push(Warning::new(Topic::FlightSolvability, problem, remedy));
         }
         Ok(warnings)
     }

@@ -8,11 +8,11 @@ use crate::settings::Scheme;
 use crate::simulation::SAME_STEP;
 use crate::stability::judged::{self, Judged};
 use crate::stability::{self, ContactDirections, Fastest, digging};
-use crate::{Error, Result, shown};
+use crate::warning::{Level, Topic};
+use crate::{Error, Result, Warning, shown};
 
-/// Beginnings of warnings, by which those of both senses are known as one.
-const GROWS: &str = "sliding contact";
-const STEP: &str = "the step makes sliding contact";
+/// Growth by this factor before contact opens takes what does not matter, a thousandth of the clearance, to all of it.
+const MATTERS: f64 = 1e3;
 /// A motion whose frequency (rad/s) is a smaller part of its rate grows without swinging.
 const SWINGS: f64 = 0.1;
 /// Steps looked at per octave, and octaves from where every mode is resolved well: what is longer is far beyond all that modes resolve, and is
@@ -26,7 +26,9 @@ const ALIKE: f64 = 1.25;
 #[derive(Debug, Clone, Default)]
 pub struct Sense {
     /// What the equations make of it, where it grows.
-    pub grows: Option<String>,
+    grows: Vec<Warning>,
+    /// Rate of flutter (1/s), 0 without.
+    rate: f64,
     /// Step to expect (s).
     expected: f64,
     /// Largest step of each range of step sizes (s), descending, and what it adds.
@@ -43,7 +45,7 @@ struct Added {
     allowed: f64,
     quiet: f64,
     refusal: Error,
-    warning: String,
+    warning: Warning,
 }
 
 impl Sense {
@@ -62,29 +64,35 @@ impl Sense {
     ///
     /// # Errors
     /// As [`Sense::check`].
-    pub fn warnings(&self, closed: f64) -> Result<Vec<String>> {
+    pub fn warnings(&self, closed: f64) -> Result<Vec<Warning>> {
         self.check(self.expected, closed)?;
         let added = in_range(&self.ranges, self.expected).filter(|added| closed > added.quiet);
-        Ok(self.grows.iter().cloned().chain(added.map(|added| added.warning.clone())).collect())
+        Ok(self.grows(closed).chain(added.map(|added| added.warning.clone())).collect())
+    }
+
+    /// What grows by the equations; flutter is a note where contact that closes for a time (s) opens before it matters.
+    pub fn grows(&self, closed: f64) -> impl Iterator<Item = Warning> {
+        let opens_before = self.rate * closed < MATTERS.ln();
+        self.grows.iter().map(move |warning| match warning.topic() {
+            Topic::Flutter if opens_before => warning
+                .clone()
+                .with_remedy(format!("Contact opens after {closed:.2e} s at most, before that matters: nothing to do"))
+                .at_level(Level::Note),
+            _ => warning.clone(),
+        })
     }
 
     /// Put the name of the structure before all texts.
     pub fn name(&mut self, name: &str) {
-        let named = |text: &mut String| *text = format!("{name}: {text}");
+        let named = |warning: &mut Warning| *warning = warning.clone().named(name);
         self.grows.iter_mut().for_each(named);
         for added in self.ranges.iter_mut().filter_map(|(_, added)| added.as_mut()) {
             named(&mut added.warning);
             if let Error::Unstable { problem, .. } = &mut added.refusal {
-                named(problem);
+                *problem = format!("{name}: {problem}");
             }
         }
     }
-}
-
-/// Whether two warnings are of one kind, told of both senses of one structure.
-pub fn are_alike(one: &str, other: &str) -> bool {
-    let kind = |text: &str| [STEP, GROWS].into_iter().find_map(|kind| Some(text[..text.find(kind)?].to_owned() + kind));
-    kind(one).is_some_and(|own| kind(other) == Some(own))
 }
 
 /// The model that grows most at the step to expect with some nodes closed, and its growth with time continuous, which no step changes.
@@ -150,7 +158,7 @@ impl Checking<'_> {
         };
         let at = |step: f64| most(&|watched| self.judged(watched, step, sign));
         let looked: Vec<_> = steps.into_iter().map(|step| (step, at(step))).collect();
-        Sense { grows: self.grows(&physics, sign), expected, ranges: self.added(&looked, sign) }
+        Sense { ranges: self.added(&looked, sign), ..self.growth(&physics, sign, expected) }
     }
 
     /// What the equations make of contact that slides in one sense, whatever the step.
@@ -160,7 +168,7 @@ impl Checking<'_> {
         }
         let sign = [1.0, -1.0][sense];
         let (_, physics) = self.watched(expected, sign);
-        Sense { grows: self.grows(&physics, sign), expected, ranges: Vec::new() }
+        self.growth(&physics, sign, expected)
     }
 
     /// Everything at the step to expect.
@@ -273,55 +281,53 @@ impl Checking<'_> {
     }
 
     /// What grows by the equations, in words.
-    fn grows(&self, physics: &Physics, sign: f64) -> Option<String> {
-        let mut parts = Vec::new();
-        if let Some((least, nodes)) = &physics.digging {
+    fn growth(&self, physics: &Physics, sign: f64, expected: f64) -> Sense {
+        let lock_up = physics.digging.as_ref().map(|(least, nodes)| {
             let rate = match physics.divergence {
                 0.0 => String::new(),
                 rate => format!(", at {rate:.2e} 1/s and 0 Hz"),
             };
-            parts.push(format!(
-                "digs in: above µ* = {least:.3} ({}) the tip turns into the casing faster than it yields, and its force grows \
-                 without end{rate}",
-                self.contact(nodes, sign)
-            ));
-        }
-        if let Some(Flutter { found, nodes, with_mass, share }) = &physics.flutter {
-            parts.push(format!(
-                "is physically unstable (flutter): {}, vibration at {:.4} kHz grows by {:.2e} 1/s{} and moves tips by up to {:.1} % of \
-                 what contact does",
-                self.contact(nodes, sign),
-                1e-3 * found.frequency / std::f64::consts::TAU,
+            let contact = self.contact(nodes, sign);
+            let remedy = "Use less friction, a casing that gives way, or a coating";
+            Warning::new(Topic::LockUp, format!("sliding contact digs in above µ* = {least:.3}{rate}: {contact}"), remedy)
+                .with_text(format!(
+                    "sliding contact digs in: above µ* = {least:.3} ({contact}) the tip turns into the casing faster than it yields, \
+                     and its force grows without end{rate}. It is in the equations, and no shorter step helps. {remedy}"
+                ))
+        });
+        let flutter = physics.flutter.as_ref().map(|Flutter { found, nodes, with_mass, share }| {
+            let contact = self.contact(nodes, sign);
+            let kilohertz = 1e-3 * found.frequency / std::f64::consts::TAU;
+            let problem =
+                format!("contact that stays closed grows by {:.2e} 1/s at {kilohertz:.4} kHz: {contact}", found.rate);
+            let remedy = "Use less friction or more damping, or see to it that contact opens sooner than that";
+            Warning::new(Topic::Flutter, problem, format!("No shorter step helps. {remedy}")).with_text(format!(
+                "sliding contact is physically unstable (flutter): {contact}, vibration at {kilohertz:.4} kHz grows by {:.2e} 1/s{} and \
+                 moves tips by up to {:.1} % of what contact does. It is in the equations, and no shorter step helps. {remedy}",
                 found.rate,
                 confirmed(found, with_mass.as_ref()),
                 100.0 * share
-            ));
-        }
-        if parts.is_empty() {
-            return None;
-        }
-        let remedy = if physics.digging.is_some() {
-            "Use less friction, a casing that gives way, or a coating"
-        } else {
-            "Use less friction or more damping, or see to it that contact opens sooner than that"
-        };
-        Some(format!(
-            "{GROWS} {}. It is in the equations, and no shorter step helps. {remedy}",
-            parts.join("; and it ")
-        ))
+            ))
+        });
+        let rate = physics.flutter.as_ref().map_or(0.0, |flutter| flutter.found.rate);
+        Sense { grows: lock_up.into_iter().chain(flutter).collect(), rate, expected, ranges: Vec::new() }
     }
 
-    fn warning(&self, (step, nodes, judged): (f64, &[usize], Judged), silent: Option<f64>, sign: f64) -> String {
-        format!(
-            "{STEP} grow: {} at {:.2e} 1/s with steps of {} s, where the equations have {:.2e} 1/s; that may displace the tips by \
-             {:.0} % of what contact does{}",
+    fn warning(&self, (step, nodes, judged): (f64, &[usize], Judged), silent: Option<f64>, sign: f64) -> Warning {
+        let problem = format!(
+            "the step makes sliding contact grow: {} at {:.2e} 1/s with steps of {} s, where the equations have {:.2e} 1/s; that may \
+             displace the tips by {:.0} % of what contact does",
             self.contact(nodes, sign),
             judged.growth.stepped,
             shown(rounded(step)),
             judged.growth.continuous.max(0.0),
             100.0 * judged.error(f64::INFINITY),
-            silent.map_or(String::new(), |step| format!(". Set `time.step` to {} or less", shown(below(step))))
-        )
+        );
+        let remedy = match silent {
+            Some(step) => format!("Set `time.step` to {} or less", shown(below(step))),
+            None => "Use less friction or more damping".to_owned(),
+        };
+        Warning::new(Topic::StepGrowth, problem, remedy)
     }
 
     fn refusal(&self, (step, nodes, judged): (f64, &[usize], Judged), accepted: Option<f64>, sign: f64) -> Error {
@@ -383,4 +389,23 @@ fn rounded(step: f64) -> f64 {
 fn below(step: f64) -> f64 {
     let near = rounded(step);
     if near <= step { near } else { rounded(0.995 * step) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flutter_is_a_note_where_contact_opens_before_it_matters() {
+        let flutter = Warning::new(Topic::Flutter, "grows", "Use less friction").with_text("the whole text");
+        let lock_up = Warning::new(Topic::LockUp, "digs in", "Use less friction");
+        let sense = Sense { grows: vec![lock_up, flutter], rate: 1e3, ..Sense::default() };
+        // ln 1000 = 6.9 at 1000 1/s.
+        for (closed, level) in [(6e-3, Level::Note), (7e-3, Level::Warning), (f64::INFINITY, Level::Warning)] {
+            let found: Vec<Warning> = sense.grows(closed).collect();
+            assert_eq!(found[0].level(), Level::Warning, "self-locking is never a note");
+            assert_eq!((found[1].level(), &*found[1]), (level, "the whole text"), "{closed} s");
+            assert_eq!(found[1].lines()[1].contains("nothing to do"), level == Level::Note);
+        }
+    }
 }

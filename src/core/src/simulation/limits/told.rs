@@ -2,10 +2,11 @@
 //! step, turns the other way, or gets too fast for any machine.
 
 use super::{BodyLimits, Parameters, in_range, senses_of};
-use crate::plausibility;
+use crate::plausibility::{self, Slip};
 use crate::settings::Scheme;
 use crate::simulation::Simulation;
 use crate::stability::{self, massless};
+use crate::warning::{Topic, Warning};
 
 /// A step longer by this factor than the one told about is worth telling again.
 const MATERIAL: f64 = 1.5;
@@ -25,7 +26,7 @@ pub struct Told {
     /// Senses of slip, + and −, of each structure that touches.
     senses: Vec<[bool; 2]>,
     /// Speed beyond which its tips are too fast (rad/s); infinite once that was told.
-    fastest: Vec<f64>,
+    pub(in crate::simulation) fastest: Vec<f64>,
     /// Most warnings at once of one friction coefficient, of each structure that touches.
     friction: Vec<usize>,
     /// Whether a displacement was that linear kinematics describes badly, of each structure that touches.
@@ -70,22 +71,23 @@ impl Simulation {
                 self.told.steps[kind][of] = if self.doubt(kind, of, expected).is_some() { expected } else { 0.0 };
             }
         }
-        let mut doubts = self.compiled.doubts();
+        let mut doubts: Vec<Warning> = self.compiled.slips().iter().map(Slip::warning).collect();
+        doubts.extend(self.compiled.idle_patches());
         for (body, speed) in self.speeds().into_iter().enumerate() {
             let mut told = [false; 2];
             senses_of(parameters.speeds[body]).for_each(|sense| told[sense] = true);
             self.told.senses[body] = told;
             self.told.friction[body] = self.warnings_of(body, parameters.speeds[body]).len();
-            let rom = self.compiled.body(body).1;
-            let fast = plausibility::of_speed(rom, speed);
-            self.told.fastest[body] = if fast.is_some() { f64::INFINITY } else { plausibility::fastest(rom) };
-            doubts.extend(fast.map(|text| self.compiled.named(body, text)));
+            let fast = self.compiled.slip_of_speed(body, speed);
+            let fastest = plausibility::fastest(self.compiled.body(body).1);
+            self.told.fastest[body] = if fast.is_some() { f64::INFINITY } else { fastest };
+            doubts.extend(fast.iter().map(Slip::warning));
         }
         self.warnings.extend(doubts);
     }
 
     /// What limits warn of for a structure whose contact slides in the sense of this sign.
-    fn warnings_of(&self, body: usize, sense: f64) -> Vec<String> {
+    fn warnings_of(&self, body: usize, sense: f64) -> Vec<Warning> {
         self.limits.as_ref().and_then(|limits| limits.bodies[body].warnings(sense).ok()).unwrap_or_default()
     }
 
@@ -128,23 +130,23 @@ impl Simulation {
         }
         self.told.turned[body] = turn;
         let error = turn / libm::sin(turn) - 1.0;
-        let text = format!(
+        let problem = format!(
             "the excitation turns by {turn:.2} rad in one internal step: central differences make a resonance {:.0} % too large and move \
-             it by {:.1} % of its frequency. Use modal-exact, or an internal_step_max (time.step) {:.1} times smaller",
+             it by {:.1} % of its frequency",
             100.0 * error,
-            100.0 * turn * turn / 24.0,
-            turn / RESOLVED_TURN
+            100.0 * turn * turn / 24.0
         );
-        let text = self.compiled.named(body, text);
-        self.note(text);
+        let remedy =
+            format!("Use modal-exact, or an internal_step_max (time.step) {:.1} times smaller", turn / RESOLVED_TURN);
+        self.note(self.compiled.warning_of(body, Warning::new(Topic::CoarseExcitation, problem, remedy)));
     }
 
     fn tell_of_speed(&mut self, body: usize, speed: f64) {
         if speed.abs() > self.told.fastest[body]
-            && let Some(text) = plausibility::of_speed(self.compiled.body(body).1, speed)
+            && let Some(slip) = self.compiled.slip_of_speed(body, speed)
         {
             self.told.fastest[body] = f64::INFINITY;
-            self.note(self.compiled.named(body, text));
+            self.note(slip.warning());
         }
         for sense in senses_of(speed).filter(|_| speed != 0.0) {
             if !std::mem::replace(&mut self.told.senses[body][sense], true) {
@@ -157,38 +159,39 @@ impl Simulation {
     }
 
     /// A warning of one kind about a structure at a step (s).
-    fn doubt(&self, kind: usize, of: usize, step: f64) -> Option<String> {
+    fn doubt(&self, kind: usize, of: usize, step: f64) -> Option<Warning> {
         let limits = self.limits.as_ref()?;
         let scheme = limits.parameters.scheme;
         let unresolved = |frequency: f64| stability::check_step(frequency, scheme, step).ok().flatten();
         match kind {
             0 => {
                 let highest = self.compiled.bodies[of].largest_frequency() * self.compiled.stiffest(of);
-                unresolved(highest).map(|text| self.compiled.named(of, text))
+                unresolved(highest).map(|text| self.compiled.warning_of(of, text))
             }
             1 => {
                 let name = self.compiled.carrier_name(self.compiled.bodies.len() + of);
                 let highest = self.compiled.carriers[of].model.largest_frequency();
-                unresolved(highest).map(|text| format!("{name}: {text}"))
+                unresolved(highest).map(|text| text.named(name))
             }
-            2 => massless::warning(step, limits.bodies[of].massless).map(|text| self.compiled.named(of, text)),
+            2 => massless::warning(step, limits.bodies[of].massless).map(|text| self.compiled.warning_of(of, text)),
             3 => stability::unresolved::warning(step, limits.bodies[of].unresolved)
-                .map(|text| self.compiled.named(of, text)),
+                .map(|text| self.compiled.warning_of(of, text)),
             _ => in_range(&limits.bodies[of].casing, step).cloned(),
         }
     }
 
     /// A warning for who asks next, unless it was given.
-    pub(in crate::simulation) fn note(&mut self, text: String) {
-        if !self.warnings.contains(&text) {
-            self.warnings.push(text.clone());
-            self.notes.push(text);
+    pub(in crate::simulation) fn note(&mut self, warning: Warning) {
+        let silenced = self.compiled.scene.settings.is_silenced(warning.topic());
+        if !silenced && !self.warnings.contains(&warning) {
+            self.warnings.push(warning.clone());
+            self.notes.push(warning);
         }
     }
 
     /// What sliding contact would do should the rotor turn the other way, which the warnings of the start leave out. Empty
     /// before [`Simulation::initialise`], and for coupled sectors, where looking takes as long again.
-    pub fn if_reversed(&self) -> Vec<String> {
+    pub fn if_reversed(&self) -> Vec<Warning> {
         let Some(limits) = &self.limits else { return Vec::new() };
         let mut found = Vec::new();
         for (index, (body, told)) in limits.bodies.iter().zip(&self.told.senses).enumerate() {
@@ -203,14 +206,21 @@ impl Simulation {
 
 impl BodyLimits {
     /// What contact of a `rotor` that slides in a sense does at the step expected and at a speed (rad/s).
-    fn of_sense(&self, sense: usize, speed: f64, rotor: &str) -> Vec<String> {
+    fn of_sense(&self, sense: usize, speed: f64, rotor: &str) -> Vec<Warning> {
         let closed = self.closing.time(speed);
         match self.senses[sense].as_ref().map(|sense| sense.warnings(closed)) {
             Some(Ok(warnings)) => warnings,
-            Some(Err(refusal)) => vec![refusal.to_string()],
-            None => vec![format!(
-                "{rotor} turns the other way than at the start: whether contact that slides that way grows was not looked at, \
-                 because of coupled sectors it takes long; a start with a speed of that sign looks"
+            Some(Err(refusal)) => vec![
+                Warning::new(Topic::StepGrowth, refusal.to_string(), "A step with that speed would end the run")
+                    .with_text(refusal.to_string()),
+            ],
+            None => vec![Warning::new(
+                Topic::OtherSense,
+                format!(
+                    "{rotor} turns the other way than at the start: whether contact that slides that way grows was not looked \
+                     at, because with coupled sectors it takes long"
+                ),
+                "A start with a speed of that sign looks",
             )],
         }
     }

@@ -1,0 +1,199 @@
+//! The answer of a run in five lines: force, heat, torque, clearance, growth.
+
+use serde_json::{Value, json};
+use tiprub_core::shown;
+use tiprub_shell::{
+    extremes::{Extreme, extremes},
+    recording::Recording,
+};
+
+/// One line of the answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// What it is about: a word.
+    pub name: &'static str,
+    /// Its value and unit; `None` where the scene does not have it.
+    pub value: Option<(f64, &'static str)>,
+    /// What the value stands for, or why there is none.
+    pub meaning: String,
+}
+
+/// The five lines of a run.
+pub fn lines(recording: &Recording) -> [Line; 5] {
+    let found = extremes(recording);
+    let extreme = |name: &str| found.iter().find(|extreme| extreme.name == name);
+    [
+        force(extreme("largest_total_normal_force")),
+        heat(recording),
+        torque(recording),
+        clearance(recording, &found),
+        growth(recording),
+    ]
+}
+
+/// The lines as text.
+pub fn text(lines: &[Line]) -> String {
+    let line = |Line { name, value, meaning }: &Line| {
+        let value = value.map_or("-".to_owned(), |(value, unit)| format!("{} {unit}", six_digits(value)));
+        format!("{name:<10} {:<16} {meaning}\n", value.trim_end())
+    };
+    lines.iter().map(line).collect()
+}
+
+/// The lines for programs: an object of values, `null` where there is none.
+pub fn json(lines: &[Line]) -> Value {
+    let one = |line: &Line| (line.name.to_owned(), json!(line.value.map(|(value, _)| value)));
+    lines.iter().map(one).collect::<serde_json::Map<_, _>>().into()
+}
+
+/// A value with six significant digits; never a negative zero.
+fn six_digits(value: f64) -> String {
+    match format!("{value:.5e}").parse::<f64>() {
+        Ok(0.0) => "0".to_owned(),
+        Ok(rounded) => shown(rounded).to_string(),
+        Err(_) => shown(value).to_string(),
+    }
+}
+
+fn at(extreme: &Extreme) -> String {
+    format!("at t = {} s", shown(extreme.time))
+}
+
+fn force(largest: Option<&Extreme>) -> Line {
+    let (value, meaning) = match largest {
+        Some(extreme) if extreme.value == 0.0 => (Some((0.0, "N")), "nothing touched".to_owned()),
+        Some(extreme) => {
+            let meaning = "largest normal force of all contacts together, mean over a communication step";
+            (Some((extreme.value, "N")), format!("{meaning}, {}", at(extreme)))
+        }
+        None => (None, "the scene has no contact force".to_owned()),
+    };
+    Line { name: "force", value, meaning }
+}
+
+fn heat(recording: &Recording) -> Line {
+    let total = recording.column("friction_loss").and_then(|column| column.last().copied());
+    let powers = || recording.column("friction_power").map(|powers| integral(recording, &powers));
+    let (value, meaning) = match total.or_else(powers) {
+        Some(heat) => (Some((heat, "J")), "friction heat of the whole run"),
+        None => (None, "no contact of the scene has friction"),
+    };
+    Line { name: "heat", value, meaning: meaning.to_owned() }
+}
+
+/// Integral of a mean over each communication step.
+fn integral(recording: &Recording, means: &[f64]) -> f64 {
+    recording.times.windows(2).zip(&means[1..]).map(|(ends, mean)| (ends[1] - ends[0]) * mean).sum()
+}
+
+fn torque(recording: &Recording) -> Line {
+    let is_torque = |name: &&String| *name == "torque" || name.ends_with(".torque");
+    let length = recording.times.last().copied().unwrap_or(0.0) - recording.times.first().copied().unwrap_or(0.0);
+    let mean = |name: &String| {
+        let column = recording.column(name).unwrap_or_default();
+        integral(recording, &column) / length
+    };
+    let rotors: Vec<(&String, f64)> = recording.names.iter().filter(is_torque).map(|name| (name, mean(name))).collect();
+    let (value, meaning) = match rotors.as_slice() {
+        [] => (None, "nothing rotates".to_owned()),
+        [(_, torque)] => (Some((*torque, "N m")), "contact torque on the rotor about +z, mean over the run".to_owned()),
+        several => {
+            let each = several.iter().map(|(name, torque)| format!("{name} {}", six_digits(*torque)));
+            let sum = several.iter().map(|(_, torque)| torque).sum();
+            (
+                Some((sum, "N m")),
+                format!("contact torques about +z, mean over the run: {}", each.collect::<Vec<_>>().join(", ")),
+            )
+        }
+    };
+    Line { name: "torque", value, meaning }
+}
+
+fn clearance(recording: &Recording, found: &[Extreme]) -> Line {
+    let least = found.iter().find(|extreme| extreme.name == "smallest_clearance");
+    let (value, meaning) = match least {
+        // Contact that is closed has a clearance of rounding.
+        Some(extreme) if extreme.value.abs() < ROUNDING => {
+            let column = recording.column("clearance_minimum").unwrap_or_default();
+            let touch = column.iter().zip(&recording.times).find(|(clearance, _)| **clearance < ROUNDING);
+            let first = touch.map_or(extreme.time, |(_, time)| *time);
+            (Some((0.0, "m")), format!("smallest: tips touch, first at t = {} s", shown(first)))
+        }
+        Some(extreme) => (Some((extreme.value, "m")), format!("smallest, {}", at(extreme))),
+        None => (None, "some contact nodes meet nothing; --all lists clearances node by node".to_owned()),
+    };
+    Line { name: "clearance", value, meaning }
+}
+
+/// Clearances (m) below this are those of closed contact.
+const ROUNDING: f64 = 1e-12;
+
+/// Largest vibration energy of the last third of the run against that of the third before.
+fn growth(recording: &Recording) -> Line {
+    let energies = recording.column("kinetic_energy").zip(recording.column("strain_energy"));
+    let ratio = energies.and_then(|(kinetic, strain)| {
+        let energy: Vec<f64> = kinetic.iter().zip(&strain).map(|(kinetic, strain)| kinetic + strain).collect();
+        let third = energy.len() / 3;
+        let most = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
+        let (before, last) = (most(energy.get(third..2 * third)?), most(energy.get(2 * third..)?));
+        (third > 0).then_some((before, last))
+    });
+    let (value, meaning) = match ratio {
+        Some((before, last)) if before > 0.0 => {
+            let meaning = format!(
+                "largest vibration energy of the last third ({} J) over that of the third before",
+                six_digits(last)
+            );
+            (Some((last / before, "")), meaning)
+        }
+        Some(_) => (None, "nothing vibrates before the last third of the run".to_owned()),
+        None => (None, "needs `outputs.energies = true` and three communication steps".to_owned()),
+    };
+    Line { name: "growth", value, meaning }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recording(names: &[&str], rows: &[&[f64]]) -> Recording {
+        Recording {
+            names: names.iter().map(ToString::to_string).collect(),
+            times: (0..rows.len()).map(|row| 0.5 * row as f64).collect(),
+            values: rows.concat(),
+        }
+    }
+
+    #[test]
+    fn five_lines_of_six_digits_answer_a_run() {
+        let names =
+            ["normal_impulse", "friction_loss", "torque", "clearance_minimum", "kinetic_energy", "strain_energy"];
+        let rows: [&[f64]; 7] = [
+            &[0.0, 0.0, 0.0, 1e-3, 0.0, 0.0],
+            &[1.0, 1.0, -1.0, 1e-4, 1.0, 1.0],
+            &[4.0, 2.0, -2.0, -3e-16, 2.0, 1.0],
+            &[1.0, 3.0, -3.0, 1e-4, 1.0, 0.0],
+            &[1.0, 4.0, -4.0, 1e-4, 3.0, 3.0],
+            &[1.0, 5.0, -5.0, 1e-4, 1.0, 1.0],
+            &[1.0, 1234.5678, -6.0, 1e-4, 1.0, 1.0],
+        ];
+        let lines = lines(&recording(&names, &rows));
+        let text = text(&lines);
+        let values: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().take(2).collect()).collect();
+        // 4 N s in 0.5 s; the mean of −1 to −6 N m; (3 + 3)/(2 + 1) J.
+        let expected = [["force", "8"], ["heat", "1234.57"], ["torque", "-3.5"], ["clearance", "0"], ["growth", "2"]];
+        assert_eq!(values, expected, "{text}");
+        assert!(text.contains("largest") && text.contains("tips touch, first at t = 1 s"), "{text}");
+        assert_eq!(json(&lines)["growth"], json!(2.0));
+    }
+
+    #[test]
+    fn what_a_scene_does_not_have_is_a_dash_with_its_reason() {
+        let lines = lines(&recording(&["front.torque", "rear.torque"], &[&[0.0, 0.0], &[1.0, -3.0]]));
+        let text = text(&lines);
+        assert!(text.contains("heat       -                no contact"), "{text}");
+        assert!(text.contains("torque     -2 N m") && text.contains("front.torque 1, rear.torque -3"), "{text}");
+        assert_eq!(json(&lines)["heat"], Value::Null);
+        assert_eq!(six_digits(-0.0), "0");
+    }
+}

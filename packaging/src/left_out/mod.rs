@@ -1,0 +1,196 @@
+//! What a scene leaves out, what it would take, and what that would cost here.
+
+mod table;
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+use tiprub_core::{Error, Scene, Simulation};
+use tiprub_shell::{
+    native::{self, Given},
+    schedule::Schedule,
+};
+
+pub use table::{EFFECTS, Effect, Group};
+
+/// Communication steps whose time is measured.
+const MEASURED_STEPS: usize = 100;
+
+/// What an effect adds to a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cost {
+    /// Variables, as scalars.
+    pub variables: i64,
+    /// Bytes of scene and models in the FMU.
+    pub bytes: i64,
+    /// Bytes of a saved state.
+    pub state: i64,
+    /// Time of a communication step relative to the scene without it, where it was measured.
+    pub time: Option<f64>,
+}
+
+/// One effect that a scene leaves out.
+pub struct LeftOut {
+    /// Which one.
+    pub effect: &'static Effect,
+    /// What it would add, or why this scene cannot have it as it stands; `None` where keys alone do not do it.
+    pub cost: Option<Result<Cost, String>>,
+}
+
+/// Sizes of a scene.
+struct Sizes {
+    variables: i64,
+    bytes: i64,
+    state: i64,
+    seconds: Option<f64>,
+}
+
+/// Everything that a scene leaves out; `measure` also runs it with each effect for the time that takes.
+///
+/// # Errors
+/// The scene is refused.
+pub fn left_out(scene: &Scene, measure: bool) -> tiprub_core::Result<Vec<LeftOut>> {
+    let own = sizes(scene, measure)?;
+    let absent = EFFECTS.iter().filter(|effect| (effect.concerns)(scene) && !(effect.has)(scene));
+    Ok(absent
+        .map(|effect| LeftOut { effect, cost: effect.with.map(|with| cost(scene, with, &own, measure)) })
+        .collect())
+}
+
+fn cost(scene: &Scene, with: fn(&mut Scene), own: &Sizes, measure: bool) -> Result<Cost, String> {
+    let mut other = scene.clone();
+    with(&mut other);
+    let found = sizes(&other, measure).map_err(|error| match error {
+        Error::Invalid { what, problem, .. } => format!("{what}: {problem}"),
+        other => other.to_string(),
+    })?;
+    Ok(Cost {
+        variables: found.variables - own.variables,
+        bytes: found.bytes - own.bytes,
+        state: found.state - own.state,
+        time: found.seconds.zip(own.seconds).map(|(with, without)| with / without),
+    })
+}
+
+fn sizes(scene: &Scene, measure: bool) -> tiprub_core::Result<Sizes> {
+    let count = |bytes: usize| i64::try_from(bytes).unwrap_or(i64::MAX);
+    let mut simulation = Simulation::new(scene)?;
+    simulation.initialise(scene.settings.experiment.start)?;
+    let resources = tiprub_format::resource_files(scene, false);
+    Ok(Sizes {
+        variables: count(simulation.table().references()),
+        bytes: count(resources.iter().map(|(_, bytes)| bytes.len()).sum()),
+        state: count(simulation.state_size()),
+        seconds: if measure { seconds(scene) } else { None },
+    })
+}
+
+/// Time of the first communication steps (s), the shorter of two runs.
+fn seconds(scene: &Scene) -> Option<f64> {
+    let mut schedule = Schedule::new(&scene.settings.experiment, None, None).ok()?;
+    schedule.count = schedule.count.min(MEASURED_STEPS);
+    let run = || Some(native::run(scene, &schedule, Given::default(), &|_| {}).ok()?.stepping.as_secs_f64());
+    Some(run()?.min(run()?))
+}
+
+/// The list as text.
+pub fn text(all: &[LeftOut]) -> String {
+    let mut text = String::new();
+    for (group, title) in [(Group::Physics, "left out here"), (Group::Machinery, "machinery that is off")] {
+        let _ = writeln!(text, "\n{title:<53} what it would take");
+        for LeftOut { effect, cost } in all.iter().filter(|one| one.effect.group == group) {
+            let _ = writeln!(text, "  {:<51} {}{}", effect.name, effect.takes, told(cost.as_ref()));
+        }
+    }
+    text
+}
+
+fn told(cost: Option<&Result<Cost, String>>) -> String {
+    match cost {
+        None => String::new(),
+        Some(Err(why)) => format!("\n  {:<51} not as it stands: {why}", ""),
+        Some(Ok(Cost { variables, bytes, state, time })) => {
+            let time = time.map_or(String::new(), |time| format!(", {time:.2} times the time per step"));
+            format!("\n  {:<51} costs {variables:+} variables, {bytes:+} bytes, state {state:+} bytes{time}", "")
+        }
+    }
+}
+
+/// The list for programs.
+pub fn json(all: &[LeftOut]) -> Value {
+    let one = |LeftOut { effect, cost }: &LeftOut| {
+        let group = if effect.group == Group::Physics { "physics" } else { "machinery" };
+        let cost = match cost {
+            None => Value::Null,
+            Some(Err(why)) => json!({ "refused": why }),
+            Some(Ok(cost)) => json!({
+                "variables": cost.variables, "bytes": cost.bytes, "state_bytes": cost.state, "time": cost.time,
+            }),
+        };
+        json!({ "name": effect.name, "group": group, "takes": effect.takes, "cost": cost })
+    };
+    all.iter().map(one).collect()
+}
+
+/// The table of the guide.
+pub fn markdown() -> String {
+    let mut text = String::new();
+    for (group, title) in [(Group::Physics, "effect"), (Group::Machinery, "machinery")] {
+        let _ = write!(text, "\n| {title} | what it takes |\n|---|---|\n");
+        for effect in EFFECTS.iter().filter(|effect| effect.group == group) {
+            let _ = writeln!(text, "| {} | {} |", effect.name, effect.takes);
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use tiprub_test_models::{blade, round, rub};
+
+    /// The guide prints this table; `UPDATE_SNAPSHOTS=1` writes it anew.
+    #[test]
+    fn the_guide_has_this_table() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/left-out.md");
+        let page = std::fs::read_to_string(path).unwrap();
+        let [begin, end] = ["<!-- generated: left out -->\n", "<!-- end of generated part -->"];
+        let (before, rest) = page.split_once(begin).unwrap();
+        let (found, after) = rest.split_once(end).unwrap();
+        if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
+            std::fs::write(path, format!("{before}{begin}{}{end}{after}", markdown())).unwrap();
+        } else {
+            assert_eq!(found, markdown(), "run with UPDATE_SNAPSHOTS=1 to write the page anew");
+        }
+    }
+
+    /// What a key switches on is there afterwards; what the scene has is not listed.
+    #[test]
+    fn effects_that_keys_add_are_found_in_the_scene_that_has_them() {
+        let scene = rub(4);
+        for effect in EFFECTS {
+            let Some(with) = effect.with.filter(|_| (effect.concerns)(&scene)) else { continue };
+            let mut other = scene.clone();
+            with(&mut other);
+            assert!((effect.has)(&other), "{}", effect.name);
+        }
+        let names: BTreeSet<&str> = EFFECTS.iter().map(|effect| effect.name).collect();
+        assert_eq!(names.len(), EFFECTS.len(), "every name once");
+    }
+
+    #[test]
+    fn the_list_names_costs_and_refusals_of_the_scene_at_hand() {
+        let scene = round(blade(4));
+        let all = left_out(&scene, false).unwrap();
+        let of = |name: &str| all.iter().find(|one| one.effect.name == name);
+        // Two inputs for the displacement of the centre, two moments, and its work.
+        let whirl = of("whirl of the shaft").unwrap().cost.as_ref().unwrap().as_ref().unwrap();
+        assert!(whirl.variables >= 4 && whirl.bytes > 0 && whirl.state > 0, "{whirl:?}");
+        let spin = of("centrifugal stiffening").unwrap().cost.as_ref().unwrap().as_ref().unwrap_err();
+        assert!(spin.contains("spin"), "{spin}");
+        assert!(of("energy balance").is_none() && of("temperature of the casing").is_none());
+        assert!(text(&all).contains("left out here") && json(&all)[0]["name"].is_string());
+    }
+}

@@ -1,0 +1,303 @@
+//! Every physical effect and every part of the machinery, in one table: for `tiprub inspect`, and for the guide.
+
+use tiprub_core::{
+    Rom, Scene,
+    settings::{
+        ContactSettings, ExcitationSettings, InitialSettings, InputInterpolation, LoadSettings, Motion, Scheme, Solver,
+        StructureSettings, SurfaceSettings,
+    },
+};
+
+/// What a row is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Group {
+    /// A physical effect.
+    Physics,
+    /// A part of the machinery.
+    Machinery,
+}
+
+/// Something that a scene has or leaves out.
+pub struct Effect {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is about.
+    pub group: Group,
+    /// What it would take.
+    pub takes: &'static str,
+    /// Whether it means anything for a scene.
+    pub concerns: fn(&Scene) -> bool,
+    /// Whether the scene has it; no scene has what is not supported.
+    pub has: fn(&Scene) -> bool,
+    /// The scene with it, where keys alone do it.
+    pub with: Option<fn(&mut Scene)>,
+}
+
+fn rotors(scene: &Scene) -> impl Iterator<Item = (&StructureSettings, &Rom)> {
+    let all = scene.settings.structures.iter().zip(&scene.roms);
+    all.filter(|(structure, _)| structure.motion == Motion::Rotating)
+}
+
+fn rotates(scene: &Scene) -> bool {
+    rotors(scene).next().is_some()
+}
+
+fn each_rotor(scene: &mut Scene, change: impl Fn(&mut StructureSettings)) {
+    let all = scene.settings.structures.iter_mut();
+    all.filter(|structure| structure.motion == Motion::Rotating).for_each(change);
+}
+
+fn rotor(scene: &Scene, has: impl Fn(&StructureSettings) -> bool) -> bool {
+    rotors(scene).any(|(structure, _)| has(structure))
+}
+
+fn casing(scene: &Scene, has: impl Fn(&StructureSettings) -> bool) -> bool {
+    scene.settings.structures.iter().any(|structure| structure.motion == Motion::Still && has(structure))
+}
+
+fn flexible(scene: &Scene) -> bool {
+    scene.settings.surfaces.iter().any(|surface| surface.structure.is_some() && !surface.rigid)
+}
+
+fn each_casing(scene: &mut Scene, change: impl Fn(&mut StructureSettings)) {
+    let all = scene.settings.structures.iter_mut();
+    all.filter(|structure| structure.motion == Motion::Still).for_each(change);
+}
+
+fn contact(scene: &Scene, has: impl Fn(&ContactSettings) -> bool) -> bool {
+    scene.settings.contacts.iter().any(has)
+}
+
+fn surface(scene: &Scene, has: impl Fn(&SurfaceSettings) -> bool) -> bool {
+    scene.settings.surfaces.iter().any(has)
+}
+
+fn always(_: &Scene) -> bool {
+    true
+}
+
+fn never(_: &Scene) -> bool {
+    false
+}
+
+const fn physics(
+    name: &'static str,
+    takes: &'static str,
+    concerns: fn(&Scene) -> bool,
+    has: fn(&Scene) -> bool,
+) -> Effect {
+    Effect { name, group: Group::Physics, takes, concerns, has, with: None }
+}
+
+const fn machinery(name: &'static str, takes: &'static str, has: fn(&Scene) -> bool) -> Effect {
+    Effect { name, group: Group::Machinery, takes, concerns: always, has, with: None }
+}
+
+impl Effect {
+    const fn by(self, with: fn(&mut Scene)) -> Self {
+        Self { with: Some(with), ..self }
+    }
+
+    const fn of_rotors(self) -> Self {
+        Self { concerns: rotates, ..self }
+    }
+}
+
+/// All of them.
+pub static EFFECTS: &[Effect] = &[
+    physics("friction", "`contact.friction`", always, |scene| contact(scene, |one| one.friction > 0.0)),
+    physics("friction that sticks", "`contact.solver = \"coulomb\"`", always, |scene| {
+        contact(scene, |one| one.solver == Solver::Coulomb)
+    })
+    .by(|scene| scene.settings.contacts.iter_mut().for_each(|one| one.solver = Solver::Coulomb)),
+    physics(
+        "contact at both sides of the tip",
+        "a ROM with two rows of patches (`--contact-rows 2`)",
+        rotates,
+        |scene| rotors(scene).any(|(_, rom)| rom.rows() > 1),
+    ),
+    physics("a casing that bends", "`surface.structure`, a ROM of the casing", rotates, flexible),
+    physics("blades coupled by their disk", "a ROM of a sector (`tiprub reduce sector`)", rotates, |scene| {
+        scene.roms.iter().any(Rom::is_cyclic)
+    }),
+    physics("mistuning", "`structure.frequency_factors`, one per blade", rotates, |scene| {
+        rotor(scene, |one| !one.frequency_factors.is_empty())
+    })
+    .by(|scene| {
+        let sectors: Vec<usize> = scene.roms.iter().map(|rom| rom.sectors).collect();
+        let all = scene.settings.structures.iter_mut().zip(sectors);
+        for (structure, sectors) in all.filter(|(structure, _)| structure.motion == Motion::Rotating) {
+            structure.frequency_factors = (0..sectors).map(|blade| [1.0, 1.001][blade % 2]).collect();
+        }
+    }),
+    physics("centrifugal stiffening", "`structure.spin.stiffening`, a ROM with spin matrices", rotates, |scene| {
+        rotor(scene, |one| one.spin.stiffening)
+    })
+    .by(|scene| each_rotor(scene, |one| one.spin.stiffening = true)),
+    physics("centrifugal growth", "`structure.spin.growth`, a ROM with spin matrices", rotates, |scene| {
+        rotor(scene, |one| one.spin.growth)
+    })
+    .by(|scene| each_rotor(scene, |one| one.spin.growth = true)),
+    physics("Coriolis force", "`structure.spin.coriolis`, a ROM with spin matrices", rotates, |scene| {
+        rotor(scene, |one| one.spin.coriolis)
+    })
+    .by(|scene| each_rotor(scene, |one| one.spin.coriolis = true)),
+    physics("whirl of the shaft", "`structure.whirl`", rotates, |scene| rotor(scene, |one| one.whirl))
+        .by(|scene| each_rotor(scene, |one| one.whirl = true)),
+    physics("axial shift of the rotor", "`structure.axial_shift`", rotates, |scene| {
+        rotor(scene, |one| one.axial_shift)
+    })
+    .by(|scene| each_rotor(scene, |one| one.axial_shift = true)),
+    physics("temperature of the blades", "`structure.thermal` of the rotor", rotates, |scene| {
+        rotor(scene, |one| one.thermal)
+    })
+    .by(|scene| each_rotor(scene, |one| one.thermal = true)),
+    physics("blades that soften with heat", "`structure.softening`, `structure.thermal`", rotates, |scene| {
+        rotor(scene, |one| one.softening > 0.0)
+    })
+    .by(|scene| each_rotor(scene, |one| (one.thermal, one.softening) = (true, 5e-4))),
+    physics("excitation by engine orders", "`structure.excitation`", rotates, |scene| {
+        rotor(scene, |one| one.excitation.is_some())
+    })
+    .by(|scene| {
+        let excitation =
+            ExcitationSettings { order: 2, mode: Some(1), node: None, direction: None, amplitude: 0.0, phase: 0.0 };
+        each_rotor(scene, |one| one.excitation = Some(excitation.clone()));
+    }),
+    physics("blades that move at the start", "`structure.initial`", rotates, |scene| {
+        rotor(scene, |one| !one.initial.is_empty())
+    })
+    .by(|scene| {
+        let initial = InitialSettings {
+            mode: 1,
+            sector: None,
+            nodal_diameter: None,
+            phase: 0.0,
+            displacement: 0.0,
+            velocity: 0.0,
+        };
+        each_rotor(scene, |one| one.initial = vec![initial]);
+    }),
+    physics("damping of single modes", "`structure.damping_ratios`", always, |scene| {
+        scene.settings.structures.iter().any(|one| !one.damping_ratios.is_empty())
+    })
+    .by(|scene| each_rotor(scene, |one| one.damping_ratios = vec![1e-3])),
+    physics("a casing that moves", "`surface.moving`", rotates, |scene| surface(scene, |one| one.moving))
+        .by(|scene| scene.settings.surfaces.iter_mut().for_each(|one| one.moving = true)),
+    physics("temperature of the casing", "`structure.thermal` of the casing", flexible, |scene| {
+        casing(scene, |one| one.thermal)
+    })
+    .by(|scene| each_casing(scene, |one| one.thermal = true)),
+    physics("nodal-diameter load on the casing", "`structure.load` of the casing", flexible, |scene| {
+        casing(scene, |one| one.load.is_some())
+    })
+    .by(|scene| each_casing(scene, |one| one.load = Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 }))),
+    physics("a coating that wears", "`contact.coating`, one-row ROM, fixed steps", rotates, |scene| {
+        contact(scene, |one| one.coating.is_some())
+    }),
+    physics("a coating that is cut", "`contact.coating.cutting`", rotates, |scene| {
+        contact(scene, |one| one.coating.is_some_and(|coating| coating.cutting.is_some()))
+    }),
+    physics("friction heat shared with the casing", "`contact.heat_to_slave`", rotates, |scene| {
+        contact(scene, |one| one.heat_to_slave.is_some())
+    })
+    .by(|scene| scene.settings.contacts.iter_mut().for_each(|one| one.heat_to_slave = Some(0.5))),
+    physics("inertia of contact nodes", "a scheme other than `galerkin` and `massless-boundary`", always, |scene| {
+        !scene.settings.time.scheme.is_massless()
+    }),
+    physics("rebound of contact nodes", "not supported: a node that closes its gap stops", always, never),
+    physics("rounded edges of the tip", "not supported: rows of patches touch at sharp edges", rotates, never),
+    physics(
+        "gaps that curve with displacement",
+        "not supported: refused where u²/2r reaches the clearance",
+        rotates,
+        never,
+    ),
+    physics("Euler force of a changing speed", "not supported", rotates, never),
+    physics("vibration that is large within a structure", "not supported: structures are linear", always, never),
+    physics("temperature fields within a blade", "not supported: one temperature per rotor", rotates, never),
+    physics("heat conduction", "an FMU of its own: `tiprub thermal`", rotates, never),
+    physics("dynamics of the shaft", "a partner of the FMU: examples/shaft", rotates, never),
+    physics("flow: aerodynamic force, damping", "a partner of the FMU, by `structure.excitation`", rotates, never),
+    physics("friction in blade roots and shrouds", "not supported: damping ratios stand for it", rotates, never),
+    physics("chips, and loss of material of the tip", "not supported: a coating alone wears", rotates, never),
+    machinery("adaptive steps", "`time.scheme = \"galerkin\"`", |scene| scene.settings.time.scheme == Scheme::Galerkin)
+        .by(|scene| scene.settings.time.scheme = Scheme::Galerkin),
+    machinery("a bound on internal steps", "`time.steps_at_most`, or adaptive steps", |scene| {
+        scene.settings.bounds_steps()
+    })
+    .by(|scene| scene.settings.time.steps_at_most = Some(0)),
+    machinery("inputs that jump", "`time.input_interpolation = \"hold\"`", |scene| {
+        scene.settings.time.input_interpolation == InputInterpolation::Hold
+    })
+    .by(|scene| scene.settings.time.input_interpolation = InputInterpolation::Hold),
+    machinery("a surface through data points", "`surface.spline`, or a casing that bends", |scene| {
+        surface(scene, |one| one.spline.is_some()) || flexible(scene)
+    })
+    .of_rotors()
+    .by(|scene| scene.settings.surfaces.iter_mut().for_each(|one| one.spline = Some(Default::default()))),
+    machinery("several rotors or contact pairs", "more `[[structure]]` and `[[contact]]`", |scene| {
+        scene.settings.contacts.len() > 1
+    }),
+    machinery("energy balance", "`outputs.energies`", |scene| scene.settings.outputs.energies)
+        .by(|scene| scene.settings.outputs.energies = true),
+    machinery("clearance and force of every blade", "`outputs.all_sectors`", |scene| {
+        scene.settings.outputs.all_sectors
+    })
+    .of_rotors()
+    .by(|scene| scene.settings.outputs.all_sectors = true),
+    machinery("amplitudes by nodal diameter", "`outputs.nodal_diameters`", |scene| {
+        scene.settings.outputs.nodal_diameters.is_some()
+    })
+    .of_rotors()
+    .by(|scene| scene.settings.outputs.nodal_diameters = Some(2)),
+    machinery("forces of an instant", "`outputs.instantaneous_forces`", |scene| {
+        scene.settings.outputs.instantaneous_forces
+    })
+    .by(|scene| scene.settings.outputs.instantaneous_forces = true),
+    machinery("stress", "`outputs.stress`, a ROM that recovers it", |scene| scene.settings.outputs.stress)
+        .of_rotors()
+        .by(|scene| scene.settings.outputs.stress = true),
+    machinery("modal amplitudes", "`outputs.modal_amplitudes`", |scene| {
+        scene.settings.outputs.modal_amplitudes.is_some()
+    })
+    .by(|scene| scene.settings.outputs.modal_amplitudes = Some(3)),
+    machinery("displacements of the tip", "`outputs.tip_displacements`", |scene| {
+        scene.settings.outputs.tip_displacements
+    })
+    .by(|scene| scene.settings.outputs.tip_displacements = true),
+    machinery("force and moment on the casing", "`outputs.casing_forces`", |scene| {
+        scene.settings.outputs.casing_forces
+    })
+    .of_rotors()
+    .by(|scene| scene.settings.outputs.casing_forces = true),
+    machinery("reaction of the casing's support", "`outputs.support_reaction`, a casing that bends", |scene| {
+        scene.settings.outputs.support_reaction
+    })
+    .of_rotors()
+    .by(|scene| scene.settings.outputs.support_reaction = true),
+    machinery("displacement of the casing", "`outputs.slave_displacement`, a casing that bends", |scene| {
+        scene.settings.outputs.slave_displacement
+    })
+    .of_rotors()
+    .by(|scene| scene.settings.outputs.slave_displacement = true),
+    machinery("stress of coupled sectors and of casings", "not supported", never).of_rotors(),
+    machinery("one structure that touches and carries a surface", "not supported: two structures", never),
+    machinery(
+        "shells, beams, constraints, anisotropic materials",
+        "not supported: solids, or matrices of your own",
+        never,
+    ),
+    machinery("derivatives by inputs of the same instant", "not supported: outputs depend on the step's start", never),
+    machinery("wear map", "`outputs.wear`, a coating", |scene| scene.settings.outputs.wear)
+        .of_rotors()
+        .by(|scene| scene.settings.outputs.wear = true),
+    machinery("friction power by patch", "`surface.patches`", |scene| {
+        surface(scene, |one| one.patches.is_some()) || casing(scene, |one| one.thermal)
+    })
+    .of_rotors()
+    .by(|scene| {
+        let patches = tiprub_core::settings::PatchSettings { around: 8, along: 1 };
+        scene.settings.surfaces.iter_mut().for_each(|one| one.patches = Some(patches));
+    }),
+];

@@ -1,0 +1,269 @@
+//! Warnings: each with an identifier by which it is looked up in the guide and silenced.
+
+use std::borrow::Borrow;
+use std::ops::Deref;
+
+use crate::{Error, Result};
+
+/// How much a warning matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// Results are as good as without it; it explains the physics of the scene.
+    Note,
+    /// Results may be worse than they look.
+    Warning,
+}
+
+impl Level {
+    /// The word that stands before its text.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Note => "note",
+            Self::Warning => "warning",
+        }
+    }
+}
+
+macro_rules! topics {
+    ($($variant:ident $id:literal $meaning:literal $remedy:literal;)*) => {
+        /// What a warning is about. Every topic has an identifier, and a row in the guide (`docs/warnings.md`).
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Topic {
+            $(#[doc = $meaning] $variant,)*
+        }
+
+        impl Topic {
+            /// Every topic, in the order of the guide.
+            pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
+
+            /// The identifier: `[flutter]` in messages, `--silence flutter` on the command line.
+            pub fn id(self) -> &'static str {
+                match self { $(Self::$variant => $id,)* }
+            }
+
+            /// What it means, a sentence for the guide.
+            pub fn meaning(self) -> &'static str {
+                match self { $(Self::$variant => $meaning,)* }
+            }
+
+            /// What to do about it, a sentence for the guide.
+            pub fn remedy(self) -> &'static str {
+                match self { $(Self::$variant => $remedy,)* }
+            }
+        }
+    };
+}
+
+topics! {
+    Flutter "flutter"
+        "Sliding contact that stays closed feeds vibration, which grows. A note where contact opens before that matters."
+        "Less friction or more damping, or nothing where it is a note.";
+    LockUp "lock-up"
+        "Friction bends the tip into the casing and no force holds it (self-locking). Clearances and energies mean nothing once it happens."
+        "Less friction than µ*, a casing that gives way, or a coating.";
+    CuttingGrowth "cutting-growth"
+        "While all contact nodes of a blade cut fresh coating, vibration grows by the equations."
+        "A larger `normal_ratio`, a smaller `specific_energy` or more damping.";
+    StepGrowth "step-growth"
+        "The fixed step itself adds growth to sliding contact, by more than 1 % of what contact displaces."
+        "Adaptive steps (`scheme = \"galerkin\"`), or a smaller `time.step`.";
+    GrowthUnchecked "growth-unchecked"
+        "The model has too many modes to check whether sliding contact grows."
+        "Check a ROM with fewer modes, or halve the step and compare.";
+    OtherSense "other-sense"
+        "The rotor turns the other way than at the start, and growth of contact that slides that way was not checked."
+        "Start once with a speed of that sign.";
+    UnresolvedModes "unresolved-modes"
+        "The fixed step is too long for the highest modes. Their free motion stays exact, contact forces on them do not."
+        "A smaller `time.step`, or adaptive steps.";
+    UnresolvedFlexibility "unresolved-flexibility"
+        "The fixed step passes over much of the flexibility that contact sees: errors of some per cent."
+        "A smaller `time.step`, or adaptive steps.";
+    MasslessEnergy "massless-energy"
+        "`massless-boundary` with this step may add energy where contact opens and closes."
+        "A smaller `time.step`, damping from 1e-3 on, or adaptive steps.";
+    MasslessBlades "massless-blades"
+        "`massless-boundary` is shown stable for some blades in contact at a time, not for all."
+        "A smaller `time.step`, or adaptive steps.";
+    CasingSolvability "casing-solvability"
+        "With this friction the casing's part of the contact problem is not positive semidefinite: a step may have no unique solution."
+        "Less friction; such a step ends the run with a message.";
+    FlightSolvability "flight-solvability"
+        "On the flight of a free body the contact problem cannot be shown to have one solution."
+        "Less friction or the solver `coulomb`; a step without a solution ends the run.";
+    CoarseExcitation "coarse-excitation"
+        "The excitation turns far in one fixed step, and central differences make its resonance too large."
+        "The scheme `modal-exact`, or a smaller `time.step`.";
+    Sticking "sticking"
+        "Tips slide more slowly than they vibrate, and the sliding law does not model sticking."
+        "The solver `coulomb`, or a higher speed.";
+    RigidContact "rigid-contact"
+        "Modes that follow contact immediately leave some directions of the contact nodes rigid: contact that needs them loses energy."
+        "A ROM of the kind free-interface, or fewer contact nodes or patches.";
+    ToleranceLimit "tolerance-limit"
+        "The tolerance is below what the shortest adaptive steps can keep."
+        "A smaller `time.step` or communication step, or a larger tolerance.";
+    ToleranceMissed "tolerance-missed"
+        "Some of the shortest adaptive steps were accepted although they missed the tolerance."
+        "A smaller `time.step`, or a larger tolerance.";
+    FilmPulls "film-pulls"
+        "The solver `film` pulls at a contact node instead of pushing: forces of single nodes are wrong by about as much."
+        "The solver `lcp`.";
+    FilmInside "film-inside"
+        "The solver `film` leaves a contact node inside the casing by a large fraction of its clearance."
+        "The solver `lcp`.";
+    CurvatureWork "curvature-work"
+        "Normals that turn within internal steps have added as much energy as inputs or the shaft did: their net work may be wrong in its sign."
+        "A smaller `time.step`, or adaptive steps.";
+    ThermalStep "thermal-step"
+        "The communication step of a heat conduction unit is shorter than the diffusion time of an element: surface temperatures rise too slowly."
+        "A longer communication step with the mean of the heat, or thinner elements.";
+    LargeDisplacement "large-displacement"
+        "A contact node moves so far around the axis that linear gaps miss 5 % of the clearance."
+        "Check loads and clearance; at 100 % the run ends.";
+    Implausible "implausible"
+        "A number that is rarely meant was accepted because the scene says so (`accept_implausible = true`)."
+        "Check it; without the key it is an error.";
+    NoFrictionPower "no-friction-power"
+        "Friction power per patch was requested, but no contact has friction."
+        "Set `contact.friction`, or leave the patches out.";
+    CommunicationStep "communication-step"
+        "The communication step is longer than the run."
+        "A shorter communication step.";
+    InputLines "input-lines"
+        "Lines of the file of inputs are closer than the communication step: only values at communication points count."
+        "A shorter communication step.";
+    RomAccuracy "rom-accuracy"
+        "Modes of a ROM deviate from the full model by more than good models do."
+        "Keep more modes.";
+}
+
+impl Topic {
+    /// The topic with an identifier.
+    ///
+    /// # Errors
+    /// An unknown identifier, with all that exist; `what` is where it stands.
+    pub fn find(what: &str, id: &str) -> Result<Self> {
+        let found = Self::ALL.iter().copied().find(|topic| topic.id() == id);
+        found.ok_or_else(|| {
+            let all: Vec<&str> = Self::ALL.iter().map(|topic| topic.id()).collect();
+            Error::invalid(what, format!("no warning has the identifier {id:?}"), format!("Use {}", all.join(", ")))
+        })
+    }
+}
+
+/// A warning: two lines for people, and the whole text, which it dereferences to.
+#[derive(Debug, Clone)]
+pub struct Warning {
+    topic: Topic,
+    level: Level,
+    lines: [String; 2],
+    text: String,
+}
+
+impl Warning {
+    /// A warning of two lines: the problem, and what to do about it. Neither ends with a full stop.
+    pub fn new(topic: Topic, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        let lines = [problem.into(), remedy.into()];
+        let text = format!("{}. {}", lines[0], lines[1]);
+        Self { topic, level: Level::Warning, lines, text }
+    }
+
+    /// With a longer text than its two lines, for logs and for people who want all of it.
+    pub fn with_text(self, text: impl Into<String>) -> Self {
+        Self { text: text.into(), ..self }
+    }
+
+    /// With something else to do about it; the whole text stays.
+    pub fn with_remedy(self, remedy: impl Into<String>) -> Self {
+        let [problem, _] = self.lines;
+        Self { lines: [problem, remedy.into()], ..self }
+    }
+
+    /// At another level.
+    pub fn at_level(self, level: Level) -> Self {
+        Self { level, ..self }
+    }
+
+    /// With the name of a structure before its texts.
+    pub fn named(self, name: &str) -> Self {
+        let [problem, remedy] = self.lines;
+        Self { lines: [format!("{name}: {problem}"), remedy], text: format!("{name}: {}", self.text), ..self }
+    }
+
+    /// What it is about.
+    pub fn topic(&self) -> Topic {
+        self.topic
+    }
+
+    /// How much it matters.
+    pub fn level(&self) -> Level {
+        self.level
+    }
+
+    /// The problem, and what to do about it.
+    pub fn lines(&self) -> &[String; 2] {
+        &self.lines
+    }
+
+    /// Both lines with the identifier, for logs: `[flutter] ...`.
+    pub fn logged(&self) -> String {
+        let [problem, remedy] = &self.lines;
+        format!("[{}] {problem}. {remedy}", self.topic.id())
+    }
+}
+
+/// Whole texts of warnings.
+pub fn texts(warnings: &[Warning]) -> Vec<String> {
+    warnings.iter().map(|warning| warning.text.clone()).collect()
+}
+
+impl Deref for Warning {
+    type Target = str;
+
+    fn deref(&self) -> &str {
+        &self.text
+    }
+}
+
+impl Borrow<str> for Warning {
+    fn borrow(&self) -> &str {
+        &self.text
+    }
+}
+
+impl PartialEq for Warning {
+    fn eq(&self, other: &Self) -> bool {
+        self.text == other.text
+    }
+}
+
+impl std::fmt::Display for Warning {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(&self.text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn identifiers_are_unique_words_that_are_found_again() {
+        for (index, topic) in Topic::ALL.iter().enumerate() {
+            let id = topic.id();
+            assert!(id.chars().all(|letter| letter.is_ascii_lowercase() || letter == '-'), "{id}");
+            assert_eq!(Topic::ALL.iter().position(|other| other.id() == id), Some(index), "{id}");
+            assert_eq!(Topic::find("silence", id).unwrap(), *topic);
+        }
+        let error = Topic::find("`silence`", "fluter").unwrap_err().to_string();
+        assert!(error.contains("\"fluter\"") && error.contains("flutter, lock-up"), "{error}");
+    }
+
+    #[test]
+    fn the_name_of_a_structure_stands_before_the_problem() {
+        let warning = Warning::new(Topic::Sticking, "too slow", "turn faster").named("front");
+        assert_eq!(warning.lines(), &["front: too slow".to_owned(), "turn faster".to_owned()]);
+        assert_eq!(warning.logged(), "[sticking] front: too slow. turn faster");
+    }
+}

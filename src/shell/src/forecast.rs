@@ -1,0 +1,202 @@
+//! Progress of long work, and how long the rest takes: from what the work at hand has cost so far.
+//!
+//! Work is planned in units (internal steps, answers, runs) of several kinds, which differ in seconds per unit. The first estimate takes
+//! the rate it is given. Each piece of work that is done measures the rate of its kind, and corrects those of the others in the same
+//! proportion. The share shown never falls, and is 1 at the end only.
+
+use std::{
+    cell::RefCell,
+    time::{Duration, Instant},
+};
+
+use crate::console::{Console, Task};
+
+/// Parts that a progress bar has.
+const PARTS: u64 = 1000;
+/// Into a log a line goes for so much more of the work, or after so long.
+const LINE_SHARE: f64 = 0.1;
+const LINE_AFTER: Duration = Duration::from_secs(30);
+/// Largest share shown while anything is left.
+const MOST_SHOWN: f64 = 0.999;
+/// Shorter work is not announced (s).
+const LONG: f64 = 20.0;
+
+/// Work of one kind.
+#[derive(Debug, Clone, Copy, Default)]
+struct Kind {
+    planned: f64,
+    done: f64,
+    seconds: f64,
+}
+
+/// What is planned and done.
+#[derive(Debug, Clone)]
+pub struct Ledger {
+    kinds: Vec<Kind>,
+    /// Seconds per unit before anything is measured.
+    rate: f64,
+    /// Largest share given so far.
+    shown: f64,
+}
+
+impl Ledger {
+    /// Nothing planned; `rate` is in seconds per unit.
+    pub fn new(rate: f64) -> Self {
+        Self { kinds: Vec::new(), rate, shown: 0.0 }
+    }
+
+    /// Plan more work of a kind.
+    pub fn plan(&mut self, kind: usize, units: f64) {
+        self.kind(kind).planned += units;
+    }
+
+    /// Work of a kind that took a time (s).
+    pub fn done(&mut self, kind: usize, units: f64, seconds: f64) {
+        let own = self.kind(kind);
+        own.done += units;
+        own.seconds += seconds;
+        own.planned = own.planned.max(own.done);
+    }
+
+    fn kind(&mut self, kind: usize) -> &mut Kind {
+        if self.kinds.len() <= kind {
+            self.kinds.resize(kind + 1, Kind::default());
+        }
+        &mut self.kinds[kind]
+    }
+
+    /// Time that the rest takes (s).
+    pub fn left(&self) -> f64 {
+        let measured = self.kinds.iter().filter(|kind| kind.done > 0.0);
+        let (units, seconds) = measured.fold((0.0, 0.0), |(units, all), kind| (units + kind.done, all + kind.seconds));
+        let usual = if units > 0.0 { seconds / units } else { self.rate };
+        let left = |kind: &Kind| {
+            let rate = if kind.done > 0.0 { kind.seconds / kind.done } else { usual };
+            (kind.planned - kind.done) * rate
+        };
+        self.kinds.iter().map(left).sum()
+    }
+
+    /// Share of the work that is done: by time, never less than before, below 1 while anything is left.
+    pub fn share(&mut self) -> f64 {
+        let spent: f64 = self.kinds.iter().map(|kind| kind.seconds).sum();
+        let is_done = self.kinds.iter().all(|kind| kind.done >= kind.planned);
+        let now = if is_done { 1.0 } else { spent / (spent + self.left()).max(f64::MIN_POSITIVE) };
+        self.shown = self.shown.max(if is_done { now } else { now.min(MOST_SHOWN) });
+        self.shown
+    }
+}
+
+/// A ledger that is shown while it is kept.
+#[derive(Debug)]
+pub struct Forecast {
+    task: Task,
+    title: String,
+    state: RefCell<State>,
+}
+
+#[derive(Debug)]
+struct State {
+    ledger: Ledger,
+    /// When the last work was done.
+    last: Instant,
+    /// Share and time of the last line.
+    line: (f64, Instant),
+}
+
+impl Forecast {
+    /// Show planned work, and say how long it takes where that is long.
+    pub fn new(console: &Console, title: &str, ledger: Ledger) -> Self {
+        let seconds = ledger.left();
+        if seconds >= LONG {
+            console.say(format_args!("{title}: about {}, a first estimate", duration(seconds)));
+        }
+        let (last, line) = (Instant::now(), (0.0, Instant::now()));
+        let task = console.task(title, Some(PARTS));
+        Self { task, title: title.to_owned(), state: RefCell::new(State { ledger, last, line }) }
+    }
+
+    /// Plan more work of a kind.
+    pub fn plan(&self, kind: usize, units: f64) {
+        self.state.borrow_mut().ledger.plan(kind, units);
+    }
+
+    /// Work of a kind that is done, since the last of any kind. Work that is done in parallel counts by what all threads do together.
+    pub fn done(&self, kind: usize, units: f64) {
+        let mut state = self.state.borrow_mut();
+        let now = Instant::now();
+        let seconds = (now - state.last).as_secs_f64();
+        state.last = now;
+        state.ledger.done(kind, units, seconds);
+        let (share, left) = (state.ledger.share(), state.ledger.left());
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ share ≤ 1")]
+        self.task.at((share * PARTS as f64) as u64);
+        let text = format!("{:.0} %, about {} left", (100.0 * share).floor(), duration(left));
+        self.task.now(&format!("{}: {text}", self.title));
+        if share - state.line.0 >= LINE_SHARE || now - state.line.1 >= LINE_AFTER {
+            state.line = (share, now);
+            self.task.line(&text);
+        }
+    }
+
+    /// All is done, whatever was planned.
+    pub fn finish(self) {
+        self.task.at(PARTS);
+        self.task.line("100 %");
+    }
+}
+
+/// "40 s", "3 min", "2.5 h": no more digits than a forecast has.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        _ if seconds < 90.0 => format!("{:.0} s", 10.0 * (seconds / 10.0).ceil()),
+        _ if seconds < 5400.0 => format!("{:.0} min", (seconds / 60.0).ceil()),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Costs that are wrong by factors, and of kinds that differ by a factor of a hundred.
+    #[test]
+    fn the_share_never_falls_and_ends_at_one_whatever_the_first_estimate() {
+        let truth = |kind: usize, index: usize| [0.01, 1.0, 0.1][kind] * (1.0 + 0.5 * (index % 3) as f64);
+        for rate in [1e-4, 1.0, 1e4] {
+            let mut ledger = Ledger::new(rate);
+            let work: Vec<(usize, f64)> =
+                (0..60).map(|index| ([0, 2, 1][index / 20], 1.0 + (index % 4) as f64)).collect();
+            work.iter().for_each(|(kind, units)| ledger.plan(*kind, *units));
+            let mut last = ledger.share();
+            for (index, (kind, units)) in work.iter().enumerate() {
+                ledger.done(*kind, *units, units * truth(*kind, index));
+                let share = ledger.share();
+                assert!(share >= last && (share < 1.0 || index == 59), "{index}: {share} after {last}");
+                last = share;
+            }
+            assert!((last - 1.0).abs() < 1e-12 && ledger.left() == 0.0, "{last}");
+        }
+    }
+
+    #[test]
+    fn the_rest_follows_what_was_measured() {
+        let mut ledger = Ledger::new(1.0);
+        ledger.plan(0, 10.0);
+        ledger.plan(1, 10.0);
+        assert!((ledger.left() - 20.0).abs() < 1e-12);
+        // Five times slower than thought, of both kinds until the second is measured.
+        ledger.done(0, 2.0, 10.0);
+        assert!((ledger.left() - 5.0 * 18.0).abs() < 1e-12);
+        ledger.done(1, 1.0, 0.5);
+        assert!((ledger.left() - (8.0 * 5.0 + 9.0 * 0.5)).abs() < 1e-12);
+        // Work that is found on the way.
+        ledger.plan(1, 1.0);
+        assert!((ledger.left() - (8.0 * 5.0 + 10.0 * 0.5)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn forecasts_have_few_digits() {
+        assert_eq!([3.0, 61.0, 200.0, 9000.0].map(duration), ["10 s", "70 s", "4 min", "2.5 h"]);
+    }
+}
