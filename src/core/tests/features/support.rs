@@ -165,11 +165,15 @@ fn at_rest_the_support_takes_the_contact_moment() {
         support.stiffness[(5, mode)] = -4.0 * square * 0.5 * radius;
         support.mass = DMatrix::zeros(SUPPORT_ROWS, mode + 1);
         let mut run = started(&scene);
+        set(&mut run, "gap_offset", -3.7e-4);
+        (0..100).for_each(|_| go(&mut run, 2e-4));
+        // The ring turns to and fro a little; over some time it gains no momentum.
+        let (mut contact, mut support) = (0.0, 0.0);
         for _ in 0..200 {
-            set(&mut run, "gap_offset", -3.7e-4);
             go(&mut run, 2e-4);
+            contact += real(&run, "casing_moment_z") / 200.0;
+            support += real(&run, "support_moment_z") / 200.0;
         }
-        let [contact, support] = ["casing_moment_z", "support_moment_z"].map(|name| real(&run, name));
         println!("mesh {larger} larger: {contact} N m on the casing, {support} N m of the support");
         assert!(contact.abs() > 10.0 && (contact + support).abs() < 1e-3 * contact.abs(), "{contact} {support}");
     }
