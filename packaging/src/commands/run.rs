@@ -105,12 +105,14 @@ fn where_the_rest_is(json: &Value, warned: bool) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
     let mut text = format!(
         "\n{}: t = {} s to {} s, computed in {:.3} s ({:.3} s of computing per simulated second)\n\
+         scheme: {}\n\
          all outputs at the end, extremes, times and whole warnings: --all; outputs over time: {}",
         json["model"].as_str().unwrap_or_default(),
         json["start"],
         json["stop"],
         number("stepping_seconds"),
         number("real_time_factor"),
+        json["scheme"].as_str().unwrap_or_default(),
         json["csv"].as_str().unwrap_or("--csv FILE"),
     );
     if warned {
