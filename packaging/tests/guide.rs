@@ -16,7 +16,7 @@ fn run(command: &str) -> Vec<String> {
 }
 
 fn run_in(directory: &Path, command: &str) -> Vec<String> {
-    let mut words = command.split(' ').skip(1);
+    let mut words = command.split_whitespace().skip(1);
     let mut tiprub = Command::new(env!("CARGO_BIN_EXE_tiprub"));
     tiprub.current_dir(directory).env("TIPRUB_CACHE", env!("CARGO_TARGET_TMPDIR")).args(&mut words).arg("--quiet");
     let output = tiprub.output().unwrap();

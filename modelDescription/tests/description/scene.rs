@@ -57,6 +57,8 @@ pub fn rigid() -> Scene {
     let two = |rows: usize| DMatrix::from_fn(rows * points.len(), rom.order(), |i, j| rom.contact_map[(i % 6, j)]);
     let (moved, stress) = (two(3), two(6));
     rom.extras.watched = Some(Watched { map: moved, points: points.clone() });
+    let static_stress = DMatrix::zeros(6 * points.len(), 1);
+    (rom.extras.stress_thermal, rom.extras.stress_centrifugal) = (Some(static_stress.clone()), Some(static_stress));
     rom.extras.stress = Some(Watched { map: stress, points });
     let mut scene = models::bumps(rom);
     let settings = &mut scene.settings;

@@ -241,6 +241,7 @@ fn a_coating_that_is_cut_is_written_without_what_yields() {
     let mut scene = features::scene_with_every_feature();
     let coating = scene.contacts[0].coating.as_mut().unwrap();
     (coating.modulus, coating.yield_stress, coating.hardening) = (0.0, 0.0, 0.0);
+    coating.contact_width = None;
     coating.cutting = Some(CuttingSettings { specific_energy: 3e8, normal_ratio: 0.7 });
     let text = write_scene(&scene);
     assert!(["modulus", "yield_stress", "hardening"].iter().all(|key| !text.contains(key)), "{text}");
