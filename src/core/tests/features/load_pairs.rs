@@ -46,7 +46,7 @@ const FEATURES: [Feature; 14] = [
     ("wear, pressed in", models::coating),
     ("wear, cut", |scene| {
         let mut coating = models::coating_of(1e-3, [500, 7]);
-        (coating.modulus, coating.yield_stress, coating.hardening) = (0.0, 0.0, 0.0);
+        (coating.modulus, coating.yield_stress, coating.hardening, coating.contact_width) = (0.0, 0.0, 0.0, None);
         coating.cutting = Some(CuttingSettings { specific_energy: 1e8, normal_ratio: 1.0 });
         scene.settings.contacts[0].coating = Some(coating);
     }),
