@@ -265,6 +265,10 @@ fn slow_rotors_and_smallest_tolerances_find_their_contacts() {
             scene.settings.surfaces[0].spline = Some(SplineSettings::default());
         }
         scene.settings.structures[0].speed = speed;
+        // Tips that vibrate faster than they slide end a run with sliding friction.
+        if speed < 100.0 {
+            scene.settings.contacts[0].friction = 0.0;
+        }
         scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.9, width: 0.15, phase: 0.0 };
         scene.settings.surfaces[0].ramp_time = 2e-4;
         let mut simulation = started(&scene);

@@ -130,7 +130,7 @@ fn a_restored_state_brings_the_limits_of_its_own_parameters() {
 #[test]
 fn a_refused_friction_leaves_the_limits_of_the_one_in_use() {
     // Growth by friction forbids the longer step, at which central differences are stable otherwise.
-    let (short, long) = (1e-6, 5e-5 / 7.0);
+    let (short, long) = (1e-6, 7.7e-6);
     let mut scene = models::rub(3);
     scene.settings.time = TimeSettings { scheme: Scheme::CentralDifference, step: 1.0, ..TimeSettings::default() };
     scene.settings.experiment.communication_step = short;
