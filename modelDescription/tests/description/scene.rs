@@ -124,7 +124,7 @@ pub const OPTIONS: [Switch; 32] = [
     }),
     ("`cutting` of the coating", |scene| {
         let coating = scene.settings.contacts[0].coating.as_mut();
-        coating.into_iter().for_each(|own| (own.cutting, own.modulus) = (None, 1e9));
+        coating.into_iter().for_each(|own| (own.cutting, own.modulus, own.contact_width) = (None, 1e9, Some(2e-3)));
     }),
     ("`watched_sectors`", |scene| {
         scene.settings.outputs.watched_sectors.clear();
