@@ -189,7 +189,7 @@ fn totals(total: &Value, cheapest: &str) {
     assert!(hidden || best.is_infinite() || own["setting"]["seconds"] == best, "{own:#}");
     let lines: Vec<&str> = cheapest.lines().collect();
     assert!(
-        lines.len() == 7 && lines[1].starts_with("steps,0.01,") && lines[4].starts_with("total,1e-1,"),
+        lines.len() == 8 && lines[1].starts_with("steps,0.1,") && lines[5].starts_with("total,1e-1,"),
         "{cheapest}"
     );
 }
