@@ -291,6 +291,11 @@ fn the_study_of_stability_answers_as_runs_do() {
     let limits = json["results"]["largest_steps"].as_array().unwrap();
     assert_eq!(limits.len(), 9);
     for limit in limits.iter().filter(|limit| !limit["method"].as_str().unwrap().ends_with("coulomb")) {
+        if limit["method"] == "massless-boundary + film" {
+            let rule = limit["refusal_beyond"].as_str().unwrap();
+            assert!(limit["step"].is_null() && rule.contains("excludes"), "{limit:#}");
+            continue;
+        }
         for (factor, accepted) in [(0.999, true), (1.02, false)] {
             let step = factor * number(limit, "step");
             let told = three_steps(root.path(), [0.15, 1800.0, step], limit["method"].as_str().unwrap());
