@@ -1,9 +1,8 @@
 //! The answer of a run in five lines: force, heat, torque, clearance, growth.
 
 use serde_json::{Value, json};
-use tiprub_core::shown;
 use tiprub_shell::{
-    extremes::{Extreme, extremes},
+    extremes::{Extreme, extremes, six_digits},
     recording::Recording,
 };
 
@@ -46,17 +45,8 @@ pub fn json(lines: &[Line]) -> Value {
     lines.iter().map(one).collect::<serde_json::Map<_, _>>().into()
 }
 
-/// A value with six significant digits; never a negative zero.
-fn six_digits(value: f64) -> String {
-    match format!("{value:.5e}").parse::<f64>() {
-        Ok(0.0) => "0".to_owned(),
-        Ok(rounded) => shown(rounded).to_string(),
-        Err(_) => shown(value).to_string(),
-    }
-}
-
 fn at(extreme: &Extreme) -> String {
-    format!("at t = {} s", shown(extreme.time))
+    format!("at t = {} s", six_digits(extreme.time))
 }
 
 fn force(largest: Option<&Extreme>) -> Line {
@@ -117,7 +107,7 @@ fn clearance(recording: &Recording, found: &[Extreme]) -> Line {
             let column = recording.column("clearance_minimum").unwrap_or_default();
             let touch = column.iter().zip(&recording.times).find(|(clearance, _)| **clearance < ROUNDING);
             let first = touch.map_or(extreme.time, |(_, time)| *time);
-            (Some((0.0, "m")), format!("smallest: tips touch, first at t = {} s", shown(first)))
+            (Some((0.0, "m")), format!("smallest: tips touch, first at t = {} s", six_digits(first)))
         }
         Some(extreme) => (Some((extreme.value, "m")), format!("smallest, {}", at(extreme))),
         None => (None, "some contact nodes meet nothing; --all lists clearances node by node".to_owned()),

@@ -23,7 +23,7 @@ const DRAWN_DISPLACEMENT: f64 = 0.12;
 const MODES_SHOWN: usize = 4;
 
 /// Error against run time as the guide shows it.
-const ERROR_PICTURE: &str = include_str!("../../../docs/error/rotor37-light-total.svg");
+const ERROR_PICTURE: &str = include_str!("../../../docs/error/rotor37-light-steps.svg");
 
 /// Results of a run, found by what they stand for rather than by name.
 pub struct Results<'a> {

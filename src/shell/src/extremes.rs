@@ -57,10 +57,10 @@ impl Extreme {
     pub fn line(&self) -> String {
         let Self { text, unit, value, time, .. } = self;
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-        let value = digits(*value);
+        let value = six_digits(*value);
         match self.value {
             0.0 if self.name != "smallest_clearance" => format!("{text}: 0{unit}"),
-            _ => format!("{text}: {value}{unit} at t = {} s", shown(*time)),
+            _ => format!("{text}: {value}{unit} at t = {} s", six_digits(*time)),
         }
     }
 
@@ -71,9 +71,13 @@ impl Extreme {
     }
 }
 
-/// Five digits are enough to read.
-fn digits(value: f64) -> String {
-    shown(format!("{value:.4e}").parse().unwrap_or(value))
+/// A value with six significant digits; never a negative zero.
+pub fn six_digits(value: f64) -> String {
+    match format!("{value:.5e}").parse::<f64>() {
+        Ok(0.0) => "0".to_owned(),
+        Ok(rounded) => shown(rounded),
+        Err(_) => shown(value),
+    }
 }
 
 #[cfg(test)]

@@ -140,6 +140,9 @@ pub struct ErrorArguments {
     /// Only this scene; may be given several times.
     #[arg(long = "scene", value_name = "SCENE", value_enum)]
     pub scenes: Vec<ErrorScene>,
+    /// Write tables and pictures into this directory of the guide too: the folder docs of the sources.
+    #[arg(long, value_name = "DIR")]
+    pub guide: Option<PathBuf>,
     /// What all studies take.
     #[command(flatten)]
     pub common: StudyCommon,

@@ -13,9 +13,10 @@ mod cutting;
 mod cyclic;
 mod cyclic_features;
 mod excitation;
+mod feature_pairs;
 mod heat;
 mod initial;
-mod load_pairs;
+
 mod pairs;
 mod stress;
 mod support;

@@ -23,19 +23,23 @@ pub fn rate(seconds: f64) -> String {
     }
 }
 
-/// Cheapest setting for each error of the steps. Every method is compared with the converged solution of its own equations.
-pub fn of_steps(scenes: &[(&dyn Case, &Measured)]) -> Table {
-    let columns = [
+/// Columns of both tables.
+fn columns(error: &str) -> [&str; 8] {
+    [
         "scene",
-        "error of the steps",
+        error,
         "cheapest method",
         "step or tolerance",
         "time (s/s)",
         "galerkin (s/s)",
         "the paper's method (s/s)",
         "factor",
-    ];
-    let mut table = Table::new("Cheapest setting for an error of the steps", columns);
+    ]
+}
+
+/// Cheapest setting for each error of the steps. Every method is compared with the converged solution of its own equations.
+pub fn of_steps(scenes: &[(&dyn Case, &Measured)]) -> Table {
+    let mut table = Table::new("Cheapest setting for an error of the steps", columns("error of the steps"));
     for &(case, measured) in scenes {
         let rows = Kind::OfOwn.rows(case, measured);
         for target in TARGETS {
@@ -51,17 +55,7 @@ pub fn of_steps(scenes: &[(&dyn Case, &Measured)]) -> Table {
 
 /// Cheapest setting for each total error: steps, and the errors of the model (modes, patches, rows, mesh, elements).
 pub fn in_total(scenes: &[(&dyn Case, &Measured)]) -> Table {
-    let columns = [
-        "scene",
-        "total error",
-        "cheapest method",
-        "step or tolerance",
-        "time (s/s)",
-        "galerkin (s/s)",
-        "the paper's method (s/s)",
-        "factor",
-    ];
-    let mut table = Table::new("Cheapest setting for a total error", columns);
+    let mut table = Table::new("Cheapest setting for a total error", columns("total error"));
     for &(case, measured) in scenes {
         let Some(error) = total_error(case) else { continue };
         let rows = Kind::Total.rows(case, measured);

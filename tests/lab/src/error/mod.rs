@@ -5,6 +5,7 @@ mod built_in;
 mod communication;
 pub(crate) mod cube;
 pub(crate) mod full;
+mod guide_page;
 pub(crate) mod marched;
 pub(crate) mod outside;
 pub(crate) mod rods;
@@ -22,18 +23,27 @@ use tiprub_gallery::rom_cache::RomCache;
 use tiprub_shell::{Failure, Result, console::Console, forecast::Forecast};
 use tiprub_study::{
     Study,
-    error::{case, competitor, measure, of_cases, planned, run, scene, window},
+    error::{case, clock, competitor, measure, of_cases, planned, run, scene, window},
 };
 
 use crate::cli::{ErrorArguments, ErrorScene};
 
 /// Time and error by the length of the communication step, as Markdown.
 const COMMUNICATION: &str = "communication-steps.md";
-/// The study.
+
+/// The study. Its tables and pictures go into the guide where that was asked for.
 ///
 /// # Errors
-/// A reference fails; never with the built-in scenes.
+/// A reference fails, which does not happen with built-in scenes, or the guide cannot be written.
 pub(crate) fn study(arguments: &ErrorArguments, console: &Console) -> Result<Study> {
+    let guide = arguments.guide.as_deref();
+    if guide.is_some() && (arguments.common.quick || !arguments.scenes.is_empty()) {
+        return Err(Failure::new(
+            "--guide",
+            "the tables of the guide are those of all scenes and of the whole study",
+            "Leave out `--quick` and `--scene`",
+        ));
+    }
     let scenes = if arguments.scenes.is_empty() { ErrorScene::ALL.to_vec() } else { arguments.scenes.clone() };
     let quick = arguments.common.quick;
     let cache = arguments.common.cache.cache();
@@ -53,6 +63,11 @@ pub(crate) fn study(arguments: &ErrorArguments, console: &Console) -> Result<Stu
     if let Some(table) = communication {
         let text = table.to_markdown().into_bytes();
         study.files.push((COMMUNICATION.into(), "time and error by the length of the communication step".into(), text));
+    }
+    let time = format!("{:.0} min", clock::now().as_secs_f64() / 60.0);
+    study.facts.push(("processor time of the study".into(), time));
+    if let Some(directory) = guide {
+        guide_page::write(&study, directory)?;
     }
     Ok(study)
 }

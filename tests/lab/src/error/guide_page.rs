@@ -1,0 +1,107 @@
+//! Tables and pictures of the study, written into the guide between its markers.
+
+use std::path::Path;
+
+use tiprub_shell::{Failure, Result, output_file};
+use tiprub_study::Study;
+
+/// Tables of the study (names of its files) and the pages that show them.
+const TABLES: [(&str, &str); 4] = [
+    ("summary-steps", "error-study.md"),
+    ("summary-total", "error-study.md"),
+    ("summary-limits", "error-study.md"),
+    ("communication-steps", "coupling.md"),
+];
+/// The page that says on which machine and when, as the block of this name.
+const MACHINE: (&str, &str) = ("machine", "error-study.md");
+/// Where pictures are, beside the pages.
+const PICTURES: &str = "error";
+
+/// Replaces pictures and every block of the guide in `directory`. Nothing is written unless every block is there.
+///
+/// # Errors
+/// A page or a block is missing, or a file cannot be written.
+pub(super) fn write(study: &Study, directory: &Path) -> Result<()> {
+    let fact = |name: &str| study.facts.iter().find(|(known, _)| known == name).map_or("", |(_, value)| value.as_str());
+    let seconds = fact("processor time of the study");
+    let mut blocks = vec![(
+        MACHINE.0,
+        MACHINE.1,
+        format!(
+            "{}, {} processors, {}. The study took {seconds} of processor time.",
+            fact("processor"),
+            fact("processors available"),
+            fact("date")
+        ),
+    )];
+    for (name, page) in TABLES {
+        let file = format!("{name}.md");
+        let found = study.files.iter().find(|(known, ..)| *known == file);
+        let (.., bytes) = found.ok_or_else(|| failed(directory, format!("the study has no table `{name}`")))?;
+        // The caption is the page's own heading.
+        let text = String::from_utf8_lossy(bytes);
+        let rows: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
+        blocks.push((name, page, rows.join("\n")));
+    }
+    let mut pages: Vec<(&str, String)> = Vec::new();
+    for (name, page, content) in blocks {
+        let known = pages.iter().position(|(known, _)| *known == page);
+        let index = match known {
+            Some(index) => index,
+            None => {
+                let path = directory.join(page);
+                let text = std::fs::read_to_string(&path).map_err(|error| failed(&path, error.to_string()))?;
+                pages.push((page, text));
+                pages.len() - 1
+            }
+        };
+        let text = replaced(&pages[index].1, name, &content, fact("date"))
+            .map_err(|problem| failed(&directory.join(page), problem))?;
+        pages[index].1 = text;
+    }
+    for figure in &study.figures {
+        output_file::write(&directory.join(PICTURES).join(format!("{}.svg", figure.name)), &figure.picture.svg)?;
+    }
+    pages.into_iter().try_for_each(|(page, text)| output_file::write(&directory.join(page), text))
+}
+
+fn failed(path: &Path, problem: String) -> Failure {
+    Failure::new(path.display().to_string(), problem, "Give the directory `docs` of the sources with `--guide`")
+}
+
+/// The page with the content of one block replaced, and its date.
+fn replaced(page: &str, name: &str, content: &str, date: &str) -> std::result::Result<String, String> {
+    let begin = format!("<!-- written: lab error {name};");
+    let end = "<!-- end -->";
+    let missing = || format!("there is no block `{begin} ... -->` that ends with `{end}`");
+    let (before, rest) = page.split_once(&begin).ok_or_else(missing)?;
+    let (_, after) = rest.split_once(end).ok_or_else(missing)?;
+    Ok(format!("{before}{begin} {date}, version {} -->\n{content}\n{end}{after}", env!("CARGO_PKG_VERSION")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAGE: &str = "# Page\n\n<!-- written: lab error first; 2026-01-01, version 0 -->\n| old |\n<!-- end -->\n\ntext\n\n\
+                        <!-- written: lab error second; 2026-01-01, version 0 -->\n<!-- end -->\n";
+
+    #[test]
+    fn a_block_is_replaced_and_all_else_stays() {
+        let found = replaced(PAGE, "first", "| new |", "2026-11-25").unwrap();
+        let expected = PAGE
+            .replacen("2026-01-01, version 0", &format!("2026-11-25, version {}", env!("CARGO_PKG_VERSION")), 1)
+            .replace("| old |", "| new |");
+        assert_eq!(found, expected);
+        assert!(replaced(PAGE, "third", "", "").unwrap_err().contains("lab error third"));
+    }
+
+    #[test]
+    fn the_guide_has_every_block() {
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
+        for (name, page) in TABLES.into_iter().chain([MACHINE]) {
+            let text = std::fs::read_to_string(docs.join(page)).unwrap();
+            assert!(replaced(&text, name, "", "").is_ok(), "{page}: {name}");
+        }
+    }
+}
