@@ -21,8 +21,8 @@ const INTERVAL: f64 = 8e-5;
 const MASSLESS: Competitor = Competitor::Core(Scheme::MasslessBoundary, Solver::Lcp);
 /// Samples per window of impulses.
 const IMPULSE_WINDOW: usize = 4;
-/// Internal steps per sample of the runs that show how long trajectories can be followed.
-const PARTING_DIVISION: u32 = 80;
+/// Internal steps per sample of the runs that show how long trajectories can be followed: the first that the scene accepts.
+const PARTING_DIVISIONS: [u32; 4] = [80, 160, 320, 640];
 
 /// A built-in scene and the steps that are compared on it.
 pub(crate) struct Facts {
@@ -113,8 +113,15 @@ impl BuiltIn {
         }
         let samples = facts.samples[usize::from(quick)];
         let mut case = Self { facts, scene, samples, quick, parting: Vec::new() };
-        case.parting = window::parting(&case, PARTING_DIVISION, samples)
-            .map_err(|problem| Failure::new(case.facts.name, problem, "Report this to the developers"))?;
+        let mut parting = Err(String::new());
+        for division in PARTING_DIVISIONS {
+            parting = window::parting(&case, division, samples);
+            if parting.is_ok() {
+                break;
+            }
+        }
+        case.parting =
+            parting.map_err(|problem| Failure::new(case.facts.name, problem, "Report this to the developers"))?;
         case.samples = window::samples(&case.parting, samples);
         Ok(case)
     }
