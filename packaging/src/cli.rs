@@ -18,19 +18,19 @@ use crate::{
     name = "tiprub",
     version,
     about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, study, demo",
-    long_about = "Marches the contact of a bladed disk (a reduced-order model) with its casing in time, rigid or \
-                  flexible, and ships that as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
+    long_about = "Simulates the contact of a bladed disk (a reduced-order model) with a rigid or flexible casing, \
+                  and packs it as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
                   tiprub package scene.toml -o out/\n\n\
-                  Scenes that ship:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps, recommended\n  \
+                  Built-in scenes:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps, recommended\n  \
                   builtin:rotor37-one-row   one row of patches, which averages over the thickness of the tip\n  \
                   builtin:rotor37-paper     with the model and the method of the paper\n  \
                   builtin:flexible-casing   in an elastic casing with heat, friction power per patch\n  \
                   builtin:abradable         wearing the coating of a rigid casing\n  \
                   builtin:stage             56 coupled blades in an oval elastic casing\n  \
                   builtin:stage-nodes       with contact at three nodes and more friction\n  \
-                  builtin:cube-between-rings  a cube that flies through two clamped rings\n\n\
-                  Exit codes: 0 done, 1 the work failed, 2 the command line is wrong, 141 the reader of stdout left early."
+                  builtin:cube-between-rings  a free cube between two clamped rings\n\n\
+                  Exit codes: 0 done, 1 the work failed, 2 the command line is wrong, 141 the reader of stdout closed it early."
 )]
 pub struct Cli {
     /// Print one JSON object with the result on stdout (errors too); progress stays on stderr.
@@ -47,28 +47,26 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The whole road on a real blade: reduce rotor 37, package both FMUs, import and run them, write a report.
+    /// All steps on a real blade: reduce rotor 37, package both FMUs, import and run them, write a report.
     #[command(after_help = "Examples:\n  tiprub demo\n  tiprub demo --out /tmp/rub --revolutions 4\n\n\
                             DIR then holds report.html (opens offline), the two .fmu files, the ROM, the scene and \
                             the results as CSV.")]
     Demo(DemoArguments),
-    /// From a finite-element model to a reduced-order model (ROM), with its checks: of your own, or one that ships.
+    /// Reduce a finite-element model, your own or a built-in one, to a reduced-order model (ROM), with checks.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  tiprub reduce casing --material titanium\n  \
                             tiprub reduce blade blade.inp --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
                             tiprub reduce blade --help\n\n\
                             docs/models.md describes models of your own; docs/rom-file.md writes a ROM from Python.")]
     Reduce(ReduceArguments),
-    /// From a scene to .fmu files. Compiles nothing: the library is generic, scene and ROM are data.
-    #[command(
-        after_help = "Examples:\n  tiprub package scene.toml                 both FMUs beside each other here\n  \
+    /// Package a scene as .fmu files. Nothing is compiled: the library is generic, scene and ROM are data.
+    #[command(after_help = "Examples:\n  tiprub package scene.toml                 both FMUs in this directory\n  \
                             tiprub package scene.toml --fmi 3 -o rub.fmu\n  \
                             tiprub package scene.toml --arrays        FMI 3 variables as arrays\n  \
                             tiprub package scene.toml --platform x86_64-windows\n\n\
                             Same inputs, same bytes. The optional generation date is left out, unless \
-                            SOURCE_DATE_EPOCH (seconds since 1970) is set."
-    )]
+                            SOURCE_DATE_EPOCH (seconds since 1970) is set.")]
     Package(PackageArguments),
-    /// From a casing to the .fmu files of its heat conduction: the partner of a scene whose casing heats up.
+    /// Package the heat conduction of a casing as .fmu files: the partner of a scene whose casing heats up.
     #[command(
         after_help = "Examples:\n  tiprub thermal -o out/\n  tiprub thermal --patches 24x1 --gas-film 800 --fmi 3\n  \
                             tiprub thermal --material titanium --modes 60 --name fan_case\n\n\
@@ -80,13 +78,13 @@ pub enum Command {
                             tiprub run builtin:rotor37 --stop 0.002 --set speed=1700 --csv - | head\n\n\
                             Column names are the FMI 2.0 variable names; numbers read back to the same bits.")]
     Run(RunArguments),
-    /// What is in an .fmu, a ROM or a scene file, and whether it is sound.
+    /// Inspect and validate an FMU, ROM or scene file.
     #[command(
         after_help = "Examples:\n  tiprub inspect rotor37_fmi2.fmu\n  tiprub inspect rotor37.rom.safetensors\n  \
                             tiprub inspect scene.toml --json\n  tiprub inspect builtin:flexible-casing"
     )]
     Inspect(InspectArguments),
-    /// Studies of a scene: pictures, numbers, and whether they show what they should.
+    /// Study a scene: pictures, numbers, and statements that are tested.
     #[command(after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study stability scene.toml\n  \
                             tiprub study map scene.toml --speeds 1200:1500:61\n  tiprub study error --help\n\n\
                             DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
@@ -97,10 +95,10 @@ pub enum Command {
 #[derive(Debug, Clone, Default, Args)]
 pub struct LibraryArguments {
     /// Library of one platform, or a directory of libraries, instead of those found beside tiprub (or built
-    /// from its sources); may be repeated. What a file is made for is read from its content.
+    /// from its sources); may be repeated. The platform is read from the content of each file.
     #[arg(long, value_name = "FILE|DIR")]
     pub library: Vec<PathBuf>,
-    /// Leave out all platforms but this; may be repeated. Without it the FMU holds every library there is.
+    /// Include only this platform; may be repeated. Default: every library that was found.
     #[arg(long, value_enum, value_name = "PLATFORM")]
     pub platform: Vec<PlatformChoice>,
 }
@@ -108,7 +106,7 @@ pub struct LibraryArguments {
 /// Arguments of `tiprub demo`.
 #[derive(Debug, Args)]
 pub struct DemoArguments {
-    /// Directory for everything the demo writes; made if missing.
+    /// Directory for everything the demo writes; created if missing.
     #[arg(long, value_name = "DIR", default_value = "demo")]
     pub out: PathBuf,
     /// Libraries that go into the FMU.
@@ -122,7 +120,7 @@ pub struct DemoArguments {
 /// Arguments of `tiprub package`.
 #[derive(Debug, Args)]
 pub struct PackageArguments {
-    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
+    /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// FMI version of the FMU.
@@ -151,10 +149,10 @@ pub struct PackageArguments {
 /// Arguments of `tiprub run`.
 #[derive(Debug, Args)]
 pub struct RunArguments {
-    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
+    /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
-    /// Print all outputs at the end, extremes, times and whole warnings, not only the answer.
+    /// Also print the final values of all outputs, extremes, times and full warnings.
     #[arg(long)]
     pub all: bool,
     /// Write all outputs as CSV; `-` is stdout.
@@ -166,15 +164,15 @@ pub struct RunArguments {
     /// Communication step H (s), instead of the scene's.
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Start value of an input or parameter; of an array one for all elements, or each its own: `NAME=[1,2,3]`. May be repeated.
+    /// Start value of an input or parameter; for an array one value for all elements, or one for each: `NAME=[1,2,3]`. May be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// Inputs over time from a CSV file with the columns `time,NAME,NAME,...`: linear between its lines, followed without delay; also
+    /// Inputs over time from a CSV file with the columns `time,NAME,NAME,...`: linear between the lines, without delay; also
     /// tunable parameters.
     #[arg(long, value_name = "FILE", conflicts_with = "estimate")]
     pub inputs: Option<PathBuf>,
-    /// Also estimate what steps, modes and patches along the chord leave, and rows of three across the thickness, from coarser runs of the same
-    /// scene: some ten runs more. What the mesh leaves is told where the ROM has it (`tiprub study convergence --into`).
+    /// Also estimate the discretisation errors of time step, modes, patches along the chord and rows across the thickness, from about ten coarser
+    /// runs. The error of the mesh is printed if the ROM contains it (`tiprub study convergence --into`).
     #[arg(long)]
     pub estimate: bool,
     /// What is added to the scene.
@@ -188,10 +186,10 @@ pub struct RunArguments {
 /// Arguments of `tiprub inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
-    /// An .fmu, a ROM (.safetensors), a scene (.toml) or one that ships (`builtin:abradable`).
+    /// An .fmu, a ROM (.safetensors), a scene (.toml) or a built-in scene (`builtin:abradable`).
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// Of a scene, also run its first 100 communication steps with each effect that it leaves out, for the time that costs.
+    /// Also measure the computing time of each effect that a scene leaves out, over its first 100 communication steps.
     #[arg(long)]
     pub measure: bool,
     /// What is added to the scene.
@@ -218,30 +216,30 @@ pub enum StudyCommand {
                             tiprub study map --set friction_coefficient=0 --set gap_offset=6e-5")]
     Map(MapArguments),
     /// Error against run time of every scheme and solver on a scene, of the steps and in total, with other numbers of patches and modes;
-    /// and what is cheapest for an error.
+    /// and the cheapest setting for a given error.
     #[command(
         after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study error builtin:flexible-casing --quick\n  \
                             tiprub study error scene.toml --window 2e-3 --set speed=1700\n\n\
-                            Errors of the steps are against two fine runs by different schemes that must meet; total errors against a \
-                            finer model, which needs what the ROM was reduced from: a model that ships, or --mesh with the options of \
+                            The reference for errors of the steps is a fine run, checked by another scheme. The reference for total errors is a \
+                            finer model. It needs the mesh of the ROM: a built-in model, or --mesh with the options of \
                             `tiprub reduce blade`."
     )]
     Error(Box<ErrorCommand>),
-    /// Over friction, speed and internal step: what is right, warned of or refused and why, growth rates of sliding contact, and the
-    /// largest accepted step of every scheme and solver.
+    /// Map friction, speed and internal step: accepted, warned of or rejected, and why; growth rates of sliding contact, and the largest
+    /// accepted step of every scheme and solver.
     #[command(
         after_help = "Examples:\n  tiprub study stability scene.toml\n  tiprub study stability builtin:rotor37 --quick\n  \
                             tiprub study stability scene.toml --friction 0:0.6:13 --speeds -1700:1700:2 --steps 1e-7:2e-5:12\n\n\
-                            The answers are those of `tiprub run`, without the run. Of coupled sectors each takes long: by default few are asked."
+                            The checks are those at the start of `tiprub run`. They take long with coupled sectors, so the default map is small for these."
     )]
     Stability(StabilityArguments),
-    /// What another internal step, more or fewer modes, other contact nodes and other meshes change: displacements, impulse, friction work,
-    /// peak force and strain energy; where that goes, and the error of the scene.
+    /// Refine internal step, modes, contact nodes and mesh: changes of displacements, impulse, friction work, peak force and strain energy,
+    /// the estimated limit, and the error of the scene.
     #[command(
         after_help = "Examples:\n  tiprub study convergence scene.toml\n  tiprub study convergence builtin:rotor37 --quick\n  \
                             tiprub study convergence scene.toml --mesh blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n\n\
-                            Modes are taken away from any ROM; more modes and other contact nodes need what it was reduced from: a model that \
-                            ships, or --mesh with the options of `tiprub reduce blade`. Other meshes are given with --other-mesh."
+                            Modes can be removed from any ROM. More modes and other contact nodes need its mesh: a built-in model, \
+                            or --mesh with the options of `tiprub reduce blade`. Other meshes are given with --other-mesh."
     )]
     Convergence(Box<ConvergenceCommand>),
 }

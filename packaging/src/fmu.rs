@@ -148,10 +148,10 @@ impl<'a> Package<'a> {
         Failure::new(
             format!("scene `{}`", self.scene.settings.name),
             format!(
-                "{without}, and its {values} variables are more than the {MOST_VARIABLES} that such an FMU may have{}",
+                "{without}, and {values} variables exceed the limit of {MOST_VARIABLES} for such an FMU{}",
                 largest.unwrap_or_default()
             ),
-            "Ask for fewer outputs in the scene, or write FMI 3.0 with arrays alone: --fmi 3 --arrays",
+            "Request fewer outputs in the scene, or write only FMI 3.0 with arrays: --fmi 3 --arrays",
         )
     }
 

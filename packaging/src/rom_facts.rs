@@ -210,7 +210,7 @@ impl RomFacts {
             let friction = self.solvable_friction.map_or("none".into(), |value| format!("{value}"));
             let _ = writeln!(text, "  contact solvable up to µ  {friction} (all nodes closed, tried up to 2)");
             let digging = self.digging_text();
-            let _ = writeln!(text, "  digs in above µ*          {digging}");
+            let _ = writeln!(text, "  locks up above µ*         {digging}");
         }
         self.write_frequencies(&mut text);
         self.write_checks(&mut text);

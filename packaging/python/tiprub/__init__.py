@@ -196,7 +196,7 @@ def reduce(kind: str, file: Optional[Place] = None, output: Optional[Place] = No
 
 
 def inspect(path: Scene, *, directory: Place = ".", quiet: bool = True, **more: Any) -> Report:
-    """What is in an FMU, a ROM or a scene, and whether it is sound.
+    """Inspect and validate an FMU, ROM or scene.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def study(
 
 
 def demo(out: Place = "demo", *, revolutions: Optional[float] = None, quiet: bool = False, **more: Any) -> Report:
-    """Go the whole road on NASA rotor 37: ROM, FMUs, import and run, error study, report.html.
+    """Run all steps on NASA rotor 37: ROM, FMUs, import and run, report.html.
 
     Parameters
     ----------

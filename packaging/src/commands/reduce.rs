@@ -76,7 +76,7 @@ fn check_slips(reduced: &Reduced, facts: &RomFacts, is_meant: bool) -> Result<Ve
     let slips = [reduced.slips.clone(), facts.slips()].concat();
     match slips.first().filter(|_| !is_meant) {
         Some(Slip { what, problem, question }) => {
-            let remedy = format!("{question} If it is meant, say so with --accept-implausible");
+            let remedy = format!("{question} If you mean it, use --accept-implausible");
             Err(Failure::new(what, problem, remedy))
         }
         None => Ok(slips.iter().map(Slip::warning).collect()),

@@ -106,7 +106,7 @@ fn where_the_rest_is(json: &Value, warned: bool) -> String {
     let mut text = format!(
         "\n{}: t = {} s to {} s, computed in {:.3} s ({:.3} s of computing per simulated second)\n\
          scheme: {}\n\
-         all outputs at the end, extremes, times and whole warnings: --all; outputs over time: {}",
+         final outputs, extremes, times and full warnings: --all; outputs over time: {}",
         json["model"].as_str().unwrap_or_default(),
         json["start"],
         json["stop"],
@@ -116,7 +116,7 @@ fn where_the_rest_is(json: &Value, warned: bool) -> String {
         json["csv"].as_str().unwrap_or("--csv FILE"),
     );
     if warned {
-        text.push_str("\nwhat a warning means: docs/warnings.md; not to see it: --silence ID");
+        text.push_str("\nmeaning of a warning: docs/warnings.md; to suppress it: --silence ID");
     }
     text
 }
@@ -171,7 +171,7 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
         text.extend(extremes.iter().map(|extreme| format!("  {}\n", extreme.line())));
     }
     if !warnings.is_empty() {
-        text.push_str("\nwhole warnings:\n");
+        text.push_str("\nfull warnings:\n");
         let whole = |warning: &Warning| format!("  [{}] {warning}\n", warning.topic().id());
         text.extend(warnings.iter().map(whole));
     }

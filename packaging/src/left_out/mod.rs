@@ -97,7 +97,7 @@ fn seconds(scene: &Scene) -> Option<f64> {
 pub fn text(all: &[LeftOut]) -> String {
     let mut text = String::new();
     for (group, title) in [(Group::Physics, "left out here"), (Group::Machinery, "machinery that is off")] {
-        let _ = writeln!(text, "\n{title:<53} what it would take");
+        let _ = writeln!(text, "\n{title:<53} what it needs");
         for LeftOut { effect, cost } in all.iter().filter(|one| one.effect.group == group) {
             let _ = writeln!(text, "  {:<51} {}{}", effect.name, effect.takes, told(cost.as_ref()));
         }
@@ -108,7 +108,7 @@ pub fn text(all: &[LeftOut]) -> String {
 fn told(cost: Option<&Result<Cost, String>>) -> String {
     match cost {
         None => String::new(),
-        Some(Err(why)) => format!("\n  {:<51} not as it stands: {why}", ""),
+        Some(Err(why)) => format!("\n  {:<51} not supported by this scene: {why}", ""),
         Some(Ok(Cost { variables, bytes, state, time })) => {
             let time = time.map_or(String::new(), |time| format!(", {time:.2} times the time per step"));
             format!("\n  {:<51} costs {variables:+} variables, {bytes:+} bytes, state {state:+} bytes{time}", "")

@@ -52,7 +52,7 @@ pub fn radius_slip(imported: &Imported, chosen: &Chosen) -> Option<Slip> {
     (chosen.grid.is_none() && contact < TIPS * outermost).then(|| Slip {
         what: "contact nodes".into(),
         problem: format!("they reach a radius of {contact:.6} m, the model one of {outermost:.6} m"),
-        question: "Are tip and root, and the axis of rotation, those that are meant?".into(),
+        question: "Are tip and root correct, and the axis of rotation?".into(),
     })
 }
 

@@ -6,8 +6,7 @@ use crate::warning::{Topic, Warning};
 use crate::{Error, Rom, shown};
 
 /// What to do about a slip that is none.
-pub const IF_MEANT: &str =
-    "If it is meant, say so with `accept_implausible = true` in the scene (--accept-implausible)";
+pub const IF_MEANT: &str = "If you mean it, set `accept_implausible = true` in the scene (--accept-implausible)";
 
 /// A value that is rarely meant.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -107,14 +106,14 @@ fn named(rom: &Rom) -> String {
 
 fn of_size(rom: &Rom) -> Option<Slip> {
     let [low, high] = radii(rom);
-    let what = if rom.frame == Frame::Cylindrical { "stand at a radius of" } else { "are spread over" };
+    let what = if rom.frame == Frame::Cylindrical { "are at a radius of" } else { "are spread over" };
     if high > RADII[1] {
         let problem = format!("its contact nodes {what} {} m", shown(high));
         return Some(Slip::new(named(rom), problem, "Are its lengths in millimetres? A ROM is in m, kg and s."));
     }
     (low < RADII[0]).then(|| {
-        let problem = format!("contact nodes stand at a radius of {} m", shown(low));
-        Slip::new(named(rom), problem, "Is the axis of rotation right, and the length in metres?")
+        let problem = format!("contact nodes are at a radius of {} m", shown(low));
+        Slip::new(named(rom), problem, "Is the axis of rotation correct, and are lengths in metres?")
     })
 }
 
@@ -124,7 +123,7 @@ fn of_frequencies(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> 
     let lowest = elastic.fold(f64::INFINITY, f64::min) / std::f64::consts::TAU;
     (lowest.is_finite() && !(FREQUENCIES[0]..=FREQUENCIES[1]).contains(&lowest)).then(|| {
         let problem = format!("its lowest natural frequency is {lowest:.3e} Hz");
-        Slip::new(named(rom), problem, "Are units (m, kg, s), material and clamped nodes those that are meant?")
+        Slip::new(named(rom), problem, "Are units (m, kg, s), material and clamped nodes correct?")
     })
 }
 
@@ -146,7 +145,7 @@ fn of_sectors(rom: &Rom) -> Option<Slip> {
         return None;
     };
     let problem = format!("{how} the {pitch:.4} rad of one of {} sectors", rom.sectors);
-    let question = "Are the number of sectors, the axis of rotation and the contact nodes those that are meant?";
+    let question = "Are the number of sectors, the axis of rotation and the contact nodes correct?";
     Some(Slip::new(named(rom), problem, question))
 }
 

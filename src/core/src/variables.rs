@@ -320,7 +320,7 @@ fn check_count(variables: &[Variable]) -> Result<()> {
             largest.name,
             largest.len()
         ),
-        "Ask for fewer outputs, or give fewer coating cells, structures or sectors",
+        "Request fewer outputs, or use fewer coating cells, structures or sectors",
     ))
 }
 

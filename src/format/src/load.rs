@@ -31,9 +31,8 @@ impl RomBytes {
         if self.0 <= LARGEST_ROMS {
             return Ok(());
         }
-        let problem =
-            format!("with it the ROM files of this scene have more than the {LARGEST_ROMS} bytes that are read");
-        Err(Error::file(path, problem, "Give fewer structures, or smaller ROMs"))
+        let problem = format!("with this file the ROM files of the scene exceed the limit of {LARGEST_ROMS} bytes");
+        Err(Error::file(path, problem, "Use fewer structures, or smaller ROMs"))
     }
 }
 

@@ -90,7 +90,7 @@ impl RomCache {
         let rom = make()?;
         let kept = output_file::only_a_file(&path).and_then(|()| output_file::write(&path, content(&rom, &key)));
         if let Err(failure) = kept {
-            console.say(format_args!("Model {name} is not kept for the next time: {failure}"));
+            console.say(format_args!("Model {name} is not cached: {failure}"));
         }
         prune(directory, name);
         Ok(rom)

@@ -30,7 +30,7 @@ impl Simulation {
         let curvature = self.system.ledgers()[set].curvature_work.value();
         let problem = format!(
             "up to t = {} s normals that turn and surfaces that curve within internal steps have added {curvature:.3e} J that no input brings \
-             (curvature work){}, beside {work:.3e} J of net work of {who}: that may be wrong by as much, and in its sign",
+             (curvature work){}, beside {work:.3e} J of net work of {who}: this net work may be wrong by as much, and in its sign",
             shown(time),
             self.of_set(set)
         );
@@ -90,14 +90,14 @@ impl Simulation {
         match loss {
             Loss::Friction => (
                 format!(
-                    "friction{of} has put {given:.3e} J in, where it can only take, of {exchanged:.3e} J exchanged: tips vibrate faster than \
-                     they slide, and this law knows no sticking"
+                    "friction{of} has put {given:.3e} J into the vibration, of {exchanged:.3e} J exchanged, but it can only dissipate: tips vibrate \
+                     faster than they slide, and this law has no sticking"
                 ),
                 self.against_sliding(settings.scheme),
             ),
             Loss::Impact => (
                 format!(
-                    "impacts{of} have put {given:.3e} J in, where they can only take, of {exchanged:.3e} J that contact forces have worked"
+                    "impacts{of} have put {given:.3e} J into the vibration, of {exchanged:.3e} J of contact work, but they can only dissipate"
                 ),
                 match (settings.solver, settings.scheme) {
                     (Solver::Film, _) => "Use solver = \"lcp\": film leaves nodes inside the surface for a step",

@@ -41,8 +41,8 @@ pub fn expansion(structure: &StructureSettings, rom: &Rom, model: &ModalModel, t
         return Ok(modes.map(|(load, w)| if *w > 0.0 { left * load / (w * w) } else { 0.0 }).collect());
     }
     let held = rom.stiffness.clone().cholesky().ok_or_else(|| {
-        let remedy = "Use a ROM whose root is held, or leave `thermal` or `spin.stiffening` out";
-        let problem = "not positive definite: what nothing holds has no free expansion";
+        let remedy = "Use a ROM with a clamped root, or leave out `thermal` or `spin.stiffening`";
+        let problem = "not positive definite: an unconstrained structure has no static thermal expansion";
         Error::invalid("ROM array `stiffness`", problem, remedy)
     })?;
     Ok(model.modal_load((&rom.mass * held.solve(&DVector::from_vec(load))).as_slice()))

@@ -56,8 +56,8 @@ impl Compiled {
         let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
         let index = settings.surfaces.iter().position(|surface| surface.patches.is_some() && !rubs)?;
         let problem =
-            format!("surface[{}].patches: no contact has friction, so that no patch has friction power", index + 1);
-        Some(Warning::new(Topic::NoFrictionPower, problem, "Is `contact.friction` missing?"))
+            format!("surface[{}].patches: no contact has friction, so no patch has friction power", index + 1);
+        Some(Warning::new(Topic::NoFrictionPower, problem, "Set `contact.friction`, or leave out the patches"))
     }
 }
 

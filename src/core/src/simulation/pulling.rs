@@ -67,8 +67,8 @@ impl Simulation {
     /// What film does to a node.
     pub(super) fn pulls(&self, structure: usize, node: usize, share: f64) -> String {
         format!(
-            "film has pulled at contact node {} with {:.0} % of the impulse of the node most pushed: it looks once for penetration, and \
-             holds nodes closed that the others push away. Forces of single nodes are wrong by about as much",
+            "film has pulled at contact node {} with {:.0} % of the impulse of the most loaded node: it checks penetration only once, and \
+             keeps nodes closed that others push away. Forces of single nodes are wrong by about as much",
             self.compiled.node_name(structure, node),
             100.0 * share
         )
@@ -77,8 +77,8 @@ impl Simulation {
     /// What film has not looked at.
     pub(super) fn left_inside(&self, structure: usize, node: usize, share: f64) -> String {
         format!(
-            "film has left contact node {} inside the casing by {:.0} % of its clearance: it looks once for penetration, and the force on \
-             others pushed the node in",
+            "film has left contact node {} inside the casing by {:.0} % of its clearance: it checks penetration only once, and forces on \
+             other nodes pushed this one in",
             self.compiled.node_name(structure, node),
             100.0 * share
         )

@@ -195,7 +195,7 @@ pub fn warning(step: f64, limit: MasslessLimit) -> Option<Warning> {
                 "massless-boundary with an internal step of {step:.3e} s: contact that opens and closes may gain energy (a falling \
                  `impact_loss` shows it)"
             ),
-            format!("`time.step` below {:.2e} s avoids it, and a damping ratio of 1e-3 outweighs it", QUIET * limit.closed),
+            format!("Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3", QUIET * limit.closed),
         )
     })
 }

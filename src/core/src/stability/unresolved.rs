@@ -78,7 +78,7 @@ pub fn warning(step: f64, limit: f64) -> Option<Warning> {
         Warning::new(
             Topic::UnresolvedFlexibility,
             format!(
-                "modal-exact with an internal step of {step:.3e} s passes over much of the flexibility that contact sees: expect \
+                "modal-exact with an internal step of {step:.3e} s does not resolve much of the flexibility that contact sees: expect \
                  errors of some per cent"
             ),
             format!("`time.step` below {:.2e} s avoids it", NEAR * limit),

@@ -218,7 +218,7 @@ fn growth_that_is_not_looked_at_is_told() {
         rom.stiffness = stiffness;
         scene.settings.contacts[0].friction = friction;
         let simulation = models::started(&scene);
-        simulation.warnings().iter().any(|text| text.contains("is not looked at with"))
+        simulation.warnings().iter().any(|text| text.contains("is not checked with"))
     };
     for scheme in [Scheme::ModalExact, Scheme::Galerkin] {
         let found = [told(scheme, 151, 0.1), told(scheme, 151, 0.0), told(scheme, 150, 0.1)];
@@ -330,7 +330,7 @@ fn digging_in_is_told_with_its_friction() {
     let [along, across] = [(0.25 + 1.0 / 16.0 + 0.01 / 81.0), (0.5 - 0.5 / 16.0 + 0.01 / 81.0)];
     let expected = format!("µ* = {:.3}", along / across);
     // It does so without swinging, and nothing else grows.
-    let told = told.iter().filter(|text| text.contains("digs in")).collect::<Vec<_>>();
+    let told = told.iter().filter(|text| text.contains("locks up")).collect::<Vec<_>>();
     assert!(told.len() == 1 && told[0].contains(&expected), "{expected}: {told:?}");
     assert!(told[0].contains("1/s and 0 Hz") && !told[0].contains("flutter"), "{told:?}");
 }
@@ -400,6 +400,6 @@ fn the_other_sense_of_a_disk_is_told_to_be_unknown() {
         set(&mut simulation, "speed", speed);
         go(&mut simulation, 1e-6);
         let told = simulation.take_notes();
-        assert_eq!(told.iter().filter(|text| text.contains("was not looked at")).count(), expected, "{told:?}");
+        assert_eq!(told.iter().filter(|text| text.contains("was not checked")).count(), expected, "{told:?}");
     }
 }

@@ -187,13 +187,13 @@ impl<'a> Checking<'a> {
         let modes = self.models.iter().map(ModalModel::len).max().unwrap_or(0);
         // No step of galerkin adds growth: what there may be is of the equations, and stays whatever the step.
         let remedy = match self.parameters.scheme {
-            Scheme::Galerkin => "Ask a ROM with fewer modes whether it flutters or digs in",
+            Scheme::Galerkin => "Check a ROM with fewer modes for flutter and self-locking",
             _ => "Halve the internal step and compare",
         };
         (self.friction != 0.0 && modes > stability::GROWTH_UP_TO).then(|| {
             let most = stability::GROWTH_UP_TO;
             let problem =
-                format!("growth of closed, sliding contact is not looked at with {modes} modes, only up to {most}");
+                format!("growth of closed, sliding contact is not checked with {modes} modes, only up to {most}");
             Warning::new(Topic::GrowthUnchecked, problem, remedy)
         })
     }
@@ -225,8 +225,8 @@ impl<'a> Checking<'a> {
         let problem = format!(
             "cutting is physically unstable: with all contact nodes of a blade in fresh coating {motion} grows by {rate:.2e} 1/s"
         );
-        let remedy = "No shorter step helps: use a larger `normal_ratio`, a smaller `specific_energy` or more damping, or see to it \
-                      that blades leave the coating sooner than that";
+        let remedy = "No shorter step helps: use a larger `normal_ratio`, a smaller `specific_energy` or more damping, or let \
+                      the blades leave the coating sooner";
         Some(Warning::new(Topic::CuttingGrowth, problem, remedy))
     }
 

@@ -76,7 +76,7 @@ impl Compiled {
         let rigid = flexibility.iter().filter(|value| **value <= RIGID * flexibility.max()).count();
         (rigid > 0).then(|| {
             let problem = format!(
-                "with galerkin the {} highest modes follow contact at once, and leave {rigid} of {} directions of the contact nodes no \
+                "with galerkin the {} highest modes follow contact immediately, so that {rigid} of {} directions of the contact nodes have no \
                  flexibility of their own: contact that needs one of them loses energy, whatever the tolerance",
                 model.len() - dynamic,
                 flexibility.len()

@@ -289,10 +289,10 @@ impl Checking<'_> {
             };
             let contact = self.contact(nodes, sign);
             let remedy = "Use less friction, a casing that gives way, or a coating";
-            Warning::new(Topic::LockUp, format!("sliding contact digs in above µ* = {least:.3}{rate}: {contact}"), remedy)
+            Warning::new(Topic::LockUp, format!("sliding contact locks up above µ* = {least:.3}{rate}: {contact}"), remedy)
                 .with_text(format!(
-                    "sliding contact digs in: above µ* = {least:.3} ({contact}) the tip turns into the casing faster than it yields, \
-                     and its force grows without end{rate}. It is in the equations, and no shorter step helps. {remedy}"
+                    "sliding contact locks up: above µ* = {least:.3} ({contact}) the tip turns into the casing faster than it yields, \
+                     and its force grows without limit{rate}. This is physics of the model, and no shorter step helps. {remedy}"
                 ))
         });
         let flutter = physics.flutter.as_ref().map(|Flutter { found, nodes, with_mass, share }| {
@@ -300,10 +300,10 @@ impl Checking<'_> {
             let kilohertz = 1e-3 * found.frequency / std::f64::consts::TAU;
             let problem =
                 format!("contact that stays closed grows by {:.2e} 1/s at {kilohertz:.4} kHz: {contact}", found.rate);
-            let remedy = "Use less friction or more damping, or see to it that contact opens sooner than that";
+            let remedy = "Use less friction or more damping, or let contact open sooner";
             Warning::new(Topic::Flutter, problem, format!("No shorter step helps. {remedy}")).with_text(format!(
                 "sliding contact is physically unstable (flutter): {contact}, vibration at {kilohertz:.4} kHz grows by {:.2e} 1/s{} and \
-                 moves tips by up to {:.1} % of what contact does. It is in the equations, and no shorter step helps. {remedy}",
+                 moves tips by up to {:.1} % of what contact does. This is physics of the model, and no shorter step helps. {remedy}",
                 found.rate,
                 confirmed(found, with_mass.as_ref()),
                 100.0 * share
@@ -398,7 +398,7 @@ mod tests {
     #[test]
     fn flutter_is_a_note_where_contact_opens_before_it_matters() {
         let flutter = Warning::new(Topic::Flutter, "grows", "Use less friction").with_text("the whole text");
-        let lock_up = Warning::new(Topic::LockUp, "digs in", "Use less friction");
+        let lock_up = Warning::new(Topic::LockUp, "locks up", "Use less friction");
         let sense = Sense { grows: vec![lock_up, flutter], rate: 1e3, ..Sense::default() };
         // ln 1000 = 6.9 at 1000 1/s.
         for (closed, level) in [(6e-3, Level::Note), (7e-3, Level::Warning), (f64::INFINITY, Level::Warning)] {

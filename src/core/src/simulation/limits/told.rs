@@ -217,10 +217,10 @@ impl BodyLimits {
             None => vec![Warning::new(
                 Topic::OtherSense,
                 format!(
-                    "{rotor} turns the other way than at the start: whether contact that slides that way grows was not looked \
-                     at, because with coupled sectors it takes long"
+                    "{rotor} turns the other way than at the start: growth of contact that slides that way was not checked, \
+                     because the check takes long with coupled sectors"
                 ),
-                "A start with a speed of that sign looks",
+                "Start once with a speed of that sign",
             )],
         }
     }
