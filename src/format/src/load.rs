@@ -12,8 +12,9 @@ pub(crate) const BUILTIN_PREFIX: &str = "builtin:";
 
 /// Largest ROM file (bytes): mass, stiffness and three matrices of spin of 3500 coordinates, whose eigenvalues take minutes.
 pub const LARGEST_ROM: u64 = 512 << 20;
-/// Largest scene file (bytes): five thousand rotors, each with its surface. A parser makes tenfold of a text.
-pub(crate) const LARGEST_SCENE: u64 = 8 << 20;
+/// Largest scene file (bytes): six hundred rotors, each with its surface, or a measured casing of fifty thousand points. A parser makes
+/// seventy times as much of a text of short tables.
+pub(crate) const LARGEST_SCENE: u64 = 1 << 20;
 /// Largest size of all ROM files of a scene together (bytes).
 const LARGEST_ROMS: u64 = 2 << 30;
 

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use tiprub_core::settings::*;
-use tiprub_format::{Error, parse_scene, write_scene};
+use tiprub_format::{Error, load_settings, parse_scene, write_scene};
 
 use crate::common;
 
@@ -50,6 +50,20 @@ fn defaults_are_as_documented() {
 }
 
 /// `preset = "paper"` says what the file leaves out, keeps what says the same, and bears nothing else.
+/// A parser makes far more of short tables than their text has bytes; a measured casing is long and still read.
+#[test]
+fn scene_files_beyond_any_scene_are_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("scene.toml");
+    std::fs::write(&path, "[[structure]]\n".repeat(80_000)).unwrap();
+    let error = load_settings(&path).unwrap_err().to_string();
+    assert!(error.contains("more than the 1048576 bytes that are read") && error.contains("scene.toml"), "{error}");
+    let table = format!("kind = \"table\", radius_change = [{}]", "1.2345678901234e-5, ".repeat(50_000));
+    let measured = GOOD.replace("kind = \"lobes\", amplitude = 1e-4, order = 2", &table);
+    std::fs::write(&path, &measured).unwrap();
+    assert_eq!(load_settings(&path).unwrap(), parse_scene(&measured, "scene.toml").unwrap());
+}
+
 #[test]
 fn the_papers_preset_is_the_method_whole() {
     let preset = GOOD.replace("name = \"demo\"", "name = \"demo\"\npreset = \"paper\"");

@@ -121,6 +121,25 @@ fn includes_are_found_beside_the_file_that_names_them() {
     assert!(missing.contains("a.inp:1") && missing.contains("c.inp"), "{missing}");
 }
 
+/// A few kilobytes that include one file again and again must not become gigabytes, however its path is written.
+#[test]
+fn a_file_that_is_included_too_often_is_refused() {
+    let list: String = (0..20_000).map(|_| "10, 20\n").collect();
+    let include = |path: &str, count: usize| format!("*INCLUDE, INPUT={path}\n").repeat(count);
+    let head = format!("{}*NSET, NSET=TIP\n", deck());
+    let few = format!("{head}{}", include("list.txt", 4));
+    let imported = read(&[("a.inp", &few), ("list.txt", &list)], &MeshOptions::default()).unwrap();
+    assert_eq!(imported.model.set("TIP").unwrap(), [0, 1]);
+    for path in ["list.txt", "./list.txt"] {
+        let many = format!("{head}{}{}", include(path, 60), include("list.txt", 60));
+        let text = read(&[("a.inp", &many), ("list.txt", &list)], &MeshOptions::default()).unwrap_err().to_string();
+        assert!(
+            text.contains("list.txt") && text.contains("8 MiB") && text.contains("Include every file once"),
+            "{text}"
+        );
+    }
+}
+
 #[test]
 fn materials_are_converted_and_tables_read_at_a_temperature() {
     let text = deck()

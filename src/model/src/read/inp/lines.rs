@@ -1,5 +1,7 @@
 //! Lines of an input file: includes expanded, keywords with their parameters and data grouped.
 
+use std::collections::HashSet;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,8 +11,11 @@ use crate::Result;
 /// Files included within each other at most this deep, and this many in all.
 const LARGEST_DEPTH: usize = 16;
 const LARGEST_COUNT: usize = 1000;
-/// Largest size of all included files together (bytes): one may be included many times.
+/// Largest size of all included files together (bytes).
 const LARGEST_INCLUDED: usize = 1 << 30;
+/// Largest size of all repetitions together (bytes). A list of nodes may belong to several sets, but nodes and elements exist once. Lines in
+/// memory take up to thirty times their length in the file, so repetitions would make gigabytes of a few kilobytes.
+const LARGEST_REPEATED: usize = 8 << 20;
 
 /// A keyword line with what follows it.
 #[derive(Debug)]
@@ -75,8 +80,16 @@ impl Card {
 
 /// All cards of a file and of the files it includes.
 pub(super) fn cards(path: &Path, bytes: &[u8], open: Open<'_>) -> Result<Vec<Card>> {
-    let mut reader =
-        Reader { open, cards: Vec::new(), active: Vec::new(), count: 0, included: 0, before_first_keyword: None };
+    let mut reader = Reader {
+        open,
+        cards: Vec::new(),
+        active: Vec::new(),
+        count: 0,
+        included: 0,
+        known: HashSet::new(),
+        repeated: 0,
+        before_first_keyword: None,
+    };
     reader.file(path.to_path_buf(), bytes)?;
     if let Some(place) = reader.before_first_keyword {
         let problem = "data stands before the first keyword";
@@ -92,6 +105,10 @@ struct Reader<'a> {
     count: usize,
     /// Bytes of included files so far.
     included: usize,
+    /// Digests of the contents of included files, which do not depend on how a path is written.
+    known: HashSet<u64>,
+    /// Bytes of files whose contents were included before.
+    repeated: usize,
     before_first_keyword: Option<ClosestPoint>,
 }
 
@@ -169,6 +186,19 @@ impl Reader<'_> {
         if self.included > LARGEST_INCLUDED {
             let problem = format!("with {} the included files have more than 1 GiB together", path.display());
             return Err(place.error(problem, "Include every file once, or give a smaller mesh"));
+        }
+        let mut digest = DefaultHasher::new();
+        bytes.hash(&mut digest);
+        if !self.known.insert(digest.finish()) {
+            self.repeated = self.repeated.saturating_add(bytes.len());
+        }
+        if self.repeated > LARGEST_REPEATED {
+            let problem = format!(
+                "with {} more than {} MiB are included that were included before",
+                path.display(),
+                LARGEST_REPEATED >> 20
+            );
+            return Err(place.error(problem, "Include every file once"));
         }
         self.file(path, &bytes)
     }
