@@ -374,6 +374,8 @@ impl Simulation {
             for (mode, velocity) in translations.modal(velocity).into_iter().enumerate() {
                 self.system.structures_mut()[body].modes_mut().set_modal_state(mode, 0, 0.0, velocity);
             }
+            // One step ago the contact nodes were where this velocity and the length of the first step put them.
+            self.system.structures_mut()[body].modes_mut().recover();
         }
         self.launch_blades();
     }

@@ -219,11 +219,13 @@ impl Record {
         rest.iter_mut().for_each(|places| places.copy_from_slice(first));
     }
 
-    /// A sector begins its span with its nodes at the places told.
+    /// A sector begins its span with its nodes at the places told. The search for the closest points of the first step starts there too: where
+    /// trials of the span before have left off is no part of a saved state.
     pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint) {
         for (node, place) in self.places[0].iter_mut().enumerate() {
             *place = place_of(node);
         }
+        self.stay();
         self.tallies.fill(Tally::NOTHING);
         (self.work, self.implausible, self.behind_edge) = (Worked::default(), false, None);
     }

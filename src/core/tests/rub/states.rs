@@ -310,3 +310,52 @@ fn a_thousand_resets_give_identical_bits() {
         simulation.reset();
     }
 }
+
+/// The search for closest points begins where the saved nodes are, not where trials of an earlier span have left off.
+#[test]
+fn adaptive_steps_continue_from_states_with_the_same_bits() {
+    const LENGTH: f64 = 2e-5;
+    let side = 0.5 * lattice::SIDE;
+    let plates = [(lattice::Side::Left, side + 2e-5), (lattice::Side::Right, side + 4e-5)];
+    let mut scene = lattice::scene(lattice::faces([0.0, 0.01, 0.0]), &plates, true, [-6.0, 1.0, 2.0]);
+    scene = lattice::with(scene, 0.2, Solver::Coulomb, Scheme::Galerkin);
+    scene.settings.time.step = LENGTH;
+    scene.settings.surfaces.iter_mut().for_each(|surface| surface.rigid = true);
+    let mut simulation = started(&scene);
+    let (mut states, mut expected) = (Vec::new(), Vec::new());
+    for _ in 0..12 {
+        states.push(saved(&simulation));
+        go(&mut simulation, LENGTH);
+        expected.push(saved(&simulation));
+    }
+    assert!(simulation.system().ledger().contact_work.value() > 0.0, "it has touched");
+    for (index, state) in states.iter().enumerate() {
+        // Where it has just been, it comes from the end of the run.
+        for other in [&mut simulation, &mut started(&scene)] {
+            other.restore_state(state).unwrap();
+            go(other, LENGTH);
+            assert!(saved(other) == expected[index], "after communication step {}", index + 1);
+        }
+    }
+}
+
+/// A free body that touches in its first internal step, which is not as long as the scene proposes.
+#[test]
+fn the_ledger_of_a_free_body_closes_from_the_first_step_on() {
+    for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
+        for share in [1.0, 0.6, 0.41] {
+            let side = 0.5 * lattice::SIDE;
+            let plates = [(lattice::Side::Left, side + 1e-6)];
+            let mut scene = lattice::scene(lattice::faces([0.0, 0.0, 0.0]), &plates, false, [-8.0, 1.0, 0.5]);
+            scene = lattice::with(scene, 0.2, Solver::Lcp, scheme);
+            scene.settings.outputs.energies = true;
+            scene.settings.surfaces[0].rigid = true;
+            let mut simulation = started(&scene);
+            go(&mut simulation, share * 1e-6);
+            assert!(!simulation.system().events().is_empty(), "{scheme:?}: it touches in the first step");
+            let residual = real(&simulation, "energy_residual_relative");
+            println!("{}, first step {share} of the one proposed: residual {residual:.1e}", scheme.name());
+            assert!(residual.abs() < 1e-12, "{scheme:?}, {share}: {residual:e}");
+        }
+    }
+}
