@@ -52,7 +52,8 @@ pub fn check(command: &Command) -> Result<()> {
         Command::Package(arguments) => package(arguments),
         Command::Thermal(arguments) => {
             let targets = targets(arguments.fmi, &arguments.output, &arguments.name())?;
-            outputs(&libraries(&arguments.libraries)?, &fmus(&targets))
+            let read: Vec<Named> = arguments.files().into_iter().chain(libraries(&arguments.libraries)?).collect();
+            outputs(&read, &fmus(&targets))
         }
         Command::Inspect(_) => Ok(()),
     }

@@ -320,6 +320,13 @@ impl CasingMeshArguments {
     }
 }
 
+impl<'a> Source<'a> {
+    /// A mesh alone.
+    pub fn mesh(file: &'a Path, model: &'a ModelOptions) -> Self {
+        Self { file: Some(file), model, matrices: None, kept: KeptOptions::default() }
+    }
+}
+
 impl Source<'_> {
     /// Name of the model.
     pub fn name(&self) -> String {

@@ -1,19 +1,33 @@
 //! Options of `tiprub thermal`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tiprub_model::{CasingOptions, casing::CASING37};
+use tiprub_shell::places::Named;
 
 use crate::{
     casing_arguments::RingArguments,
     cli::{FmiChoice, LibraryArguments},
+    own_arguments::{AxisChoice, ModelOptions, Source, UnitChoice},
     shared_arguments::axial,
 };
 
 /// Arguments of `tiprub thermal`.
 #[derive(Debug, Args)]
 pub struct ThermalArguments {
+    /// Mesh file of a casing of your own, of one material: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh), instead of a contour.
+    #[arg(value_name = "FILE", conflicts_with_all = ["contour", "thickness", "low_flange", "high_flange", "element", "mesh"])]
+    pub file: Option<PathBuf>,
+    /// Set of the nodes of the inner surface of FILE [default: found in the mesh].
+    #[arg(long, value_name = "SET", requires = "file")]
+    pub contact_set: Option<String>,
+    /// Units of FILE; everything on the command line is in SI units [default: m].
+    #[arg(long, value_enum, requires = "file")]
+    pub units: Option<UnitChoice>,
+    /// Engine axis in FILE; the others follow in turn [default: z].
+    #[arg(long, value_enum, requires = "file")]
+    pub axis: Option<AxisChoice>,
     /// The casing, as for `tiprub reduce casing`: with the same options patches are the same.
     #[command(flatten)]
     pub ring: RingArguments,
@@ -29,13 +43,14 @@ pub struct ThermalArguments {
     /// Film coefficient of the air outside (W/(m2 K)) [default: 25].
     #[arg(long, value_name = "H")]
     pub ambient_film: Option<f64>,
-    /// Axial positions (m) between which the inner surface is heated [default: from the first to the last contact ring].
+    /// Axial positions (m) between which the inner surface is heated [default: from the first to the last contact ring; of
+    /// FILE without --contact-axial all of it].
     #[arg(long, value_name = "FROM:TO", value_parser = axial, allow_hyphen_values = true)]
     pub heated: Option<[f64; 2]>,
     /// Eigenmodes kept besides responses at rest [default: 20].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Name of the model [default: casing37_thermal, of another casing casing_thermal].
+    /// Name of the model [default: casing37_thermal, of another casing casing_thermal, of FILE its name and _thermal].
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
     /// FMI version of the FMU.
@@ -56,8 +71,26 @@ impl ThermalArguments {
     /// Name of the model.
     pub fn name(&self) -> String {
         self.name.clone().unwrap_or_else(|| {
+            let stem = self.file.as_deref().and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned());
             let built_in = self.ring.options() == CasingOptions::default();
-            format!("{}_thermal", if built_in { CASING37 } else { "casing" })
+            format!("{}_thermal", stem.as_deref().unwrap_or(if built_in { CASING37 } else { "casing" }))
         })
+    }
+
+    /// How FILE is read.
+    pub fn model(&self) -> ModelOptions {
+        ModelOptions {
+            contact_set: self.contact_set.clone(),
+            units: self.units,
+            axis: self.axis,
+            material: self.ring.material,
+            ..ModelOptions::default()
+        }
+    }
+
+    /// All files that are read.
+    pub fn files(&self) -> Vec<Named> {
+        let model = self.model();
+        self.file.as_deref().map_or_else(Vec::new, |file| Source::mesh(file, &model).files())
     }
 }

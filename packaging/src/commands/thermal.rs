@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use serde_json::json;
 use tiprub_gallery::reduction;
 use tiprub_model::conduction::{
-    AMBIENT_FILM, Conduction, ConductionOptions, Conductor, GAS_FILM, MODES, reduce_ring_conduction,
+    AMBIENT_FILM, Conduction, ConductionOptions, Conductor, GAS_FILM, MODES, reduce_mesh_conduction,
+    reduce_ring_conduction,
 };
 use tiprub_shell::{
     Failure, Result,
@@ -18,17 +19,21 @@ use crate::{
     shared_arguments::MaterialChoice,
     thermal_arguments::ThermalArguments,
     thermal_fmu::ThermalPackage,
+    users_model,
 };
 
 /// Reduce, check, find the library, zip.
 ///
 /// # Errors
-/// A casing that cannot be, no library, or files that cannot be written.
+/// A casing or a mesh that cannot be, no library, or files that cannot be written.
 pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
     let casing = arguments.ring.options();
     let name = arguments.name();
     let targets = targets(arguments.fmi, &arguments.output, &name)?;
+    let own =
+        arguments.file.as_deref().map(|file| users_model::conducting(file, &arguments.model(), console)).transpose()?;
     let conductor = match arguments.ring.material {
+        None if own.is_some() => None,
         None | Some(MaterialChoice::Steel) => Some(Conductor::steel()),
         Some(MaterialChoice::Titanium) => Some(Conductor::titanium()),
         Some(MaterialChoice::MaragingSteel) => None,
@@ -36,12 +41,13 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
     let property = |given: Option<f64>, known: Option<f64>, option: &str| {
         given.or(known).ok_or_else(|| {
             let problem = "how this material conducts heat is not known here";
-            Failure::usage("--material maraging-steel", problem, format!("Give --{option} too"))
+            let what = if arguments.ring.material.is_some() { "--material maraging-steel" } else { "material of FILE" };
+            Failure::usage(what, problem, format!("Give --{option} too"))
         })
     };
     let options = ConductionOptions {
         name,
-        density: casing.material.density,
+        density: own.as_ref().map_or(casing.material.density, |own| own.material.density),
         conductor: Conductor {
             conductivity: property(arguments.conductivity, conductor.map(|known| known.conductivity), "conductivity")?,
             specific_heat: property(
@@ -52,11 +58,15 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
         },
         films: [arguments.gas_film.unwrap_or(GAS_FILM), arguments.ambient_film.unwrap_or(AMBIENT_FILM)],
         heated: arguments.heated.unwrap_or(casing.rings.axial),
+        surface: None,
         modes: arguments.modes.unwrap_or(MODES),
     };
     let reduced = reduction::with_progress("Reducing the casing", console, &|listener| {
-        reduce_ring_conduction(&casing, &options, listener)
+        let Some(own) = &own else { return reduce_ring_conduction(&casing, &options, listener) };
+        let heated = arguments.heated.or(arguments.ring.contact_axial);
+        reduce_mesh_conduction(&own.mesh, (own.set.as_deref(), heated), casing.patches, &options, listener)
     })?;
+    console.warn_texts(&own.map_or(Vec::new(), |own| own.warnings));
     let libraries = library::load(Unit::Thermal, &arguments.libraries, console)?;
     let package = ThermalPackage::new(&reduced.model, &libraries)?;
     for (version, path) in &targets {

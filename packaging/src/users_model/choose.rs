@@ -179,12 +179,12 @@ pub fn stress(imported: &Imported, asked: &BladeOptions) -> Result<StressPlaces>
 /// # Errors
 /// Sets that are missing, and a grid that they do not hold.
 pub fn grid(imported: &Imported, asked: &CasingMeshArguments) -> Result<Chosen> {
-    named_set(imported, asked.model.contact_set.as_deref(), "--contact-set")?;
+    let name = named_set(imported, asked.model.contact_set.as_deref(), "--contact-set")?;
     let clamped = clamped_nodes(imported, &asked.model.clamp_set)?;
-    let (free, _) = free_contact_nodes(imported, &asked.model, &clamped)?;
+    free_contact_nodes(imported, &asked.model, &clamped)?;
+    let (set, _) = nodes_of(imported, name, "--contact-set")?;
     let Some((mesh, _)) = &imported.model.mesh else { return Err(super::no_mesh()) };
-    let [around, along] = asked.contact_grid;
-    let grid = GridNodes::chosen(mesh, &free, around, along, asked.contact_axial).map_err(failure)?;
+    let grid = GridNodes::chosen(mesh, (&set, &clamped), asked.contact_grid, asked.contact_axial).map_err(failure)?;
     Ok(Chosen {
         stress: StressPlaces::default(),
         clamped,
@@ -237,7 +237,7 @@ fn set<'a>(imported: &'a Imported, name: &str) -> Result<&'a [usize]> {
 }
 
 /// Nodes of a set, or those whose numbers in the file are listed (then true), ascending.
-fn nodes_of(imported: &Imported, text: &str, option: &str) -> Result<(Vec<usize>, bool)> {
+pub fn nodes_of(imported: &Imported, text: &str, option: &str) -> Result<(Vec<usize>, bool)> {
     let numbers: Result<Vec<u64>, _> = text.split(',').map(|part| part.trim().parse::<u64>()).collect();
     let (Ok(numbers), false) = (numbers, imported.model.sets.contains_key(text)) else {
         return Ok((set(imported, text)?.to_vec(), false));

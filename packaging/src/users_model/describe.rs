@@ -91,10 +91,15 @@ fn contact(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> String
         );
     }
     let is_patch = |point: &ContactPoint| !point.patch.is_empty();
-    let what = if chosen.contact.iter().any(is_patch) { "contact patches" } else { "contact nodes  " };
+    let what = match chosen.contact.iter().any(is_patch) {
+        true if chosen.grid.is_some() => "contact points ",
+        true => "contact patches",
+        false => "contact nodes  ",
+    };
     let _ = write!(text, "\n  {what}           {} from {contact_set}", chosen.contact.len());
     if let Some(grid) = &chosen.grid {
-        let _ = write!(text, ": {} around x {} along", grid.around, grid.along());
+        let between = if grid.points.is_empty() { "" } else { ", on the faces of the mesh" };
+        let _ = write!(text, ": {} around x {} along{between}", grid.around, grid.along());
     }
     for point in chosen.contact.iter().filter(|_| chosen.grid.is_none()) {
         let number = imported.node_numbers[point.node];

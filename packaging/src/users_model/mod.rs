@@ -16,7 +16,7 @@ use choose::Chosen;
 use tiprub_core::rom::Frame;
 use tiprub_gallery::reduction::{self, with_progress};
 use tiprub_model::{
-    CasingOptions, FeModel, Reduction,
+    CasingOptions, FeModel, Material, Mesh, Reduction,
     casing::{self, CasingReductionOptions},
     cyclic::{CyclicOptions, ModeSelection, reduce_cyclic},
     element::Formulation,
@@ -31,7 +31,9 @@ use tiprub_study::convergence::refine::{self, Meshed};
 
 use crate::shared_arguments::KindChoice;
 use crate::{
-    own_arguments::{BladeOptions, CasingMeshArguments, FromMesh, KeptOptions, SectorArguments, Source, TipOptions},
+    own_arguments::{
+        BladeOptions, CasingMeshArguments, FromMesh, KeptOptions, ModelOptions, SectorArguments, Source, TipOptions,
+    },
     reduced::Reduced,
 };
 
@@ -130,6 +132,32 @@ pub fn casing(asked: &CasingMeshArguments, console: &Console) -> Result<Reduced>
         }
         Ok(Reduced::general(ring(&source, asked, model, chosen, console)?, clamped))
     })
+}
+
+/// A casing of one material for its heat conduction: mesh, material, the nodes of its contact set where one is named, warnings.
+///
+/// # Errors
+/// As [`blade`]; a mesh of several materials.
+pub fn conducting(file: &Path, asked: &ModelOptions, console: &Console) -> Result<ConductingMesh> {
+    let imported = import(&Source::mesh(file, asked), console)?;
+    let mut warnings = imported.warnings.clone();
+    warnings.extend(judge::judge(&imported, asked)?);
+    let set =
+        asked.contact_set.as_deref().map(|name| choose::nodes_of(&imported, name, "--contact-set")).transpose()?;
+    let Some((mesh, material)) = imported.model.mesh else { return Err(no_mesh()) };
+    Ok(ConductingMesh { mesh, material, set: set.map(|(nodes, _)| nodes), warnings })
+}
+
+/// What [`conducting`] reads.
+pub struct ConductingMesh {
+    /// Mesh.
+    pub mesh: Mesh,
+    /// Material of all its elements.
+    pub material: Material,
+    /// Nodes of the inner surface, where a set is named.
+    pub set: Option<Vec<usize>>,
+    /// What is unusual.
+    pub warnings: Vec<String>,
 }
 
 fn no_mesh() -> Failure {

@@ -5,6 +5,7 @@ mod tips;
 
 use crate::guide::told;
 use std::{
+    f64::consts::TAU,
     fs,
     path::{Path, PathBuf},
     process::{Command, Output},
@@ -327,10 +328,58 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
         project.rom("hot.rom.safetensors").extras.thermal.unwrap().loads.amax()
     };
     assert!((loads("2e-5") / loads("1e-5") - 2.0).abs() < 1e-6);
+    // Between nodes the grid lies on the faces, and counts angles from zero.
+    let between = project.run(&format!("{} --force -o between.rom.safetensors", file.replace("12x2", "13x2")));
+    let text = String::from_utf8_lossy(&between.stdout);
+    assert!(
+        between.status.success()
+            && text.contains("contact points            26 from INNER: 13 around x 2 along, on the faces"),
+        "{text}"
+    );
+    let between = project.rom("between.rom.safetensors").contact_nodes[14].position;
+    assert!((between[1] - TAU / 13.0).abs() < 1e-12 && (between[2] - 0.038).abs() < 1e-12, "{between:?}");
     for (line, code, words) in [
-        (file.replace("12x2", "13x2"), 1, ["no node at", "divides"]),
-        (file.replace("12x2", "12x14"), 1, ["fewer than 14 rings", "fewer rings"]),
+        (file.replace("12x2", "12x14"), 1, ["12 x 14 points are more than", "fewer rings"]),
         (format!("{file} --sectors 12"), 2, ["unexpected argument", "--sectors"]),
+    ] {
+        let text = project.fail(&line, code);
+        assert!(words.iter().all(|word| text.contains(word)), "{line}: {text}");
+    }
+}
+
+#[test]
+fn conducts_heat_in_a_casing_mesh_of_the_user() {
+    let project = Project::new(&[]);
+    // What packaging looks at in a library of heat conduction for Linux on x86-64.
+    let mut library = vec![0_u8; 4096];
+    library[..20].copy_from_slice(b"\x7fELF\x02\x01\x01\0\0\0\0\0\0\0\0\0\x03\0\x3e\0");
+    let parts = ["fmi2DoStep\0fmi3DoStep\0", tiprub_format::LIBRARY_RELEASE, tiprub_format::THERMAL_FILE];
+    for (place, part) in [64, 128, 512].into_iter().zip(parts) {
+        library[place..][..part.len()].copy_from_slice(part.as_bytes());
+    }
+    fs::write(project.root.path().join("library.so"), library).unwrap();
+    project.succeed(
+        "reduce casing --mesh 24x1x6 --patches 0x0 --contact-grid 12x2 --modes 8 --fixed-interface-modes 8 -o a.rom.safetensors --inp ring.inp",
+    );
+    let common = "--contact-axial 0.0026:0.038 --patches 4x1 --modes 4 --library library.so --fmi 3 -o .";
+    let own = format!("thermal ring.inp --contact-set INNER --material steel {common}");
+    let [built, own_facts] = [format!("thermal --mesh 24x1x6 --contact-grid 12x2 {common}"), own.clone()]
+        .map(|line| project.succeed(&line)["model"].take());
+    assert_eq!(own_facts["name"], "ring_thermal");
+    let numbers = |facts: &Value| -> Vec<f64> {
+        let lists = ["areas", "conductances", "time_constants"].map(|key| facts[key].as_array().unwrap().clone());
+        lists.concat().iter().chain([&facts["heat_capacity"]]).map(|value| value.as_f64().unwrap()).collect()
+    };
+    for (own, built) in numbers(&own_facts).iter().zip(numbers(&built)) {
+        assert!((own / built - 1.0).abs() < 1e-8, "{own_facts} {built}");
+    }
+    let found = project.succeed(&own.replace("--contact-set INNER", "--name found"));
+    assert_eq!(numbers(&found["model"]), numbers(&own_facts));
+    for (line, code, words) in [
+        (own.replace("--material steel", ""), 2, ["material of FILE", "--conductivity"]),
+        (own.replace("INNER", "OUTER"), 1, ["none of 144 outer faces looks towards the z axis", "--contact-set"]),
+        (own.replace("--contact-set INNER", "--axis x"), 1, ["no full ring about the z axis", "--axis"]),
+        (format!("{own} --mesh 24x1x6"), 2, ["cannot be used with", "--mesh"]),
     ] {
         let text = project.fail(&line, code);
         assert!(words.iter().all(|word| text.contains(word)), "{line}: {text}");

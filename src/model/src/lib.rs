@@ -21,6 +21,7 @@ mod error;
 pub mod fe_model;
 pub(crate) mod free_body;
 pub mod free_interface;
+pub mod inner_surface;
 pub mod inp;
 pub mod material;
 pub mod mesh;

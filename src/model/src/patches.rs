@@ -296,7 +296,11 @@ pub(crate) fn face_points(
 ) -> impl Iterator<Item = (FacePoint, f64)> {
     let at: Vec<[f64; 3]> = corners.iter().map(|&corner| kind.natural_nodes()[corner]).collect();
     // Of a triangle the third and the fourth corner are one: its sides degenerate, its area does not.
-    let at: [[f64; 3]; 4] = std::array::from_fn(|corner| at[corner.min(at.len() - 1)]);
+    points_between(std::array::from_fn(|corner| at[corner.min(at.len() - 1)]), rule)
+}
+
+/// The same between four corners in natural coordinates.
+pub(crate) fn points_between(at: [[f64; 3]; 4], rule: Vec<(f64, f64)>) -> impl Iterator<Item = (FacePoint, f64)> {
     let pairs: Vec<_> = rule.iter().flat_map(|first| rule.iter().map(|second| (*first, *second))).collect();
     pairs.into_iter().map(move |((a, wa), (b, wb))| {
         let mix =

@@ -5,13 +5,14 @@
 //! patches add up. Forces and moments of every f vanish, since a rigid motion strains nothing. The temperature jumps at
 //! the edges of a patch: what is wanted of it is the deformation of the whole, not the stress at those edges.
 
-use core::f64::consts::TAU;
+use core::f64::consts::{PI, TAU};
+use std::collections::BTreeMap;
 
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::rom::{Patch, Thermal};
 
-use crate::element::thermal_load;
+use crate::element::{ElementKind, QuadraturePoint, thermal_load_of};
 use crate::fe_model::FeModel;
 use crate::material::Material;
 use crate::mesh::{Element, Mesh};
@@ -19,7 +20,7 @@ use crate::sparse::tall_product;
 use crate::{Error, Result};
 
 /// Centroids this close to the edge between two patches (share of a turn, of the mesh's axial extent) belong to the
-/// patch that begins there, whatever their rounding.
+/// patch that begins there, whatever their rounding. Corners this close to it (of the element's extent) lie on it.
 const EDGE: f64 = 1e-9;
 
 /// Equal patches, `around` × `along`, over a whole turn from θ = 0 and the axial positions `axial` (m); those of one
@@ -81,18 +82,90 @@ pub fn patch_of_elements(mesh: &Mesh, patches: &[Patch]) -> Result<Vec<Option<us
     Ok(found)
 }
 
-/// Nodal forces per kelvin of each patch, dofs (3·node + component) × patches (N/K).
+/// What patches have of an element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ElementShare {
+    /// No patch holds any of it.
+    Nothing,
+    /// One patch holds all of it.
+    Whole(usize),
+    /// Borders of patches pass through it.
+    Divided,
+}
+
+/// What patches have of each element.
+///
+/// # Errors
+/// Those of [`patch_of_elements`].
+pub(crate) fn shares_of_elements(mesh: &Mesh, patches: &[Patch]) -> Result<Vec<ElementShare>> {
+    let share = |(element, found): (&Element, Option<usize>)| {
+        let corners = || element.nodes[..element.kind.corner_count()].iter().map(|&node| mesh.nodes[node]);
+        let ends = |axis: usize| {
+            let values = corners().map(|corner| corner[axis]);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+        };
+        let [low, high] = ends(2);
+        let slack = EDGE * (high - low);
+        let [x, y, _] = centroid(mesh, element);
+        // Angles of the corners from the middle of a patch.
+        let within = |patch: &Patch| {
+            let (middle, half) = (0.5 * (patch.angle[0] + patch.angle[1]), 0.5 * (patch.angle[1] - patch.angle[0]));
+            let turned = (y.atan2(x) - middle + PI).rem_euclid(TAU) - PI;
+            let around = corners().all(|[cx, cy, _]| {
+                let off = (cy * x - cx * y).atan2(cx * x + cy * y);
+                half > PI * (1.0 - EDGE) || (turned + off).abs() <= half + TAU * EDGE
+            });
+            around && low >= patch.axial[0] - slack && high <= patch.axial[1] + slack
+        };
+        match found {
+            Some(patch) if within(&patches[patch]) => ElementShare::Whole(patch),
+            // Without a patch for its middle, it may still reach into one.
+            None if patches.is_empty() => ElementShare::Nothing,
+            _ => ElementShare::Divided,
+        }
+    };
+    Ok(mesh.elements.iter().zip(patch_of_elements(mesh, patches)?).map(share).collect())
+}
+
+/// Points of a rule by the patches that they lie in.
+pub(crate) fn patches_of_points(
+    coordinates: &[[f64; 3]],
+    (kind, rule): (ElementKind, &[QuadraturePoint]),
+    patches: &[Patch],
+) -> Vec<(usize, Vec<QuadraturePoint>)> {
+    let mut found: BTreeMap<usize, Vec<QuadraturePoint>> = BTreeMap::new();
+    for point in rule {
+        let shape = kind.shape(point.point);
+        let [x, y, z]: [f64; 3] =
+            core::array::from_fn(|i| coordinates.iter().zip(shape.values).map(|(x, value)| x[i] * value).sum());
+        if let Some(patch) = patches.iter().position(|patch| contains(patch, y.atan2(x), z, 0.0)) {
+            found.entry(patch).or_default().push(*point);
+        }
+    }
+    found.into_iter().collect()
+}
+
+/// Nodal forces per kelvin of each patch, dofs (3·node + component) × patches (N/K). Elements across the border of a patch belong to it with
+/// the integration points that lie in it, so that the loads of patches that fill the mesh add up to that of the whole.
 ///
 /// # Errors
 /// Those of [`patch_of_elements`]; [`Error::NegativeJacobian`].
 pub fn patch_loads(mesh: &Mesh, material: &Material, patches: &[Patch]) -> Result<Mat<f64>> {
     let mut loads = Mat::zeros(3 * mesh.nodes.len(), patches.len());
-    for (number, (element, patch)) in mesh.elements.iter().zip(patch_of_elements(mesh, patches)?).enumerate() {
-        let Some(patch) = patch else { continue };
-        let forces = thermal_load(element.kind, &mesh.coordinates(element), material, number)?;
-        for (&node, force) in element.nodes.iter().zip(forces.as_chunks::<3>().0) {
-            for component in 0..3 {
-                loads[(3 * node + component, patch)] += force[component];
+    for (number, (element, share)) in mesh.elements.iter().zip(shares_of_elements(mesh, patches)?).enumerate() {
+        let coordinates = mesh.coordinates(element);
+        let rule = element.kind.stiffness_rule();
+        let parts = match share {
+            ElementShare::Nothing => Vec::new(),
+            ElementShare::Whole(patch) => vec![(patch, rule)],
+            ElementShare::Divided => patches_of_points(&coordinates, (element.kind, &rule), patches),
+        };
+        for (patch, rule) in parts {
+            let forces = thermal_load_of(element.kind, &coordinates, material, &rule, number)?;
+            for (&node, force) in element.nodes.iter().zip(forces.as_chunks::<3>().0) {
+                for component in 0..3 {
+                    loads[(3 * node + component, patch)] += force[component];
+                }
             }
         }
     }

@@ -1,9 +1,10 @@
-//! Contact nodes of a casing as a grid of rings.
+//! Contact nodes of a casing as a grid of rings: at nodes of the mesh, or between them on its faces.
 
 use core::f64::consts::TAU;
 
 use tiprub_core::rom::{ContactGrid, ContactNode};
 
+use crate::inner_surface::{InnerSurface, SurfacePoint};
 use crate::mesh::Mesh;
 use crate::reduce::ContactPoint;
 use crate::{Error, Result};
@@ -14,11 +15,18 @@ use crate::{Error, Result};
 pub struct GridNodes {
     /// Nodes of a ring.
     pub around: usize,
-    /// Node indices of the mesh (from 0), ring by ring.
+    /// Node indices of the mesh (from 0), ring by ring; of points between nodes the node with the largest weight.
     pub nodes: Vec<usize>,
     /// Slope dr/dz of the inner surface at each ring.
     pub slopes: Vec<f64>,
+    /// The points of the grid on the faces of the mesh; empty where all of them are nodes.
+    pub points: Vec<SurfacePoint>,
 }
+
+/// Fraction of the distance between neighbours around within which a place of the grid has to be met.
+const TOLERANCE: f64 = 1e-3;
+/// Points with no larger weight than this at a node that can move are clamped.
+const CLAMPED: f64 = 0.01;
 
 impl GridNodes {
     /// Sort nodes into `along` rings by z, and the nodes of a ring by angle. Slopes are those of the parabola through
@@ -51,41 +59,59 @@ impl GridNodes {
             let place = |node: usize| (angle(node) - smallest + 3.0 * quarter).rem_euclid(TAU);
             ring.sort_by(|a, b| place(*a).total_cmp(&place(*b)));
         }
-        let mut grid = Self { around, nodes: sorted, slopes: Vec::new() };
+        let mut grid = Self { around, nodes: sorted, slopes: Vec::new(), points: Vec::new() };
         grid.slopes = grid.parabolic_slopes(mesh);
         Ok(grid)
     }
 
-    /// Choose a grid among the `nodes` of a surface: `along` rings, evenly from the axial position `axial[0]` to `axial[1]` (m; the
-    /// first and the last of the nodes where absent), each at the node nearest to its place; `around` nodes at equal angles
-    /// from the smallest angle on.
+    /// Choose a grid on the surface whose nodes are the `set`, of which the `clamped` ones (ascending) cannot move: `along` rings, evenly from
+    /// the axial position `axial[0]` to `axial[1]` (m; the first and the last of the nodes that can move where absent), `around` points at
+    /// equal angles. Where the mesh has a node at each place these are taken: rings at the nodes nearest to their axial positions,
+    /// angles from the smallest angle on. Else angles count from zero, and points lie on the faces of the [`InnerSurface`].
     ///
     /// # Errors
-    /// [`Error::Invalid`] when a place of the grid has no node, saying how far the nearest one is.
-    pub fn chosen(mesh: &Mesh, nodes: &[usize], around: usize, along: usize, axial: Option<[f64; 2]>) -> Result<Self> {
+    /// [`Error::Invalid`] for a grid that is too small, and those of [`InnerSurface`].
+    pub fn chosen(
+        mesh: &Mesh,
+        (set, clamped): (&[usize], &[usize]),
+        [around, along]: [usize; 2],
+        axial: Option<[f64; 2]>,
+    ) -> Result<Self> {
         let what = "contact grid of the casing";
-        if around < 4 || along < 2 || nodes.len() < around * along {
-            let problem = format!("{} nodes cannot be {along} rings of {around}", nodes.len());
-            return Err(Error::invalid(what, problem, "Ask for at least 4 x 2, and for no more than the set has"));
+        if around < 4 || along < 2 {
+            let problem = format!("{around} around and {along} along");
+            return Err(Error::invalid(what, problem, "Ask for at least 4 x 2"));
         }
-        if let Some(node) = nodes.iter().find(|node| **node >= mesh.nodes.len()) {
+        if let Some(node) = set.iter().find(|node| **node >= mesh.nodes.len()) {
             let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
             return Err(Error::invalid(what, problem, "Name nodes of the mesh"));
         }
-        let angle = |node: usize| mesh.nodes[node][1].atan2(mesh.nodes[node][0]);
-        let height = |node: usize| mesh.nodes[node][2];
-        let heights = nodes.iter().map(|node| height(*node));
+        let free: Vec<usize> = set.iter().copied().filter(|node| clamped.binary_search(node).is_err()).collect();
+        let heights = free.iter().map(|&node| mesh.nodes[node][2]);
         let ends = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)]);
         let [from, to] = axial.unwrap_or(ends);
+        let heights: Vec<f64> = (0..along).map(|ring| from + (to - from) * ring as f64 / (along - 1) as f64).collect();
+        let (nodes, points) = match Self::nodes_at(mesh, &free, around, &heights) {
+            Some(nodes) => (nodes, Vec::new()),
+            None => Self::points_at(mesh, (set, clamped), around, &heights)?,
+        };
+        let mut grid = Self { around, nodes, slopes: Vec::new(), points };
+        grid.slopes = grid.parabolic_slopes(mesh);
+        Ok(grid)
+    }
+
+    /// The nodes of a grid, where there is one at each place and none is at two.
+    fn nodes_at(mesh: &Mesh, nodes: &[usize], around: usize, heights: &[f64]) -> Option<Vec<usize>> {
+        let angle = |node: usize| mesh.nodes[node][1].atan2(mesh.nodes[node][0]);
+        let height = |node: usize| mesh.nodes[node][2];
         let step = TAU / around as f64;
         let first =
             nodes.iter().map(|node| (angle(*node) + 1e-3 * step).rem_euclid(TAU)).fold(TAU, f64::min) - 1e-3 * step;
-        let mut chosen = Vec::with_capacity(around * along);
-        for ring in 0..along {
-            let wanted = from + (to - from) * ring as f64 / (along - 1) as f64;
+        let mut chosen = Vec::with_capacity(around * heights.len());
+        for wanted in heights {
             let off = |node: &usize| (height(*node) - wanted).abs();
             let nearest = nodes.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-            let level = nearest.map_or(wanted, |node| height(*node));
+            let level = nearest.map_or(*wanted, |node| height(*node));
             for place in 0..around {
                 let target = first + step * place as f64;
                 let miss = |node: &usize| {
@@ -93,14 +119,10 @@ impl GridNodes {
                     let [x, y, z] = mesh.nodes[*node];
                     (turned * x.hypot(y)).hypot(z - level)
                 };
-                let Some(node) = nodes.iter().copied().min_by(|a, b| miss(a).total_cmp(&miss(b))) else { continue };
+                let node = nodes.iter().copied().min_by(|a, b| miss(a).total_cmp(&miss(b)))?;
                 let radius = mesh.nodes[node][0].hypot(mesh.nodes[node][1]);
-                if miss(&node) > 1e-3 * step * radius {
-                    let (degrees, distance) = (target.to_degrees(), miss(&node));
-                    let problem =
-                        format!("no node at {degrees:.3}° and z = {level:.6} m: the nearest is {distance:.2e} m away");
-                    let remedy = "Ask for a number of nodes around that divides the mesh's, and for rings that it has";
-                    return Err(Error::invalid(what, problem, remedy));
+                if miss(&node) > TOLERANCE * step * radius {
+                    return None;
                 }
                 chosen.push(node);
             }
@@ -108,13 +130,45 @@ impl GridNodes {
         let mut distinct = chosen.clone();
         distinct.sort_unstable();
         distinct.dedup();
-        if distinct.len() < chosen.len() {
-            let problem = format!("the mesh has fewer than {along} rings from z = {from:.6} m to {to:.6} m");
-            return Err(Error::invalid(what, problem, "Ask for fewer rings, or other axial positions"));
+        (distinct.len() == chosen.len()).then_some(chosen)
+    }
+
+    /// The points of a grid on the faces of the mesh, each with its node.
+    fn points_at(
+        mesh: &Mesh,
+        (set, clamped): (&[usize], &[usize]),
+        around: usize,
+        heights: &[f64],
+    ) -> Result<(Vec<usize>, Vec<SurfacePoint>)> {
+        let surface = InnerSurface::find(mesh, Some(set), Some([heights[0], heights[heights.len() - 1]]))?;
+        let step = TAU / around as f64;
+        let radius = surface.radius();
+        let (mut nodes, mut points) = (Vec::new(), Vec::new());
+        for &height in heights {
+            for place in 0..around {
+                let mut point = surface.point(step * place as f64, height, TOLERANCE * step * radius)?;
+                // Held nodes do not move: a force at the point still goes to the others with their weights.
+                point.weights.retain(|(node, _)| clamped.binary_search(node).is_err());
+                let largest = point.weights.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+                let Some(&(node, _)) = largest.filter(|(_, weight)| weight.abs() > CLAMPED) else {
+                    let degrees = (step * place as f64).to_degrees();
+                    let problem = format!("the point at {degrees:.3}° and z = {height:.6} m is at clamped nodes");
+                    let remedy = "Give axial positions away from what is clamped (--contact-axial)";
+                    return Err(Error::invalid("contact grid of the casing", problem, remedy));
+                };
+                nodes.push(node);
+                points.push(point);
+            }
         }
-        let mut grid = Self { around, nodes: chosen, slopes: Vec::new() };
-        grid.slopes = grid.parabolic_slopes(mesh);
-        Ok(grid)
+        Ok((nodes, points))
+    }
+
+    /// Position (x, y, z) of each point of the grid (m).
+    pub fn positions(&self, mesh: &Mesh) -> Vec<[f64; 3]> {
+        if self.points.is_empty() {
+            return self.nodes.iter().map(|&node| mesh.nodes[node]).collect();
+        }
+        self.points.iter().map(|point| point.position).collect()
     }
 
     /// Check that nodes and slopes fill whole rings.
@@ -122,7 +176,9 @@ impl GridNodes {
     /// # Errors
     /// [`Error::Invalid`] giving the counts.
     pub(crate) fn validate(&self) -> Result<()> {
-        let whole = self.around > 0 && self.nodes.len().is_multiple_of(self.around);
+        let whole = self.around > 0
+            && self.nodes.len().is_multiple_of(self.around)
+            && (self.points.is_empty() || self.points.len() == self.nodes.len());
         if whole && self.slopes.len() == self.along() {
             return Ok(());
         }
@@ -143,8 +199,7 @@ impl GridNodes {
 
     /// The contact nodes in the cylindrical frame.
     pub(crate) fn contact_nodes(&self, mesh: &Mesh) -> Vec<ContactNode> {
-        let node = |(index, node): (usize, &usize)| {
-            let [x, y, z] = mesh.nodes[*node];
+        let node = |(index, [x, y, z]): (usize, [f64; 3])| {
             let meridional_slope = self.slopes[index / self.around];
             ContactNode {
                 name: self.name(index),
@@ -153,13 +208,16 @@ impl GridNodes {
                 ..ContactNode::default()
             }
         };
-        self.nodes.iter().enumerate().map(node).collect()
+        self.positions(mesh).into_iter().enumerate().map(node).collect()
     }
 
-    /// The contact nodes before the reduction.
+    /// The contact nodes before the reduction; points between nodes as patches of the nodes of their faces.
     pub fn contact_points(&self) -> Vec<ContactPoint> {
         let slope = |index: usize| self.slopes[index / self.around];
-        let point = |(index, node): (usize, &usize)| ContactPoint::at(self.name(index), *node, slope(index));
+        let point = |(index, node): (usize, &usize)| ContactPoint {
+            patch: self.points.get(index).map_or(Vec::new(), |point| point.weights.clone()),
+            ..ContactPoint::at(self.name(index), *node, slope(index))
+        };
         self.nodes.iter().enumerate().map(point).collect()
     }
 
@@ -170,11 +228,11 @@ impl GridNodes {
 
     /// Mean z and r of every ring.
     fn rings(&self, mesh: &Mesh) -> Vec<[f64; 2]> {
-        let mean = |ring: &[usize], value: &dyn Fn([f64; 3]) -> f64| {
-            ring.iter().map(|node| value(mesh.nodes[*node])).sum::<f64>() / ring.len() as f64
+        let mean = |ring: &[[f64; 3]], value: &dyn Fn([f64; 3]) -> f64| {
+            ring.iter().map(|point| value(*point)).sum::<f64>() / ring.len() as f64
         };
-        let ring = |ring| [mean(ring, &|[_, _, z]| z), mean(ring, &|[x, y, _]| x.hypot(y))];
-        self.nodes.chunks(self.around).map(ring).collect()
+        let ring = |ring: &[[f64; 3]]| [mean(ring, &|[_, _, z]| z), mean(ring, &|[x, y, _]| x.hypot(y))];
+        self.positions(mesh).chunks(self.around).map(ring).collect()
     }
 
     fn parabolic_slopes(&self, mesh: &Mesh) -> Vec<f64> {

@@ -13,16 +13,17 @@ use super::condense::condense;
 use super::grid::GridNodes;
 use super::modal_form::{ModalForm, modal_form};
 use super::support::HeldRows;
-use crate::Result;
 use crate::assembly::{assemble_with, free_dofs};
 use crate::craig_bampton::{CraigBampton, InnerBasis, craig_bampton_with};
 use crate::element::Formulation;
 use crate::material::Material;
 use crate::mesh::Mesh;
+use crate::patches::PatchCoordinates;
 use crate::progress::{Listener, Stage, report};
-use crate::reduce::{Reduction, check_nodes, compare, element_names, full_modes};
+use crate::reduce::{ContactPoint, Reduction, check_nodes, compare, element_names, full_modes};
 use crate::sparse::{principal_pair, tall_product};
 use crate::thermal::patch_loads;
+use crate::{Error, Result};
 
 /// Rigid-body motions of a free structure.
 const RIGID: usize = 6;
@@ -66,8 +67,12 @@ pub fn reduce_casing(
     // As for blades: the library's own threads would split sums by their number, and with it the bits of the ROM.
     faer::set_global_parallelism(faer::Par::Seq);
     grid.validate()?;
-    check_nodes(&mesh.nodes, clamped, &grid.contact_points(), Frame::Cylindrical)?;
+    let contact = grid.contact_points();
+    check_nodes(&mesh.nodes, clamped, &contact, Frame::Cylindrical)?;
     let free = free_dofs(mesh.nodes.len(), clamped);
+    // Points between nodes become degrees of freedom of their own, in the directions of the mesh.
+    let coordinates =
+        PatchCoordinates::new(&free, &mesh.nodes, &contact, Frame::Cartesian).map_err(|_| too_fine(grid))?;
     let all_loads = patch_loads(&mesh, material, patches)?;
     let loads = Mat::from_fn(free.len(), patches.len(), |i, k| all_loads[(free[i], k)]);
     let assembled = assemble_with(&mesh, material, options.formulation, listener)?;
@@ -76,10 +81,23 @@ pub fn reduce_casing(
     let (stiffness, mass) = principal_pair(&assembled.stiffness, &assembled.mass, &free);
     drop(assembled);
     let full = full_modes(&stiffness, &mass, clamped.is_empty(), options.checked_modes, listener)?;
-    let inner = InnerBasis { modes: options.fixed_interface_modes, whole_pairs: true, loads: Some(loads.as_ref()) };
-    let reduced = craig_bampton_with(&stiffness, &mass, &interface_dofs(&free, grid), &inner, listener)?;
+    let basis = |loads| InnerBasis { modes: options.fixed_interface_modes, whole_pairs: true, loads: Some(loads) };
+    let reduced = match &coordinates {
+        None => {
+            craig_bampton_with(&stiffness, &mass, &interface_dofs(&free, &contact), &basis(loads.as_ref()), listener)?
+        }
+        Some(coordinates) => {
+            let (stiffness, mass) = coordinates.transformed_sparsely(&stiffness, &mass);
+            let mut loads = loads.clone();
+            coordinates.project(&mut loads);
+            let interface = interface_dofs(&free, coordinates.points());
+            let mut reduced = craig_bampton_with(&stiffness, &mass, &interface, &basis(loads.as_ref()), listener)?;
+            coordinates.restore(&mut reduced.transformation);
+            reduced
+        }
+    };
     let order = reduced.mass.nrows();
-    let points: Vec<[f64; 3]> = grid.nodes.iter().map(|&node| mesh.nodes[node]).collect();
+    let points = grid.positions(&mesh);
     let rigid = if clamped.is_empty() { rigid_motions(&points, order) } else { DMatrix::zeros(order, 0) };
     let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
     let reduced_loads = reduced_loads(grid, &reduced, &loads);
@@ -96,7 +114,7 @@ pub fn reduce_casing(
         mass: DMatrix::identity(modes.squares.len(), modes.squares.len()),
         stiffness: DMatrix::from_diagonal(&DVector::from_column_slice(&modes.squares)),
         damping_ratio: options.damping_ratio,
-        contact_map: contact_map(&mesh, grid, &modes),
+        contact_map: contact_map(&points, &modes),
         contact_nodes: grid.contact_nodes(&mesh),
         checks,
         extras: RomExtras {
@@ -111,9 +129,20 @@ pub fn reduce_casing(
     Ok(Reduction { fixed_interface_frequencies, ..Reduction::new(rom, &full.modes, &free, &modes.squares, model)? })
 }
 
+/// A grid whose points follow from each other.
+fn too_fine(grid: &GridNodes) -> Error {
+    let problem =
+        format!("{} x {} points are more than the faces of the mesh can move independently", grid.around, grid.along());
+    Error::invalid(
+        "contact grid of the casing",
+        problem,
+        "Ask for fewer points around or fewer rings, or refine the mesh",
+    )
+}
+
 /// Rows of the contact nodes' dofs among the free ones; none is clamped.
-fn interface_dofs(free: &[usize], grid: &GridNodes) -> Vec<usize> {
-    let dofs = grid.nodes.iter().flat_map(|node| (0..3).map(move |component| 3 * node + component));
+fn interface_dofs(free: &[usize], contact: &[ContactPoint]) -> Vec<usize> {
+    let dofs = contact.iter().flat_map(|point| (0..3).map(move |component| 3 * point.node + component));
     dofs.map(|dof| free.partition_point(|other| *other < dof)).collect()
 }
 
@@ -144,10 +173,9 @@ pub(crate) fn rigid_motions(points: &[[f64; 3]], order: usize) -> DMatrix<f64> {
 }
 
 /// Radial, tangential and axial displacement of the contact nodes, 3·nodes × modes.
-fn contact_map(mesh: &Mesh, grid: &GridNodes, modes: &ModalForm) -> DMatrix<f64> {
-    let mut map = modes.shapes.rows(0, 3 * grid.nodes.len()).into_owned();
-    for (index, &node) in grid.nodes.iter().enumerate() {
-        let [x, y, _] = mesh.nodes[node];
+fn contact_map(points: &[[f64; 3]], modes: &ModalForm) -> DMatrix<f64> {
+    let mut map = modes.shapes.rows(0, 3 * points.len()).into_owned();
+    for (index, &[x, y, _]) in points.iter().enumerate() {
         let radius = x.hypot(y);
         let (cos, sin) = (x / radius, y / radius);
         for mode in 0..map.ncols() {

@@ -139,6 +139,7 @@ pub fn ring_mesh(
         around: rings.around,
         nodes: nodes.map(|place| numbers[&place]).collect(),
         slopes: contact.iter().map(|z| geometry.contour.slope(*z)).collect(),
+        points: Vec::new(),
     };
     Ok(RingMesh { mesh, grid })
 }

@@ -2,13 +2,13 @@
 //!
 //! C Ṫ + (K + s_g H_g + s_a H_a) T = heat, with the heat capacity C = ∫ρc N Nᵀ, conduction K = ∫k ∇N·∇N, and films H = ∫h N Nᵀ on
 //! the surface in the gas and on that in the air. Faces that look towards the axis are in the gas, the end faces let no heat
-//! through, all others are in the air. Heat comes in evenly over the heated faces of a patch: those in the gas between two axial
-//! positions, as a rule the outermost contact rings. Patches are those of the mechanical model, so that numbers agree.
+//! through, all others are in the air. Heat comes in evenly over the heated surface of a patch: what is in the gas between two axial
+//! positions, as a rule the outermost contact rings; faces across a border are cut there. Patches are those of the mechanical model, so that numbers agree.
 
 mod reduction;
 mod surfaces;
 
-pub use reduction::{Conduction, SteadyCheck, reduce_conduction, reduce_ring_conduction};
+pub use reduction::{Conduction, SteadyCheck, reduce_conduction, reduce_mesh_conduction, reduce_ring_conduction};
 pub use surfaces::Surfaces;
 
 use std::sync::Arc;
@@ -20,10 +20,10 @@ use tiprub_core::rom::Patch;
 use tiprub_core::shown;
 
 use crate::assembly::neighbours;
-use crate::element::{conduction, consistent_mass};
+use crate::element::{conduction, consistent_mass, shape_integrals};
 use crate::mesh::Mesh;
 use crate::sparse::{Pattern, SparseMatrix};
-use crate::thermal::patch_of_elements;
+use crate::thermal::{ElementShare, patches_of_points, shares_of_elements};
 use crate::{Error, Result};
 
 /// How a material conducts and stores heat.
@@ -65,6 +65,8 @@ pub struct ConductionOptions {
     pub films: [f64; 2],
     /// Axial positions (m) between which faces in the gas are heated.
     pub heated: [f64; 2],
+    /// Corner nodes of the faces that are heated; all faces in the gas where absent.
+    pub surface: Option<Vec<usize>>,
     /// Number of eigenmodes, besides the uniform temperature and the responses at rest.
     pub modes: usize,
 }
@@ -139,14 +141,13 @@ impl FullConduction {
             return Err(Error::invalid("thermal model, patches", "there is none", remedy));
         }
         let pattern = Arc::new(node_pattern(mesh));
-        let surfaces = Surfaces::new(mesh, options.heated)?;
+        let surfaces = Surfaces::new(mesh, options.heated, options.surface.as_deref())?;
         let (conduction, capacity) = volumes(mesh, options, &pattern)?;
         let films = [0, 1].map(|side| surfaces.film(mesh, &pattern, side, options.films[side]));
-        let of_elements = patch_of_elements(mesh, patches)?;
         Ok(Self {
             wetted: surfaces.wetted_means(mesh),
-            heat: surfaces.heat(mesh, &of_elements, patches.len())?,
-            patch_means: patch_means(mesh, &of_elements, patches.len())?,
+            heat: surfaces.heat(mesh, patches)?,
+            patch_means: patch_means(mesh, patches)?,
             places: surfaces.places(mesh),
             areas: surfaces.areas(mesh),
             depth: surfaces.depth(mesh)?,
@@ -217,17 +218,31 @@ fn volumes(mesh: &Mesh, options: &ConductionOptions, pattern: &Arc<Pattern>) -> 
     Ok((matrix(first), matrix(second)))
 }
 
-/// ∫ N dV / V of each patch.
-fn patch_means(mesh: &Mesh, of_elements: &[Option<usize>], patches: usize) -> Result<Mat<f64>> {
-    let mut means = Mat::<f64>::zeros(mesh.nodes.len(), patches);
-    let mut volumes = vec![0.0; patches];
-    for (number, (element, patch)) in mesh.elements.iter().zip(of_elements).enumerate() {
-        let Some(patch) = *patch else { continue };
-        let products = consistent_mass(element.kind, &mesh.coordinates(element), 1.0, number)?;
-        for (&node, part) in element.nodes.iter().zip(products.row_sum().iter()) {
-            means[(node, patch)] += part;
-            volumes[patch] += part;
+/// ∫ N dV / V of each patch; elements across its borders belong to it with the points of their mass matrix that lie in it.
+fn patch_means(mesh: &Mesh, patches: &[Patch]) -> Result<Mat<f64>> {
+    let mut means = Mat::<f64>::zeros(mesh.nodes.len(), patches.len());
+    let mut volumes = vec![0.0; patches.len()];
+    for (number, (element, share)) in mesh.elements.iter().zip(shares_of_elements(mesh, patches)?).enumerate() {
+        let coordinates = mesh.coordinates(element);
+        let parts = match share {
+            ElementShare::Nothing => Vec::new(),
+            ElementShare::Whole(patch) => {
+                let products = consistent_mass(element.kind, &coordinates, 1.0, number)?;
+                vec![(patch, products.row_sum().iter().copied().collect::<Vec<f64>>())]
+            }
+            ElementShare::Divided => {
+                patches_of_points(&coordinates, (element.kind, &element.kind.mass_rule()), patches)
+                    .into_iter()
+                    .map(|(patch, rule)| Ok((patch, shape_integrals(element.kind, &coordinates, &rule, number)?)))
+                    .collect::<Result<_>>()?
+            }
+        };
+        for (patch, integrals) in parts {
+            for (&node, part) in element.nodes.iter().zip(integrals) {
+                means[(node, patch)] += part;
+                volumes[patch] += part;
+            }
         }
     }
-    Ok(Mat::from_fn(mesh.nodes.len(), patches, |i, k| means[(i, k)] / volumes[k]))
+    Ok(Mat::from_fn(mesh.nodes.len(), patches.len(), |i, k| means[(i, k)] / volumes[k]))
 }

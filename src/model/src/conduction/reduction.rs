@@ -14,8 +14,10 @@ use tiprub_thermal::Model;
 use super::{ConductionOptions, FullConduction};
 use crate::casing::{CasingOptions, supported_ring};
 use crate::eigen::{Modes, lowest_modes, positive_factor};
+use crate::inner_surface::InnerSurface;
 use crate::mesh::Mesh;
 use crate::progress::{Listener, Stage, report};
+use crate::read::bounding_box;
 use crate::sparse::{SparseMatrix, tall_product};
 use crate::thermal::equal_patches;
 use crate::{Error, Result};
@@ -72,6 +74,26 @@ pub fn reduce_ring_conduction(
     let patches = equal_patches(around, along, casing.geometry.contour.axial());
     report(listener, Stage::Mesh, 1, 1);
     reduce_conduction(&ring.mesh, &patches, options, listener)
+}
+
+/// Reduce the conduction of a casing of one's own, a full ring about the z axis, with equal patches `[around, along]` over its length. The
+/// [`InnerSurface`] of the `set` of nodes (of all where absent) is heated between the axial positions `heated` (m; all of it where absent).
+///
+/// # Errors
+/// Those of [`InnerSurface::find`] and [`reduce_conduction`].
+pub fn reduce_mesh_conduction(
+    mesh: &Mesh,
+    (set, heated): (Option<&[usize]>, Option<[f64; 2]>),
+    [around, along]: [usize; 2],
+    options: &ConductionOptions,
+    listener: Listener<'_>,
+) -> Result<Conduction> {
+    let surface = InnerSurface::find(mesh, set, heated)?;
+    let [low, high] = bounding_box(&mesh.nodes);
+    let patches = equal_patches(around, along, [low[2], high[2]]);
+    let heated = heated.unwrap_or_else(|| surface.axial());
+    let options = ConductionOptions { heated, surface: Some(surface.corner_nodes()), ..options.clone() };
+    reduce_conduction(mesh, &patches, &options, listener)
 }
 
 /// Reduce the conduction of a mesh around the z axis.

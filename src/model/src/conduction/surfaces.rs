@@ -1,63 +1,58 @@
 //! The surface of a casing: which faces are in the gas, in the air, heated; integrals over them.
 
-use std::collections::{BTreeSet, HashMap};
+use core::f64::consts::TAU;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use faer::Mat;
+use tiprub_core::rom::Patch;
 
 use super::add;
-use crate::element::consistent_mass;
-use crate::mesh::{Element, Mesh};
-use crate::patches::{face_points, on_face};
+use crate::element::{ElementKind, consistent_mass};
+use crate::inner_surface::{Face, outer_faces};
+use crate::mesh::Mesh;
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, Result};
 
-/// A face looks towards the axis where its normal is within 45 degrees of that direction.
-const INWARD: f64 = -core::f64::consts::FRAC_1_SQRT_2;
 /// Axial positions closer than this share of the length are one.
 const SAME: f64 = 1e-9;
-/// Gauss-Legendre on 0 to 1.
-const GAUSS_3: [(f64, f64); 3] =
-    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
-
-/// A face of an element: number of the element, its own numbers of the corners.
-#[derive(Debug, Clone, Copy)]
-struct Face {
-    element: usize,
-    corners: &'static [usize],
-}
 
 /// Faces by what they meet.
 #[derive(Debug, Clone)]
 pub struct Surfaces {
     /// In the gas, in the air.
     sides: [Vec<Face>; 2],
+    /// Faces in the gas of which some is heated.
     heated: Vec<Face>,
+    /// Axial positions between which these are heated (m).
+    axial: [f64; 2],
 }
 
 impl Surfaces {
-    /// Outer faces of the mesh; those in the gas between the axial positions `heated` (m) are heated.
+    /// Outer faces of the mesh; those in the gas are heated between the axial positions `heated` (m), faces across these in part. Where corner
+    /// nodes of a `surface` are given, only its faces are.
     ///
     /// # Errors
     /// No face in the gas, or none that is heated.
-    pub fn new(mesh: &Mesh, heated: [f64; 2]) -> Result<Self> {
+    pub fn new(mesh: &Mesh, heated: [f64; 2], surface: Option<&[usize]>) -> Result<Self> {
+        let mut named = vec![surface.is_none(); mesh.nodes.len()];
+        surface.into_iter().flatten().for_each(|&node| named[node] = true);
         let axial = mesh.nodes.iter().map(|node| node[2]);
         let [low, high] = axial.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| [a.min(z), b.max(z)]);
         let slack = SAME * (high - low);
-        let mut surfaces = Self { sides: [Vec::new(), Vec::new()], heated: Vec::new() };
+        let mut surfaces = Self { sides: [Vec::new(), Vec::new()], heated: Vec::new(), axial: heated };
         for face in outer_faces(mesh) {
             let corners = face.corner_positions(mesh);
             let at = |end: f64| corners.iter().all(|corner| (corner[2] - end).abs() <= slack);
             if at(low) || at(high) {
                 continue;
             }
-            if !looks_inward(&corners) {
+            if !face.looks_inward(mesh) {
                 surfaces.sides[1].push(face);
                 continue;
             }
             surfaces.sides[0].push(face);
-            let middle = corners.iter().map(|corner| corner[2]).sum::<f64>() / corners.len() as f64;
-            if middle > heated[0] && middle < heated[1] {
+            if face.corner_nodes(mesh).iter().all(|&node| named[node]) && face.meets(mesh, &all_round(heated)) {
                 surfaces.heated.push(face);
             }
         }
@@ -93,15 +88,24 @@ impl Surfaces {
         normalised(means)
     }
 
-    /// ∫ N dA / A of the heated faces of each patch.
+    /// ∫ N dA / A of the heated surface of each patch: faces across its borders are cut there.
     ///
     /// # Errors
     /// A patch without one.
-    pub(super) fn heat(&self, mesh: &Mesh, of_elements: &[Option<usize>], patches: usize) -> Result<Mat<f64>> {
-        let mut means = Mat::zeros(mesh.nodes.len(), patches);
-        let of_patches = self.heated.iter().filter_map(|face| Some((face, of_elements[face.element]?)));
-        add_means(mesh, of_patches, &mut means);
-        let empty = (0..patches).find(|&patch| means.col(patch).iter().all(|value| *value == 0.0));
+    pub(super) fn heat(&self, mesh: &Mesh, patches: &[Patch]) -> Result<Mat<f64>> {
+        let mut means = Mat::zeros(mesh.nodes.len(), patches.len());
+        let [from, to] = self.axial;
+        for (column, patch) in patches.iter().enumerate() {
+            let [low, high] = patch.axial;
+            let within = Patch { angle: patch.angle, axial: [low.max(from), high.min(to)] };
+            for face in &self.heated {
+                let nodes = &mesh.elements[face.element].nodes;
+                face.integrate_within(mesh, &within, |shape, area| {
+                    nodes.iter().zip(shape).for_each(|(&node, value)| means[(node, column)] += value * area);
+                });
+            }
+        }
+        let empty = (0..patches.len()).find(|&patch| means.col(patch).iter().all(|value| *value == 0.0));
         empty.map_or_else(
             || Ok(normalised(means)),
             |patch| {
@@ -124,7 +128,8 @@ impl Surfaces {
         nodes.collect::<BTreeSet<_>>().into_iter().collect()
     }
 
-    /// Largest depth of an element under a heated face (m): its volume over the area of the face.
+    /// Largest depth of an element under a heated face (m): its volume over the area of the face, times three where it ends in a corner and two
+    /// where it ends in an edge.
     ///
     /// # Errors
     /// An element without volume.
@@ -135,63 +140,36 @@ impl Surfaces {
             let products = consistent_mass(element.kind, &mesh.coordinates(element), 1.0, face.element)?;
             let mut area = 0.0;
             face.integrate(mesh, |_, part| area += part);
-            deepest = deepest.max(products.sum() / area);
+            let ends = match (element.kind, face.corners.len()) {
+                (ElementKind::Tet4 | ElementKind::Tet10, _) => 3.0,
+                (ElementKind::Penta6 | ElementKind::Penta15, 4) => 2.0,
+                _ => 1.0,
+            };
+            deepest = deepest.max(ends * products.sum() / area);
         }
         Ok(deepest)
     }
 
     /// In the gas, in the air, heated (m²).
     pub(super) fn areas(&self, mesh: &Mesh) -> [f64; 3] {
-        [&self.sides[0], &self.sides[1], &self.heated].map(|faces| {
+        let part = all_round(self.axial);
+        let area = |faces: &[Face], part: Option<&Patch>| {
             let mut total = 0.0;
-            faces.iter().for_each(|face| face.integrate(mesh, |_, area| total += area));
+            for face in faces {
+                match part {
+                    Some(part) => face.integrate_within(mesh, part, |_, area| total += area),
+                    None => face.integrate(mesh, |_, area| total += area),
+                }
+            }
             total
-        })
+        };
+        [area(&self.sides[0], None), area(&self.sides[1], None), area(&self.heated, Some(&part))]
     }
 }
 
-impl Face {
-    fn corner_positions(&self, mesh: &Mesh) -> Vec<[f64; 3]> {
-        let nodes = &mesh.elements[self.element].nodes;
-        self.corners.iter().map(|&corner| mesh.nodes[nodes[corner]]).collect()
-    }
-
-    /// Shape functions of the element and area at each point of a rule.
-    fn integrate(&self, mesh: &Mesh, mut visit: impl FnMut(&[f64], f64)) {
-        let element: &Element = &mesh.elements[self.element];
-        let coordinates = mesh.coordinates(element);
-        for (point, share) in face_points(element.kind, self.corners, GAUSS_3.to_vec()) {
-            let (shape, area, _) = on_face(element.kind, &coordinates, point);
-            visit(&shape, area * share);
-        }
-    }
-}
-
-/// Faces that belong to one element, in the order of elements.
-fn outer_faces(mesh: &Mesh) -> Vec<Face> {
-    let key = |element: &Element, corners: &[usize]| {
-        let mut nodes: Vec<usize> = corners.iter().map(|&corner| element.nodes[corner]).collect();
-        nodes.sort_unstable();
-        nodes
-    };
-    let mut count: HashMap<Vec<usize>, usize> = HashMap::new();
-    let all = || {
-        mesh.elements.iter().enumerate().flat_map(|(number, element)| {
-            element.kind.faces().iter().map(move |&corners| (Face { element: number, corners }, element))
-        })
-    };
-    all().for_each(|(face, element)| *count.entry(key(element, face.corners)).or_default() += 1);
-    all().filter(|(face, element)| count[&key(element, face.corners)] == 1).map(|(face, _)| face).collect()
-}
-
-/// Whether the normal of a face, counter-clockwise seen from outside, points towards the axis.
-fn looks_inward(corners: &[[f64; 3]]) -> bool {
-    let edge = |to: usize| -> [f64; 3] { core::array::from_fn(|i| corners[to][i] - corners[0][i]) };
-    let ([ax, ay, az], [bx, by, bz]) = (edge(1), edge(corners.len() - 1));
-    let [x, y, z] = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
-    let middle = [0, 1].map(|i| corners.iter().map(|corner| corner[i]).sum::<f64>());
-    let size = x.hypot(y).hypot(z) * middle[0].hypot(middle[1]);
-    x * middle[0] + y * middle[1] < INWARD * size
+/// The patch all the way round between two axial positions.
+fn all_round(axial: [f64; 2]) -> Patch {
+    Patch { angle: [0.0, TAU], axial }
 }
 
 /// Add ∫ N dA of faces to columns.

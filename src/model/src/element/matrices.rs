@@ -150,10 +150,24 @@ pub fn thermal_load(
     material: &Material,
     element: usize,
 ) -> Result<Vec<f64>> {
+    thermal_load_of(kind, coordinates, material, &kind.stiffness_rule(), element)
+}
+
+/// The same of some integration points only.
+///
+/// # Errors
+/// Those of [`thermal_load`].
+pub(crate) fn thermal_load_of(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    material: &Material,
+    rule: &[QuadraturePoint],
+    element: usize,
+) -> Result<Vec<f64>> {
     let (lambda, shear) = material.lame();
     let pressure = (3.0 * lambda + 2.0 * shear) * material.expansion;
     let mut load = vec![0.0; 3 * kind.node_count()];
-    for (index, quadrature) in kind.stiffness_rule().iter().enumerate() {
+    for (index, quadrature) in rule.iter().enumerate() {
         let mapped = map_point(kind, coordinates, quadrature, (element, index))?;
         for (a, gradient) in mapped.shape.gradients[..kind.node_count()].iter().enumerate() {
             for i in 0..3 {
@@ -162,6 +176,24 @@ pub fn thermal_load(
         }
     }
     Ok(load)
+}
+
+/// ∫ N_a dV over some integration points (m³), per node.
+///
+/// # Errors
+/// [`Error::NegativeJacobian`] with `element + 1` as the element's number.
+pub(crate) fn shape_integrals(
+    kind: ElementKind,
+    coordinates: &[[f64; 3]],
+    rule: &[QuadraturePoint],
+    element: usize,
+) -> Result<Vec<f64>> {
+    let mut integrals = vec![0.0; kind.node_count()];
+    for (index, quadrature) in rule.iter().enumerate() {
+        let mapped = map_point(kind, coordinates, quadrature, (element, index))?;
+        integrals.iter_mut().zip(mapped.shape.values).for_each(|(sum, value)| *sum += mapped.volume * value);
+    }
+    Ok(integrals)
 }
 
 /// Lumped mass per node (kg): the consistent diagonal scaled to the element's mass (Hinton, Rock, Zienkiewicz 1976).

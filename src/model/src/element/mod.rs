@@ -20,9 +20,9 @@ mod recovery;
 mod shape;
 
 pub use incompatible::{Formulation, incompatible_stiffness};
-pub(crate) use matrices::lumped_mass;
 pub use matrices::thermal_load;
 pub use matrices::{conduction, consistent_mass, stiffness, strain, stress};
+pub(crate) use matrices::{lumped_mass, shape_integrals, thermal_load_of};
 pub use nonlinear::{Tangent, geometric_stiffness, second_stresses, tangent};
 pub use quadrature::QuadraturePoint;
 pub use recovery::nodal_stress;

@@ -10,7 +10,7 @@
 //! With K ← TᵀKT and M ← TᵀMT the mean displacements of patches are boundary degrees of freedom as those of contact nodes are: they can be
 //! held, condensed to, turned. Forces on patches are forces on pivots. What fills up are the rows of nodes of patches and of those beside pivots.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Add, Mul};
 use std::sync::Arc;
 
@@ -105,6 +105,66 @@ impl PatchCoordinates {
         let pattern = Arc::new(self.filled(old, &near));
         let [stiffness, mass] = [stiffness, mass].map(|matrix| self.projected(matrix, &pattern, &near));
         Ok((stiffness, mass))
+    }
+
+    /// The same for patches of few nodes that are spread over the mesh: only nodes of a patch and those beside its pivot are coupled.
+    pub(crate) fn transformed_sparsely(
+        &self,
+        stiffness: &SparseMatrix,
+        mass: &SparseMatrix,
+    ) -> (SparseMatrix, SparseMatrix) {
+        let old = &stiffness.pattern;
+        let mut row = vec![usize::MAX; old.order()];
+        self.pivots.iter().enumerate().for_each(|(index, &dof)| row[dof] = index);
+        // What a degree of freedom of u is of those of v.
+        let parts: Vec<Vec<(usize, f64)>> = (0..self.pivots.len())
+            .map(|pivot| {
+                let own = self.touched.iter().enumerate().map(|(j, &dof)| (dof, self.dependence[(pivot, j)]));
+                own.filter(|(_, share)| *share != 0.0).collect()
+            })
+            .collect();
+        let alone: Vec<[(usize, f64); 1]> = (0..old.order()).map(|dof| [(dof, 1.0)]).collect();
+        let part = |dof: usize| row.get(dof).and_then(|&row| parts.get(row)).map_or(&alone[dof][..], Vec::as_slice);
+        let mut added: BTreeMap<(usize, usize), [f64; 2]> = BTreeMap::new();
+        for column in 0..old.order() {
+            for entry in old.starts[column]..old.starts[column + 1] {
+                let other = old.rows[entry];
+                if row[column] == usize::MAX && row[other] == usize::MAX {
+                    continue;
+                }
+                let values = [stiffness.values[entry], mass.values[entry]];
+                for &(b, share) in part(column) {
+                    for &(a, other) in part(other) {
+                        // Half of each triangle, so that rounding leaves the matrices symmetric.
+                        for place in [(b, a), (a, b)] {
+                            let sums = added.entry(place).or_default();
+                            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += 0.5 * share * other * value);
+                        }
+                    }
+                }
+            }
+        }
+        let mut pattern = Pattern { starts: vec![0], rows: Vec::with_capacity(old.rows.len()) };
+        let mut values = [Vec::with_capacity(old.rows.len()), Vec::with_capacity(old.rows.len())];
+        for column in 0..old.order() {
+            let mut entries: BTreeMap<usize, [f64; 2]> =
+                added.range((column, 0)..(column + 1, 0)).map(|(&(_, row), &sums)| (row, sums)).collect();
+            for entry in old.starts[column]..old.starts[column + 1] {
+                let other = old.rows[entry];
+                if row[column] == usize::MAX && row[other] == usize::MAX {
+                    let sums = entries.entry(other).or_default();
+                    *sums = [sums[0] + stiffness.values[entry], sums[1] + mass.values[entry]];
+                }
+            }
+            for (other, sums) in entries {
+                pattern.rows.push(other);
+                values.iter_mut().zip(sums).for_each(|(values, sum)| values.push(sum));
+            }
+            pattern.starts.push(pattern.rows.len());
+        }
+        let pattern = Arc::new(pattern);
+        let [stiffness, mass] = values.map(|values| SparseMatrix { pattern: Arc::clone(&pattern), values });
+        (stiffness, mass)
     }
 
     fn filled(&self, old: &Pattern, near: &[usize]) -> Pattern {
@@ -313,11 +373,15 @@ mod tests {
         let whole = matrix(18, 4, |i, j| if i == j { 9.0 } else { ((7 * i + 3 * j) as f64).sin() });
         let (found, same) = own.transformed(&whole, &whole).unwrap();
         assert!(found.values == same.values && found.pattern == same.pattern);
+        let (sparse, same) = own.transformed_sparsely(&whole, &whole);
+        assert!(sparse.values == same.values && sparse.pattern == same.pattern);
         let mut turned = Mat::<f64>::identity(18, 18);
         own.restore(&mut turned);
         let all: Vec<usize> = (0..18).collect();
         let expected = turned.transpose() * whole.block(&all, &all) * &turned;
-        assert!((found.block(&all, &all) - &expected).norm_max() < 1e-12 * expected.norm_max());
+        for found in [found, sparse] {
+            assert!((found.block(&all, &all) - &expected).norm_max() < 1e-12 * expected.norm_max());
+        }
         let mut forces = whole.block(&all, &all);
         own.project(&mut forces);
         assert!((forces - turned.transpose() * whole.block(&all, &all)).norm_max() < 1e-12);

@@ -131,7 +131,8 @@ pub fn stage_casing_mesh(options: &StageCasingOptions) -> Result<RingMesh> {
     let step = 2 * options.around / around;
     let (low, between) = (2 * (ALONG[0] + ALONG[1]), 2 * ALONG[2] / (along - 1));
     let places = (0..along).flat_map(|k| (0..around).map(move |i| [step * i, low + between * k, 0]));
-    let grid = GridNodes { around, nodes: places.map(|place| numbers[&place]).collect(), slopes: vec![0.0; along] };
+    let nodes = places.map(|place| numbers[&place]).collect();
+    let grid = GridNodes { around, nodes, slopes: vec![0.0; along], points: Vec::new() };
     Ok(RingMesh { mesh, grid })
 }
 

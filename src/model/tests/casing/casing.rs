@@ -20,7 +20,7 @@ use tiprub_model::thermal::{equal_patches, patch_loads};
 use tiprub_model::{CasingOptions, Material, Mesh, Reduction, reduce_casing, reduce_ring};
 
 /// Displacement of the whole finite-element model at rest, all dofs × loads.
-fn full_at_rest(mesh: &Mesh, material: &Material, clamped: &[usize], loads: &Mat<f64>) -> Mat<f64> {
+pub(super) fn full_at_rest(mesh: &Mesh, material: &Material, clamped: &[usize], loads: &Mat<f64>) -> Mat<f64> {
     let assembled = assemble(mesh, material, &silent).unwrap();
     let free = free_dofs(mesh.nodes.len(), clamped);
     let (stiffness, _) = principal_pair(&assembled.stiffness, &assembled.mass, &free);

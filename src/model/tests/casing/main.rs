@@ -9,3 +9,4 @@ mod casing;
 mod closed_rings;
 mod momentum;
 mod ring;
+mod unstructured;

@@ -3,6 +3,7 @@
 
 pub mod casing;
 pub mod disk;
+pub mod tetrahedra;
 
 use nalgebra::DMatrix;
 use tiprub_model::Material;

@@ -6,6 +6,7 @@ mod common;
 
 mod closed_forms;
 mod reduction;
+mod unstructured;
 
 use std::f64::consts::PI;
 
@@ -18,7 +19,7 @@ use tiprub_thermal::Simulation;
 /// Steel with the films given (W/(m² K)).
 fn options(films: [f64; 2], heated: [f64; 2], modes: usize) -> ConductionOptions {
     let conductor = Conductor::steel();
-    ConductionOptions { name: "wall".into(), density: 7850.0, conductor, films, heated, modes }
+    ConductionOptions { name: "wall".into(), density: 7850.0, conductor, films, heated, surface: None, modes }
 }
 
 /// One patch that holds everything.
