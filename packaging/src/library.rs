@@ -229,12 +229,12 @@ fn find(unit: Unit, arguments: &LibraryArguments, console: &Console) -> Result<(
         Origin::Nowhere => Err(Failure::new(
             "FMU library",
             format!(
-                "none beside {} or in ../lib/tiprub from there, by a name such as {}{}, and the sources of this program are gone",
+                "not found beside {} or in ../lib/tiprub relative to it (file name such as {}{}), and the sources of this program no longer exist",
                 executable.display(),
                 unit.prefix(),
                 Platform::X86_64Linux.file_name()
             ),
-            "Give it with --library FILE, or install tiprub again from its sources",
+            "Use --library FILE, or install tiprub again from its sources",
         )),
     }
 }
@@ -295,8 +295,8 @@ fn recognised(path: &Path, bytes: &[u8]) -> Result<Platform> {
         let found = release(bytes).unwrap_or_else(|| "a library that names no release".into());
         return Err(Failure::new(
             path.display(),
-            format!("{found}, where this program needs {LIBRARY_RELEASE}"),
-            "Give the library of the same release and sources, or make it again with packaging/libraries.sh",
+            format!("{found}; this program needs {LIBRARY_RELEASE}"),
+            "Use the library of the same release and sources, or build it again with packaging/libraries.sh",
         ));
     }
     Ok(platform)

@@ -37,7 +37,7 @@ pub struct BladeArguments {
 /// What blades are read from.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct BladeOptions {
-    /// Number of blades around the axis, that know nothing of each other [default: 1].
+    /// Number of uncoupled blades around the axis [default: 1].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub sectors: Option<u32>,
     /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s); from a mesh only.
@@ -46,11 +46,11 @@ pub struct BladeOptions {
     /// Which modes are kept [default: craig-bampton; free-interface with patches].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
-    /// Stress is recovered where each of so many of the lowest modes has its largest, away from held nodes; from a mesh of one material only
-    /// [default: 0].
+    /// Number of lowest modes at whose places of largest stress, away from clamped nodes, stress is recovered; from a mesh of one material
+    /// only [default: 0].
     #[arg(long, value_name = "N", conflicts_with = "stiffness")]
     pub stress_modes: Option<usize>,
-    /// Stress is recovered at the nodes of this set, or at those of these numbers in the file, such as 12,57,103.
+    /// Nodes where stress is recovered: a set, or numbers of nodes in the file, such as 12,57,103.
     #[arg(long, value_name = "SET", conflicts_with = "stiffness")]
     pub stress_set: Option<String>,
     /// What is read.

@@ -52,17 +52,17 @@ pub enum Model {
                             tiprub reduce casing --material titanium --thickness 0.003 --high-flange none\n  \
                             tiprub reduce casing --contour=-0.02:0.256,0.04:0.245 --contact-axial 0.0026:0.038")]
     Casing(Box<CasingArguments>),
-    /// The NASA rotor 37 blade that ships with tiprub.
+    /// The built-in blade: NASA rotor 37.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  \
                             tiprub reduce rotor37 --contact-patches 17 --modes 120 --mesh 32x2x40 -o fine.rom.safetensors")]
     Rotor37(Rotor37Arguments),
-    /// The disk with 56 blades that ships.
+    /// The built-in disk with 56 blades.
     #[command(after_help = "Example:\n  tiprub reduce stage --coarse --inp sector.inp --vtk sector.vtu")]
     Stage(StageArguments),
     /// The casing around that disk.
     #[command(after_help = "Example:\n  tiprub reduce stage-casing --coarse --material titanium")]
     StageCasing(StageCasingArguments),
-    /// The cube that flies between two rings.
+    /// The free cube between two rings.
     #[command(after_help = "Example:\n  tiprub reduce cube --modes 100")]
     Cube(CubeArguments),
     /// The ring at its left.

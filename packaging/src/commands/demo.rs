@@ -47,7 +47,7 @@ pub const FILES: [&str; 6] = [ROM_FILE, SCENE_FILE, REPORT_FILE, CSV_FILE, "roto
 const LARGEST_SCENE: u64 = 1 << 20;
 
 /// Where the error study is that the demo does not run.
-const STUDY: &str = "error against run time of every method: a picture in the report; measured here, in minutes, by\n  \
+const STUDY: &str = "error against run time of every method: see the picture in the report; to measure it here (minutes), run\n  \
                      tiprub study error builtin:rotor37 --quick\n";
 
 /// What to do about a scene in the directory that somebody changed.

@@ -82,7 +82,7 @@ pub(super) fn build(unit: Unit, workspace: &Path, target: &Path, console: &Conso
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .map_err(|error| failed(format!("cargo cannot be started: {error}"), "Install Rust, or give --library FILE"))?;
+        .map_err(|error| failed(format!("cargo cannot be started: {error}"), "Install Rust, or use --library FILE"))?;
     let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
     let messages = thread::spawn(move || {
         let mut text = String::new();
@@ -102,10 +102,10 @@ pub(super) fn build(unit: Unit, workspace: &Path, target: &Path, console: &Conso
     let status = child.wait().map_err(|error| failed(format!("cargo was lost: {error}"), "Try again"))?;
     if !status.success() {
         let lines = Vec::from(last_lines).join("\n");
-        return Err(failed(format!("cargo ended with {status}:\n{lines}\n"), "Correct what it names, then try again"));
+        return Err(failed(format!("cargo ended with {status}:\n{lines}\n"), "Correct these errors, then try again"));
     }
     artifact(&messages.join().unwrap_or_default(), unit.names().1)
-        .ok_or_else(|| failed("cargo reported no shared library".into(), "Give --library FILE"))
+        .ok_or_else(|| failed("cargo reported no shared library".into(), "Use --library FILE"))
 }
 
 /// Cargo options that keep the places of cargo's home, its registry and the workspace, and with them the builder's name

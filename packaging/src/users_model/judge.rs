@@ -65,8 +65,8 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
     let mut warnings = Vec::new();
     if *automatic && tip.elsewhere > 0 {
         warnings.push(format!(
-            "beside the tip that was found {} faces that are not connected with it are as far out: if they can touch as well, name \
-             all in a set (--contact-set)",
+            "beside the tip that was found, {} faces that are not connected with it are as far out: if they can also touch, name \
+             all of them in a set (--contact-set)",
             tip.elsewhere
         ));
     }
@@ -85,8 +85,8 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
     } else if count == 1 || edges > REFINED * (count - 1) as f64 {
         let nodes = if count == 1 { "a single node".to_owned() } else { format!("{count} nodes") };
         warnings.push(format!(
-            "contact at {nodes} of a tip about {edges:.0} edges of elements long: a force at a node digs in deeper the finer the mesh, and \
-             the tip between nodes passes through the casing; --contact-patches {} spreads contact over the tip",
+            "contact at {nodes} of a tip about {edges:.0} edges of elements long: the indentation by a force at a node grows as the mesh is refined, \
+             and the tip between nodes passes through the casing; --contact-patches {} spreads contact over the tip",
             tip.at_most(PATCHES)
         ));
     }
@@ -102,7 +102,7 @@ pub fn set_warnings(asked: &ModelOptions, chosen: &Chosen) -> Vec<String> {
         if on_tip < all {
             warnings.push(format!(
                 "{name} has {on_tip} of the {all} nodes of the outermost faces, and the other nodes of the tip pass through the casing: is that \
-                 meant? Without --contact-set all of them are taken"
+                 meant? Without --contact-set all of them are contact nodes"
             ));
         } else if own > all {
             warnings.push(format!(
@@ -124,8 +124,8 @@ pub fn set_warnings(asked: &ModelOptions, chosen: &Chosen) -> Vec<String> {
 /// More patches than the elements of a tip tell apart.
 pub fn narrow(patches: usize, edges: f64, most: usize) -> String {
     format!(
-        "{patches} contact patches along about {edges:.0} edges of elements: patches narrower than elements share what these can do, and their \
-         forces say more than the mesh knows; ask for {most} at most (--contact-patches {most}), or refine the tip"
+        "{patches} contact patches along about {edges:.0} edges of elements: patches narrower than elements are not independent, and the mesh \
+         does not resolve their forces; request at most {most} (--contact-patches {most}), or refine the tip"
     )
 }
 
@@ -133,8 +133,8 @@ pub fn narrow(patches: usize, edges: f64, most: usize) -> String {
 pub fn narrow_rows(rows: usize, elements: usize) -> String {
     let (plural, most) = (if elements == 1 { "" } else { "s" }, elements + 1);
     format!(
-        "{rows} rows of contact patches across {elements} element{plural}: rows narrower than elements share what these can do, and their forces \
-         say more than the mesh knows; ask for {most} at most (--contact-rows {most}), or refine the tip"
+        "{rows} rows of contact patches across {elements} element{plural}: rows narrower than elements are not independent, and the mesh \
+         does not resolve their forces; request at most {most} (--contact-rows {most}), or refine the tip"
     )
 }
 
@@ -146,7 +146,7 @@ fn single(chosen: &Chosen) -> Option<String> {
         _ => return None,
     };
     Some(format!(
-        "contact at {what}: where along the chord the tip touches is not told apart, nor is it held from tilting; ask for more \
+        "contact at {what}: the position of contact along the chord is not resolved, and nothing prevents tilting; request more patches \
          (--contact-patches {PATCHES})"
     ))
 }
@@ -156,8 +156,6 @@ pub fn frequency_warning(rom: &Rom, free: bool) -> Option<String> {
     let first = *rom.checks.full_frequencies.get(if free { 6 } else { 0 })?;
     let [low, high] = USUAL_FREQUENCIES;
     (!(low..=high).contains(&first)).then(|| {
-        format!(
-            "the first natural frequency is {first:.3e} Hz: are units, material and clamped nodes those that are meant?"
-        )
+        format!("the first natural frequency is {first:.3e} Hz: are units, material and clamped nodes correct?")
     })
 }

@@ -87,7 +87,7 @@ fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document
         return Ok(());
     }
     let why = scheme_reason.as_ref().map_or(String::new(), |reason| format!(" ({reason})"));
-    let problem = format!("missing: the scheme is `{}`{why}, which has steps of one length", scheme.name());
+    let problem = format!("missing: the scheme is `{}`{why}, which has fixed steps", scheme.name());
     let galerkin = if scheme_reason.is_some() { "" } else { ", or use scheme = \"galerkin\", which needs none" };
     Err(document.refusal(STEP, problem, format!("Add `step = ...` to [time]: {}{galerkin}", requirement(STEP))))
 }

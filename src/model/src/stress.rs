@@ -193,8 +193,12 @@ pub(crate) fn recovered_stress(
         return Ok(None);
     }
     let Some((mesh, material)) = &model.mesh else {
-        let problem = "the model has no mesh of one material, whose elements know it";
-        return Err(Error::invalid("stress", problem, "Leave it out, or give a mesh file of one material"));
+        let problem = "stress needs a mesh of one material, and the model has none";
+        return Err(Error::invalid(
+            "stress",
+            problem,
+            "Leave out the places of stress, or use a mesh file of one material",
+        ));
     };
     let places = all_places((mesh, material), free, modes, &options.stress)?;
     let nodes: Vec<usize> = places.iter().map(|(_, node)| *node).collect();

@@ -142,10 +142,10 @@ impl History {
             return Vec::new();
         }
         let problem = format!(
-            "{}: lines are {shortest:.3e} s apart, and only what they say at communication points counts, every {step:.3e} s",
+            "{}: lines are {shortest:.3e} s apart, but only values at communication points count, every {step:.3e} s",
             self.name
         );
-        vec![Warning::new(Topic::InputLines, problem, "A shorter communication step (--step) sees more")]
+        vec![Warning::new(Topic::InputLines, problem, "Use a shorter communication step (--step)")]
     }
 }
 

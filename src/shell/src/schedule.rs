@@ -61,7 +61,7 @@ impl Schedule {
         let one_step = self.step > length && !is_close(self.step, length);
         let warning = || {
             let problem = format!(
-                "the communication step {} s is longer than the run of {} s: one step covers all of it, with no point in between",
+                "the communication step {} s is longer than the run of {} s, so the run is a single step",
                 shown(self.step),
                 shown(length)
             );

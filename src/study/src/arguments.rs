@@ -10,7 +10,7 @@ use tiprub_shell::console::Console;
 /// What all studies take.
 #[derive(Debug, Args)]
 pub struct StudyCommon {
-    /// Directory for everything the study writes; made if missing [default: study-STUDY].
+    /// Directory for everything the study writes; created if missing [default: study-STUDY].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Few and short runs: seconds instead of minutes, for a first look.
@@ -27,10 +27,10 @@ pub struct StudyCommon {
 /// Arguments of `tiprub study map`.
 #[derive(Debug, Args)]
 pub struct MapArguments {
-    /// Scene file (TOML), or one that ships.
+    /// Scene file (TOML), or a built-in scene.
     #[arg(value_name = "SCENE", default_value = "builtin:rotor37")]
     pub scene: String,
-    /// Angular velocities (rad/s), from, to and how many [default: 141 from 0.8 to 1.5 times the one where twice the casing's
+    /// Angular velocities (rad/s): first, last and count [default: 141 from 0.8 to 1.5 times the one where twice the casing's
     /// lowest engine order meets the first mode, where the model holds].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
     pub speeds: Option<Speeds>,
@@ -55,11 +55,11 @@ pub struct MapArguments {
 /// Arguments of `tiprub study error`.
 #[derive(Debug, Args)]
 pub struct ErrorArguments {
-    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
+    /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
-    /// Time from the start of the experiment over which errors are taken (s), at most until runs that differ by almost
-    /// nothing part [default: 400 communication steps beyond the first contact].
+    /// Time from the start of the experiment over which errors are measured (s), at most until almost identical
+    /// runs diverge [default: 400 communication steps beyond the first contact].
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     pub window: Option<f64>,
     /// Start value of an input or parameter; may be repeated.
@@ -73,19 +73,19 @@ pub struct ErrorArguments {
 /// Arguments of `tiprub study stability`.
 #[derive(Debug, Args)]
 pub struct StabilityArguments {
-    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
+    /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
-    /// Friction coefficients, from, to and how many [default: 11 from 0 to 1, or to twice the scene's].
+    /// Friction coefficients: first, last and count [default: 11 from 0 to 1, or to twice the scene's].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = frictions, allow_hyphen_values = true)]
     pub friction: Option<Range>,
-    /// Speeds (rad/s), from, to and how many; negative ones turn backwards [default: -1, 0.5, 1 and 1.5 times the scene's].
+    /// Speeds (rad/s): first, last and count; negative ones turn backwards [default: -1, 0.5, 1 and 1.5 times the scene's].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = range, allow_hyphen_values = true)]
     pub speeds: Option<Range>,
-    /// Internal steps (s), from, to and how many, evenly on a logarithmic scale [default: 9 from 1/16 to 16 times the scene's].
+    /// Internal steps (s): first, last and count, evenly on a logarithmic scale [default: 9 from 1/16 to 16 times the scene's].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = steps, allow_hyphen_values = true)]
     pub steps: Option<Range>,
-    /// Answers sought at the same time [default: one per processor].
+    /// Checks at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Start value of an input or parameter; may be repeated.
@@ -99,16 +99,16 @@ pub struct StabilityArguments {
 /// Arguments of `tiprub study convergence`.
 #[derive(Debug, Args)]
 pub struct ConvergenceArguments {
-    /// Scene file (TOML), or one that ships, such as `builtin:rotor37`.
+    /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
-    /// Also write the ROM of what touches with the errors that were found, for `tiprub run` and `tiprub inspect` to tell.
+    /// Also write the ROM of the touching structure with the errors that were found; `tiprub run` and `tiprub inspect` print them.
     #[arg(long, value_name = "FILE")]
     pub into: Option<PathBuf>,
-    /// Replace that file if it is there already.
+    /// Replace that file if it exists.
     #[arg(long, requires = "into")]
     pub force: bool,
-    /// Time from the start of the experiment that is compared (s), at most until runs that differ by almost nothing part [default: 400
+    /// Time from the start of the experiment that is compared (s), at most until almost identical runs diverge [default: 400
     /// communication steps beyond the first contact].
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     pub window: Option<f64>,
@@ -187,7 +187,7 @@ pub type Speeds = Range;
 /// What a command line adds to a scene.
 #[derive(Debug, Clone, Default, Args)]
 pub struct SceneOptions {
-    /// Do not give warnings with this identifier, such as `flutter`; may be repeated. In an FMU they are not logged.
+    /// Suppress warnings with this identifier, such as `flutter`; may be repeated. In an FMU they are not logged.
     #[arg(long, value_name = "ID", value_parser = topic)]
     pub silence: Vec<String>,
     /// Accept values that are rarely meant (tips faster than 1500 m/s, lengths in millimetres) with a warning.
@@ -216,8 +216,8 @@ fn topic(text: &str) -> Result<String, String> {
 /// Whether built-in models are kept from one command to the next.
 #[derive(Debug, Clone, Default, Args)]
 pub struct CacheArguments {
-    /// Reduce built-in models anew, and keep them for no other command. Otherwise they are kept in the directory that the
-    /// environment variable TIPRUB_CACHE names, or in `tiprub` in the user's cache directory.
+    /// Reduce built-in models again, without the cache. By default they are cached in the directory that the environment
+    /// variable TIPRUB_CACHE names, or in `tiprub` in the user's cache directory.
     #[arg(long)]
     pub no_cache: bool,
 }

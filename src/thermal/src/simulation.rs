@@ -251,13 +251,13 @@ impl Simulation {
         let problem = format!(
             "{}: the communication step of {} s is shorter than the {:.3} s in which heat passes an element of the heated surface \
              (the square of its depth over the diffusivity), so that `surface_temperature` rises too slowly after `casing_heat` has \
-             changed; `casing_temperature`, means over the volume, and heat are not affected",
+             changed; `casing_temperature` (means over the volume) and heat are not affected",
             self.model.name,
             shown(step_size),
             self.model.element_time
         );
-        let remedy = "Hand heat over as its mean over longer communication steps, or make the model with thinner elements: `tiprub thermal --mesh` \
-                      with twice the elements through the thickness lets steps be a quarter as long";
+        let remedy = "Use longer communication steps with the mean of the heat, or thinner elements: with twice as many elements through the \
+                      thickness (`tiprub thermal --mesh`) steps may be a quarter as long";
         Warning::new(Topic::ThermalStep, problem, remedy)
     }
 

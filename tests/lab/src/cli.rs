@@ -18,7 +18,7 @@ use crate::{
     scatter, stability, stage, wear, witness,
 };
 
-/// Evidence for tiprub: studies of the models that ship and of standard problems.
+/// Evidence for tiprub: studies of the built-in models and of standard problems.
 #[derive(Debug, Parser)]
 #[command(
     name = "lab",
@@ -43,14 +43,14 @@ pub struct Cli {
 pub enum Command {
     /// Error against run time of every method on built-in scenes and standard problems, beside independent methods.
     Error(ErrorArguments),
-    /// Stiff and extreme cases: each must end in a right answer or in a refusal that says why.
+    /// Stiff and extreme cases: each must end with a correct result or with an error that gives the reason.
     #[command(
-        after_help = "Every case runs in a process of its own with a time limit. DIR then holds index.html, stability.csv, \
+        after_help = "Every case runs in a separate process with a time limit. DIR then holds index.html, stability.csv, \
                       stability.md and results.json."
     )]
     Stability(StabilityArguments),
-    /// Random valid scenes, small and violent: energy, losses, penetration, saved states, and the bits of the FMU must hold in each.
-    #[command(after_help = "A scene follows from its seed: a wrong one is run alone with `lab random --only SEED`.")]
+    /// Small extreme random scenes: checks of energy, losses, penetration, saved states, and the bits of the FMU.
+    #[command(after_help = "A seed determines its scene. Run a single one with `lab random --only SEED`.")]
     Random(RandomArguments),
     /// Frequency deviation and residual criterion of the reduced disk against the number of component modes.
     Convergence(StudyCommon),
@@ -109,7 +109,7 @@ pub struct CubeArguments {
 /// Arguments of `lab beside`.
 #[derive(Debug, Args)]
 pub struct BesideArguments {
-    /// Scene file (TOML), or one that ships.
+    /// Scene file (TOML), or a built-in scene.
     #[arg(value_name = "SCENE", default_value = "builtin:rotor37-paper")]
     pub scene: String,
     /// What all studies take.
