@@ -325,7 +325,7 @@ mod tests {
 
     /// What compresses well, such as a text of newlines, may take no more than what it can mean: no disk, and no memory.
     #[test]
-    fn an_entry_beyond_what_it_can_mean_is_refused_before_anything_is_unpacked() {
+    fn rejects_oversized_entries_before_unpacking() {
         for name in [DESCRIPTION, "resources/scene.toml", "resources/package.toml", "resources/a.safetensors"] {
             let (_root, path) = archive_with(&[Entry::new(name, "\n".repeat(1 << 16))]);
             announce(&path, 1 << 30);

@@ -45,7 +45,7 @@ fn arguments(library: &[PathBuf], platform: &[Platform]) -> LibraryArguments {
 }
 
 #[test]
-fn libraries_of_a_directory_are_told_apart_by_content_and_chosen_by_platform() {
+fn selects_libraries_of_a_directory_by_their_content() {
     let root = tempfile::tempdir().unwrap();
     let console = Console::new(true, false);
     let names = ["c.so", "e.DLL", "a.so", "d.dylib", "b.dylib"];
@@ -81,7 +81,7 @@ fn installed_libraries_are_beside_the_program_or_in_its_prefix() {
 }
 
 #[test]
-fn without_a_library_beside_it_an_installed_program_builds_one_and_keeps_it() {
+fn installed_program_builds_and_caches_a_missing_library() {
     let root = tempfile::tempdir().unwrap();
     let [sources, cache] = ["sources", "cache"].map(|name| root.path().join(name));
     let program = root.path().join("bin/tiprub");

@@ -387,7 +387,7 @@ fn conducts_heat_in_a_casing_mesh_of_the_user() {
 }
 
 #[test]
-fn contact_nodes_are_given_by_number_and_slips_of_tip_and_axis_are_refused() {
+fn accepts_contact_node_numbers_and_rejects_wrong_tips_and_axes() {
     let project = Project::new(&["blade_hex8.inp"]);
     let line =
         "reduce blade blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";

@@ -236,7 +236,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_topic_has_two_lines_whatever_the_number_of_its_warnings() {
+    fn prints_two_lines_per_topic_for_any_number_of_warnings() {
         use tiprub_core::warning::{Level, Topic};
         let slow = |name: &str| Warning::new(Topic::Sticking, "too slow", "Turn faster").named(name);
         let flutter = Warning::new(Topic::Flutter, "contact grows", "Nothing to do").at_level(Level::Note);

@@ -161,7 +161,7 @@ mod tests {
 
     /// Costs that are wrong by factors, and of kinds that differ by a factor of a hundred.
     #[test]
-    fn the_share_never_falls_and_ends_at_one_whatever_the_first_estimate() {
+    fn progress_never_falls_and_ends_at_one_for_any_first_estimate() {
         let truth = |kind: usize, index: usize| [0.01, 1.0, 0.1][kind] * (1.0 + 0.5 * (index % 3) as f64);
         for rate in [1e-4, 1.0, 1e4] {
             let mut ledger = Ledger::new(rate);

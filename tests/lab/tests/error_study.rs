@@ -103,7 +103,7 @@ fn the_cube_comes_nearer_to_the_full_model_with_steps_and_modes() {
 }
 
 #[test]
-fn adaptive_steps_converge_on_the_default_model_with_less_time_than_the_papers_method() {
+fn adaptive_steps_converge_faster_than_the_papers_method() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), &["rotor37-light"]);
     let scene = &json["results"]["scenes"][0];

@@ -396,7 +396,7 @@ fn flanks_steeper_than_45_degrees_are_refused() {
 }
 
 #[test]
-fn tips_that_become_too_fast_are_refused_unless_the_scene_accepts_them() {
+fn rejects_too_fast_tips_unless_the_scene_accepts_them() {
     let mut scene = models::rub(4);
     scene.settings.contacts[0].friction = 0.0;
     scene.settings.surfaces[0].shape = Shape::Circular {};

@@ -205,7 +205,7 @@ fn ramped() -> impl Iterator<Item = (&'static str, Scene)> {
 
 /// The times of a state are its own: when the receiving instance started is of no account.
 #[test]
-fn a_state_is_restored_by_an_instance_that_started_at_another_time() {
+fn restores_a_state_in_an_instance_with_another_start_time() {
     for (name, scene) in ramped() {
         let length = scene.settings.experiment.communication_step;
         let mut simulation = started(&scene);

@@ -120,7 +120,7 @@ fn refusals_write_numbers_of_any_size_in_short() {
 }
 
 #[test]
-fn slips_of_units_and_axes_are_refused_unless_the_scene_accepts_them() {
+fn rejects_wrong_units_and_axes_unless_the_scene_accepts_them() {
     type Change = fn(&mut Scene);
     let slips: [(&str, Change); 6] = [
         ("rpm", |scene| scene.settings.structures[0].speed = 17_188.0),

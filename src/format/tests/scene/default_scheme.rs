@@ -52,7 +52,7 @@ fn a_rigid_casing_has_adaptive_steps_and_needs_no_time_table() {
 }
 
 #[test]
-fn features_that_exclude_adaptive_steps_have_fixed_steps_with_a_reason() {
+fn chooses_fixed_steps_with_a_reason_where_galerkin_is_excluded() {
     for (after, line, reason) in FIXED {
         let text = if line.contains("ring") { format!("{line}{RING}") } else { line.to_owned() };
         let settings = scene(after, &text, true).unwrap_or_else(|error| panic!("{line}: {error}"));
@@ -72,7 +72,7 @@ fn features_that_exclude_adaptive_steps_have_fixed_steps_with_a_reason() {
 }
 
 #[test]
-fn a_scheme_that_is_named_has_no_reason_and_fixed_ones_need_a_step() {
+fn named_schemes_have_no_reason_and_fixed_steps_need_a_length() {
     for scheme in Scheme::ALL {
         let text = format!("{SCENE}[time]\nscheme = \"{}\"\n", scheme.name());
         let settings = parse_scene(&format!("{text}step = 1e-6\n"), "demo.toml").unwrap();

@@ -273,7 +273,7 @@ fn force_does_not_depend_on_the_width_of_cells() {
 
 /// A staggered rectangle of 60 × 2 mm in five patches; widths are 2 mm over the cosine of its stagger.
 #[test]
-fn width_of_patches_is_their_thickness_over_the_cosine_of_the_stagger() {
+fn patch_width_is_thickness_over_cosine_of_stagger() {
     for (stagger, radius) in [(0.0_f64, 0.25), (1.0, 0.25), (-1.0, 0.25), (1.0, 2.5)] {
         let (chord, thickness) = (0.06, 2e-3);
         let node = |index: usize| {
