@@ -8,6 +8,7 @@
 //! derived from, and marches the contact problem from one communication point to the next.
 #![forbid(unsafe_op_in_unsafe_fn)]
 
+mod cubic;
 pub mod dynamics;
 mod error;
 pub mod galerkin;

@@ -1,5 +1,7 @@
 //! Polynomials of degree s through the Lobatto points of a step, s = 1, 2, 3, on 0 ≤ θ ≤ 1.
 
+use crate::cubic;
+
 /// Largest degree.
 pub const MOST: usize = 3;
 /// Points of the largest degree.
@@ -75,6 +77,25 @@ impl Basis {
             }
         }
         basis
+    }
+
+    /// Coefficients of θᵃ of the polynomial through values at the points.
+    pub fn coefficients(&self, values: &[f64; POINTS]) -> [f64; POINTS] {
+        let mut sums = [0.0; POINTS];
+        for (value, row) in values[..self.count()].iter().zip(&self.monomials) {
+            sums.iter_mut().zip(row).for_each(|(sum, coefficient)| *sum += value * coefficient);
+        }
+        sums
+    }
+
+    /// L_i at θ.
+    pub fn weights_at(&self, theta: f64) -> [f64; POINTS] {
+        self.monomials.map(|row| cubic::evaluate(&row, theta))
+    }
+
+    /// L_i′ at θ.
+    pub fn slopes_at(&self, theta: f64) -> [f64; POINTS] {
+        self.monomials.map(|row| row[1] + theta * (2.0 * row[2] + theta * 3.0 * row[3]))
     }
 
     /// Number of points, the start included.

@@ -7,6 +7,8 @@ use super::trial::{Kind, Verdict};
 const LENGTHEN: f64 = 1.0 / 32.0;
 /// Steps that would pay into a bank which is not spent are halved down to this level.
 const SAVED: usize = 3;
+/// The bank is full with this share of the largest energy there was: steps that would pay into it are halved down to the shortest then.
+const FULL: f64 = 0.01;
 /// Nearness between points is looked at down to this step (s).
 const SHORTEST_LOOK: f64 = 2.5e-6;
 
@@ -25,6 +27,9 @@ pub struct Step {
 pub trait Marched {
     /// Energy left by contacts that opened and closed (J), and level of the next step; both go on from step to step.
     fn pace(&mut self) -> (&mut f64, &mut usize);
+
+    /// Largest energy up to now, that of the start of the step included (J).
+    fn largest_energy(&mut self) -> f64;
 
     /// Length of steps of a level (s).
     fn length(&self, level: usize) -> f64;
@@ -69,7 +74,8 @@ pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Re
                 && (verdict.error > demand.tolerance
                     || (verdict.near && body.length(level) > SHORTEST_LOOK)
                     || (verdict.switches && verdict.switched > *body.pace().0)
-                    || (verdict.switched < 0.0 && level < SAVED && *body.pace().0 > 0.0)));
+                    || (verdict.switched < 0.0
+                        && (level < SAVED && *body.pace().0 > 0.0 || overflows(body, -verdict.switched)))));
         if refused && level < HALVINGS {
             *body.pace().1 += 1;
             continue;
@@ -87,6 +93,12 @@ pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Re
         }
     }
     Ok(())
+}
+
+/// Whether the bank would hold more than it may with `paid` (J) paid in. Where there was no energy yet, nobody knows what is much.
+fn overflows(body: &mut impl Marched, paid: f64) -> bool {
+    let largest = body.largest_energy();
+    largest > 0.0 && *body.pace().0 + paid > FULL * largest
 }
 
 /// Try one step; the shortest with a constant force where a polynomial cannot be taken.

@@ -120,6 +120,15 @@ impl Rows {
         }
     }
 
+    /// Three components at a node of what all modes add up to.
+    pub fn at_node(&self, node: usize, modes: &[f64]) -> [f64; 3] {
+        let padded = self.all.len().next_multiple_of(PADDED);
+        [0, 1, 2].map(|component| {
+            let shapes = &self.by_row[(3 * node + component) * padded..][..modes.len()];
+            shapes.iter().zip(modes).map(|(shape, mode)| shape * mode).sum()
+        })
+    }
+
     /// Displacements and velocities of the modes with inertia.
     pub fn now(&self, state: &SectorState, sums: &mut Sums<2>) {
         let [one, two] = &mut sums.rows;

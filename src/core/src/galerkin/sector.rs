@@ -35,6 +35,12 @@ impl Tables {
         Self { rows: Rows::new(&modes), levels, modes }
     }
 
+    /// Kinetic and strain energy of a sector (J).
+    pub fn energy(&self, state: &SectorState) -> f64 {
+        let (kinetic, strain) = state.energies(&self.modes.frequencies, self.rows.residual());
+        kinetic + strain
+    }
+
     /// Fill the tables for spans of length `span` (s). Does not allocate.
     pub fn set_span(&mut self, span: f64) {
         if self.levels[0].step.to_bits() == span.to_bits() {
@@ -129,6 +135,14 @@ pub trait Witness: Obstacle {
     /// (shares of the span).
     fn is_clear(&self, from: f64, length: f64, reach: &[f64]) -> bool;
 
+    /// Whether a node that stays within `reach` may come closer within that step than at its ends, by more than the tolerance.
+    fn may_come_closer(&self, _from: f64, _length: f64, _reach: &[f64]) -> bool {
+        false
+    }
+
+    /// The same step is about to be taken, with these gaps and displacements at its points.
+    fn passed(&mut self, _level: &Level, _trial: &Trial) {}
+
     /// A step has been taken in which nothing was in reach; its damping loss (J).
     fn flew(&mut self, damping_loss: f64);
 
@@ -194,7 +208,7 @@ impl Marcher {
         effort: &mut Effort,
     ) -> Result<(), Stopped> {
         self.trial.forget();
-        march(&mut Alone { marcher: self, tables, state, witness, precision: demand.precision }, demand, effort)
+        march(&mut Alone { marcher: self, tables, state, witness, demand }, demand, effort)
     }
 }
 
@@ -204,12 +218,17 @@ struct Alone<'a, W> {
     tables: &'a Tables,
     state: &'a mut SectorState,
     witness: &'a mut W,
-    precision: f64,
+    demand: Demand,
 }
 
 impl<W: Witness> Marched for Alone<'_, W> {
     fn pace(&mut self) -> (&mut f64, &mut usize) {
         (&mut self.state.bank, &mut self.state.level)
+    }
+
+    fn largest_energy(&mut self) -> f64 {
+        self.state.largest = self.state.largest.max(self.tables.energy(self.state));
+        self.state.largest
     }
 
     fn length(&self, level: usize) -> f64 {
@@ -221,13 +240,23 @@ impl<W: Witness> Marched for Alone<'_, W> {
     }
 
     fn fly(&mut self, step: Step) -> bool {
-        let Self { marcher: Marcher { trial, advance }, tables, state, witness, .. } = self;
+        let Self { marcher: Marcher { trial, advance }, tables, state, witness, demand: Demand { tolerance, .. } } =
+            self;
         if state.multipliers.iter().any(|value| *value != 0.0)
             || !witness.is_clear(step.from, step.length, trial.reach(&tables.rows, state))
         {
             return false;
         }
-        witness.flew(advance.freely(&tables.levels[step.level], state));
+        let table = &tables.levels[step.level];
+        if witness.may_come_closer(step.from, step.length, trial.reach(&tables.rows, state)) {
+            witness.go(step.from, step.length, table, Kind::Polynomial);
+            trial.glide(table, &tables.rows, state, *witness);
+            if trial.find_minima(&table.basis, Kind::Polynomial, *tolerance) {
+                trial.follow(tables, step.level, state, advance);
+            }
+            witness.passed(table, trial);
+        }
+        witness.flew(advance.freely(table, state));
         trial.forget();
         state.looked = false;
         true
@@ -236,12 +265,16 @@ impl<W: Witness> Marched for Alone<'_, W> {
     fn attempt(&mut self, step: Step, kind: Kind) -> Verdict {
         let table = &self.tables.levels[step.level];
         self.witness.go(step.from, step.length, table, kind);
-        self.marcher.trial.run((table, kind), &self.tables.rows, self.state, self.witness, self.precision)
+        self.marcher.trial.run((table, kind), &self.tables.rows, self.state, self.witness, self.demand.precision)
     }
 
     fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
-        let Self { marcher, tables, state, witness, .. } = self;
+        let Self { marcher, tables, state, witness, demand: Demand { tolerance, .. } } = self;
         let level = &tables.levels[step.level];
+        if marcher.trial.find_minima(&level.basis, kind, *tolerance) {
+            let Marcher { trial, advance } = &mut **marcher;
+            trial.follow(tables, step.level, state, advance);
+        }
         let dropped = if kind == Kind::Constant { marcher.trial.dropped(tables.rows.residual(), state) } else { 0.0 };
         let (trial, basis) = (&marcher.trial, &level.basis);
         let damping_loss =

@@ -23,6 +23,8 @@ pub struct SectorState {
     pub looked: bool,
     /// Energy that contacts which opened or closed have left to those to come (J).
     pub bank: f64,
+    /// Largest energy that has been asked for (J).
+    pub largest: f64,
     /// Level of the last step.
     pub level: usize,
 }
@@ -40,6 +42,7 @@ impl SectorState {
             slopes: Vec::new(),
             looked: true,
             bank: 0.0,
+            largest: 0.0,
             level: 0,
         }
     }

@@ -287,6 +287,16 @@ impl Whole {
         0.5 * change.zip(&self.coordinates.softness).map(|(change, softness)| change * change * softness).sum::<f64>()
     }
 
+    /// Kinetic and strain energy under the forces at the start of the step (J).
+    pub fn energy(&self) -> f64 {
+        let mode = |mode: usize| {
+            let (q, v, p) = (self.state.position[mode], self.state.velocity[mode], self.forces[0][mode]);
+            let w = self.coordinates.frequencies[mode];
+            self.coordinates.inertia[mode] * (v * v + (w * q) * (w * q)) + self.coordinates.softness[mode] * p * p
+        };
+        0.5 * (0..self.len()).map(mode).sum::<f64>()
+    }
+
     /// Largest amplitude of each coordinate from now on while nothing pushes.
     pub fn amplitudes(&self, to: &mut [f64]) {
         for (mode, to) in to.iter_mut().enumerate() {

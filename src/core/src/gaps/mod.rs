@@ -154,6 +154,16 @@ impl GapLaw {
         }
     }
 
+    /// By how much the gap of a node that stays within `reach` (m, own directions) of where it rests may be smaller on the way than at its
+    /// ends (m), while the rotor turns from where it is to `turned` (rad) and nothing else moves.
+    pub fn approach(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> f64 {
+        match self {
+            Self::Fixed(law) => 2.0 * dot(law.normals[at.node].map(f64::abs), reach),
+            Self::Revolution(law) => law.approach(at, turned, reach),
+            Self::Spline(_) | Self::Open(_) => f64::INFINITY,
+        }
+    }
+
     /// The gap that a node which stays within `reach` (m, own directions) of where it rests keeps at least on a way to `end` that
     /// is linear in time, while the rotor turns by `turn` against the shape (rad): that of the narrowest place at the narrowest time,
     /// less the reach. `None` where that is not known, or not met on the way (m).

@@ -113,7 +113,7 @@ impl RevolutionGap {
     }
 
     /// Gap (m) and unit normal of one node displaced by `moved` (m).
-    pub(super) fn of_one(&self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3]) {
+    pub fn of_one(&self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3]) {
         let (node, drive, radius) = (at.node, at.drive, self.layout.radii[at.node]);
         let (slope, per_radius) = (self.slopes[node], self.layout.per_radius[node]);
         let angle = self.angle(at, moved);
@@ -147,6 +147,17 @@ impl RevolutionGap {
         let left = clearance + drive.shape_factor * shape - reach[0] - self.slopes[node].abs() * reach[2];
         // On a shaft that moves, and with a shape turned inside out, nobody knows.
         !self.shaft_moves && drive.shape_factor >= 0.0 && left > 0.0
+    }
+
+    /// See [`super::GapLaw::approach`].
+    pub(super) fn approach(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> f64 {
+        let (node, drive) = (at.node, at.drive);
+        let seen = self.layout.angles[at.index] - drive.shape_rotation;
+        let (from, to) = (seen + drive.rotor_angle.min(turned), seen + drive.rotor_angle.max(turned));
+        let around = reach[1] * self.layout.per_radius[node];
+        let ends = self.surface.evaluate(from).0.min(self.surface.evaluate(to).0);
+        let dip = drive.shape_factor * (ends - self.surface.lowest_between(from - around, to + around));
+        dip + 2.0 * (reach[0] + self.slopes[node].abs() * reach[2])
     }
 
     /// See [`super::GapLaw::least`].

@@ -4,6 +4,7 @@
 //! the casing radius, in the fixed frame; positive s opens the clearance. What the kernels need per contact
 //! node is s and its slope ds/dθ.
 
+use crate::cubic::{evaluate, interior_minimum};
 use crate::settings::Shape;
 use crate::{Error, Result};
 
@@ -34,6 +35,8 @@ pub enum Surface {
     Table {
         /// Largest magnitude of d²s/dθ² (m/rad²).
         curvature: f64,
+        /// Smallest value (m).
+        lowest: f64,
         /// Values at the knots and their slopes ds/dθ (m, m/rad).
         knots: Vec<[f64; 2]>,
     },
@@ -55,7 +58,8 @@ impl Surface {
             }
             Shape::Table { radius_change } => {
                 let knots = periodic_spline(radius_change)?;
-                Self::Table { curvature: largest_curvature(&knots), knots }
+                let lowest = lowest_of_spline(&knots, 0.0, std::f64::consts::TAU);
+                Self::Table { curvature: largest_curvature(&knots), lowest, knots }
             }
         })
     }
@@ -70,16 +74,35 @@ impl Surface {
         }
     }
 
-    /// A bound that s stays above everywhere, which it reaches where it is given in closed form (m).
+    /// Smallest s (m), which it reaches.
     pub fn least(&self) -> f64 {
         match self {
             Self::Circular => 0.0,
             Self::Lobes { amplitude, .. } => -amplitude.abs(),
-            Self::TwoLobe { height, .. } => -height.max(0.0),
-            Self::Table { knots, curvature } => {
-                let lowest = knots.iter().fold(f64::INFINITY, |lowest, knot| lowest.min(knot[0]));
-                lowest - 0.125 * curvature * self.angular_scale() * self.angular_scale()
+            Self::TwoLobe { height, .. } if *height >= 0.0 => -height,
+            Self::TwoLobe { phase, .. } => self.evaluate(*phase).0,
+            Self::Table { lowest, .. } => *lowest,
+        }
+    }
+
+    /// Smallest s between two angles (m), which it reaches.
+    pub fn lowest_between(&self, from: f64, to: f64) -> f64 {
+        let ends = self.evaluate(from).0.min(self.evaluate(to).0);
+        // Whether one of the angles `first` + n·`period` lies between.
+        let passes = |first: f64, period: f64| ((to - first) / period).floor() > ((from - first) / period).floor();
+        match self {
+            Self::Circular => 0.0,
+            Self::Lobes { amplitude, order, phase } => {
+                let crest = if *amplitude >= 0.0 { *phase } else { *phase + std::f64::consts::PI };
+                if passes(crest / order, std::f64::consts::TAU / order) { -amplitude.abs() } else { ends }
             }
+            // Of bumps the crest; of dents the ridge between two.
+            Self::TwoLobe { height, phase, .. } => {
+                let (half, whole) = (std::f64::consts::FRAC_PI_2, std::f64::consts::PI);
+                let crest = if *height >= 0.0 { *phase + half } else { *phase };
+                if passes(crest, whole) { self.evaluate(crest).0 } else { ends }
+            }
+            Self::Table { knots, .. } => lowest_of_spline(knots, from, to).min(ends),
         }
     }
 
@@ -189,7 +212,38 @@ fn exp_of_negative(x: f64) -> f64 {
     sum * scale
 }
 
-/// Value and slope of a periodic cubic (Hermite form) at `angle`.
+/// Smallest value between two angles of a periodic cubic, at a knot or between two; infinite where it has no minimum there.
+fn lowest_of_spline(knots: &[[f64; 2]], from: f64, to: f64) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
+    let count = knots.len() as f64;
+    let spacing = std::f64::consts::TAU / count;
+    let (first, last) = ((from / spacing).floor(), (to / spacing).floor());
+    let mut lowest = f64::INFINITY;
+    let mut place = first;
+    while place <= last.min(first + count) {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value < len")]
+        let index = (place.rem_euclid(count) as usize).min(knots.len() - 1);
+        let cubic = hermite(knots, index, spacing);
+        if place > first {
+            lowest = lowest.min(cubic[0]);
+        }
+        if let Some(t) = interior_minimum(&cubic).filter(|t| (place + t) * spacing > from && (place + t) * spacing < to)
+        {
+            lowest = lowest.min(evaluate(&cubic, t));
+        }
+        place += 1.0;
+    }
+    lowest
+}
+
+/// Coefficients of the cubic after a knot, by the share of the spacing.
+fn hermite(knots: &[[f64; 2]], index: usize, spacing: f64) -> [f64; 4] {
+    let [a, slope_a] = knots[index];
+    let [b, slope_b] = knots[(index + 1) % knots.len()];
+    let (p, q) = (slope_a * spacing, slope_b * spacing);
+    [a, p, 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q]
+}
+
 /// Largest |d²s/dθ²| (m/rad²): at a knot, from either side.
 fn largest_curvature(knots: &[[f64; 2]]) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
@@ -202,6 +256,7 @@ fn largest_curvature(knots: &[[f64; 2]]) -> f64 {
     both.fold(0.0, f64::max)
 }
 
+/// Value and slope of a periodic cubic (Hermite form) at `angle`.
 fn evaluate_spline(knots: &[[f64; 2]], angle: f64) -> (f64, f64) {
     #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
     let count = knots.len() as f64;
@@ -212,10 +267,7 @@ fn evaluate_spline(knots: &[[f64; 2]], angle: f64) -> (f64, f64) {
     // rem_euclid keeps the index in range whatever the angle; the cast cannot then truncate.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value < len")]
     let index = (floor.rem_euclid(count) as usize).min(knots.len() - 1);
-    let [a, slope_a] = knots[index];
-    let [b, slope_b] = knots[(index + 1) % knots.len()];
-    let (p, q) = (slope_a * spacing, slope_b * spacing);
-    let (quadratic, cubic) = (3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q);
+    let [a, p, quadratic, cubic] = hermite(knots, index, spacing);
     let value = a + t * (p + t * (quadratic + t * cubic));
     let slope = (p + t * (2.0 * quadratic + 3.0 * t * cubic)) / spacing;
     (value, slope)
@@ -275,6 +327,30 @@ mod tests {
             // And it says something.
             let dent = matches!(shape, Shape::TwoLobe { depth, .. } if depth < 0.0);
             assert!(dent || tightest < 1e-6 && lowest <= 0.0);
+        }
+    }
+
+    #[test]
+    fn smallest_values_are_those_of_the_shape() {
+        let dents = Shape::TwoLobe { depth: -0.7, width: 0.4, phase: 0.1 };
+        let turned = Shape::Lobes { amplitude: -1e-4, order: 2, phase: 0.3 };
+        for shape in shapes().into_iter().chain([dents, turned]) {
+            let surface = Surface::new(&shape, 3.56e-4).unwrap();
+            let sampled = |from: f64, width: f64| {
+                let values = (0..=2000).map(|k| surface.evaluate(from + width * f64::from(k) / 2000.0).0);
+                values.fold(f64::INFINITY, f64::min)
+            };
+            let steepest = 3e-3;
+            let holds = |found: f64, from: f64, width: f64| {
+                let sampled = sampled(from, width);
+                let close = found <= sampled + 1e-18 && found > sampled - steepest * width / 4000.0;
+                assert!(close, "{shape:?} at {from}, {width}: {found:e}, {sampled:e}");
+            };
+            for i in 0..300 {
+                let (from, width) = (-4.0 + 0.031 * f64::from(i), 0.011 * f64::from(1 + i % 190));
+                holds(surface.lowest_between(from, from + width), from, width);
+            }
+            holds(surface.least(), -1.0, std::f64::consts::TAU);
         }
     }
 

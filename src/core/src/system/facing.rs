@@ -5,6 +5,7 @@ use super::march::casing::Casing;
 use super::pair::Pair;
 use super::record::{Place, Record};
 
+use crate::galerkin::basis::Basis;
 use crate::galerkin::compliance::Lanes;
 use crate::galerkin::level::Level;
 use crate::galerkin::sector::{Taken, Witness};
@@ -199,7 +200,7 @@ impl Witness for Facing<'_> {
                 *drive = course.at(from + length * theta);
             }
         }
-        self.record.looks = 0;
+        (self.record.looks, self.record.step) = (0, [from, length]);
         self.record.slips.iter_mut().for_each(|slips| slips.fill(None));
         self.record.lanes_of = self.enter_lanes(Lanes { points: count - 1, nodes: self.pair_of.len() });
     }
@@ -217,6 +218,26 @@ impl Witness for Facing<'_> {
         })
     }
 
+    fn may_come_closer(&self, from: f64, length: f64, reach: &[f64]) -> bool {
+        let pairs = self.pairs.iter().enumerate().filter(|(pair, _)| self.pair_of.contains(&Some(*pair)));
+        pairs.into_iter().any(|(pair, of)| {
+            let [start, end] = [from, from + length].map(|theta| self.record.courses[pair].at(theta).0);
+            of.nodes().iter().any(|node| {
+                let (at, reach) = (self.at(*node, &start), three(reach, *node));
+                of.gap().approach(at, end.rotor_angle, reach) > self.record.tolerance
+            })
+        })
+    }
+
+    fn passed(&mut self, level: &Level, trial: &Trial) {
+        for (node, pair) in self.pair_of.iter().enumerate() {
+            if let Some(pair) = *pair {
+                let lowest = self.lowest((trial, &level.basis), node, pair);
+                self.record.tallies[node].lowest = lowest;
+            }
+        }
+    }
+
     fn flew(&mut self, damping_loss: f64) {
         self.record.work.damping += damping_loss;
     }
@@ -228,9 +249,7 @@ impl Witness for Facing<'_> {
         for (node, pair) in self.pair_of.iter().enumerate() {
             let Some(pair) = *pair else { continue };
             let points = step.trial.points();
-            let gaps = (1..=points).map(|point| step.trial.gap(point, node));
-            let tally = &mut self.record.tallies[node];
-            tally.lowest = gaps.fold(tally.lowest, f64::min);
+            self.record.tallies[node].lowest = self.lowest((step.trial, &step.level.basis), node, pair);
             let comes = (1..=points).find(|i| step.trial.multiplier(*i, node) > 0.0);
             if comes.is_some_and(|i| self.was_behind(step.trial, node, pair, i)) {
                 self.record.behind_edge = Some(node);
@@ -246,7 +265,61 @@ impl Witness for Facing<'_> {
     }
 }
 
+/// Times that the smallest gap between points is sought by a parabola through three gaps.
+const PARABOLAS: usize = 4;
+/// How much closer these are each time.
+const CLOSER: f64 = 0.25;
+
 impl Facing<'_> {
+    /// Smallest gap of a node (m) up to now and at the points of a step, and between them where it stays open.
+    fn lowest(&mut self, (trial, basis): (&Trial, &Basis), node: usize, pair: usize) -> f64 {
+        let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
+        let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
+        match trial.minimum(node) {
+            Some(theta) => lowest.min(self.lowest_near((trial, basis), (node, pair), theta)),
+            _ => lowest,
+        }
+    }
+
+    /// Smallest gap of a node (m) within a step, near `theta` if its motion is not known in parts.
+    ///
+    /// A surface of revolution and the displacements are not polynomials of time: gaps are evaluated. Those to other surfaces are a polynomial.
+    fn lowest_near(&self, (trial, basis): (&Trial, &Basis), (node, pair): (usize, usize), theta: f64) -> f64 {
+        let ([from, length], course) = (self.record.step, &self.record.courses[pair]);
+        let mut lowest = f64::INFINITY;
+        let mut look = |theta: f64| {
+            let drive = course.at(from + length * theta).0;
+            let (at, moved) = (self.at(node, &drive), trial.displacement_within(basis, node, theta));
+            let gap = match self.pairs[pair].gap() {
+                GapLaw::Fixed(law) => law.gaps[node] + dot(law.normals[node], moved),
+                GapLaw::Revolution(law) => law.of_one(at, moved).0,
+                GapLaw::Spline(_) | GapLaw::Open(_) => trial.gap_within(basis, node, theta),
+            };
+            lowest = lowest.min(gap);
+            gap
+        };
+        #[expect(clippy::cast_precision_loss, reason = "few parts")]
+        let (parts, count) = (trial.parts() as f64, trial.parts());
+        #[expect(clippy::cast_precision_loss, reason = "few parts")]
+        let ends = (1..count).map(|part| part as f64 / parts);
+        let (mut theta, _) = ends.fold((theta, f64::INFINITY), |(best, least), theta| {
+            let gap = look(theta);
+            if gap < least { (theta, gap) } else { (best, least) }
+        });
+        let mut apart = if trial.parts() > 1 { 0.5 / parts } else { 0.1 };
+        for _ in 0..PARABOLAS {
+            theta = theta.clamp(apart, 1.0 - apart);
+            let [before, here, after] = [theta - apart, theta, theta + apart].map(&mut look);
+            let bend = before - 2.0 * here + after;
+            let downhill = if before < after { -1.0 } else { 1.0 };
+            let vertex = if bend > 0.0 { 0.5 * (before - after) / bend } else { downhill };
+            theta += apart * vertex.clamp(-1.0, 1.0);
+            apart *= CLOSER;
+        }
+        look(theta.clamp(0.0, 1.0));
+        lowest
+    }
+
     /// Whether a node that touches at point `i` had nothing to touch before, and was behind the surface, continued beyond its edge.
     fn was_behind(&self, trial: &Trial, node: usize, pair: usize, i: usize) -> bool {
         let GapLaw::Open(open) = self.pairs[pair].gap() else { return false };
@@ -284,6 +357,7 @@ impl Facing<'_> {
         let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
         let (drives, motions) = (&self.record.drives[pair], &self.record.motions[pair]);
         let (gap, slides) = (self.pairs[pair].gap(), self.pairs[pair].friction() != 0.0);
+        tally.peak = tally.peak.max(trial.peak(basis, step.kind, node));
         let mut heats = 0.0;
         for i in (0..=trial.points()).filter(|i| trial.multiplier(*i, node) != 0.0) {
             let normal_force = trial.multiplier(i, node);
@@ -298,7 +372,6 @@ impl Facing<'_> {
             let wrench = gap.wrench(at, point, force);
             let length = step.level.step
                 * if step.kind == Kind::Constant { f64::from(u8::from(i == 1)) } else { basis.weights[i] };
-            tally.peak = tally.peak.max(normal_force);
             tally.normal += length * normal_force;
             tally.tangential += length * dot(tangential, tangential).sqrt();
             for c in 0..3 {

@@ -62,7 +62,7 @@ impl Galerkin {
                 .collect(),
             marcher: if sticks { marcher.sticking() } else { marcher },
             state: if sticks { state.sticking() } else { state },
-            record: Record::new(nodes, pairs),
+            record: Record::new(nodes, pairs, tolerance),
             demand: Demand { tolerance, precision: (PRECISION * tolerance).max(rounding), most: u64::MAX },
         }
     }
@@ -299,15 +299,18 @@ impl Structure {
         let tables = &tables[bank.set_number(sector)];
         bank.read_sector(sector, &mut state.position, &mut state.velocity);
         self.read_contacts(sector, state);
-        (state.bank, state.level) = (self.pace.bank[sector], self.pace.level_of(sector));
+        (state.bank, state.largest) = (self.pace.bank[sector], self.pace.largest[sector]);
+        state.level = self.pace.level_of(sector);
         let places = &self.history.geometry.before;
-        record.begin(|node| places.place_at(node * lanes + sector));
+        let gaps = &self.history.gap.before;
+        record.begin(|node| places.place_at(node * lanes + sector), |node| gaps[node * lanes + sector]);
         let mut facing = Facing { ground: None, pairs, pair_of: &self.pair_of, lanes, sector, record };
         let outcome = marcher.march(tables, state, &mut facing, *demand, effort);
         record.check((number, sector))?;
         let entered = marcher.entered();
         outcome.map_err(|stopped| failure(stopped, (number, sector), entered))?;
-        (self.pace.bank[sector], self.pace.level[sector]) = (state.bank, state.level as u64);
+        (self.pace.bank[sector], self.pace.largest[sector]) = (state.bank, state.largest);
+        self.pace.level[sector] = state.level as u64;
         self.write_contacts(sector, state, |node| record.tallies[node].lowest);
         if let Sectors::Uncoupled(bank) = self.modes_mut() {
             let moved = marcher.displacements(tables, state);

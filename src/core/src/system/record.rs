@@ -73,11 +73,11 @@ pub struct Tally {
     pub force: [f64; 3],
     /// ∫ of force and moment in fixed directions (N·s, N·m·s), and λ-weighted ∫ of the point (m·N·s).
     pub wrench: Wrench,
-    /// Largest λ (N).
+    /// Largest λ (N), between the points as well.
     pub peak: f64,
     /// Friction heat (J).
     pub heat: f64,
-    /// Smallest gap at any point (m).
+    /// Smallest gap (m): at the start of the span, at points, and between points of nodes that stay open.
     pub lowest: f64,
 }
 
@@ -137,6 +137,10 @@ pub struct Record {
     pub work: Worked,
     /// Motion of each pair over the span.
     pub courses: Vec<Course>,
+    /// Start and length of the step being tried, as shares of the span.
+    pub step: [f64; 2],
+    /// Gaps within free flight are looked for where they may be smaller than at its ends by more than this (m).
+    pub tolerance: f64,
     /// At the points of the step being tried, pair by pair.
     pub drives: Vec<[(Drive, Motion); POINTS]>,
     /// Motion that forces at each point of the step taken work on, pair by pair.
@@ -157,9 +161,11 @@ pub struct Record {
 }
 
 impl Record {
-    /// Room for so many nodes and pairs.
-    pub fn new(nodes: usize, pairs: usize) -> Self {
+    /// Room for so many nodes and pairs, with errors of `tolerance` (m).
+    pub fn new(nodes: usize, pairs: usize, tolerance: f64) -> Self {
         Self {
+            step: [0.0; 2],
+            tolerance,
             tallies: vec![Tally::NOTHING; nodes],
             work: Worked::default(),
             courses: vec![Course::default(); pairs],
@@ -219,14 +225,16 @@ impl Record {
         rest.iter_mut().for_each(|places| places.copy_from_slice(first));
     }
 
-    /// A sector begins its span with its nodes at the places told. The search for the closest points of the first step starts there too: where
-    /// trials of the span before have left off is no part of a saved state.
-    pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint) {
+    /// A sector begins its span with its nodes at these places and gaps (m). The search for the closest points of the first step starts there
+    /// too: where trials of the span before have left off is no part of a saved state.
+    pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint, gap_of: impl Fn(usize) -> f64) {
         for (node, place) in self.places[0].iter_mut().enumerate() {
             *place = place_of(node);
         }
         self.stay();
-        self.tallies.fill(Tally::NOTHING);
+        for (node, tally) in self.tallies.iter_mut().enumerate() {
+            *tally = Tally { lowest: gap_of(node), ..Tally::NOTHING };
+        }
         (self.work, self.implausible, self.behind_edge) = (Worked::default(), false, None);
     }
 }

@@ -45,17 +45,24 @@ pub struct Structure {
 pub struct Pace {
     /// Energy left by contacts that opened and closed (J).
     pub bank: Vec<f64>,
+    /// Largest energy that this has been compared with (J).
+    pub largest: Vec<f64>,
     /// How often the span is halved.
     pub level: Vec<u64>,
     /// Slopes of contact forces over the last step (N/s), `[row · lanes + lane]`.
     pub slopes: Vec<f64>,
 }
 
-persist_fields!(Pace { bank, level, slopes });
+persist_fields!(Pace { bank, largest, level, slopes });
 
 impl Pace {
     fn new(sectors: usize, contacts: usize) -> Self {
-        Self { bank: vec![0.0; sectors], level: vec![0; sectors], slopes: vec![0.0; 3 * contacts] }
+        Self {
+            bank: vec![0.0; sectors],
+            largest: vec![0.0; sectors],
+            level: vec![0; sectors],
+            slopes: vec![0.0; 3 * contacts],
+        }
     }
 
     /// How often the span of a sector is halved.
@@ -228,6 +235,7 @@ impl Structure {
         self.history.clear();
         self.pulling.clear();
         self.pace.bank.fill(0.0);
+        self.pace.largest.fill(0.0);
         self.pace.level.fill(0);
         self.pace.slopes.fill(0.0);
     }

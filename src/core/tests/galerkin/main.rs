@@ -1,8 +1,10 @@
 //! Continuous Galerkin in time on whole scenes: against massless-boundary with ever shorter steps, within its tolerance, with books that
 //! close, with all it may be combined with.
 
+mod bank;
 #[path = "../common/counting.rs"]
 mod counting;
+mod extremes;
 #[path = "../../../../tests/guide.rs"]
 mod guide;
 mod sticking;

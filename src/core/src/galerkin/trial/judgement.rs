@@ -14,7 +14,7 @@ const KINK: f64 = 0.2;
 /// 14 stops leave up to 2.5 times the tolerance. And on a rub where all slides (`core/tests/galerkin/sticking.rs`): 0.2 to 0.8 of it.
 const BEND: f64 = 0.5;
 /// Gap of a node between points may be so many times what the polynomial leaves out, or the step is shortened.
-const NEAR: f64 = 4.0;
+pub(super) const NEAR: f64 = 4.0;
 /// How a trial came out.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Verdict {

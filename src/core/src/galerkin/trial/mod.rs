@@ -2,6 +2,7 @@
 
 mod found;
 mod judgement;
+mod minima;
 mod obstacle;
 mod sticking;
 mod together;
@@ -15,6 +16,7 @@ use super::state::SectorState;
 use crate::dynamics::dispatch::InstructionSet;
 use crate::laws::active_set::ContactSolver;
 pub use judgement::Verdict;
+use minima::Minima;
 use nalgebra::DMatrix;
 pub use obstacle::{Obstacle, Sliding, one_by_one};
 use sticking::Sticking;
@@ -98,6 +100,7 @@ pub struct Trial {
     /// Impulses left out (N·s), and what the error makes of them (m²/(N·s)).
     impulses: Vec<f64>,
     left: Vec<f64>,
+    minima: Minima,
     /// Where contacts may stick; and 1/h of the step (1/s), 0 where its force does not follow on that before.
     sticking: Option<Box<Sticking>>,
     per_step: f64,
@@ -160,6 +163,7 @@ impl Trial {
             withdrawn: rows(),
             impulses: rows(),
             left: rows(),
+            minima: Minima::new(modes, nodes),
             sticking: None,
             per_step: 0.0,
         }
@@ -189,12 +193,7 @@ impl Trial {
     ) -> Verdict {
         let compliance = level.compliance_of(kind);
         self.begin((level, kind), Some(rows), state);
-        if !state.looked {
-            self.find_start(rows, state);
-            for node in 0..self.nodes() {
-                (self.begun.gaps[node], _) = obstacle.gap(node, 0, three(&self.start, node));
-            }
-        }
+        self.find_gaps_at_start(rows, state, obstacle);
         let mut verdict = Verdict::default();
         for pass in 0..PASSES {
             let (lowest, largest) = self.find_gaps(obstacle);
@@ -216,6 +215,16 @@ impl Trial {
             self.judge((level, rows), obstacle, &mut verdict);
         }
         verdict
+    }
+
+    /// Gaps at the start where nobody has looked.
+    fn find_gaps_at_start(&mut self, rows: &Rows, state: &SectorState, obstacle: &mut impl Obstacle) {
+        if !state.looked {
+            self.find_start(rows, state);
+            for node in 0..self.nodes() {
+                (self.begun.gaps[node], _) = obstacle.gap(node, 0, three(&self.start, node));
+            }
+        }
     }
 
     /// Displacements and velocities of the rows at the start.

@@ -38,6 +38,8 @@ pub struct Together {
     tables: Vec<Vec<Tables>>,
     pub demand: Demand,
     bank: f64,
+    /// Largest energy that this has been compared with (J).
+    largest: f64,
     level: usize,
     /// Length of the spans that the tables are for (s).
     span: f64,
@@ -117,7 +119,7 @@ impl Together {
                     trial: if sticks { trial.sticking() } else { trial },
                     state: if sticks { state.sticking() } else { state },
                     advance: Advance::new(modes, of.nodes()),
-                    record: Record::new(of.nodes(), pairs.len()),
+                    record: Record::new(of.nodes(), pairs.len(), tolerance),
                     far: false,
                 });
             }
@@ -132,6 +134,7 @@ impl Together {
             tables: kinds.into_iter().map(made).collect(),
             demand: Demand { tolerance, precision: (CLOSE * PRECISION * tolerance).max(rounding), most: u64::MAX },
             bank: 0.0,
+            largest: 0.0,
             level: 0,
             span: 0.0,
             fresh: true,
@@ -174,7 +177,8 @@ impl Together {
             }
             one.trial.forget();
             let (places, lanes, sector) = (&structure.history.geometry.before, structure.lanes(), one.sector);
-            one.record.begin(|node| places.place_at(node * lanes + sector));
+            let gaps = &structure.history.gap.before;
+            one.record.begin(|node| places.place_at(node * lanes + sector), |node| gaps[node * lanes + sector]);
         }
         for disk in &mut self.disks {
             let structure = &mut structures[disk.structure];
@@ -190,7 +194,8 @@ impl Together {
         }
         let first = self.sectors.first().map(|one| &structures[one.structure].pace);
         (self.fresh, self.failed) = (true, None);
-        (self.bank, self.level) = first.map_or((0.0, 0), |pace| (pace.bank[0], pace.level_of(0)));
+        (self.bank, self.largest, self.level) =
+            first.map_or((0.0, 0.0, 0), |pace| (pace.bank[0], pace.largest[0], pace.level_of(0)));
         let mut marching = Marching { together: self, world: World { structures, pairs } };
         marching.find_start();
         marching
@@ -469,8 +474,8 @@ impl Marching<'_> {
         for one in &mut together.sectors {
             let structure = &mut structures[one.structure];
             structure.write_contacts(one.sector, &one.state, |node| one.record.tallies[node].lowest);
-            (structure.pace.bank[one.sector], structure.pace.level[one.sector]) =
-                (together.bank, together.level as u64);
+            (structure.pace.bank[one.sector], structure.pace.largest[one.sector]) = (together.bank, together.largest);
+            structure.pace.level[one.sector] = together.level as u64;
             let table = &together.tables[one.table[0]][one.table[1]];
             if let (None, Sectors::Uncoupled(bank)) = (one.disk, &mut structure.modes) {
                 let (state, loss) = (&one.state, one.record.work.damping);
@@ -505,6 +510,12 @@ impl Marched for Marching<'_> {
         (&mut self.together.bank, &mut self.together.level)
     }
 
+    fn largest_energy(&mut self) -> f64 {
+        let energy = self.together.energy();
+        self.together.largest = self.together.largest.max(energy);
+        self.together.largest
+    }
+
     fn length(&self, level: usize) -> f64 {
         self.together.tables[0][0].levels[level].step
     }
@@ -530,6 +541,7 @@ impl Marched for Marching<'_> {
         if !clear {
             return false;
         }
+        self.pass(step);
         self.together.disks.iter_mut().for_each(|disk| disk.whole.fly(step.level));
         self.together.sectors.iter_mut().for_each(|one| one.state.looked = false);
         self.find_start();
@@ -580,7 +592,7 @@ impl Marched for Marching<'_> {
         for whole in self.together.wholes() {
             dropped += if kind == Kind::Constant { whole.dropped() } else { 0.0 };
         }
-        let mut of_wholes = dropped;
+        let (mut of_wholes, tolerance) = (dropped, self.together.demand.tolerance);
         self.each((step, kind), |facing, (trial, state), tables, disk| {
             let own = if kind == Kind::Constant && disk.is_none() {
                 trial.dropped(tables.rows.residual(), state)
@@ -590,6 +602,7 @@ impl Marched for Marching<'_> {
             closed += if kind == Kind::Constant { trial.closed() } else { 0.0 };
             dropped += own;
             let level = &tables.levels[step.level];
+            trial.find_minima(&level.basis, kind, tolerance);
             facing.took(&Taken {
                 level,
                 kind,
@@ -606,6 +619,27 @@ impl Marched for Marching<'_> {
 }
 
 impl Marching<'_> {
+    /// Find gaps within a step of free flight, where a node may come closer there than at its ends.
+    fn pass(&mut self, step: Step) {
+        let mut closer = false;
+        self.each((step, Kind::Polynomial), |facing, _, _, disk| {
+            closer = closer || disk.is_some_and(|disk| facing.may_come_closer(step.from, step.length, &disk.reach));
+        });
+        if !closer {
+            return;
+        }
+        let (kind, tolerance) = (Kind::Polynomial, self.together.demand.tolerance);
+        let points = self.together.tables[0][0].levels[step.level].basis.degree;
+        self.prepare(step, kind);
+        self.push(step, kind, points);
+        self.find_gaps(step, kind, points, false);
+        self.each((step, kind), |facing, (trial, _), tables, _| {
+            let level = &tables.levels[step.level];
+            trial.find_minima(&level.basis, kind, tolerance);
+            facing.passed(level, trial);
+        });
+    }
+
     /// All states go to the end of the step.
     fn go_on(&mut self, step: Step, kind: Kind) {
         self.together.fresh = false;
@@ -625,6 +659,13 @@ impl Marching<'_> {
 }
 
 impl Together {
+    /// Kinetic and strain energy of all bodies at the start of the step (J).
+    fn energy(&self) -> f64 {
+        let own = self.sectors.iter().filter(|one| one.disk.is_none());
+        let sectors = own.map(|one| self.tables[one.table[0]][one.table[1]].energy(&one.state));
+        sectors.chain(self.wholes().map(Whole::energy)).sum()
+    }
+
     fn wholes(&self) -> impl Iterator<Item = &Whole> {
         self.disks.iter().map(|disk| &disk.whole).chain(self.casings.iter().map(|casing| &casing.whole))
     }

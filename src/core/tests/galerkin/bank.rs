@@ -1,0 +1,43 @@
+//! Energy over very many impacts that take none: what the bank holds is bounded.
+
+use super::{SECTORS, scene};
+use crate::guide::{self, told};
+use tiprub_core::settings::{Scheme, Shape};
+use tiprub_test_models::{go, real, set, started};
+
+/// Blades without damping and friction that are squeezed by a round casing, and then swing against it.
+#[test]
+fn blades_keep_their_energy_over_thousands_of_impacts() {
+    let (longest, turns) = (8e-5, 40.0);
+    for tolerance in [1e-1, 1e-2, 1e-3] {
+        let mut scene = scene(Scheme::Galerkin, longest, tolerance);
+        scene.settings.surfaces[0].shape = Shape::Circular {};
+        scene.settings.surfaces[0].ramp_time = 0.0;
+        scene.settings.contacts[0].friction = 0.0;
+        scene.settings.structures[0].damping_ratio = Some(0.0);
+        let mut simulation = started(&scene);
+        let energy = |simulation: &_| real(simulation, "kinetic_energy") + real(simulation, "strain_energy");
+        let mut largest = 0.0_f64;
+        for radius in [-1.4e-4, -2.8e-4, -4.2e-4, -5.6e-4, -7e-4, -3.2e-4] {
+            set(&mut simulation, "casing_radius_change", radius);
+            go(&mut simulation, longest);
+            largest = largest.max(energy(&simulation));
+        }
+        let given = energy(&simulation) + real(&simulation, "impact_loss");
+        let mut most = 0.0_f64;
+        for _ in 0..400 {
+            go(&mut simulation, turns * std::f64::consts::TAU / 1300.0 / 400.0);
+            let lost = real(&simulation, "impact_loss");
+            most = most.max(lost / given);
+            assert!(lost >= -1e-12 * given && lost <= 0.01 * largest, "{tolerance:e}: {lost:e} of {largest:e} J");
+            assert!((energy(&simulation) + lost - given).abs() < 1e-10 * given, "{tolerance:e}");
+        }
+        let (left, effort) = (energy(&simulation) / given, *simulation.system().effort());
+        told!(
+            "tolerance {tolerance:.0e}: energy left {left:.4}, most lost {most:.4}, {} steps, {} trials per blade",
+            effort.steps / SECTORS as u64,
+            effort.trials / SECTORS as u64
+        );
+    }
+    guide::hold("cargo test -p tiprub-core --test galerkin bank");
+}

@@ -1,0 +1,79 @@
+//! Smallest clearances and largest forces of communication steps: those within internal steps, not only at their points.
+
+use super::{H, SECTORS, scene};
+use tiprub_core::settings::{Scheme, Shape};
+use tiprub_core::{Scene, Simulation};
+use tiprub_test_models::disk::Disk;
+use tiprub_test_models::{GAP, element, go, real, set, started};
+
+/// Communication step (s), of ten longest steps.
+const WINDOW: f64 = 8e-4;
+
+/// Smallest clearance of every blade (m), and the largest force (N), of each communication step.
+fn windows(scene: &Scene, drive: fn(&mut Simulation, u32)) -> Vec<(Vec<f64>, f64)> {
+    let mut simulation = started(scene);
+    let all = (0..12).map(|n| {
+        drive(&mut simulation, n);
+        go(&mut simulation, WINDOW);
+        let of = |sector: usize| element(&simulation, "sector_clearance_minimum", u32::try_from(sector).unwrap());
+        ((0..SECTORS).map(of).collect(), real(&simulation, "normal_force_peak"))
+    });
+    all.collect()
+}
+
+/// How far the smallest clearances (m) are from others, and the largest forces as a share of the largest of all.
+fn apart(found: &[(Vec<f64>, f64)], others: &[(Vec<f64>, f64)]) -> (f64, f64) {
+    let largest = others.iter().fold(1.0, |largest: f64, other| largest.max(other.1));
+    let pairs = found.iter().zip(others);
+    pairs.fold((0.0_f64, 0.0_f64), |(gap, force), (found, other)| {
+        let gaps = found.0.iter().zip(&other.0).map(|(a, b)| (a - b).abs());
+        (gaps.fold(gap, f64::max), force.max((found.1 - other.1).abs() / largest))
+    })
+}
+
+/// A change of the scene, and what the importer sets before a communication step.
+type Case = (&'static str, fn(&mut Scene), fn(&mut Simulation, u32));
+
+const CASES: [Case; 5] = [
+    ("rub", |_| (), |_, _| ()),
+    // Blades touch at first, then they swing freely past lobes that come close.
+    (
+        "flight after a rub",
+        |_| (),
+        |simulation, n| set(simulation, "casing_radius_change", if n < 3 { 0.0 } else { 1.2e-4 }),
+    ),
+    ("coupled", |scene| scene.roms[0] = Disk::random(SECTORS, 1, 9, 0.25, 3).cyclic(), wide),
+    ("at rest past two lobes", |_| (), wide),
+    (
+        "at rest past a table",
+        |scene| {
+            let radius_change = (0..24).map(|i| -1.5e-4 * (f64::from(i) * 0.9).sin().max(0.0)).collect();
+            scene.settings.surfaces[0].shape = Shape::Table { radius_change };
+        },
+        wide,
+    ),
+];
+
+fn wide(simulation: &mut Simulation, _: u32) {
+    set(simulation, "casing_radius_change", 2e-4);
+}
+
+/// The smallest clearance is within the tolerance, a share of the clearance, of what steps of half a microsecond find.
+#[test]
+fn extremes_do_not_depend_on_the_longest_step() {
+    for (name, change, drive) in CASES {
+        let of = |step: f64, tolerance: f64| {
+            let mut scene = scene(Scheme::Galerkin, step, tolerance);
+            change(&mut scene);
+            windows(&scene, drive)
+        };
+        let fine = of(5e-7, 1e-6);
+        let closest = fine.iter().flat_map(|(gaps, _)| gaps).copied().fold(f64::INFINITY, f64::min);
+        assert!(closest < 1.2 * GAP, "{name}: {closest:e} m");
+        for tolerance in [1e-1, 1e-2, 1e-3] {
+            let (gap, force) = apart(&of(2.0 * H, tolerance), &fine);
+            println!("{name}, {tolerance:e}: clearance off by {:.3} um, largest force by {force:.1e}", 1e6 * gap);
+            assert!(gap < tolerance * GAP && force < 3.0 * tolerance, "{name}, {tolerance:e}: {gap:e} m, {force:e}");
+        }
+    }
+}
