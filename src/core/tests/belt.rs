@@ -225,7 +225,7 @@ fn by_a_tolerance_a_flexible_contact_sticks_and_slips_as_its_closed_form() {
             error / tolerance
         );
         // The contact begins with a jump, which the shortest steps miss at the smallest tolerance.
-        assert!(error < 3.0 * tolerance && residual < 1e-12 && 100 * effort.missed < steps, "{effort:?}, {residual:e}");
+        assert!(error < 3.0 * tolerance && residual < 1e-12 && effort.missed < 20, "{effort:?}, {residual:e}");
     }
     guide::hold("cargo test -p tiprub-core --test belt tolerance");
 }

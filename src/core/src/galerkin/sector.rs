@@ -19,6 +19,8 @@ pub struct Tables {
     pub rows: Rows,
     /// Span, half of it, a quarter, …
     pub levels: Vec<Level>,
+    /// The same of a higher degree, for steps in which no contact changes that may stick; empty without sticking.
+    pub steady: Vec<Level>,
     modes: Modes,
 }
 
@@ -32,7 +34,7 @@ impl Tables {
     /// The same of a degree that is known to do.
     pub fn of_degree(modes: Modes, degree: usize) -> Self {
         let levels = (0..=HALVINGS).map(|_| Level::new(&modes, degree)).collect();
-        Self { rows: Rows::new(&modes), levels, modes }
+        Self { rows: Rows::new(&modes), levels, steady: Vec::new(), modes }
     }
 
     /// Kinetic and strain energy of a sector (J).
@@ -41,14 +43,29 @@ impl Tables {
         kinetic + strain
     }
 
+    /// The same with steps of degree `degree` while no contact changes.
+    #[must_use]
+    pub fn steady(mut self, degree: usize) -> Self {
+        self.steady = (0..=HALVINGS).map(|_| Level::new(&self.modes, degree)).collect();
+        self
+    }
+
+    /// Tables of a level, for so many points.
+    pub fn of_points(&self, level: usize, kind: Kind, points: usize) -> &Level {
+        let steady = self.steady.get(level).filter(|level| kind == Kind::Polynomial && level.basis.degree == points);
+        steady.unwrap_or(&self.levels[level])
+    }
+
     /// Fill the tables for spans of length `span` (s). Does not allocate.
     pub fn set_span(&mut self, span: f64) {
         if self.levels[0].step.to_bits() == span.to_bits() {
             return;
         }
-        for (halvings, level) in self.levels.iter_mut().enumerate() {
-            level.set_step(&self.modes, halved(span, halvings));
-            level.share = halved(1.0, halvings);
+        for levels in [&mut self.levels, &mut self.steady] {
+            for (halvings, level) in levels.iter_mut().enumerate() {
+                level.set_step(&self.modes, halved(span, halvings));
+                level.share = halved(1.0, halvings);
+            }
         }
     }
 }
@@ -175,7 +192,7 @@ impl Marcher {
     /// The same where contacts may stick.
     #[must_use]
     pub fn sticking(mut self) -> Self {
-        self.trial = self.trial.sticking();
+        self.trial = self.trial.sticking().steady();
         self
     }
 
@@ -252,7 +269,7 @@ impl<W: Witness> Marched for Alone<'_, W> {
             witness.go(step.from, step.length, table, Kind::Polynomial);
             trial.glide(table, &tables.rows, state, *witness);
             if trial.find_minima(&table.basis, Kind::Polynomial, *tolerance) {
-                trial.follow(tables, step.level, state, advance);
+                trial.follow(tables, table, step.level, state, advance);
             }
             witness.passed(table, trial);
         }
@@ -263,6 +280,14 @@ impl<W: Witness> Marched for Alone<'_, W> {
     }
 
     fn attempt(&mut self, step: Step, kind: Kind) -> Verdict {
+        if let Some(table) = self.tables.steady.get(step.level).filter(|_| kind == Kind::Polynomial) {
+            self.witness.go(step.from, step.length, table, kind);
+            let (trial, precision) = (&mut self.marcher.trial, self.demand.precision);
+            let verdict = trial.run_steady(table, &self.tables.rows, self.state, self.witness, precision);
+            if verdict.solved {
+                return verdict;
+            }
+        }
         let table = &self.tables.levels[step.level];
         self.witness.go(step.from, step.length, table, kind);
         self.marcher.trial.run((table, kind), &self.tables.rows, self.state, self.witness, self.demand.precision)
@@ -270,10 +295,10 @@ impl<W: Witness> Marched for Alone<'_, W> {
 
     fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
         let Self { marcher, tables, state, witness, demand: Demand { tolerance, .. } } = self;
-        let level = &tables.levels[step.level];
+        let level = tables.of_points(step.level, kind, marcher.trial.points());
         if marcher.trial.find_minima(&level.basis, kind, *tolerance) {
             let Marcher { trial, advance } = &mut **marcher;
-            trial.follow(tables, step.level, state, advance);
+            trial.follow(tables, level, step.level, state, advance);
         }
         let dropped = if kind == Kind::Constant { marcher.trial.dropped(tables.rows.residual(), state) } else { 0.0 };
         let (trial, basis) = (&marcher.trial, &level.basis);

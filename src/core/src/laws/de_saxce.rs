@@ -15,13 +15,14 @@
 //! For W of full rank a solution exists for every µ; it need not be unique when µ is large. For singular W (coincident
 //! nodes) one exists when some motion opens all contacts at once with u_N > µ‖u_T‖; its reactions are not unique.
 
-mod linear;
+pub(crate) mod linear;
 mod newton;
 mod one_contact;
 mod problem;
 
 use nalgebra::DMatrix;
 
+pub(crate) use self::linear::Eliminate;
 use self::newton::Newton;
 use self::problem::Problem;
 use super::active_set::Outcome;

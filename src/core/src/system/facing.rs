@@ -175,15 +175,16 @@ impl Obstacle for Facing<'_> {
         self.pair_of[node].map_or(0.0, |pair| self.pairs[pair].friction())
     }
 
-    fn drift(&self, node: usize, moved: [f64; 3]) -> [f64; 3] {
+    fn drift(&self, node: usize, step_point: usize, moved: [f64; 3]) -> [f64; 3] {
         let Some(pair) = self.pair_of[node] else { return [0.0; 3] };
-        let [(_, before), (drive, now), ..] = &self.record.drives[pair];
+        let drives = &self.record.drives[pair];
+        let ((_, before), (drive, now)) = (&drives[0], &drives[step_point]);
         let (gap, motion) = (self.pairs[pair].gap(), now.less(before));
         let at = self.at(node, drive);
-        let point = gap.contact_point(at, moved, self.record.places[1][node]);
+        let point = gap.contact_point(at, moved, self.record.places[step_point][node]);
         let (spin, shaft) = (gap.spin_motion(at, point, &motion), gap.shaft_motion(at, point, &motion));
-        let ground = self.on_ground((node, 1), Place::Now, |casing, spot| {
-            let [now, before] = [1, 0].map(|instant| casing.moved_at(spot, instant));
+        let ground = self.on_ground((node, step_point), Place::Now, |casing, spot| {
+            let [now, before] = [step_point, 0].map(|instant| casing.moved_at(spot, instant));
             std::array::from_fn(|c| now[c] - before[c])
         });
         let ground: [f64; 3] = ground.unwrap_or_default();

@@ -56,8 +56,9 @@ impl Galerkin {
             tables: kinds
                 .into_iter()
                 .map(|kind| {
-                    let degree = degree(&kind);
-                    Tables::of_degree(kind, degree)
+                    let (degree, steady) = (degree(&kind), kind.degree_up_to(longest));
+                    let tables = Tables::of_degree(kind, degree);
+                    if sticks { tables.steady(steady) } else { tables }
                 })
                 .collect(),
             marcher: if sticks { marcher.sticking() } else { marcher },

@@ -1,11 +1,11 @@
 //! Contacts that may stick, by a tolerance, on whole scenes: blades by themselves, in elastic casings, coupled.
 
-use super::{Change, H, apart, disk_displacements, goes_on_with_the_same_bits, run, scene, still};
+use super::{Change, H, apart, disk_displacements, goes_on_with_the_same_bits, run, scene, scene_time, still};
 use crate::guide::{self, told};
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::settings::{Scheme, Shape, Solver, TimeSettings};
 use tiprub_core::{Rom, Scene};
 use tiprub_test_models::disk::Disk;
-use tiprub_test_models::{bumps, flexible};
+use tiprub_test_models::{GAP, RADIUS, bumps, flexible, go, modal, node, real, started};
 
 /// The solver that knows sticking, on a rub where all slides: it tends to what massless-boundary tends to with it, and errors are those
 /// asked for.
@@ -53,7 +53,7 @@ fn coupled_sectors_stick_as_one_structure_does() {
             let (parted, error) = (apart(&together, &alone), apart(&together, &exact));
             println!("{speed} rad/s, tolerance {tolerance:e}: {error:.1e}, from one structure {parted:.1e}");
             assert!(parted < tolerance, "{speed} rad/s, {tolerance:e}: {parted:e}");
-            assert!(speed < 1000.0 || error < 2.0 * tolerance, "{speed} rad/s, {tolerance:e}: {error:e}");
+            assert!(error < 2.0 * tolerance, "{speed} rad/s, {tolerance:e}: {error:e}");
         }
     }
 }
@@ -66,4 +66,53 @@ fn what_sticks_is_saved_and_asks_for_no_memory() {
     flexible(&mut carried);
     coupled.roms[0] = Disk::random(4, 1, 9, 0.25, 3).cyclic();
     [alone, carried, coupled].iter().for_each(goes_on_with_the_same_bits);
+}
+
+/// A blade of three modes and one contact node, which lets the node give way in every direction.
+fn three_springs() -> Rom {
+    let frequencies = [350.0, 520.0, 800.0, 40e3, 45e3, 50e3];
+    let springs = [[1.2, 0.5, 0.1], [-0.4, 1.1, 0.3], [0.2, -0.3, 1.0]];
+    let shape = |row: usize, mode: usize| match mode.checked_sub(3) {
+        None => springs[row][mode],
+        Some(local) => f64::from(u8::from(local == row)) * 8.0,
+    };
+    let tip = node("tip", [RADIUS, 0.0, 0.0], 0.0);
+    Rom { damping_ratio: 0.002, ..modal("blade", &frequencies, shape, vec![tip]) }
+}
+
+/// A slow blade that lobes press on: it sticks, slips and leaves again and again.
+#[test]
+fn errors_stay_near_the_tolerance_where_blades_stick_and_slip() {
+    for (speed, friction, steps) in [(60.0, 0.3, 600), (200.0, 0.2, 600)] {
+        let run = |tolerance: f64| {
+            let mut scene = bumps(three_springs());
+            scene.settings.time = TimeSettings { tolerance: Some(tolerance), step: 2.0 * H, ..scene_time() };
+            scene.settings.outputs.energies = true;
+            scene.settings.structures[0].speed = speed;
+            scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.9, width: 0.15, phase: 0.0 };
+            (scene.settings.contacts[0].friction, scene.settings.contacts[0].solver) = (friction, Solver::Coulomb);
+            let mut simulation = started(&scene);
+            let mut displacements = Vec::new();
+            for _ in 0..steps {
+                go(&mut simulation, 2.0 * H);
+                let bank = simulation.system().bank();
+                displacements.extend((0..3).map(|row| bank.row(row, 0)));
+            }
+            assert!(real(&simulation, "energy_residual_relative").abs() < 1e-12);
+            (displacements, *simulation.system().effort())
+        };
+        let (exact, _) = run(1e-6);
+        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
+            let (found, effort) = run(tolerance);
+            let error = found.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / GAP / tolerance;
+            told!(
+                "{speed} rad/s, tolerance {tolerance:.0e}: error over it {error:.2}, {} steps, {} trials, missed {}",
+                effort.steps,
+                effort.trials,
+                effort.missed
+            );
+            assert!(error < 4.0, "{speed} rad/s, {tolerance:e}: {error}");
+        }
+    }
+    guide::hold("cargo test -p tiprub-core --test galerkin stick and slip");
 }

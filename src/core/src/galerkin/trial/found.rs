@@ -104,7 +104,12 @@ impl Trial {
             state.forces[3 * node..3 * node + 3].copy_from_slice(&force);
             state.normals[3 * node..3 * node + 3].copy_from_slice(&normal);
             for (component, slope) in state.slopes.iter_mut().skip(3 * node).take(3).enumerate() {
-                *slope = (force[component] - self.begun.forces[3 * node + component]) * self.per_step;
+                let change = force[component] - self.begun.forces[3 * node + component];
+                *slope = if points == 1 {
+                    change * self.per_step
+                } else {
+                    (0..=points).map(|point| self.end_slopes[point] * self.force(point, node)[component]).sum()
+                };
             }
             state.multipliers[node] = self.multiplier(points, node);
             state.gaps[node] = self.gap(points, node);

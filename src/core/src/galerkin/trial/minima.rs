@@ -87,10 +87,10 @@ impl Trial {
     }
 
     /// Follow the nodes found over a step of a level, before its state moves on.
-    pub fn follow(&mut self, tables: &Tables, level: usize, state: &SectorState, advance: &mut Advance) {
+    pub fn follow(&mut self, tables: &Tables, of: &Level, level: usize, state: &SectorState, advance: &mut Advance) {
         let finer = FINER.min(HALVINGS - level);
         let (parts, rows) = (1_usize << finer, &tables.rows);
-        let (table, basis) = (&tables.levels[level + finer], &tables.levels[level].basis);
+        let (table, basis) = (&tables.levels[level + finer], &of.basis);
         self.find_start(rows, state);
         let mut minima = std::mem::replace(&mut self.minima, Minima::new(0, 0));
         minima.state.position.copy_from_slice(&state.position);

@@ -4,6 +4,7 @@ mod found;
 mod judgement;
 mod minima;
 mod obstacle;
+mod steady;
 mod sticking;
 mod together;
 
@@ -19,6 +20,7 @@ pub use judgement::Verdict;
 use minima::Minima;
 use nalgebra::DMatrix;
 pub use obstacle::{Obstacle, Sliding, one_by_one};
+use steady::Steady;
 use sticking::Sticking;
 
 /// Most evaluations of the gaps of one trial.
@@ -104,6 +106,9 @@ pub struct Trial {
     /// Where contacts may stick; and 1/h of the step (1/s), 0 where its force does not follow on that before.
     sticking: Option<Box<Sticking>>,
     per_step: f64,
+    /// Of steps of a higher degree; and slopes of the polynomials through the points at the end of the step (1/s).
+    steady: Option<Box<Steady>>,
+    end_slopes: [f64; POINTS],
 }
 
 /// Forces, λ, gaps and normals of the nodes at the start.
@@ -166,6 +171,8 @@ impl Trial {
             minima: Minima::new(modes, nodes),
             sticking: None,
             per_step: 0.0,
+            steady: None,
+            end_slopes: [0.0; POINTS],
         }
     }
 
@@ -174,6 +181,13 @@ impl Trial {
     pub fn sticking(mut self) -> Self {
         self.sticking = Some(Box::new(Sticking::new(self.lanes.nodes)));
         self.begun.slopes = vec![0.0; 3 * self.lanes.nodes];
+        self
+    }
+
+    /// The same with steps of a higher degree, while nothing changes.
+    #[must_use]
+    pub fn steady(mut self) -> Self {
+        self.steady = Some(Box::new(Steady::new(self.lanes.len(), self.lanes.nodes)));
         self
     }
 

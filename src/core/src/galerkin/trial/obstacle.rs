@@ -38,9 +38,9 @@ pub trait Obstacle {
         0.0
     }
 
-    /// What prescribed motion, and that of what it touches, add to its own over the step where it slides (m); it is displaced by `moved` at the
-    /// end (m).
-    fn drift(&self, _node: usize, _moved: [f64; 3]) -> [f64; 3] {
+    /// What prescribed motion, and that of what it touches, add to its own up to a point of the step where it slides (m); it is displaced by
+    /// `moved` there (m).
+    fn drift(&self, _node: usize, _point: usize, _moved: [f64; 3]) -> [f64; 3] {
         [0.0; 3]
     }
 }

@@ -4,6 +4,7 @@
 //! slip without its force and W the flexibility along normal and tangents, they are the problem of [`crate::laws::de_saxce`].
 
 use super::{Trial, Verdict, three};
+use crate::galerkin::basis::POINTS;
 use crate::galerkin::compliance::{Compliance, Lanes};
 use crate::galerkin::kernels::{AddProduct, Combine};
 use crate::galerkin::trial::Obstacle;
@@ -151,7 +152,7 @@ impl Trial {
     fn pose_sticking(&mut self, own: &mut Sticking, obstacle: &impl Obstacle) {
         let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
         for (place, lane) in self.members.iter().enumerate() {
-            let slip = self.slip(*lane, obstacle);
+            let slip = self.slip(*lane, 1, obstacle);
             let (pushed, under) = (lanes.three(&self.pushed, *lane), lanes.three(&own.under, *lane));
             let without: [f64; 3] = std::array::from_fn(|c| slip[c] - pushed[c] - under[c]);
             let [normal, first, second] = own.axes[*lane];
@@ -200,25 +201,31 @@ impl Trial {
         found
     }
 
-    /// What a node moves over the step against what it touches (m).
-    fn slip(&self, node: usize, obstacle: &impl Obstacle) -> [f64; 3] {
-        let (now, before) = (self.displacement(1, node), three(&self.start, node));
-        let under = obstacle.drift(node, now);
+    /// What a node moves up to a point against what it touches (m).
+    pub(super) fn slip(&self, node: usize, point: usize, obstacle: &impl Obstacle) -> [f64; 3] {
+        let (now, before) = (self.displacement(point, node), three(&self.start, node));
+        let under = obstacle.drift(node, point, now);
         std::array::from_fn(|c| now[c] - before[c] + under[c])
     }
 
     /// Energy that friction puts in at nodes over a step that is solved (J): the force at its start is not that of the slip to come.
     pub fn find_gain(&self, obstacle: &impl Obstacle) -> f64 {
         let mut gain = 0.0;
-        for node in (0..self.lanes.nodes).filter(|node| (0..2).any(|point| self.multiplier(point, *node) > 0.0)) {
-            let slip = self.slip(node, obstacle);
-            let pushed = self.lanes.three(&self.pushed, node);
+        let points = self.points();
+        let touches = |node: &usize| (0..=points).any(|point| self.multiplier(point, *node) > 0.0);
+        for node in (0..self.lanes.nodes).filter(touches) {
+            let mut slips = [[0.0; 3]; POINTS];
+            (1..=points).for_each(|point| slips[point] = self.slip(node, point, obstacle));
+            let pushed = self.lanes.three(&self.pushed, self.lanes.at(points, node));
             let (mut own, mut moved) = (0.0, 0.0);
-            for point in 0..2 {
+            for point in 0..=points {
+                let terms = self.ways[point].iter().zip(&slips);
+                let slip =
+                    terms.fold([0.0; 3], |sum, (weight, slip)| std::array::from_fn(|c| sum[c] + weight * slip[c]));
                 let (force, normal) = (self.force(point, node), self.normal(point, node));
                 let multiplier = self.multiplier(point, node);
                 let tangential: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
-                own += 0.5 * dot(tangential, slip);
+                own += dot(tangential, slip);
                 moved += dot(tangential, tangential).sqrt() * dot(pushed, pushed).sqrt();
             }
             gain += if own > ROUNDING * moved { own } else { 0.0 };
@@ -239,8 +246,8 @@ impl Trial {
         self.instructions.run(AddProduct { matrix, x, y });
         let touches = |node: &usize| (0..2).all(|point| self.multiplier(point, *node) > 0.0);
         let turn = |node: usize| {
-            let (normal, slip) = (self.normal(1, node), self.slip(node, obstacle));
-            let under = obstacle.drift(node, self.displacement(1, node));
+            let (normal, slip) = (self.normal(1, node), self.slip(node, 1, obstacle));
+            let under = obstacle.drift(node, 1, self.displacement(1, node));
             let first = three(&self.withdrawn, node);
             let along: [f64; 3] = std::array::from_fn(|c| first[c] + under[c] / step);
             let across = dot(along, normal);

@@ -47,11 +47,11 @@ impl Kernel for AddMagnitudes<'_> {
 
 /// Solve `matrix · x = right` in place by elimination with row exchanges; `right` returns x, `matrix` is destroyed.
 /// The matrix is `order` × `order` by columns. False when a pivot vanishes or is not finite.
-pub(super) struct Eliminate<'a> {
-    pub(super) order: usize,
-    pub(super) matrix: &'a mut [f64],
-    pub(super) right: &'a mut [f64],
-    pub(super) regular: &'a mut bool,
+pub(crate) struct Eliminate<'a> {
+    pub(crate) order: usize,
+    pub(crate) matrix: &'a mut [f64],
+    pub(crate) right: &'a mut [f64],
+    pub(crate) regular: &'a mut bool,
 }
 
 impl Kernel for Eliminate<'_> {

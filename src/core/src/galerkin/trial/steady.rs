@@ -1,0 +1,261 @@
+//! Steps of a higher degree of contacts that may stick, while nothing changes: what sticks goes with the surface, what slides goes on sliding.
+//!
+//! Forces at the points are linear then: a node that sticks stays where it is on the surface, one that slides is rubbed against its slip.
+//! Whether that holds is found out afterwards: forces press and are within the cone, sliding has not turned round, open nodes stay open.
+//! Where it does not, a step of degree 1 finds what changes.
+
+use super::{Trial, Verdict, three};
+use crate::galerkin::basis::{Basis, POINTS};
+use crate::galerkin::compliance::Compliance;
+use crate::galerkin::level::Level;
+use crate::galerkin::rows::Rows;
+use crate::galerkin::state::SectorState;
+use crate::galerkin::trial::{Kind, Obstacle};
+use crate::gaps::dot;
+use crate::laws::de_saxce::Eliminate;
+use crate::laws::tangents;
+
+/// Most evaluations of gaps and slips.
+const PASSES: usize = 8;
+/// A force within the cone by less than this share of µλ slides.
+const ON_THE_CONE: f64 = 1e-7;
+/// Directions of sliding are known to this.
+const TURNED: f64 = 1e-9;
+/// What rounding leaves of forces, as a share of the largest.
+const ROUNDING: f64 = 1e-10;
+
+/// What a closed contact does over the step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Status {
+    Open,
+    Sticks,
+    /// Against this direction, at the start.
+    Slides([f64; 3]),
+}
+
+/// Scratch.
+#[derive(Debug, Clone)]
+pub(super) struct Steady {
+    status: Vec<Status>,
+    /// Direction of the slip at every lane.
+    directions: Vec<[f64; 3]>,
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl Steady {
+    /// Room for so many lanes and nodes.
+    pub(super) fn new(lanes: usize, nodes: usize) -> Self {
+        Self {
+            status: vec![Status::Open; nodes],
+            directions: vec![[0.0; 3]; lanes],
+            matrix: vec![0.0; 9 * lanes * lanes],
+            right: vec![0.0; 3 * lanes],
+        }
+    }
+}
+
+impl Trial {
+    /// Try a step in which no contact changes; not solved where one does.
+    pub fn run_steady(
+        &mut self,
+        level: &Level,
+        rows: &Rows,
+        state: &SectorState,
+        obstacle: &mut impl Obstacle,
+        precision: f64,
+    ) -> Verdict {
+        let mut verdict = Verdict::default();
+        let Some(mut own) = self.steady.take() else { return verdict };
+        if self.find_status(&mut own, state, obstacle) {
+            self.begin((level, Kind::Polynomial), Some(rows), state);
+            self.find_start(rows, state);
+            self.end_slopes = level.basis.slopes_at(1.0).map(|slope| slope / level.step);
+            verdict.solved = self.seek_steady(&mut own, level, obstacle, precision, &mut verdict);
+        }
+        self.steady = Some(own);
+        if verdict.solved {
+            self.judge((level, rows), obstacle, &mut verdict);
+            // What friction puts in at the start would have to be paid for.
+            verdict.solved = !verdict.switches;
+        }
+        verdict
+    }
+
+    /// What contacts do at the start; false where nothing pushes.
+    fn find_status(&self, own: &mut Steady, state: &SectorState, obstacle: &impl Obstacle) -> bool {
+        let mut any = false;
+        for (node, status) in own.status.iter_mut().enumerate() {
+            let (multiplier, normal, force) =
+                (state.multipliers[node], three(&state.normals, node), three(&state.forces, node));
+            let along: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
+            let (size, most) = (dot(along, along).sqrt(), obstacle.friction(node) * multiplier);
+            *status = if multiplier == 0.0 {
+                Status::Open
+            } else if size < most * (1.0 - ON_THE_CONE) {
+                Status::Sticks
+            } else {
+                Status::Slides(along.map(|component| if size > 0.0 { -component / size } else { 0.0 }))
+            };
+            any |= multiplier > 0.0;
+        }
+        any
+    }
+
+    fn seek_steady(
+        &mut self,
+        own: &mut Steady,
+        level: &Level,
+        obstacle: &mut impl Obstacle,
+        precision: f64,
+        verdict: &mut Verdict,
+    ) -> bool {
+        let (lanes, basis) = (self.lanes, &level.basis);
+        for lane in 0..lanes.len() {
+            if let Status::Slides(direction) = own.status[lanes.place(lane).1] {
+                own.directions[lane] = direction;
+            }
+        }
+        for pass in 0..PASSES {
+            let (lowest, largest) = self.find_gaps(obstacle);
+            if lowest.is_nan() {
+                return false;
+            }
+            let turned = self.find_directions(own, basis, obstacle);
+            if pass > 0 && largest <= precision && turned <= TURNED && self.largest_slip(own, obstacle) <= precision {
+                return lowest >= -precision && self.holds(own, obstacle);
+            }
+            verdict.factorisations += 1;
+            if !self.solve_steady(own, &level.compliance, obstacle) {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// Motion of a node against what it touches, from the start to a point (m).
+    fn relative(&self, point: usize, node: usize, obstacle: &impl Obstacle) -> [f64; 3] {
+        if point == 0 { [0.0; 3] } else { self.slip(node, point, obstacle) }
+    }
+
+    /// Directions in which nodes slide at all points; by how much they have turned.
+    fn find_directions(&self, own: &mut Steady, basis: &Basis, obstacle: &impl Obstacle) -> f64 {
+        let mut turned = 0.0_f64;
+        for node in 0..self.lanes.nodes {
+            let Status::Slides(_) = own.status[node] else { continue };
+            let mut places = [[0.0; 3]; POINTS];
+            (1..basis.count()).for_each(|point| places[point] = self.relative(point, node, obstacle));
+            for point in 1..basis.count() {
+                let (lane, normal) = (self.lanes.at(point, node), self.normal(point, node));
+                let slip = (0..basis.count())
+                    .fold([0.0; 3], |sum, k| std::array::from_fn(|c| sum[c] + basis.work[point][k] * places[k][c]));
+                let across = dot(slip, normal);
+                let along: [f64; 3] = std::array::from_fn(|c| slip[c] - across * normal[c]);
+                let size = dot(along, along).sqrt();
+                if size > 0.0 {
+                    let direction = along.map(|component| component / size);
+                    let change = (0..3).map(|c| (direction[c] - own.directions[lane][c]).abs()).fold(0.0, f64::max);
+                    (turned, own.directions[lane]) = (turned.max(change), direction);
+                }
+            }
+        }
+        turned
+    }
+
+    /// Largest slip of a node that sticks (m).
+    fn largest_slip(&self, own: &Steady, obstacle: &impl Obstacle) -> f64 {
+        let lanes = self.lanes;
+        let slip = |lane: usize| {
+            let (point, node) = lanes.place(lane);
+            let (moved, normal) = (self.relative(point, node, obstacle), self.normal(point, node));
+            let across = dot(moved, normal);
+            let along: [f64; 3] = std::array::from_fn(|c| moved[c] - across * normal[c]);
+            dot(along, along).sqrt()
+        };
+        let sticking = (0..lanes.len()).filter(|lane| own.status[lanes.place(*lane).1] == Status::Sticks);
+        sticking.map(slip).fold(0.0, f64::max)
+    }
+
+    /// Forces that keep closed nodes closed, sticking ones in place and sliding ones rubbed.
+    fn solve_steady(&mut self, own: &mut Steady, compliance: &Compliance, obstacle: &impl Obstacle) -> bool {
+        let lanes = self.lanes;
+        self.members.clear();
+        let closed = (0..lanes.len()).filter(|lane| own.status[lanes.place(*lane).1] != Status::Open);
+        self.members.extend(closed);
+        let order = 3 * self.members.len();
+        own.matrix[..order * order].fill(0.0);
+        for (place, lane) in self.members.iter().enumerate() {
+            let (point, node) = lanes.place(*lane);
+            let (normal, friction) = (self.normal(point, node), obstacle.friction(node));
+            let [first, second] = tangents(normal);
+            let (moved, free) = (lanes.three(&self.moved, *lane), lanes.three(&self.free, *lane));
+            let relative = self.relative(point, node, obstacle);
+            let slides = own.status[node] != Status::Sticks;
+            // Forces as displacements.
+            let own_columns = compliance.of_lane(*lane);
+            let scale = (0..3).map(|c| lanes.three(own_columns[c], *lane)[c]).sum::<f64>() / 3.0;
+            for (axis, direction) in [normal, first, second].into_iter().enumerate() {
+                let row = 3 * place + axis;
+                if axis > 0 && slides {
+                    let share = friction * dot(direction, own.directions[*lane]);
+                    for c in 0..3 {
+                        own.matrix[(3 * place + c) * order + row] = scale * (direction[c] + share * normal[c]);
+                    }
+                    own.right[row] = 0.0;
+                    continue;
+                }
+                for (column, other) in self.members.iter().enumerate() {
+                    for (c, table) in compliance.of_lane(*other).into_iter().enumerate() {
+                        own.matrix[(3 * column + c) * order + row] = dot(direction, lanes.three(table, *lane));
+                    }
+                }
+                let away = if axis == 0 { self.gaps[*lane] } else { dot(direction, relative) };
+                let there: [f64; 3] = std::array::from_fn(|c| moved[c] - free[c]);
+                own.right[row] = dot(direction, there) - away;
+            }
+        }
+        let mut regular = false;
+        let (matrix, right) = (&mut own.matrix[..order * order], &mut own.right[..order]);
+        self.instructions.run(Eliminate { order, matrix, right, regular: &mut regular });
+        if !regular || right.iter().any(|force| !force.is_finite()) {
+            return false;
+        }
+        let width = lanes.width();
+        self.multipliers[..width].fill(0.0);
+        self.forces[..3 * width].fill(0.0);
+        self.taken.clear();
+        self.amounts.clear();
+        for (place, lane) in self.members.iter().enumerate() {
+            let force = [0, 1, 2].map(|c| right[3 * place + c]);
+            let (point, node) = lanes.place(*lane);
+            lanes.set(&mut self.forces, *lane, force);
+            self.multipliers[*lane] = dot(force, self.normal(point, node));
+            for (c, force) in force.into_iter().enumerate() {
+                self.taken.push(3 * (lanes.nodes + *lane) + c);
+                self.amounts.push(force);
+            }
+        }
+        self.combine(compliance.columns(), compliance.stride());
+        true
+    }
+
+    /// Whether forces press and are within the cone, and sliding has not turned round.
+    fn holds(&mut self, own: &Steady, obstacle: &impl Obstacle) -> bool {
+        let lanes = self.lanes;
+        let largest = self.multipliers[..lanes.len()].iter().copied().fold(0.0, f64::max);
+        self.members.iter().all(|lane| {
+            let (point, node) = lanes.place(*lane);
+            let (force, normal) = (lanes.three(&self.forces, *lane), self.normal(point, node));
+            let multiplier = self.multipliers[*lane];
+            let along: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
+            multiplier > 0.0
+                && match own.status[node] {
+                    Status::Open => true,
+                    Status::Sticks => {
+                        dot(along, along).sqrt() <= obstacle.friction(node) * multiplier + ROUNDING * largest
+                    }
+                    Status::Slides(direction) => direction == [0.0; 3] || dot(direction, own.directions[*lane]) > 0.0,
+                }
+        })
+    }
+}
