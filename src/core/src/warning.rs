@@ -110,7 +110,7 @@ topics! {
         "The solver `film` pulls at a contact node instead of pushing: forces of single nodes are wrong by about as much."
         "The solver `lcp`.";
     FilmInside "film-inside"
-        "The solver `film` leaves a contact node inside the casing by a large fraction of its clearance."
+        "The solver `film` leaves a contact node inside the surface: by 5 % of its clearance or more, and of a free body by 20 % of a thousandth of its extent."
         "The solver `lcp`.";
     CurvatureWork "curvature-work"
         "Normals that turn within internal steps have added as much energy as inputs or the shaft did: their net work may be wrong in its sign."

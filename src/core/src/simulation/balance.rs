@@ -95,6 +95,13 @@ impl Simulation {
                 ),
                 self.against_sliding(settings.scheme),
             ),
+            Loss::Cutting => (
+                format!(
+                    "forces of cutting{of} have put {given:.3e} J into tips that go back, where nothing is cut, of {exchanged:.3e} J \
+                     exchanged: tips vibrate faster than they slide, and cutting knows no sticking"
+                ),
+                "Use a smaller internal step, a lower `specific_energy`, or a motion that keeps sliding".to_owned(),
+            ),
             Loss::Impact => (
                 format!(
                     "impacts{of} have put {given:.3e} J into the vibration, of {exchanged:.3e} J of contact work, but they can only dissipate"

@@ -27,6 +27,9 @@ const REFUSED: f64 = 0.2;
 /// Share of its clearance by which a node may be inside at the end of a step. Forces of one step push a node in by what this step corrects,
 /// which is a small part of the clearance as long as steps are short: 4 % at most in random rubs that `lcp` agrees with.
 const INSIDE: f64 = 0.2;
+/// From this share on it is told, and again once it is so many times as much.
+const INSIDE_TOLD: f64 = 0.05;
+const DEEPER: f64 = 2.0;
 /// Internal steps that contact must have lasted for: what a few of them do is soon outweighed.
 const LASTED: u64 = 100;
 
@@ -38,13 +41,18 @@ impl Simulation {
         }
         let is_paper = self.compiled.scene.settings.preset == Preset::Paper;
         for structure in 0..self.compiled.bodies.len() {
-            if let Some((node, share)) = self.system.left_inside(structure).filter(|(_, share)| *share >= INSIDE) {
-                if !is_paper {
+            if let Some((node, share)) = self.system.left_inside(structure) {
+                let goes_on = is_paper || self.is_free(structure);
+                if share >= INSIDE && !goes_on {
                     return Err(self.fail(StepFailure::LeftInside { structure, node, share }, time));
                 }
-                if !std::mem::replace(&mut self.told.inside[structure], true) {
+                let least = if goes_on { INSIDE } else { INSIDE_TOLD };
+                if share >= least.max(DEEPER * self.told.inside[structure]) {
+                    self.told.inside[structure] = share;
                     let problem = self.left_inside(structure, node, share);
-                    let problem = format!("up to t = {} s {problem}", shown(time));
+                    let then =
+                        if goes_on { String::new() } else { format!(". From {:.0} % on the run ends", 100.0 * INSIDE) };
+                    let problem = format!("up to t = {} s {problem}{then}", shown(time));
                     let remedy = self.against_pulling(structure);
                     self.note(Warning::new(Topic::FilmInside, problem, remedy));
                 }
@@ -76,12 +84,23 @@ impl Simulation {
 
     /// What film has not looked at.
     pub(super) fn left_inside(&self, structure: usize, node: usize, share: f64) -> String {
+        let (surface, length) = if self.is_free(structure) {
+            ("surface", "a thousandth of the extent of what touches")
+        } else {
+            ("casing", "its clearance")
+        };
         format!(
-            "film has left contact node {} inside the casing by {:.0} % of its clearance: it checks penetration only once, and forces on \
-             other nodes pushed this one in",
+            "film has left contact node {} inside the {surface} by {:.2e} m, {:.0} % of {length}: it checks penetration only once, and \
+             forces on other nodes pushed this one in",
             self.compiled.node_name(structure, node),
+            share * self.system.clearance_of(structure, node),
             100.0 * share
         )
+    }
+
+    /// Whether nothing holds a structure that touches.
+    fn is_free(&self, structure: usize) -> bool {
+        self.compiled.bodies[structure].translations.is_some()
     }
 
     /// What helps.

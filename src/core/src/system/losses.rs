@@ -18,6 +18,8 @@ pub enum Loss {
     Friction,
     /// Gaps that close.
     Impact,
+    /// Cutting of a coating, whose force is the same forwards and backwards.
+    Cutting,
 }
 
 /// Rounding of the ledger, as a share of all energy exchanged: its residual is held to as much by every test.
@@ -27,7 +29,8 @@ const ROUNDING: f64 = 1e-9;
 /// gaps of the step before that are continued to another step size along their slope, and may end inside the surface.
 const RETURNED: f64 = 0.02;
 
-/// Share of all energy exchanged that friction of bodies that fly may give where their sliding stops: it falls with the step.
+/// Share of all energy exchanged that friction of bodies that fly may give where their sliding stops, and that forces of cutting may give where
+/// tips turn round: it falls with the step.
 const STOPPED: f64 = 0.01;
 
 /// Most that has been taken so far (J).
@@ -35,9 +38,11 @@ const STOPPED: f64 = 0.01;
 pub struct Taken {
     friction: f64,
     impact: f64,
+    /// What forces of cutting have given to tips that go back, which is not booked as cutting.
+    pub(super) uncut: f64,
 }
 
-persist_fields!(Taken { friction, impact });
+persist_fields!(Taken { friction, impact, uncut });
 
 impl Taken {
     /// What is given back of the most that friction, and impacts, had taken (J). Steps by a tolerance pay impacts from those before: these
@@ -69,6 +74,9 @@ impl System {
             let stopped = if self.pairs.iter().any(flies) { STOPPED } else { ROUNDING };
             if friction > stopped * exchanged {
                 return Err(StepFailure::Gives { set, loss: Loss::Friction, given: friction, exchanged });
+            }
+            if taken.uncut > STOPPED * exchanged {
+                return Err(StepFailure::Gives { set, loss: Loss::Cutting, given: taken.uncut, exchanged });
             }
             let moved = ledger.initial.abs() + ledger.contact_work.value();
             let allowed = if returns { ROUNDING * exchanged + RETURNED * moved } else { ROUNDING * exchanged };

@@ -59,7 +59,7 @@ impl System {
             last = event.structure;
             pulling.add(event.node, event.normal * step);
         }
-        for pair in self.pairs.iter().filter(|pair| pair.gap().layout().is_some()) {
+        for pair in &self.pairs {
             let structure = &mut self.structures[pair.structure()];
             let (clearance, lanes) = (pair.gap().clearance(), structure.lanes());
             for &node in pair.nodes() {
@@ -71,10 +71,16 @@ impl System {
         }
     }
 
-    /// Of a structure that touches a surface around an axis: the node that was deepest inside at the end of a step, and how deep, as a
-    /// share of its clearance.
+    /// Of a structure that touches: the node that was deepest inside at the end of a step, and how deep, as a share of its clearance
+    /// ([`GapLaw::clearance`](crate::gaps::GapLaw::clearance)).
     pub fn left_inside(&self, structure: usize) -> Option<(usize, f64)> {
         self.structures[structure].pulling.inside.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Clearance of a contact node (m); 0 where it has nothing to touch.
+    pub(crate) fn clearance_of(&self, structure: usize, node: usize) -> f64 {
+        let pair = self.structures[structure].pair_of[node];
+        pair.map_or(0.0, |pair| self.pairs[pair].gap().clearance())
     }
 
     /// Of a structure that touches: the node most pulled at and the share of its impulse in that of the node most pushed, once contact

@@ -14,10 +14,13 @@ struct Work {
     shift: f64,
     casing: f64,
     heat: f64,
-    /// Friction that gives, of contacts that may stick (≤ 0): the tip turns round between the two steps whose mean is booked.
+    /// Friction that gives, of contacts that may stick, and cutting that gives (≤ 0): the tip turns round between the two steps whose mean
+    /// is booked.
     turned: f64,
     /// Against what is cut off.
     cut: f64,
+    /// Part of `turned` that is cutting (≤ 0): a tip that goes back cuts nothing.
+    uncut: f64,
     /// Of the node that stops at the surface.
     closing: f64,
     /// The part of it that a coating takes.
@@ -41,6 +44,7 @@ impl Work {
         self.heat += other.heat;
         self.turned += other.turned;
         self.cut += other.cut;
+        self.uncut += other.uncut;
         self.closing += other.closing;
         self.worn += other.worn;
         self.exact += other.exact;
@@ -108,7 +112,8 @@ impl System {
             let work = self.work_of(event, moved, &motion, when);
             event.friction_heat = work.heat;
             if event.tangential > 0.0 {
-                event.slid = (work.heat + work.cut) / event.tangential;
+                // What goes back cuts nothing, and is not paid for.
+                event.slid = ((work.heat + work.cut + work.turned) / event.tangential).max(0.0);
             }
             total.add(&work);
         }
@@ -181,6 +186,7 @@ impl System {
         ledger.curvature_work.add(work.curvature());
         ledger.turnover.add(work.turnover);
         ledger.contact_work.add(work.moved);
+        self.counted.taken[set].uncut -= work.uncut;
     }
 
     /// The work on both structures is f·(u⁺ − u⁻)/2 with u the relative displacement. It is what inputs do, force times
@@ -207,14 +213,16 @@ impl System {
         let (whirl, shift) = (-(x * across[0] + y * across[1]), -z * across[2]);
         let (heat, exact) = (opposed - cut, dot(event.force, moved));
         let turned = if self.settings.solver == Solver::Coulomb { heat.min(0.0) } else { 0.0 };
+        let uncut = cut.min(0.0);
         Work {
             shaft,
             whirl,
             shift,
             casing,
             heat: heat - turned,
-            turned,
-            cut,
+            turned: turned + uncut,
+            cut: cut - uncut,
+            uncut,
             closing: event.normal * approach,
             worn: event.coating * approach,
             exact,

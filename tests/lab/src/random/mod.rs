@@ -95,6 +95,7 @@ fn run(trial: &Trial, faces: Option<&Faces>, row: &mut Row) {
         Ok(begun) => begun,
         Err(error) => return reject(trial, faces, row, &error),
     };
+    watch.begin(&simulation);
     let record = plan.march(&mut simulation, 0, |simulation, _| watch.look(simulation));
     row.outcome = if record.end.is_some() { Outcome::Ended } else { Outcome::Ran };
     row.message.clone_from(&record.end);

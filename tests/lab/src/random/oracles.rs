@@ -1,7 +1,9 @@
 //! What must hold of any scene: energy, losses, penetration, finite outputs, messages.
 
-use tiprub_core::settings::{Scheme, Solver};
-use tiprub_core::{Error, Scene, Simulation};
+use tiprub_core::rom::Frame;
+use tiprub_core::settings::{ContactSettings, Scheme, Solver};
+use tiprub_core::warning::Topic;
+use tiprub_core::{Error, Ledger, Rom, Scene, Simulation};
 
 use super::scenes::Trial;
 use super::structures::largest_frequency;
@@ -17,6 +19,15 @@ const INSTANT: f64 = 1e-2;
 const FACTOR: f64 = 4.0;
 /// Rounding of gaps, as a fraction of the clearance.
 const GAP_ROUNDING: f64 = 1e-9;
+/// What the guide announces (chapter 12, "Losses only grow"): impacts may give back this fraction of the work of contact forces where the method is
+/// known for it, and friction of free bodies this fraction of all energy exchanged. A run ends beyond it.
+const RETURNED: f64 = 0.02;
+const STOPPED: f64 = 0.01;
+/// What it announces of `film` (chapter 5): nodes stay inside by less than this fraction of the clearance without a warning, of a free body by this
+/// fraction of a thousandth of its extent; warnings follow once it is twice as deep.
+const FILM_INSIDE: f64 = 0.05;
+const FILM_INSIDE_FREE: f64 = 0.2e-3;
+const FILM_DEEPER: f64 = 2.0;
 
 /// Something that must not be.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,31 +50,68 @@ const GROWING: [&str; 8] = [
     "internal_steps",
 ];
 
+/// How a quantity may fall nevertheless, as the guide announces it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fall {
+    /// By this fraction of its scale.
+    Rounding(f64),
+    /// By rounding, and by [`RETURNED`] of the work of contact forces; where `steps`, once the internal step has changed.
+    Returned { steps: bool },
+    /// As it likes, but below zero by no more than that.
+    Spent,
+}
+
 /// A quantity that only grows.
 #[derive(Debug, Clone)]
 struct Growing {
     name: String,
     reference: u32,
     energy: bool,
-    before: f64,
-    /// Largest fall so far, and most negative value, as fractions of the scale.
-    fall: f64,
-    lowest: f64,
-    when: f64,
+    may: Fall,
+    /// The most it has been so far, and what it is.
+    most: f64,
+    now: f64,
+    /// Largest fall beyond what is announced so far: beyond, fall (both as fractions of the scale), time (s).
+    worst: Option<[f64; 3]>,
+}
+
+impl Growing {
+    /// At a communication point.
+    fn look(&mut self, now: f64, ledger: &Ledger, another_step: bool, time: f64) {
+        let scale = if self.energy { ledger.scale() } else { self.most.abs() }.max(f64::MIN_POSITIVE);
+        let returned = RETURNED * (ledger.initial.abs() + ledger.contact_work.value());
+        let (most, allowed) = match self.may {
+            Fall::Rounding(share) => (self.most, share * scale),
+            Fall::Returned { steps } if steps && !another_step => (self.most, ROUNDING * scale),
+            Fall::Returned { .. } => (self.most, ROUNDING * scale + returned),
+            Fall::Spent => (0.0, ROUNDING * scale + returned),
+        };
+        let beyond = (most - now - allowed) / scale;
+        // What is no number is found by another oracle.
+        if beyond > self.worst.map_or(0.0, |[worst, ..]| worst) {
+            self.worst = Some([beyond, (most - now) / scale, time]);
+        }
+        (self.most, self.now) = (self.most.max(now), now);
+    }
 }
 
 /// Largest of everything that should be small, over a run.
 #[derive(Debug, Clone)]
 pub(crate) struct Watch {
     growing: Vec<Growing>,
+    /// Length of the internal step at first (s), and whether it has been another one.
+    step: f64,
+    another_step: bool,
     clearance: Option<u32>,
     /// Deepest penetration and what the law promises (m).
     deepest: [f64; 2],
     /// Energy of the instant may be so many times what the scheme conserves.
     factor: f64,
     residual: f64,
-    /// Losses may fall by this fraction of all energy exchanged.
-    rounding: f64,
+    /// Contact forces act, and their work is booked, one internal step after they are found.
+    acts_later: bool,
+    /// Energy of the instant that is to be explained at the next communication point: excess, energy, bound (J), time (s).
+    pending: Option<[f64; 4]>,
     /// Largest energy beyond its bound: excess, energy, bound (J), time (s).
     excess: Option<[f64; 4]>,
     infinite: Option<String>,
@@ -81,22 +129,30 @@ impl Watch {
             name: row.name.clone(),
             reference: row.reference,
             energy: row.name.ends_with("_loss") || row.name.ends_with("_work") || row.name.ends_with("_energy"),
-            before: 0.0,
-            fall: 0.0,
-            lowest: 0.0,
-            when: 0.0,
+            may: announced(row.name.rsplit('.').next().unwrap_or_default(), &trial.scene),
+            most: 0.0,
+            now: 0.0,
+            worst: None,
         });
         Self {
             growing: growing.collect(),
+            step: 0.0,
+            another_step: false,
             clearance: table.find("clearance_minimum").map(|row| row.reference),
             deepest: [0.0, promised(&trial.scene, trial.gap)],
             factor: factor(&trial.scene),
             residual: 0.0,
-            rounding: if trial.scene.settings.time.scheme == Scheme::Galerkin { ITERATED } else { ROUNDING },
+            acts_later: trial.scene.settings.time.scheme == Scheme::MasslessBoundary,
+            pending: None,
             excess: None,
             infinite: None,
             scale: 0.0,
         }
+    }
+
+    /// Of a simulation that was started.
+    pub(crate) fn begin(&mut self, simulation: &Simulation) {
+        self.step = simulation.system().step_size();
     }
 
     /// At a communication point.
@@ -105,19 +161,15 @@ impl Watch {
         let real = |reference: u32| simulation.real(reference).unwrap_or(f64::NAN);
         let ledger = simulation.system().ledger();
         self.scale = ledger.scale();
+        // Lengths of internal steps differ by rounding where communication steps do.
+        self.another_step |= (simulation.system().step_size() / self.step - 1.0).abs() > 1e-9;
         for one in &mut self.growing {
-            let now = real(one.reference);
-            let scale = if one.energy { self.scale } else { one.before.abs() }.max(f64::MIN_POSITIVE);
-            let fall = (one.before - now) / scale;
-            if fall > one.fall {
-                (one.fall, one.when) = (fall, time);
-            }
-            one.lowest = one.lowest.min(now / scale);
-            one.before = now;
+            one.look(real(one.reference), &ledger, self.another_step, time);
         }
         if let Some(clearance) = self.clearance {
             self.deepest[0] = self.deepest[0].min(real(clearance));
         }
+        self.deepest[1] = self.deepest[1].max(FILM_DEEPER * warned_depth(simulation));
         let (kinetic, strain) = ["kinetic_energy", "strain_energy"]
             .map(|name| simulation.table().find(name).map_or(f64::NAN, |row| real(row.reference)))
             .into();
@@ -129,12 +181,24 @@ impl Watch {
         let supplied = ledger.initial + ledger.supplied() + ledger.curvature_work.value();
         let bound =
             self.factor * (supplied - ledger.impact_loss.value()).max(conserved).max(0.0) + INSTANT * self.scale;
-        let excess = kinetic + strain - bound;
-        if excess > self.excess.map_or(0.0, |[most, ..]| most) {
-            self.excess = Some([excess, kinetic + strain, bound, time]);
+        // Work that is booked one internal step later is found in the bound of the next communication point.
+        if let Some([_, energy, before, when]) = self.pending.take() {
+            self.exceeds([energy - bound.max(before), energy, bound.max(before), when]);
+        }
+        let found = [kinetic + strain - bound, kinetic + strain, bound, time];
+        if self.acts_later {
+            self.pending = Some(found).filter(|[excess, ..]| *excess > 0.0);
+        } else {
+            self.exceeds(found);
         }
         if self.infinite.is_none() {
             self.infinite = infinite(simulation);
+        }
+    }
+
+    fn exceeds(&mut self, found: [f64; 4]) {
+        if found[0] > self.excess.map_or(0.0, |[most, ..]| most) {
+            self.excess = Some(found);
         }
     }
 
@@ -149,7 +213,7 @@ impl Watch {
             add("ledger", format!("the ledger is off by {:.1e} of {:.3e} J exchanged", self.residual, self.scale));
         }
         for one in &self.growing {
-            if one.fall > self.rounding || one.lowest < -self.rounding {
+            if let Some([beyond, fall, when]) = one.worst {
                 let oracle = match one.name.rsplit('.').next().unwrap_or_default() {
                     "friction_loss" => "friction_loss",
                     "impact_loss" => "impact_loss",
@@ -157,8 +221,8 @@ impl Watch {
                     _ => "wear",
                 };
                 let text = format!(
-                    "{} falls by {:.1e} in a step (t = {:.3e} s) and is {:.1e} at its lowest, of {:.3e} J exchanged; it ends at {:.3e}",
-                    one.name, one.fall, one.when, one.lowest, self.scale, one.before
+                    "{} has fallen by {fall:.1e} at t = {when:.3e} s, {beyond:.1e} more than is announced, of {:.3e} J exchanged; it ends at {:.3e}",
+                    one.name, self.scale, one.now
                 );
                 add(oracle, text);
             }
@@ -186,7 +250,45 @@ fn promised(scene: &Scene, gap: f64) -> f64 {
         Scheme::Galerkin => scene.settings.time.tolerance.unwrap_or(tiprub_core::settings::TOLERANCE),
         _ => 0.0,
     };
-    thickness + gap * (GAP_ROUNDING + tolerance)
+    let film = if solver(scene) == Solver::Film { film_inside(scene) } else { 0.0 };
+    thickness + gap * (GAP_ROUNDING + tolerance) + film
+}
+
+/// How deep `film` may leave a node inside without a warning (m).
+fn film_inside(scene: &Scene) -> f64 {
+    if scene.roms.iter().any(|rom| rom.frame == Frame::Cartesian) {
+        return FILM_INSIDE_FREE * scene.roms.iter().map(extent).fold(f64::INFINITY, f64::min);
+    }
+    FILM_INSIDE * scene.settings.contacts.iter().map(ContactSettings::nominal_gap).fold(0.0, f64::max)
+}
+
+/// Longest side of the box around the contact nodes of a structure described in fixed directions (m).
+fn extent(rom: &Rom) -> f64 {
+    let side = |axis: usize| {
+        let values = || rom.contact_nodes.iter().map(|node| node.position[axis]);
+        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+    };
+    (0..3).map(side).fold(0.0, f64::max)
+}
+
+/// How deep the last warning says that `film` has left a node inside (m).
+fn warned_depth(simulation: &Simulation) -> f64 {
+    let warned = simulation.warnings().iter().filter(|warning| warning.topic() == Topic::FilmInside);
+    let depth = |text: &str| text.split_once(" by ")?.1.split_once(" m")?.0.parse().ok();
+    warned.map(|warning| depth(&warning.lines()[0]).unwrap_or(f64::NAN)).fold(0.0, f64::max)
+}
+
+/// How a quantity that only grows may fall nevertheless, as the guide announces it.
+fn announced(name: &str, scene: &Scene) -> Fall {
+    let scheme = scene.settings.time.scheme;
+    let is_free = scene.roms.iter().any(|rom| rom.frame == Frame::Cartesian);
+    match name {
+        "impact_loss" if scheme == Scheme::Galerkin => Fall::Spent,
+        "impact_loss" => Fall::Returned { steps: scheme != Scheme::MasslessBoundary && solver(scene) != Solver::Film },
+        "friction_loss" if is_free => Fall::Rounding(STOPPED),
+        _ if scheme == Scheme::Galerkin => Fall::Rounding(ITERATED),
+        _ => Fall::Rounding(ROUNDING),
+    }
 }
 
 /// Energy of the instant over what was supplied, at most.

@@ -35,8 +35,10 @@ pub struct Told {
     pub(in crate::simulation) pulls: Vec<bool>,
     /// Turn of the excitation per internal step (rad) that was warned of, of each structure that touches.
     turned: Vec<f64>,
-    /// Whether contact nodes were left deep inside, of each structure that touches.
-    pub(in crate::simulation) inside: Vec<bool>,
+    /// The same of the loads on structures that carry surfaces.
+    load_turned: Vec<f64>,
+    /// How deep contact nodes were left inside when that was last told, of each structure that touches, as a share of the clearance.
+    pub(in crate::simulation) inside: Vec<f64>,
     /// Whether curvature work was large beside the net work of inputs.
     pub(in crate::simulation) curvature: bool,
     /// Whether a tolerance was missed.
@@ -54,7 +56,8 @@ impl Told {
             curved: vec![false; bodies],
             pulls: vec![false; bodies],
             turned: vec![RESOLVED_TURN / MATERIAL; bodies],
-            inside: vec![false; bodies],
+            load_turned: vec![RESOLVED_TURN / MATERIAL; carriers],
+            inside: vec![0.0; bodies],
             curvature: false,
             missed: false,
         }
@@ -121,6 +124,20 @@ impl Simulation {
                 self.warn_of_excitation(body, step * self.excitation_rate(body, offset).abs());
             }
         }
+        for carrier in 0..self.compiled.carriers.len() {
+            self.warn_of_load(carrier, step * self.inputs.carriers[carrier].load_phase.rate().abs());
+        }
+    }
+
+    /// The same of the load on a casing.
+    fn warn_of_load(&mut self, carrier: usize, turn: f64) {
+        let coarse =
+            self.system.scheme() == Scheme::CentralDifference && turn > MATERIAL * self.told.load_turned[carrier];
+        if coarse && self.compiled.carriers[carrier].loads.nodal.is_some() {
+            self.told.load_turned[carrier] = turn;
+            let name = self.compiled.carrier_name(self.compiled.bodies.len() + carrier);
+            self.note(coarse_excitation(&format!("the load on the {name}"), turn));
+        }
     }
 
     /// Central differences make a resonance too large where the excitation turns far in one internal step (rad).
@@ -129,16 +146,7 @@ impl Simulation {
             return;
         }
         self.told.turned[body] = turn;
-        let error = turn / libm::sin(turn) - 1.0;
-        let problem = format!(
-            "the excitation turns by {turn:.2} rad in one internal step: central differences make a resonance {:.0} % too large and move \
-             it by {:.1} % of its frequency",
-            100.0 * error,
-            100.0 * turn * turn / 24.0
-        );
-        let remedy =
-            format!("Use modal-exact, or an internal_step_max (time.step) {:.1} times smaller", turn / RESOLVED_TURN);
-        self.note(self.compiled.warning_of(body, Warning::new(Topic::CoarseExcitation, problem, remedy)));
+        self.note(self.compiled.warning_of(body, coarse_excitation("the excitation", turn)));
     }
 
     fn tell_of_speed(&mut self, body: usize, speed: f64) {
@@ -202,6 +210,20 @@ impl Simulation {
         }
         found
     }
+}
+
+/// What central differences make of a resonance where `what` turns so far (rad) in one internal step.
+fn coarse_excitation(what: &str, turn: f64) -> Warning {
+    let error = turn / libm::sin(turn) - 1.0;
+    let problem = format!(
+        "{what} turns by {turn:.2} rad in one internal step: central differences make a resonance {:.0} % too large and move it by {:.1} % \
+         of its frequency",
+        100.0 * error,
+        100.0 * turn * turn / 24.0
+    );
+    let remedy =
+        format!("Use modal-exact, or an internal_step_max (time.step) {:.1} times smaller", turn / RESOLVED_TURN);
+    Warning::new(Topic::CoarseExcitation, problem, remedy)
 }
 
 impl BodyLimits {
