@@ -15,8 +15,11 @@ use tiprub_figure::plots::{Plot, Series};
 use tiprub_shell::{Failure, Result, sweep};
 use tiprub_study::{Figure, Picture, Sheet, Statement, Study};
 
-use crate::stability::models::{SCHEMES, SOLVERS};
+use crate::stability::models::SOLVERS;
 
+/// Schemes of the table with their names.
+const SCHEMES: [(Scheme, &str); Scheme::RECURRENCES.len()] =
+    [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
 /// Largest internal step of the table (s).
 const STEP: f64 = 1e-6;
 /// Halvings of the figure.

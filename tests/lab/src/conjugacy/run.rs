@@ -4,13 +4,13 @@ use tiprub_core::{
     Result, Scene, Simulation,
     dynamics::sectors::Sectors,
     gaps::{shape::Surface, surface_spline::SurfaceSpline, wrench::Wrench},
-    settings::{Scheme, Shape, Solver, SplineSettings},
+    settings::{Shape, Solver, SplineSettings},
     system::{ContactEvent, Structure, System},
 };
 
 use crate::stability::{
     bodies::{Body, HALF, Plate, Throw},
-    models::{GAP, RADIUS, Tower, blade, bumps, on_ring},
+    models::{GAP, Method, RADIUS, Tower, blade, bumps, on_ring},
     observe::{real, worse},
 };
 
@@ -95,8 +95,7 @@ impl Feature {
                 velocity: [-5.0, 2.5, 0.5],
                 plates: vec![left, right],
                 friction,
-                scheme: Scheme::ModalExact,
-                solver: Solver::Lcp,
+                method: Method::exact(Solver::Lcp),
                 step: 1e-6,
             };
             let mut scene = throw.scene();

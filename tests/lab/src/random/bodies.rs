@@ -6,6 +6,7 @@ use tiprub_test_models::{Random, lattice};
 
 use super::structures::chance;
 use crate::stability::bodies::{Body, HALF, Plate, Throw};
+use crate::stability::models::Method;
 
 /// Settings, structures, and a length (m) that displacements go by.
 pub(crate) fn scene(random: &mut Random, scheme: Scheme, solver: Solver) -> (SceneSettings, Vec<Rom>, f64) {
@@ -50,5 +51,6 @@ fn throw(random: &mut Random, scheme: Scheme, solver: Solver, friction: f64) -> 
         left if left.stiffness > 5e6 => vec![left],
         left => vec![left, plate(1.0)],
     };
-    Throw { body, velocity: random.vector(6.0), plates, friction, scheme, solver, step: 1e-6 }
+    let method = Method { scheme, ..Method::exact(solver) };
+    Throw { body, velocity: random.vector(6.0), plates, friction, method, step: 1e-6 }
 }

@@ -190,8 +190,10 @@ impl Happened {
 pub(crate) enum Verdict {
     /// A right answer.
     Right,
-    /// Refused as it should be.
+    /// Refused as it should be, before the first step.
     Refused,
+    /// Ended in a step, by the name that it should be.
+    Ended,
     /// A wrong answer, a wrong refusal, or an answer where there is none.
     Wrong,
     /// The process ended by itself: panic, abort, signal.
@@ -202,19 +204,28 @@ pub(crate) enum Verdict {
 
 impl Verdict {
     /// All of them, in the order of a table.
-    pub(crate) const ALL: [Self; 5] = [Self::Right, Self::Refused, Self::Wrong, Self::Crashed, Self::Hung];
+    pub(crate) const ALL: [Self; 6] = [Self::Right, Self::Refused, Self::Ended, Self::Wrong, Self::Crashed, Self::Hung];
+
+    /// As it should be.
+    pub(crate) fn is_sound(self) -> bool {
+        matches!(self, Self::Right | Self::Refused | Self::Ended)
+    }
 
     /// In a word.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Right => "right",
             Self::Refused => "refused",
+            Self::Ended => "ended",
             Self::Wrong => "WRONG",
             Self::Crashed => "CRASHED",
             Self::Hung => "HUNG",
         }
     }
 }
+
+/// What a message says that ends a run in a step.
+const IN_A_STEP: &str = "last good time";
 
 /// Verdict on what happened, and what to say about it.
 pub(crate) fn judge(expected: &Expected, happened: &Happened) -> (Verdict, String) {
@@ -233,7 +244,8 @@ pub(crate) fn judge(expected: &Expected, happened: &Happened) -> (Verdict, Strin
             if !failed.is_empty() {
                 return (Verdict::Wrong, format!("{}; refused: {message}", failed.join("; ")));
             }
-            (Verdict::Refused, format!("{message}{remarks}"))
+            let verdict = if message.contains(IN_A_STEP) { Verdict::Ended } else { Verdict::Refused };
+            (verdict, format!("{message}{remarks}"))
         }
         (None, _) if !failed.is_empty() => (Verdict::Wrong, format!("{}{remarks}", failed.join("; "))),
         (None, _) if matches!(expected, Expected::Refused(_)) => (Verdict::Wrong, "was not refused".to_owned()),
@@ -374,6 +386,8 @@ mod tests {
         let several = || Expected::refused_as(&[&["µ", "h ="], &["load"]]);
         assert_eq!(verdict(several(), Happened::refused("the load is 1e300")), Verdict::Refused);
         assert_eq!(verdict(several(), Happened::refused("µ = 2")), Verdict::Wrong);
+        let ended = Happened::refused("at t = 2 s (last good time 1 s) the load is 1e300");
+        assert_eq!(verdict(several(), ended), Verdict::Ended);
         // Nothing named is nothing asked: no refusal counts.
         for nothing in [Expected::refused([""]), Expected::refused([]), Expected::refused_as(&[])] {
             assert_eq!(verdict(nothing, Happened::refused("no")), Verdict::Wrong);

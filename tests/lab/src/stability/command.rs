@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &StabilityArguments, console: &Console) -> Result<O
         threads,
         |case| {
             let row = child::run(case, &context)?;
-            if !matches!(row.verdict, stability::Verdict::Right | stability::Verdict::Refused) {
+            if !row.verdict.is_sound() {
                 task.line(&format!("{} {}: {}", row.verdict.name(), row.name, row.happened));
             }
             Ok(row)

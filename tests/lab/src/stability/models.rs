@@ -11,14 +11,157 @@ use tiprub_core::{
 pub(crate) use tiprub_test_models::{GAP, RADIUS, Random, bumps, rich_blade as blade, round};
 use tiprub_test_models::{node, ring, structure};
 
-/// All schemes with their names.
-pub(crate) const SCHEMES: [(Scheme, &str); Scheme::RECURRENCES.len()] =
-    [(Scheme::CentralDifference, "central"), (Scheme::ModalExact, "exact"), (Scheme::MasslessBoundary, "massless")];
-/// Steps by a tolerance, which have rules of their own.
-pub(crate) const GALERKIN: (Scheme, &str) = (Scheme::Galerkin, "galerkin");
+/// Longest step of adaptive integration (s), as scenes have it that name none.
+pub(crate) const LONGEST: f64 = tiprub_core::settings::ADAPTIVE_STEP;
 /// All contact solvers with their names.
 pub(crate) const SOLVERS: [(Solver, &str); Solver::ALL.len()] =
     [(Solver::Film, "film"), (Solver::Lcp, "lcp"), (Solver::Coulomb, "coulomb")];
+
+/// How the length of a step is chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Steps {
+    /// The case gives the internal step; for galerkin the longest one, with the largest tolerance that scenes accept.
+    Fixed,
+    /// The tolerance of the method (a fraction of the clearance) chooses it.
+    Adaptive(f64),
+}
+
+/// Scheme, contact solver, and choice of the step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Method {
+    /// Scheme.
+    pub scheme: Scheme,
+    /// Contact solver.
+    pub solver: Solver,
+    /// Choice of the step.
+    pub steps: Steps,
+}
+
+/// Schemes with their choice of the step and their name in the table.
+const INTEGRATIONS: [(Scheme, Steps, &str); Scheme::ALL.len() + 1] = [
+    (Scheme::CentralDifference, Steps::Fixed, "central"),
+    (Scheme::ModalExact, Steps::Fixed, "exact"),
+    (Scheme::MasslessBoundary, Steps::Fixed, "massless"),
+    (Scheme::Galerkin, Steps::Adaptive(1e-4), "galerkin"),
+    (Scheme::Galerkin, Steps::Fixed, "galerkin-fixed"),
+];
+
+impl Method {
+    /// Modal-exact with this solver.
+    pub(crate) const fn exact(solver: Solver) -> Self {
+        Self { scheme: Scheme::ModalExact, solver, steps: Steps::Fixed }
+    }
+
+    /// Every method.
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
+        let with = |(scheme, steps, _)| SOLVERS.into_iter().map(move |(solver, _)| Self { scheme, solver, steps });
+        INTEGRATIONS.into_iter().flat_map(with)
+    }
+
+    /// Every scheme and choice of the step, with one solver.
+    pub(crate) fn all_with(solver: Solver) -> impl Iterator<Item = Self> {
+        Self::all().filter(move |method| method.solver == solver)
+    }
+
+    /// Modal-exact and both ways of galerkin, with every solver: for cases that the choice of a recurrence does not change.
+    pub(crate) fn common() -> impl Iterator<Item = Self> {
+        Self::all().filter(|method| [Scheme::ModalExact, Scheme::Galerkin].contains(&method.scheme))
+    }
+
+    /// Scheme and choice of the step, in a word.
+    pub(crate) fn integration(self) -> &'static str {
+        let adaptive = |steps| matches!(steps, Steps::Adaptive(_));
+        let own = |&(scheme, steps, _): &(Scheme, Steps, &str)| {
+            scheme == self.scheme && adaptive(steps) == adaptive(self.steps)
+        };
+        INTEGRATIONS.iter().find(|row| own(row)).map_or("", |(.., name)| name)
+    }
+
+    /// Name of the solver.
+    pub(crate) fn solver_name(self) -> &'static str {
+        SOLVERS.iter().find(|(solver, _)| *solver == self.solver).map_or("", |(_, name)| name)
+    }
+
+    /// Both, as parts of the name of a case.
+    pub(crate) fn name(self) -> String {
+        format!("{}/{}", self.integration(), self.solver_name())
+    }
+
+    /// The method that the name of a case holds: scheme with choice of the step, and solver.
+    pub(crate) fn in_name(name: &str) -> (Option<&'static str>, Option<&'static str>) {
+        let part = |known: &'static str| name.split('/').any(|part| part == known).then_some(known);
+        let scheme = INTEGRATIONS.iter().find_map(|(.., known)| part(known));
+        (scheme, SOLVERS.iter().find_map(|(_, known)| part(known)))
+    }
+
+    /// Names of schemes with their choice of the step.
+    pub(crate) fn integrations() -> impl Iterator<Item = &'static str> {
+        INTEGRATIONS.iter().map(|(.., name)| *name)
+    }
+
+    /// Steps by a tolerance, or at longest steps.
+    pub(crate) fn is_galerkin(self) -> bool {
+        self.scheme == Scheme::Galerkin
+    }
+
+    /// Steps by a tolerance.
+    pub(crate) fn is_adaptive(self) -> bool {
+        matches!(self.steps, Steps::Adaptive(_))
+    }
+
+    /// Massless-boundary.
+    pub(crate) fn is_massless(self) -> bool {
+        self.scheme == Scheme::MasslessBoundary
+    }
+
+    /// With another tolerance, if it has one.
+    pub(crate) fn within(self, tolerance: f64) -> Self {
+        if self.is_adaptive() { Self { steps: Steps::Adaptive(tolerance), ..self } } else { self }
+    }
+
+    /// What an answer is compared with: a smaller tolerance; and the step is to be divided by the second number.
+    pub(crate) fn finer(self) -> (Self, f64) {
+        match self.steps {
+            Steps::Adaptive(tolerance) => (self.within((tolerance / 16.0).max(1e-9)), 1.0),
+            Steps::Fixed => (self, 4.0),
+        }
+    }
+
+    /// Internal step, or the longest of adaptive integration (s).
+    pub(crate) fn step(self, step: f64) -> f64 {
+        if self.is_adaptive() { LONGEST } else { step }
+    }
+
+    /// A scene with this method.
+    pub(crate) fn on(self, scene: Scene) -> Scene {
+        let mut scene = with_methods(scene, self.scheme, self.solver);
+        scene.settings.time.tolerance = match self.steps {
+            Steps::Adaptive(tolerance) => Some(tolerance),
+            Steps::Fixed if self.is_galerkin() => Some(tiprub_core::ranges::TOLERANCE[1]),
+            Steps::Fixed => None,
+        };
+        scene
+    }
+
+    /// A scene with this method in internal steps of `step` (s), or in the longest adaptive ones, and communication steps as long.
+    pub(crate) fn stepping(self, scene: Scene, step: f64) -> Scene {
+        with_step(self.on(scene), self.step(step))
+    }
+}
+
+/// Distance that the tolerance of a scene allows (m); 0 for schemes without one.
+pub(crate) fn allowed(scene: &Scene) -> f64 {
+    let contacts = scene.settings.contacts.iter();
+    let smallest = contacts.flat_map(|contact| {
+        contact.sector_gaps.iter().copied().chain(contact.sector_gaps.is_empty().then_some(contact.gap))
+    });
+    if scene.settings.time.scheme == Scheme::Galerkin {
+        scene.settings.time.tolerance.unwrap_or(tiprub_core::settings::TOLERANCE)
+            * smallest.fold(f64::INFINITY, f64::min)
+    } else {
+        0.0
+    }
+}
 
 /// A contact node on a spring on a mass on a spring, in each direction: six degrees of freedom per sector.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tiprub_figure::{STYLE, escape};
 use tiprub_shell::{Result, console::Outcome, output_file};
 
-use super::{Verdict, child::Row};
+use super::{Verdict, child::Row, models::Method};
 
 /// All rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,9 +35,45 @@ impl Table {
         families
     }
 
+    /// Families with a row for each of their methods: cases, and how many of each verdict.
+    fn methods(&self) -> Vec<Counted<'_>> {
+        let mut counted: Vec<Counted<'_>> = Vec::new();
+        for row in &self.rows {
+            let (family, method) = (family(row), Method::in_name(&row.name));
+            let place = counted.iter().position(|one| one.family == family && one.method == method);
+            let place = place.unwrap_or_else(|| {
+                counted.push(Counted { family, method, counts: [0; Verdict::ALL.len()] });
+                counted.len() - 1
+            });
+            let verdict = Verdict::ALL.iter().position(|verdict| *verdict == row.verdict);
+            counted[place].counts[verdict.unwrap_or(0)] += 1;
+        }
+        counted
+    }
+
+    /// Families by schemes with their choice of the step: right + refused + ended, and what is wrong where something is.
+    fn by_method(&self) -> (Vec<&'static str>, Vec<(&str, Vec<String>)>) {
+        let columns: Vec<Option<&str>> = Method::integrations().map(Some).chain([None]).collect();
+        let counted = self.methods();
+        let cell = |family: &str, column: Option<&str>| {
+            let rows = counted.iter().filter(|one| one.family == family && one.method.0 == column);
+            let sum = |verdict: usize| rows.clone().map(|one| one.counts[verdict]).sum::<usize>();
+            let [right, refused, ended] = [0, 1, 2].map(sum);
+            let wrong: usize = (3..Verdict::ALL.len()).map(sum).sum();
+            match (right + refused + ended, wrong) {
+                (0, 0) => String::new(),
+                (_, 0) => format!("{right} + {refused} + {ended}"),
+                _ => format!("{right} + {refused} + {ended}, {wrong} WRONG"),
+            }
+        };
+        let line = |family| (family, columns.iter().map(|column| cell(family, *column)).collect());
+        let names = Method::integrations().chain([OTHER]).collect();
+        (names, self.families().into_iter().map(line).collect())
+    }
+
     /// Rows that are neither right nor refused.
     pub(crate) fn unsound(&self) -> impl Iterator<Item = &Row> {
-        self.rows.iter().filter(|row| !matches!(row.verdict, Verdict::Right | Verdict::Refused))
+        self.rows.iter().filter(|row| !row.verdict.is_sound())
     }
 
     fn summary(&self) -> String {
@@ -51,6 +87,11 @@ impl Table {
         for family in self.families() {
             let counts = Verdict::ALL.map(|verdict| format!("{:>9}", self.of(family, verdict)));
             let _ = writeln!(text, "  {family:<16}{}", counts.concat());
+        }
+        let (columns, lines) = self.by_method();
+        let _ = writeln!(text, "\nright + refused + ended, family by method\n\n  {:<16}{}", "family", wide(&columns));
+        for (family, cells) in &lines {
+            let _ = writeln!(text, "  {family:<16}{}", wide(cells));
         }
         for row in self.unsound() {
             let _ = write!(
@@ -76,6 +117,7 @@ impl Table {
         json!({
             "cases": self.rows.len(),
             "counts": counts,
+            "methods": self.methods().iter().map(Counted::to_json).collect::<Vec<_>>(),
             "rows": self.rows.iter().map(|row| json!({
                 "case": row.name, "expected": row.expected, "happened": row.happened,
                 "verdict": row.verdict.name(), "seconds": row.seconds,
@@ -96,10 +138,16 @@ impl Table {
     /// The chapter of the guide, below its fixed introduction. No times: the same sources give the same text.
     pub(crate) fn to_markdown(&self) -> String {
         let mut text = format!("{}\n\n| family | {} |\n", self.summary(), Verdict::ALL.map(Verdict::name).join(" | "));
-        text.push_str("|---|---|---|---|---|---|\n");
+        text.push_str("|---|---|---|---|---|---|---|\n");
         for family in self.families() {
             let counts = Verdict::ALL.map(|verdict| self.of(family, verdict).to_string());
             let _ = writeln!(text, "| {family} | {} |", counts.join(" | "));
+        }
+        let (columns, lines) = self.by_method();
+        let _ = write!(text, "\nRight + refused + ended:\n\n| family | {} |\n", columns.join(" | "));
+        let _ = writeln!(text, "|{}", "---|".repeat(columns.len() + 1));
+        for (family, cells) in &lines {
+            let _ = writeln!(text, "| {family} | {} |", cells.join(" | "));
         }
         for family in self.families() {
             let _ = write!(text, "\n### {family}\n\n| case | expected | happened | verdict |\n|---|---|---|---|\n");
@@ -150,6 +198,39 @@ impl Table {
         output_file::write(&directory.join("results.json"), format!("{json:#}\n"))?;
         Ok(Outcome { text: format!("{}\nopen {}", self.to_text(), page.display()), json, ..Outcome::default() })
     }
+}
+
+/// Cases of a family that one method runs.
+#[derive(Debug)]
+struct Counted<'a> {
+    family: &'a str,
+    /// Scheme with its choice of the step, and solver; as far as the names of cases tell.
+    method: (Option<&'static str>, Option<&'static str>),
+    /// Of each verdict.
+    counts: [usize; Verdict::ALL.len()],
+}
+
+impl Counted<'_> {
+    fn to_json(&self) -> Value {
+        let counts = Verdict::ALL.iter().zip(self.counts);
+        let counts: serde_json::Map<_, _> =
+            counts.map(|(verdict, count)| (verdict.name().to_lowercase(), json!(count))).collect();
+        json!({
+            "family": self.family,
+            "method": self.method.0.unwrap_or(OTHER),
+            "solver": self.method.1,
+            "cases": self.counts.iter().sum::<usize>(),
+            "counts": counts,
+        })
+    }
+}
+
+/// Column of cases whose names hold no method: most run modal-exact with lcp.
+const OTHER: &str = "other";
+
+/// Cells of a table in text.
+fn wide(cells: &[impl AsRef<str>]) -> String {
+    cells.iter().map(|cell| format!("{:>18}", cell.as_ref())).collect()
 }
 
 fn family(row: &Row) -> &str {

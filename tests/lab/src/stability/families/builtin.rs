@@ -10,7 +10,7 @@ use tiprub_shell::console::Console;
 use super::{
     super::{
         Case, Cases, Check, Expected, Happened,
-        models::{SCHEMES, SOLVERS, Tower, round, with_methods, with_step},
+        models::{Method, Tower, round, with_step},
         observe::{Watch, apart, begin, displacements, set},
         press::Press,
     },
@@ -28,26 +28,25 @@ fn model(name: &str) -> Option<Rom> {
 
 fn rotor37() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scheme, scheme_name) in SCHEMES {
-        for (solver, solver_name) in SOLVERS {
-            for factor in [0.9, 0.999, 1.001, 1.5, 10.0, 100.0] {
-                let name = format!("rotor37/step-limit/{scheme_name}/{solver_name}/h={factor}");
-                let against = "static contact of all 36 blades, signs of the ledger";
-                let expected = match scheme {
-                    Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
-                    Scheme::MasslessBoundary if factor > 1.0 => Expected::refused(["massless-boundary"]),
-                    Scheme::ModalExact if factor > 50.0 => {
-                        Expected::refused(["modal-exact", "flexibility that contact sees"])
-                    }
-                    // Steps of several periods: film closes all patches, and pulls at those that the static solution has open.
-                    Scheme::ModalExact if solver == Solver::Film && factor > 5.0 => {
-                        Expected::refused(["film", "pulled at contact node", "lcp"])
-                    }
-                    _ => Expected::right(against),
-                };
-                let work = move |_: &_| at_limit(scheme, solver, factor);
-                cases.push(Case::new(name, expected, work).within(300.0));
-            }
+    for method in Method::all() {
+        let factors: &[f64] = if method.is_adaptive() { &[1.0] } else { &[0.9, 0.999, 1.001, 1.5, 10.0, 100.0] };
+        for factor in factors.iter().copied() {
+            let name = format!("rotor37/step-limit/{}/h={factor}", method.name());
+            let against = "static contact of all 36 blades, signs of the ledger";
+            let expected = match method.scheme {
+                Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
+                Scheme::MasslessBoundary if factor > 1.0 => Expected::refused(["massless-boundary"]),
+                Scheme::ModalExact if factor > 50.0 => {
+                    Expected::refused(["modal-exact", "flexibility that contact sees"])
+                }
+                // Steps of several periods: film closes all patches, and pulls at those that the static solution has open.
+                Scheme::ModalExact if method.solver == Solver::Film && factor > 5.0 => {
+                    Expected::refused(["film", "pulled at contact node", "lcp"])
+                }
+                _ => Expected::right(against),
+            };
+            let work = move |_: &_| at_limit(method, factor);
+            cases.push(Case::new(name, expected, work).within(300.0));
         }
     }
     for share in [0.1, 0.2, 0.24, 0.3, 0.39, 0.5, 0.6, 0.79] {
@@ -58,52 +57,53 @@ fn rotor37() -> Vec<Case> {
             cases.push(Case::new(name, expected, work).within(300.0));
         }
     }
-    for (solver, solver_name) in SOLVERS {
+    for method in Method::common() {
         for friction in [0.0, 0.15, 0.5, 1.0, 1.5, 2.0] {
             for sense in [1.0, -1.0] {
-                let name =
-                    format!("rotor37/friction/µ={friction}/{solver_name}/{}Ω", if sense > 0.0 { '+' } else { '−' });
-                let expected = Expected::either("the same with a fourth of the step, complementarity", ["µ"]);
-                cases.push(
-                    Case::new(name, expected, move |_: &_| Happened::of(rubbed(solver, friction, sense))).within(300.0),
-                );
+                let sign = if sense > 0.0 { '+' } else { '−' };
+                let name = format!("rotor37/friction/µ={friction}/{}/{sign}Ω", method.name());
+                let expected = Expected::either("the same in a finer run, complementarity", ["µ"]);
+                let work = move |_: &_| Happened::of(rubbed(method, friction, sense));
+                cases.push(Case::new(name, expected, work).within(300.0));
             }
         }
     }
     // Steps at which growth by the mass of contact nodes goes up and down, whatever it does to the run.
-    for friction in [0.15, 0.4, 0.8] {
-        for step in [5e-7, 1e-6, 2e-6, 4e-6] {
-            let expected = Expected::either_as("the same with a fourth of the step", &[&["time.step"], &["µ below"]]);
-            let name = format!("rotor37/growth/µ={friction}/h={step:e}");
-            let work = move |_: &_| Happened::of(grown(friction, step));
-            cases.push(Case::new(name, expected, work).within(300.0));
+    for method in Method::common().filter(|method| method.solver == Solver::Lcp && !method.is_adaptive()) {
+        for friction in [0.15, 0.4, 0.8] {
+            for step in [5e-7, 1e-6, 2e-6, 4e-6] {
+                let expected = Expected::either_as("the same in a finer run", &[&["time.step"], &["µ below"]]);
+                let name = format!("rotor37/growth/µ={friction}/h={step:e}/{}", method.integration());
+                let work = move |_: &_| Happened::of(grown(method, friction, step));
+                cases.push(Case::new(name, expected, work).within(300.0));
+            }
         }
     }
     cases
 }
 
 /// Against bumps that nothing moves.
-fn grown(friction: f64, step: f64) -> Result<Vec<Check>> {
+fn grown(method: Method, friction: f64, step: f64) -> Result<Vec<Check>> {
     let Some(rom) = model("rotor37-one-row") else { return Ok(Vec::new()) };
     let mut scene = super::super::models::bumps(rom);
     scene.settings.contacts[0].friction = friction;
     scene.settings.structures[0].speed = 1800.0;
     scene.settings.surfaces[0].moving = false;
-    against_finer(&with_methods(scene, Scheme::ModalExact, Solver::Lcp), step, 150, 0.1)
+    against_finer(&scene, method, step, 150, 0.1)
 }
 
-fn at_limit(scheme: Scheme, solver: Solver, factor: f64) -> Happened {
+fn at_limit(method: Method, factor: f64) -> Happened {
     let Some(rom) = model("rotor37-one-row") else { return Happened::refused("there is no rotor 37") };
     let fastest = tiprub_core::dynamics::modal::ModalModel::from_rom(&rom, 0.0)
         .map_or(f64::NAN, |model| model.largest_frequency());
-    let mut scene = with_methods(round(rom), scheme, solver);
+    let mut scene = method.on(round(rom));
     scene.settings.structures[0].damping_ratio = Some(0.3);
-    let limit = match scheme {
+    let limit = match method.scheme {
         Scheme::MasslessBoundary => massless_step(&scene),
         _ => Some(2.0 / fastest),
     };
     let Some(limit) = limit else { return Happened::refused("no limit was named") };
-    let press = Press { depth: 2e-5, ..Press::new(with_step(scene, factor * limit)) };
+    let press = Press { depth: 2e-5, ..Press::new(with_step(scene, method.step(factor * limit))) };
     Happened::of(press.run())
 }
 
@@ -111,7 +111,8 @@ fn at_limit(scheme: Scheme, solver: Solver, factor: f64) -> Happened {
 fn share_of_limit(share: f64, damping: f64) -> Happened {
     // With few nodes: lightly damped blades come to rest after a second of steps near the limit.
     let Some(rom) = model("rotor37-paper") else { return Happened::refused("there is no rotor 37") };
-    let mut scene = with_methods(round(rom), Scheme::MasslessBoundary, Solver::Lcp);
+    let method = Method { scheme: Scheme::MasslessBoundary, ..Method::exact(Solver::Lcp) };
+    let mut scene = method.on(round(rom));
     scene.settings.structures[0].damping_ratio = Some(damping);
     let long = with_step(scene.clone(), 1e-2);
     let refusal = Simulation::new(&long)
@@ -130,19 +131,18 @@ fn share_of_limit(share: f64, damping: f64) -> Happened {
     Happened::of(press.run())
 }
 
-fn rubbed(solver: Solver, friction: f64, sense: f64) -> Result<Vec<Check>> {
+fn rubbed(method: Method, friction: f64, sense: f64) -> Result<Vec<Check>> {
     let Some(rom) = model("rotor37-one-row") else { return Ok(Vec::new()) };
     let mut scene = super::super::models::bumps(rom);
     scene.settings.contacts[0].friction = friction;
     scene.settings.structures[0].speed = 1800.0 * sense;
-    against_finer(&with_methods(scene, Scheme::ModalExact, solver), 5e-7, 150, 0.1)
+    against_finer(&scene, method, 5e-7, 150, 0.1)
 }
 
-/// A scene against itself with a fourth of the step.
-fn against_finer(scene: &Scene, step: f64, count: usize, bound: f64) -> Result<Vec<Check>> {
-    let run = |step: f64| -> Result<(Vec<f64>, Watch)> {
-        let mut scene = scene.clone();
-        scene.settings.time.step = step;
+/// A scene against itself with a fourth of the step, or a sixteenth of the tolerance.
+fn against_finer(scene: &Scene, method: Method, step: f64, count: usize, bound: f64) -> Result<Vec<Check>> {
+    let run = |method: Method, step: f64| -> Result<(Vec<f64>, Watch)> {
+        let mut scene = method.stepping(scene.clone(), step);
         scene.settings.experiment.communication_step = 1e-5;
         let (mut simulation, mut watch) = begin(&scene)?;
         let mut history = Vec::new();
@@ -152,35 +152,31 @@ fn against_finer(scene: &Scene, step: f64, count: usize, bound: f64) -> Result<V
         }
         Ok((history, watch))
     };
-    let (coarse, watch) = run(step)?;
-    let (fine, finer) = run(0.25 * step)?;
+    let (better, parts) = method.finer();
+    let (coarse, watch) = run(method, step)?;
+    let (fine, finer) = run(better, step / parts)?;
     let mut checks = vec![
-        Check::at_most("displacements from a fourth of the step", apart(&coarse, &fine), bound),
+        Check::at_most("displacements from the finer run", apart(&coarse, &fine), bound),
         Check::so("blades touched", watch.contacts > 0 && finer.contacts > 0),
         watch.ledger(),
         finer.ledger(),
         Check::so("all outputs finite", watch.finite),
     ];
-    let contact = &scene.settings.contacts[0];
-    if contact.solver != Solver::Film {
+    if method.solver != Solver::Film {
         checks.extend(watch.complementarity());
-        let massless = scene.settings.time.scheme == Scheme::MasslessBoundary;
-        checks.push(Check::at_most("impact loss falls by", watch.impact_drop(), if massless { 2e-2 } else { 1e-9 }));
+        checks.push(watch.impact(if method.is_massless() { 2e-2 } else { 1e-9 }));
     }
     Ok(checks)
 }
 
 fn stage() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (solver, name) in SOLVERS {
+    for method in Method::common() {
         for friction in [0.0, 0.15, 1.0, 2.0] {
-            let expected = Expected::either("the same with a fourth of the step, complementarity", ["µ"]);
-            cases.push(
-                Case::new(format!("stage/oval/µ={friction}/{name}"), expected, move |_: &_| {
-                    Happened::of(on_stage(solver, friction, 1.35e5))
-                })
-                .within(600.0),
-            );
+            let expected = Expected::either("the same in a finer run, complementarity", ["µ"]);
+            let name = format!("stage/oval/µ={friction}/{}", method.name());
+            let work = move |_: &_| Happened::of(on_stage(method, friction, 1.35e5));
+            cases.push(Case::new(name, expected, work).within(600.0));
         }
         for load in [1e7, 1e9, 1e12, 1e300] {
             let expected = Expected::refused_as(&[
@@ -190,22 +186,18 @@ fn stage() -> Vec<Case> {
                 &["casing_load_amplitude", "within"],
                 &["load.amplitude", "between"],
             ]);
-            cases.push(
-                Case::new(format!("stage/load={load:e}/{name}"), expected, move |_: &_| {
-                    Happened::of(on_stage(solver, 0.15, load))
-                })
-                .within(600.0),
-            );
+            let name = format!("stage/load={load:e}/{}", method.name());
+            let work = move |_: &_| Happened::of(on_stage(method, 0.15, load));
+            cases.push(Case::new(name, expected, work).within(600.0));
         }
     }
     cases
 }
 
-fn on_stage(solver: Solver, friction: f64, load: f64) -> Result<Vec<Check>> {
+fn on_stage(method: Method, friction: f64, load: f64) -> Result<Vec<Check>> {
     let mut scene = scene_source::stage_scene(true, &RomCache::of_user(), &Console::new(true, false))
         .map_err(|failure| tiprub_core::Error::invalid("builtin:stage", failure.to_string(), ""))?;
     scene.settings.contacts[0].friction = friction;
-    scene.settings.contacts[0].solver = solver;
     scene.settings.surfaces[0].ramp_time = 1e-3;
     if load > 1e6 {
         scene.settings.structures[1].load =
@@ -213,7 +205,7 @@ fn on_stage(solver: Solver, friction: f64, load: f64) -> Result<Vec<Check>> {
     }
     // Much friction makes contact that grows by itself: small steps, before they part.
     let (step, count) = if friction > 0.5 { (2.5e-7, 60) } else { (2e-6, 120) };
-    against_finer(&scene, step, count, 0.1)
+    against_finer(&scene, method, step, count, 0.1)
 }
 
 fn exchanged() -> Vec<Case> {

@@ -7,7 +7,7 @@ use tiprub_core::{
 
 use super::super::{
     Case, Expected, Happened,
-    models::{SCHEMES, SOLVERS, Tower, blade, round, with_methods, with_step},
+    models::{Method, Tower, blade, round, with_methods, with_step},
     press::Press,
 };
 
@@ -27,52 +27,58 @@ pub(crate) fn massless_step(scene: &Scene) -> Option<f64> {
 
 fn step_limit() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scheme, scheme_name) in SCHEMES {
-        for (solver, solver_name) in SOLVERS {
-            for (friction, model) in [(0.0, "tower"), (0.15, "tower"), (0.0, "blade"), (0.15, "blade")] {
-                for factor in FACTORS {
-                    let name = format!("step-limit/{scheme_name}/{solver_name}/{model}/µ={friction}/h={factor}");
-                    let against = "static contact, signs of the ledger";
-                    let expected = match scheme {
-                        Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
-                        Scheme::MasslessBoundary if factor > 1.0 => {
-                            Expected::refused(["massless-boundary", "internal step"])
-                        }
-                        // Three nodes that push each other apart: film, which looks once, need not come to the static solution.
-                        _ if solver == Solver::Film && model == "blade" => Expected::either_as(
-                            against,
-                            &[
-                                &["grows"],
-                                &["film", "pulled at contact node"],
-                                &["kinetic and strain energy", "does not resolve"],
-                            ],
-                        ),
-                        _ if friction > 0.0 && model == "blade" => Expected::either(against, ["grows"]),
-                        // A mode near ωh = π may come to hold energy that nobody supplied.
-                        Scheme::ModalExact if factor > 1.0 => {
-                            Expected::either(against, ["kinetic and strain energy", "does not resolve"])
-                        }
-                        _ => Expected::right(against),
-                    };
-                    let quick = model == "tower" && friction > 0.0 && solver != Solver::Film;
-                    cases.push(
-                        Case::new(name, expected, move |_| at(scheme, solver, friction, model, factor)).quick(quick),
-                    );
+    for method in Method::all() {
+        for (friction, model) in [(0.0, "tower"), (0.15, "tower"), (0.0, "blade"), (0.15, "blade")] {
+            let against = "static contact, signs of the ledger";
+            let quick = model == "tower" && friction > 0.0 && method.solver == Solver::Lcp;
+            if method.is_adaptive() {
+                // The tolerance in place of the step.
+                for tolerance in [1e-9, 1e-6, 1e-3, 0.1] {
+                    let name = format!("step-limit/{}/{model}/µ={friction}/tolerance={tolerance:e}", method.name());
+                    let work = move |_: &_| at(method.within(tolerance), friction, model, 1.0);
+                    cases.push(Case::new(name, Expected::right(against), work).quick(quick));
                 }
+                continue;
+            }
+            for factor in FACTORS {
+                let name = format!("step-limit/{}/{model}/µ={friction}/h={factor}", method.name());
+                let expected = match method.scheme {
+                    Scheme::Galerkin => Expected::right(against),
+                    Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
+                    Scheme::MasslessBoundary if factor > 1.0 => {
+                        Expected::refused(["massless-boundary", "internal step"])
+                    }
+                    // Three nodes that push each other apart: film, which looks once, need not come to the static solution.
+                    _ if method.solver == Solver::Film && model == "blade" => Expected::either_as(
+                        against,
+                        &[
+                            &["grows"],
+                            &["film", "pulled at contact node"],
+                            &["kinetic and strain energy", "does not resolve"],
+                        ],
+                    ),
+                    _ if friction > 0.0 && model == "blade" => Expected::either(against, ["grows"]),
+                    // A mode near ωh = π may come to hold energy that nobody supplied.
+                    Scheme::ModalExact if factor > 1.0 => {
+                        Expected::either(against, ["kinetic and strain energy", "does not resolve"])
+                    }
+                    _ => Expected::right(against),
+                };
+                cases.push(Case::new(name, expected, move |_| at(method, friction, model, factor)).quick(quick));
             }
         }
     }
     cases
 }
 
-fn at(scheme: Scheme, solver: Solver, friction: f64, model: &str, factor: f64) -> Happened {
+fn at(method: Method, friction: f64, model: &str, factor: f64) -> Happened {
     let tower = Tower::default();
     let rom = if model == "tower" { tower.rom() } else { blade(12) };
     let fastest = if model == "tower" { tower.largest_frequency() } else { rom.stiffness.diagonal().max().sqrt() };
-    let mut scene = with_methods(round(rom), scheme, solver);
+    let mut scene = method.on(round(rom));
     scene.settings.contacts[0].friction = friction;
     // Free of friction, so that what is refused is the step.
-    let limit = match scheme {
+    let limit = match method.scheme {
         Scheme::MasslessBoundary => {
             let mut pressed = scene.clone();
             pressed.settings.structures[0].damping_ratio = Some(0.3);
@@ -81,26 +87,25 @@ fn at(scheme: Scheme, solver: Solver, friction: f64, model: &str, factor: f64) -
         _ => Some(2.0 / fastest),
     };
     let Some(limit) = limit else { return Happened::refused("no limit was named") };
-    Happened::of(Press::new(with_step(scene, factor * limit)).run())
+    Happened::of(Press::new(with_step(scene, method.step(factor * limit))).run())
 }
 
 fn ratios() -> Vec<Case> {
     let mut cases = Vec::new();
     for exponent in 2..=8 {
-        for (scheme, scheme_name) in SCHEMES {
-            for (solver, solver_name) in SOLVERS {
-                for kind in ["stiff node", "light node"] {
-                    let name = format!("stiffness/{}/1e{exponent}/{scheme_name}/{solver_name}", kind.replace(' ', "-"));
-                    let against = "static contact, signs of the ledger";
-                    let expected = if scheme == Scheme::MasslessBoundary && kind == "stiff node" && exponent > 4 {
-                        Expected::either(against, ["massless-boundary", "modes with inertia"])
-                    } else {
-                        Expected::right(against)
-                    };
-                    let quick = solver == Solver::Lcp && exponent % 3 == 2 && scheme != Scheme::CentralDifference;
-                    let work = move |_: &_| ratio(kind, 10_f64.powi(exponent), scheme, solver);
-                    cases.push(Case::new(name, expected, work).quick(quick).within(300.0));
-                }
+        for method in Method::all() {
+            for kind in ["stiff node", "light node"] {
+                let name = format!("stiffness/{}/1e{exponent}/{}", kind.replace(' ', "-"), method.name());
+                let against = "static contact, signs of the ledger";
+                let expected = if method.is_massless() && kind == "stiff node" && exponent > 4 {
+                    Expected::either(against, ["massless-boundary", "modes with inertia"])
+                } else {
+                    Expected::right(against)
+                };
+                let central = method.scheme == Scheme::CentralDifference;
+                let quick = method.solver == Solver::Lcp && exponent % 3 == 2 && !central;
+                let work = move |_: &_| ratio(kind, 10_f64.powi(exponent), method);
+                cases.push(Case::new(name, expected, work).quick(quick).within(300.0));
             }
         }
     }
@@ -108,7 +113,7 @@ fn ratios() -> Vec<Case> {
 }
 
 /// Ratio of the squares of the highest to the lowest frequency: by stiffness, or by mass.
-fn ratio(kind: &str, ratio: f64, scheme: Scheme, solver: Solver) -> Happened {
+fn ratio(kind: &str, ratio: f64, method: Method) -> Happened {
     let soft = 4e6 / 0.1;
     let mut tower = Tower { sectors: 2, ..Tower::default() };
     if kind == "stiff node" {
@@ -116,11 +121,11 @@ fn ratio(kind: &str, ratio: f64, scheme: Scheme, solver: Solver) -> Happened {
     } else {
         tower.mass[1] = tower.tip / (ratio * soft);
     }
-    let mut scene = with_methods(round(tower.rom()), scheme, solver);
+    let mut scene = method.on(round(tower.rom()));
     scene.settings.contacts[0].friction = 0.15;
-    let step = match scheme {
+    let step = match method.scheme {
         Scheme::CentralDifference => 0.9 * 2.0 / tower.largest_frequency(),
-        Scheme::ModalExact | Scheme::Galerkin => 5e-6,
+        Scheme::ModalExact | Scheme::Galerkin => method.step(5e-6),
         Scheme::MasslessBoundary => {
             scene.settings.structures[0].damping_ratio = Some(0.3);
             match massless_step(&scene) {

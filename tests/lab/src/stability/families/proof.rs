@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use tiprub_core::settings::{Scheme, Solver};
+use tiprub_core::settings::Solver;
 
 use super::{
-    super::{Case, Check, Expected, Happened},
+    super::{Case, Check, Expected, Happened, models::Method},
     decay::{self, Released},
     disk::{Mirrored, Still},
     free::Impact,
@@ -21,39 +21,25 @@ pub(crate) fn cases() -> Vec<Case> {
 
 /// Small faults of mechanics: what is run and what the closed form is told differ by them.
 fn faults() -> Vec<Case> {
-    let (scheme, solver) = (Scheme::ModalExact, Solver::Lcp);
-    let case = |name: &str, work: fn(Scheme, Solver) -> tiprub_core::Result<Vec<Check>>| {
-        Case::new(format!("judge/{name}"), Expected::right("what is not so"), move |_| {
-            Happened::of(work(scheme, solver))
-        })
+    let method = Method::exact(Solver::Lcp);
+    let case = |name: &str, work: fn(Method) -> tiprub_core::Result<Vec<Check>>| {
+        Case::new(format!("judge/{name}"), Expected::right("what is not so"), move |_| Happened::of(work(method)))
     };
     vec![
-        case("damping-of-blades-10%", |scheme, solver| {
-            Released { scheme, solver, turned: 0.45, ratio: 0.055, told: 0.05 }.blade()
+        case("damping-of-blades-10%", |method| Released { method, turned: 0.45, ratio: 0.055, told: 0.05 }.blade()),
+        case("damping-of-blades-0.1%", |method| Released { method, turned: 0.0, ratio: 0.05005, told: 0.05 }.blade()),
+        case("damping-of-a-ring-10%", |method| decay::ring(method, 2, 0.055, 0.05)),
+        case("speed-1%", |method| Pressed { method, order: 3, speed: 1300.0, factor: 1.01, early: 0.0 }.run()),
+        case("rotor-a-step-early", |method| Pressed { method, order: 3, speed: 1300.0, factor: 1.0, early: 1.0 }.run()),
+        case("load-a-step-early", |method| Travelling { method, order: 2, ratio: 0.3, early: 1.0 }.run()),
+        case("slope-of-a-lobe-1%", |method| Flank { method, slope: 0.05, share: 1.01 }.run()),
+        case("coupling-of-sectors-1%", |method| Still { method, sectors: 8, friction: 0.0, coupling: 8.08e6 }.run()),
+        case("disk-not-mirrored", |method| Mirrored { method, sectors: 8, conjugate: false }.run()),
+        case("heat-1%", |method| Heat { method, friction: 0.15, speed: 1300.0, share: 1.01 }.run()),
+        case("impact-loses-momentum-1%", |method| {
+            Impact { method, speed: 1.0, mass: 1.0, friction: 0.15, along: 0.5, share: 1.01 }.run()
         }),
-        case("damping-of-blades-0.1%", |scheme, solver| {
-            Released { scheme, solver, turned: 0.0, ratio: 0.05005, told: 0.05 }.blade()
-        }),
-        case("damping-of-a-ring-10%", |scheme, _| decay::ring(scheme, 2, 0.055, 0.05)),
-        case("speed-1%", |scheme, solver| {
-            Pressed { scheme, solver, order: 3, speed: 1300.0, factor: 1.01, early: 0.0 }.run()
-        }),
-        case("rotor-a-step-early", |scheme, solver| {
-            Pressed { scheme, solver, order: 3, speed: 1300.0, factor: 1.0, early: 1.0 }.run()
-        }),
-        case("load-a-step-early", |scheme, _| Travelling { scheme, order: 2, ratio: 0.3, early: 1.0 }.run()),
-        case("slope-of-a-lobe-1%", |scheme, solver| Flank { scheme, solver, slope: 0.05, share: 1.01 }.run()),
-        case("coupling-of-sectors-1%", |scheme, solver| {
-            Still { scheme, solver, sectors: 8, friction: 0.0, coupling: 8.08e6 }.run()
-        }),
-        case("disk-not-mirrored", |scheme, solver| Mirrored { scheme, solver, sectors: 8, conjugate: false }.run()),
-        case("heat-1%", |scheme, solver| Heat { scheme, solver, friction: 0.15, speed: 1300.0, share: 1.01 }.run()),
-        case("impact-loses-momentum-1%", |scheme, solver| {
-            Impact { scheme, solver, speed: 1.0, mass: 1.0, friction: 0.15, along: 0.5, share: 1.01 }.run()
-        }),
-        case("momentum-1e-9", |scheme, solver| {
-            Balance { scheme, solver, friction: 0.15, speed: 1.0, share: 1.0 + 1e-9 }.run()
-        }),
+        case("momentum-1e-9", |method| Balance { method, friction: 0.15, speed: 1.0, share: 1.0 + 1e-9 }.run()),
     ]
 }
 

@@ -8,8 +8,8 @@ use tiprub_core::{
 use super::{
     super::{
         Case, Cases, Check, Expected, Happened,
-        models::{GAP, Random, SCHEMES, SOLVERS, Tower, blade, bumps, round, with_methods, with_step},
-        observe::{MASSLESS_RETURN, Watch, apart, begin, bits, displacements, real, set},
+        models::{GAP, Method, Random, Tower, allowed, blade, bumps, round, with_methods, with_step},
+        observe::{MASSLESS_RETURN, Watch, apart, begin, bits, displacements, real, set, steps},
     },
     gaps::processor_time,
     limits::massless_step,
@@ -22,42 +22,41 @@ pub(crate) fn cases() -> Vec<Case> {
 
 fn communication() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scheme, scheme_name) in SCHEMES {
-        for (solver, solver_name) in SOLVERS {
-            for ratio in [1e-3, 0.1, 0.7, 1.0, 2.0, 3.3, 10.0, 1e3] {
-                let expected = if ratio < 1.0 {
-                    Expected::right("the same with h = H/4")
-                } else {
-                    Expected::right("the same with H = h, one step at a time")
-                };
-                let name = format!("communication/H={ratio}h/{scheme_name}/{solver_name}");
-                let quick = solver == Solver::Lcp && scheme == Scheme::ModalExact;
-                cases.add(quick, name, expected, move || lengths(scheme, solver, ratio));
-            }
-            let expected = Expected::right("the same with even steps a quarter as long; signs of the ledger");
-            let name = format!("communication/wild/{scheme_name}/{solver_name}");
-            cases.add(solver == Solver::Lcp, name, expected, move || wildly(scheme, solver));
+    for method in Method::all() {
+        let lcp = method.solver == Solver::Lcp;
+        for ratio in [1e-3, 0.1, 0.7, 1.0, 2.0, 3.3, 10.0, 1e3] {
+            let expected = if ratio < 1.0 {
+                Expected::right("the same with h = H/4")
+            } else {
+                Expected::right("the same with H = h, one step at a time")
+            };
+            let name = format!("communication/H={ratio}h/{}", method.name());
+            let quick = lcp && (method == Method::exact(Solver::Lcp) || method.is_galerkin());
+            cases.add(quick && ratio > 0.5, name, expected, move || lengths(method, ratio));
         }
+        let expected = Expected::right("the same with even steps a quarter as long; signs of the ledger");
+        let name = format!("communication/wild/{}", method.name());
+        cases.add(false, name, expected, move || wildly(method));
+    }
+    for method in Method::all_with(Solver::Lcp) {
+        let name = method.integration();
         let expected = Expected::right("energy of free blades without damping, and their phase against ω t");
-        cases.add(false, format!("communication/H=1e6h/{scheme_name}"), expected, move || huge(scheme));
-        let refused = Expected::refused(["communicationStepSize", "internal steps"]);
-        cases.push(
-            Case::new(format!("communication/H=1e10h/{scheme_name}"), refused, move |_| {
-                Happened::of(beyond(scheme, 1e4))
-            })
-            .quick(true),
-        );
-        for (what, length, word) in [
-            ("0", 0.0, "communicationStepSize"),
-            ("-1e-6", -1e-6, "communicationStepSize"),
-            ("NaN", f64::NAN, "communicationStepSize"),
-            ("inf", f64::INFINITY, "communicationStepSize"),
-            ("5e-324", 5e-324, "communicationStepSize"),
-            ("1e308", 1e308, "communicationStepSize"),
+        cases.add(false, format!("communication/H=1e6h/{name}"), expected, move || huge(method));
+        // Steps of galerkin are counted as they are done.
+        let words = ["communicationStepSize", "internal steps"];
+        let expected =
+            if method.is_galerkin() { Expected::either("finite outputs", words) } else { Expected::refused(words) };
+        cases.add(true, format!("communication/H=1e10h/{name}"), expected, move || beyond(method, 1e4));
+        for (what, length) in [
+            ("0", 0.0),
+            ("-1e-6", -1e-6),
+            ("NaN", f64::NAN),
+            ("inf", f64::INFINITY),
+            ("5e-324", 5e-324),
+            ("1e308", 1e308),
         ] {
-            cases.add(true, format!("communication/H={what}/{scheme_name}"), Expected::refused([word]), move || {
-                beyond(scheme, length)
-            });
+            let refused = Expected::refused(["communicationStepSize"]);
+            cases.add(true, format!("communication/H={what}/{name}"), refused, move || beyond(method, length));
         }
         for length in [5e-324, 1e-310, 1e-17, 9e-13, 1e-12] {
             let expected = if length < 1e-12 {
@@ -65,22 +64,21 @@ fn communication() -> Vec<Case> {
             } else {
                 Expected::right("finite outputs")
             };
-            cases.add(true, format!("communication/from-0/H={length:e}/{scheme_name}"), expected, move || {
-                from(0.0, scheme, length)
-            });
+            let name = format!("communication/from-0/H={length:e}/{name}");
+            cases.add(true, name, expected, move || from(0.0, method, length));
         }
     }
     cases
 }
 
 /// A step after a start at 1 s, so that the shortest ones do not change the time.
-fn beyond(scheme: Scheme, length: f64) -> Result<Vec<Check>> {
-    from(1.0, scheme, length)
+fn beyond(method: Method, length: f64) -> Result<Vec<Check>> {
+    from(1.0, method, length)
 }
 
 /// A step from `start` (s).
-fn from(start: f64, scheme: Scheme, length: f64) -> Result<Vec<Check>> {
-    let scene = with_methods(with_step(round(Tower::default().rom()), 1e-6), scheme, Solver::Lcp);
+fn from(start: f64, method: Method, length: f64) -> Result<Vec<Check>> {
+    let scene = method.stepping(round(Tower::default().rom()), 1e-6);
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(start)?;
     simulation.do_step(start, length)?;
@@ -88,11 +86,10 @@ fn from(start: f64, scheme: Scheme, length: f64) -> Result<Vec<Check>> {
     Ok(vec![Check::so("all outputs finite", finite)])
 }
 
-fn rub(scheme: Scheme, solver: Solver, step: f64) -> Scene {
-    let mut scene = with_methods(bumps(blade(6)), scheme, solver);
+fn rub(method: Method, step: f64) -> Scene {
+    let mut scene = method.stepping(bumps(blade(6)), step);
     scene.settings.structures[0].damping_ratio = Some(0.02);
     // The bumps stand still at the start and are there at once where the blades are not.
-    scene.settings.time.step = step;
     scene
 }
 
@@ -118,36 +115,38 @@ fn history(scene: &Scene, mut length: impl FnMut() -> f64) -> Result<(Vec<f64>, 
 
 const STEP: f64 = 1e-6;
 
-fn lengths(scheme: Scheme, solver: Solver, ratio: f64) -> Result<Vec<Check>> {
+fn lengths(method: Method, ratio: f64) -> Result<Vec<Check>> {
     let length = (ratio * STEP).min(1e-4);
     let (found, watch) = if ratio < 0.01 {
         // A thousand times as many: the first two marks are enough.
-        return short(scheme, solver, length);
+        return short(method, length);
     } else {
-        history(&rub(scheme, solver, STEP), || length)?
+        history(&rub(method, STEP), || length)?
     };
+    // What a tolerance chooses depends on the communication step.
+    let same = if method.is_galerkin() { 0.05 } else { 1e-6 };
     let (other, bound) = if ratio < 1.0 {
-        (history(&rub(scheme, solver, length / 4.0), || length)?.0, 0.05)
+        (history(&rub(method, length / 4.0), || length)?.0, 0.05)
     } else if (ratio - 3.3).abs() < 0.1 {
         // 3.3 h is four steps of 0.825 h.
-        (history(&rub(scheme, solver, length / 4.0), || length / 4.0)?.0, 0.05)
+        (history(&rub(method, length / 4.0), || length / 4.0)?.0, 0.05)
     } else {
-        (history(&rub(scheme, solver, STEP), || STEP)?.0, 1e-6)
+        (history(&rub(method, STEP), || STEP)?.0, same)
     };
     let mut checks = vec![
         Check::at_most("displacements differ", apart(&found, &other), bound),
         Check::so("the blades touched", watch.contacts > 0),
         watch.ledger(),
     ];
-    if solver != Solver::Film {
+    if method.solver != Solver::Film {
         checks.extend(watch.complementarity());
     }
     Ok(checks)
 }
 
 /// h/1000 for a tenth of a microsecond in contact, continued from a state at h, against ten times as long steps.
-fn short(scheme: Scheme, solver: Solver, length: f64) -> Result<Vec<Check>> {
-    let mut scene = rub(scheme, solver, STEP);
+fn short(method: Method, length: f64) -> Result<Vec<Check>> {
+    let mut scene = rub(method, STEP);
     scene.settings.surfaces[0].ramp_time = 0.0;
     scene.settings.surfaces[0].shape = tiprub_core::settings::Shape::Circular {};
     let (mut simulation, mut watch) = begin(&scene)?;
@@ -174,37 +173,42 @@ fn short(scheme: Scheme, solver: Solver, length: f64) -> Result<Vec<Check>> {
     ])
 }
 
-fn wildly(scheme: Scheme, solver: Solver) -> Result<Vec<Check>> {
+fn wildly(method: Method) -> Result<Vec<Check>> {
     let mut random = Random(11);
-    let (found, watch) = history(&rub(scheme, solver, STEP), || random.scale(1e-8, 5e-5))?;
-    let (even, _) = history(&rub(scheme, solver, STEP / 4.0), || STEP / 4.0)?;
+    let (found, watch) = history(&rub(method, STEP), || random.scale(1e-8, 5e-5))?;
+    let (even, _) = history(&rub(method, STEP / 4.0), || STEP / 4.0)?;
     let mut checks = vec![
         Check::at_most("displacements from even steps", apart(&found, &even), 0.05),
         Check::so("the blades touched", watch.contacts > 0),
         watch.ledger(),
     ];
-    if solver != Solver::Film {
+    if method.solver != Solver::Film {
         checks.extend(watch.complementarity());
     }
     Ok(checks)
 }
 
 /// A blade in free motion: kicked by the casing, which then leaves.
-fn kicked(scheme: Scheme, step: f64) -> Result<(Simulation, f64)> {
+fn kicked(method: Method, step: f64) -> Result<(Simulation, f64)> {
     let tower = Tower { sectors: 1, ..Tower::default() };
-    let mut scene = with_methods(round(tower.rom()), scheme, Solver::Lcp);
+    let mut scene = method.on(round(tower.rom()));
     scene.settings.structures[0].damping_ratio = Some(0.0);
     scene.settings.outputs.all_sectors = false;
-    let step = match scheme {
+    let step = match method.scheme {
         Scheme::CentralDifference => 0.9 * 2.0 / tower.largest_frequency(),
         Scheme::ModalExact | Scheme::Galerkin => step,
         Scheme::MasslessBoundary => 0.5 * massless_step(&scene).unwrap_or(step),
     };
-    let scene = with_step(scene, step);
+    let scene = with_step(scene, method.step(step));
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
-    for index in 0..400 {
-        set(&mut simulation, "casing_radius_change", -1.2 * GAP * f64::from(index.min(300)) / 300.0)?;
+    // It leaves slowly: forces of massless-boundary act a step late, and work on what the casing does then.
+    let place = |index: u32| match index {
+        0..400 => -1.2 * f64::from(index.min(300)) / 300.0,
+        _ => -1.2 + 2.2 * f64::from(index - 400) / 2000.0,
+    };
+    for index in 0..=2400 {
+        set(&mut simulation, "casing_radius_change", GAP * place(index))?;
         simulation.do_step(simulation.time(), step)?;
     }
     set(&mut simulation, "casing_radius_change", 2e-2)?;
@@ -217,8 +221,8 @@ fn energy(simulation: &Simulation) -> f64 {
     real(simulation, "scheme_energy")
 }
 
-fn huge(scheme: Scheme) -> Result<Vec<Check>> {
-    let (mut simulation, step) = kicked(scheme, 2e-6)?;
+fn huge(method: Method) -> Result<Vec<Check>> {
+    let (mut simulation, step) = kicked(method, 2e-6)?;
     let mut twin = simulation.clone();
     let before = energy(&simulation);
     simulation.do_step(simulation.time(), 1e6 * step)?;
@@ -238,28 +242,25 @@ fn huge(scheme: Scheme) -> Result<Vec<Check>> {
 
 fn long() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scheme, name) in SCHEMES {
+    for method in Method::all_with(Solver::Lcp) {
+        let name = method.integration();
         for (steps, quick) in [(1e5, true), (1e7, false)] {
             let expected = Expected::right("energy of free undamped blades");
-            let work = move |_: &_| match drift(scheme, steps) {
+            let work = move |_: &_| match drift(method, steps) {
                 Ok((checks, remark)) => Happened::answer(checks).remark(remark),
                 Err(error) => Happened::refused(error),
             };
             cases.push(Case::new(format!("long/{steps:e}-steps/{name}"), expected, work).quick(quick).within(600.0));
         }
-    }
-    for (scheme, name) in SCHEMES {
         let expected = Expected::right("energy at most what the casing did; signs of the ledger");
-        cases.push(
-            Case::new(format!("long/chatter/{name}"), expected, move |_: &_| Happened::of(chatter(scheme)))
-                .within(600.0),
-        );
+        let work = move |_: &_| Happened::of(chatter(method));
+        cases.push(Case::new(format!("long/chatter/{name}"), expected, work).within(600.0));
     }
     cases
 }
 
-fn drift(scheme: Scheme, steps: f64) -> Result<(Vec<Check>, String)> {
-    let (mut simulation, step) = kicked(scheme, 2e-6)?;
+fn drift(method: Method, steps: f64) -> Result<(Vec<Check>, String)> {
+    let (mut simulation, step) = kicked(method, 2e-6)?;
     let (before, clock) = (energy(&simulation), processor_time());
     let mut most: f64 = 0.0;
     for _ in 0..100 {
@@ -272,32 +273,25 @@ fn drift(scheme: Scheme, steps: f64) -> Result<(Vec<Check>, String)> {
 }
 
 /// Blades without damping that bounce in a round casing for long: contact may take energy, never give it.
-fn chatter(scheme: Scheme) -> Result<Vec<Check>> {
+fn chatter(method: Method) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 4, ..Tower::default() };
-    let mut scene = with_methods(round(tower.rom()), scheme, Solver::Lcp);
-    scene.settings.structures[0].damping_ratio = Some(if scheme == Scheme::MasslessBoundary { 1e-3 } else { 0.0 });
-    let scene = with_step(scene, 2e-6);
+    let mut scene = method.stepping(round(tower.rom()), 2e-6);
+    scene.settings.structures[0].damping_ratio = Some(if method.is_massless() { 1e-3 } else { 0.0 });
+    let length = scene.settings.experiment.communication_step;
     let (mut simulation, mut watch) = begin(&scene)?;
-    for index in 0..500_000 {
-        let share = (f64::from(index) / 500.0).min(1.0);
+    for index in 0..steps(1.0, length) {
+        let share = (f64::from(index) * length / 1e-3).min(1.0);
         set(&mut simulation, "casing_radius_change", -1.05 * GAP * share)?;
-        watch.step(&mut simulation, 2e-6)?;
+        watch.step(&mut simulation, length)?;
     }
     let supplied = real(&simulation, "external_work");
+    let bound = if method.is_massless() { MASSLESS_RETURN } else { 1e-9 };
     Ok([
         watch.complementarity(),
         vec![
             watch.ledger(),
-            Check::at_most(
-                "energy beyond the work of the casing",
-                energy(&simulation) / supplied - 1.0,
-                if scheme == Scheme::MasslessBoundary { MASSLESS_RETURN } else { 1e-9 },
-            ),
-            Check::at_most(
-                "impact loss falls by",
-                watch.impact_drop(),
-                if scheme == Scheme::MasslessBoundary { MASSLESS_RETURN } else { 1e-9 },
-            ),
+            Check::at_most("energy beyond the work of the casing", energy(&simulation) / supplied - 1.0, bound),
+            watch.impact(bound),
         ],
     ]
     .concat())
@@ -305,17 +299,11 @@ fn chatter(scheme: Scheme) -> Result<Vec<Check>> {
 
 fn jumps() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (solver, name) in SOLVERS {
-        for (scheme, scheme_name) in SCHEMES {
-            for jump in [1e-6, 1e-5, 1e-4, 1e-3, -1e-4] {
-                let expected = Expected::right("impulse = W⁻¹ jump, energy of the casing = impact loss + energy left");
-                cases.add(
-                    solver == Solver::Lcp,
-                    format!("jump/gap-offset/{jump:e}/{scheme_name}/{name}"),
-                    expected,
-                    move || jumped(scheme, solver, jump),
-                );
-            }
+    for method in Method::all() {
+        for jump in [1e-6, 1e-5, 1e-4, 1e-3, -1e-4] {
+            let expected = Expected::right("impulse = W⁻¹ jump, energy of the casing = impact loss + energy left");
+            let name = format!("jump/gap-offset/{jump:e}/{}", method.name());
+            cases.add(method.solver == Solver::Lcp, name, expected, move || jumped(method, jump));
         }
     }
     cases
@@ -323,34 +311,42 @@ fn jumps() -> Vec<Case> {
 
 /// The casing jumps onto resting blades by a distance. In that step the force is the jump over W, an impulse p = λh; the casing
 /// does λ·jump/2 of work twice over two steps, what stays is in the blade.
-fn jumped(scheme: Scheme, solver: Solver, jump: f64) -> Result<Vec<Check>> {
+fn jumped(method: Method, jump: f64) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 3, slope: 0.0, ..Tower::default() };
-    let mut scene = with_step(with_methods(round(tower.rom()), scheme, solver), 2e-6);
+    let mut scene = with_step(method.on(round(tower.rom())), 2e-6);
     scene.settings.structures[0].damping_ratio = Some(0.0);
     let (mut simulation, mut watch) = begin(&scene)?;
     watch.step(&mut simulation, 2e-6)?;
     set(&mut simulation, "gap_offset", -GAP - jump)?;
     watch.step(&mut simulation, 2e-6)?;
     let found = simulation.system().multiplier(0, 1);
-    let model = tiprub_core::dynamics::modal::ModalModel::from_rom(&scene.roms[0], 0.0)?;
-    let compliance: f64 = (0..model.len())
-        .map(|mode| model.contact_modes[(0, mode)].powi(2) * model.coefficient(mode, 1.0, scheme, 2e-6).compliance)
-        .sum();
-    let exact = if jump > 0.0 { jump / compliance } else { 0.0 };
+    let exact = if jump <= 0.0 {
+        0.0
+    } else if method.is_galerkin() {
+        pushed(&scene.roms[0], jump, 2e-6)
+    } else {
+        let model = tiprub_core::dynamics::modal::ModalModel::from_rom(&scene.roms[0], 0.0)?;
+        let compliance = |mode: usize| {
+            let coefficient = model.coefficient(mode, 1.0, method.scheme, 2e-6);
+            model.contact_modes[(0, mode)].powi(2) * coefficient.compliance
+        };
+        jump / (0..model.len()).map(compliance).sum::<f64>()
+    };
     let displaced = simulation.system().bank().row(0, 1);
     let mut checks = watch.complementarity();
-    checks.push(Check::relative("λ from jump/W", found, exact, 1e-9));
-    checks.push(Check::at_most("tip from the casing", (displaced + jump.max(0.0)).abs() / GAP, 1e-9));
+    let near = allowed(&scene);
+    checks.push(Check::relative("λ from jump/W", found, exact, 1e-9 + if jump > 0.0 { near / jump } else { 0.0 }));
+    checks.push(Check::at_most("tip from the casing", (displaced + jump.max(0.0)).abs() / GAP, 1e-9 + near / GAP));
     for _ in 0..500 {
         watch.step(&mut simulation, 2e-6)?;
     }
     let supplied = real(&simulation, "external_work");
-    checks.extend(watch.books_of(scheme));
+    checks.extend(watch.books_of(method.scheme));
     if jump > 0.0 {
         checks.push(Check::at_most(
             "energy beyond the work of the casing",
             energy(&simulation) / supplied - 1.0,
-            if scheme == Scheme::MasslessBoundary { MASSLESS_RETURN } else { 1e-9 },
+            if method.is_massless() { MASSLESS_RETURN } else { 1e-9 },
         ));
     } else {
         checks.push(Check::so("nothing moves", energy(&simulation) == 0.0 && supplied == 0.0));
@@ -358,15 +354,28 @@ fn jumped(scheme: Scheme, solver: Solver, jump: f64) -> Result<Vec<Check>> {
     Ok(checks)
 }
 
+/// λ of a tip that a wall pushes in at constant speed, `jump` (m) deep at the end of a step that also closes the gap. The tip has no mass: with
+/// its residual flexibility G and one mode with inertia, q̈ + ω²q = φλ and φq + Gλ = vt.
+fn pushed(rom: &tiprub_core::Rom, jump: f64, step: f64) -> f64 {
+    let (frequencies, shapes) = super::decay::modes(&rom.mass, &rom.stiffness);
+    let seen = |mode: usize| shapes[(3, mode)];
+    let flexible: f64 = (3..6).map(|mode| (seen(mode) / frequencies[mode]).powi(2)).sum();
+    let moving = (0..3).max_by(|a, b| seen(*a).abs().total_cmp(&seen(*b).abs())).unwrap_or(0);
+    let (time, speed) = (step * jump / (GAP + jump), (GAP + jump) / step);
+    let held = (frequencies[moving].powi(2) + seen(moving).powi(2) / flexible).sqrt();
+    let turned = held * time;
+    // t − sin(Ωt)/Ω, where t is short by its series.
+    let late = if turned < 1e-2 { turned * turned * time / 6.0 } else { time - turned.sin() / held };
+    let moved = seen(moving) * speed / (flexible * held * held) * late;
+    (jump - seen(moving) * moved) / flexible
+}
+
 fn restore() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (solver, name) in SOLVERS {
-        for (scheme, scheme_name) in SCHEMES {
-            let expected = Expected::right("the same bits as where it was saved, whatever the parameters there were");
-            cases.add(true, format!("restore/other-parameters/{scheme_name}/{name}"), expected, move || {
-                elsewhere(scheme, solver)
-            });
-        }
+    for method in Method::all() {
+        let expected = Expected::right("the same bits as where it was saved, whatever the parameters there were");
+        let name = format!("restore/other-parameters/{}", method.name());
+        cases.add(method.solver == Solver::Lcp, name, expected, move || elsewhere(method));
     }
     let expected = Expected::right("refused, set back, and then the same bits as of a fresh instance");
     cases.push(Case::new("restore/refused-scheme", expected, |_| Happened::of(after_refusal())).quick(true));
@@ -377,8 +386,8 @@ fn restore() -> Vec<Case> {
     cases
 }
 
-fn elsewhere(scheme: Scheme, solver: Solver) -> Result<Vec<Check>> {
-    let scene = rub(scheme, solver, STEP);
+fn elsewhere(method: Method) -> Result<Vec<Check>> {
+    let scene = rub(method, STEP);
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
     for _ in 0..40 {
@@ -419,7 +428,7 @@ fn elsewhere(scheme: Scheme, solver: Solver) -> Result<Vec<Check>> {
 /// A scheme that leaves no mode, asked for and taken back as an FMU does in Initialization Mode.
 fn after_refusal() -> Result<Vec<Check>> {
     // As many modes as three contact nodes have directions.
-    let mut scene = rub(Scheme::ModalExact, Solver::Lcp, STEP);
+    let mut scene = rub(Method::exact(Solver::Lcp), STEP);
     let rom = &mut scene.roms[0];
     for matrix in [&mut rom.mass, &mut rom.stiffness, &mut rom.contact_map] {
         *matrix = matrix.view((0, 0), (9, 9)).into_owned();
@@ -465,7 +474,7 @@ fn told() -> Result<Vec<Check>> {
 }
 
 fn other_scene() -> Result<Vec<Check>> {
-    let scene = rub(Scheme::ModalExact, Solver::Lcp, STEP);
+    let scene = rub(Method::exact(Solver::Lcp), STEP);
     let mut changed = scene.clone();
     changed.roms[0].stiffness[(0, 0)] *= 1.0 + 1e-15;
     let [first, mut second] = [Simulation::new(&scene)?, Simulation::new(&changed)?];
