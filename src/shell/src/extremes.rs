@@ -104,7 +104,7 @@ mod tests {
         assert!(lines[1].ends_with("internal step: 80 N at t = 1 s"), "{lines:?}");
         assert_eq!(lines[2], "smallest clearance: 0 m at t = 1 s");
         assert_eq!(lines[3], "most contact nodes touching at a communication point: 5 at t = 1 s");
-        assert_eq!(digits(1.234_567e-5), "1.2346e-5");
+        assert_eq!(six_digits(1.234_567e-5), "1.23457e-5");
         assert_eq!(Extreme::json(&found)["most_contacts"], json!({ "value": 5.0, "time": 1.0 }));
     }
 

@@ -120,7 +120,10 @@ mod tests {
         run::{Trace, trace},
         scene::SceneRun,
     };
-    use crate::stability::bodies::{Body, Plate, Throw};
+    use crate::stability::{
+        bodies::{Body, Plate, Throw},
+        models::Method,
+    };
 
     const METHOD: (Scheme, Solver) = (Scheme::ModalExact, Solver::Lcp);
     const INTERVAL: f64 = 1e-5;
@@ -140,8 +143,7 @@ mod tests {
             velocity: [-approach, 30.0, 0.0],
             plates: vec![Plate::left(0.0201)],
             friction: 0.0,
-            scheme: METHOD.0,
-            solver: METHOD.1,
+            method: Method::exact(METHOD.1),
             step: 1e-6,
         };
         let thrown = throw.scene();
