@@ -18,6 +18,7 @@ fn read() -> Vec<(&'static str, &'static str, String)> {
         ("demo", "library", "demo --library {}".into()),
         ("package", "scene", "package {} --fmi 2".into()),
         ("package", "library", "package SCENE --fmi 2 --library {}".into()),
+        ("thermal", "file", "thermal {} --name written --fmi 2".into()),
         ("thermal", "library", "thermal --name written --fmi 2 --library {}".into()),
         ("run", "scene", "run {}".into()),
         ("run", "inputs", "run builtin:rotor37 --inputs {}".into()),

@@ -248,7 +248,7 @@ fn a_second_surface_as_far_out_is_told_of() {
     let found = reduce(0.0);
     let warnings = found["warnings"].to_string();
     assert!(
-        warnings.contains("beside the tip that was found 12 faces that are not connected with it are as far out"),
+        warnings.contains("beside the tip that was found, 12 faces that are not connected with it are as far out"),
         "{warnings}"
     );
     assert_eq!(found["model"]["tip"]["faces"], 12, "{found:#}");
@@ -256,7 +256,7 @@ fn a_second_surface_as_far_out_is_told_of() {
     assert!(!inside["warnings"].to_string().contains("as far out"), "{inside:#}");
     let guide = guide();
     for told in [
-        "beside the tip that was found 12 faces that are not connected with it are as far out",
+        "beside the tip that was found, 12 faces that are not connected with it are as far out",
         "contact at a single node of a tip about 6 edges of elements long",
         "9 contact patches along about 6 edges of elements",
     ] {

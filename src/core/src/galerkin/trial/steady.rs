@@ -254,7 +254,9 @@ impl Trial {
                     Status::Sticks => {
                         dot(along, along).sqrt() <= obstacle.friction(node) * multiplier + ROUNDING * largest
                     }
-                    Status::Slides(direction) => direction == [0.0; 3] || dot(direction, own.directions[*lane]) > 0.0,
+                    Status::Slides(direction) => {
+                        direction.iter().all(|own| *own == 0.0) || dot(direction, own.directions[*lane]) > 0.0
+                    }
                 }
         })
     }
