@@ -359,8 +359,9 @@ fn cutting() -> Vec<Case> {
             let expected = if method.solver != Solver::Lcp {
                 Expected::refused(["solver", "coating"])
             } else if energy > 1e10 && !excluded {
-                // So hard that the cut drags blades around the axis.
-                Expected::either(against, ["is displaced by", "around the axis"])
+                // So hard that the cut drags blades around the axis, or feeds tips that vibrate faster than they slide.
+                let feeds: &[&str] = &["forces of cutting have put"];
+                Expected::either_as(against, &[&["is displaced by", "around the axis"], feeds])
             } else {
                 unless(excluded, against, [method.scheme.name(), "contact.coating"])
             };
