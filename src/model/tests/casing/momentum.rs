@@ -3,7 +3,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use tiprub_core::rom::Support as Rows;
-use tiprub_core::settings::Scheme;
+use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::casing::{
@@ -154,7 +154,8 @@ fn scene(casing: Rom, drive: Drive, scheme: Scheme, step: f64) -> Scene {
     settings.structures[0].whirl = true;
     settings.structures[1].thermal = true;
     settings.contacts[0].gap = GAP;
-    settings.contacts[0].friction = 0.4;
+    // Blows make the tip vibrate faster than it slides, so that contact has to be able to stick.
+    (settings.contacts[0].friction, settings.contacts[0].solver) = (0.4, Solver::Coulomb);
     (settings.time.scheme, settings.time.step) = (scheme, step);
     settings.outputs.casing_forces = true;
     settings.outputs.support_reaction = true;
@@ -262,7 +263,8 @@ fn a_support_in_motion_takes_what_changes_the_momentum_of_the_mesh() {
         off(1.0, &|rows| rows.thermal.fill(0.0)),
     ];
     println!("without S_M: {}\nwithout S_K: {}\nwithout S_T: {}", without[0], without[1], without[2]);
-    assert!([found.force, found.moment, found.moved].iter().all(|off| *off < 1e-6), "{found}");
+    // Friction that sticks is solved to a tolerance, and its moments show that.
+    assert!(found.force < 1e-6 && found.moved < 1e-6 && found.moment < 3e-5, "{found}");
     for off in &without {
         assert!(off.moved < 1e-6 && off.force > 0.2 && off.moment > 0.2, "{off}");
     }
