@@ -205,7 +205,10 @@ fn compare(options: &CasingOptions, drive: Drive, scheme: Scheme, step: f64, cha
     change(casing.extras.support.as_mut().unwrap());
     let mut run = start(&scene(casing, drive, scheme, step), &drive.heat);
     mesh.rest(&drive.heat);
-    let place = mesh.ring.mesh.nodes[mesh.ring.grid.nodes[AROUND]];
+    // Contact is on the surface, a clearance outside the pin: forces have its lever.
+    let [x, y, z] = mesh.ring.mesh.nodes[mesh.ring.grid.nodes[AROUND]];
+    let out = (models::RADIUS + GAP) / x.hypot(y);
+    let place = [out * x, out * y, z];
     let window = (MEAN / step).round() as u32;
     let (mut off, mut largest) = ([[0.0_f64; 6]; 2], [[0.0_f64; 6]; 2]);
     let (mut sums, mut moved) = ([[0.0_f64; 6]; 2], [0.0_f64; 2]);
@@ -263,8 +266,7 @@ fn a_support_in_motion_takes_what_changes_the_momentum_of_the_mesh() {
         off(1.0, &|rows| rows.thermal.fill(0.0)),
     ];
     println!("without S_M: {}\nwithout S_K: {}\nwithout S_T: {}", without[0], without[1], without[2]);
-    // Friction that sticks is solved to a tolerance, and its moments show that.
-    assert!(found.force < 1e-6 && found.moved < 1e-6 && found.moment < 3e-5, "{found}");
+    assert!([found.force, found.moment, found.moved].iter().all(|off| *off < 1e-6), "{found}");
     for off in &without {
         assert!(off.moved < 1e-6 && off.force > 0.2 && off.moment > 0.2, "{off}");
     }
