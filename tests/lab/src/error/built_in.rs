@@ -86,7 +86,7 @@ pub(crate) const STAGE: Facts = Facts {
     title: "Stage",
     description: "56 blades that are coupled by their disk, with 18 contact patches each, in an elastic casing under load.",
     scene: "builtin:stage",
-    samples: [120, 8],
+    samples: [60, 8],
     ..CASING
 };
 
