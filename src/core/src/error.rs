@@ -63,6 +63,16 @@ impl Error {
         Self::Invalid { what: what.into(), problem: problem.into(), remedy: remedy.into() }
     }
 
+    /// The same, with the time at which it was found (s).
+    pub(crate) fn at_time(self, time: f64) -> Self {
+        let at = |problem: &str| format!("at t = {} s {problem}", shown(time));
+        match self {
+            Self::Invalid { what, problem, remedy } => Self::Invalid { what, problem: at(&problem), remedy },
+            Self::Unstable { problem, remedy } => Self::Unstable { problem: at(&problem), remedy },
+            other => other,
+        }
+    }
+
     /// What is wrong in a `table` of the scene file, as that of the one `at` which it is: `contact` as `contact[2]`.
     pub(crate) fn placed(self, table: &str, at: &str) -> Self {
         let rest = |what: &str| Some(format!("{at}.{}", what.strip_prefix(table)?.strip_prefix('.')?));

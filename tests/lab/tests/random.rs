@@ -18,21 +18,15 @@ fn random(arguments: &[&str], code: i32) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Scenes whose fault is known and open. Coupled sectors with adaptive steps: `clearance_minimum` shows a node 24 µm inside between the points of
-/// a step, in a run that ends.
-const KNOWN: [&str; 1] = ["3529516470729186345"];
-
 #[test]
 fn oracles_hold_in_300_random_scenes() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("out");
-    // Ends with 1 where an oracle finds something.
-    random(&["--scenes", "300", "--seed", "1", "--fmu", "5", "--out", out.to_str().unwrap()], 1);
+    random(&["--scenes", "300", "--seed", "1", "--fmu", "5", "--out", out.to_str().unwrap()], 0);
     let text = std::fs::read_to_string(out.join("results.json")).unwrap();
     let json: Value = serde_json::from_str(&text).unwrap();
     let wrong = json["wrong"].as_array().unwrap();
-    assert!(wrong.len() == KNOWN.len(), "{wrong:?}");
-    assert!(wrong.iter().all(|one| KNOWN.iter().any(|known| one.to_string().contains(known))), "{wrong:?}");
+    assert!(wrong.is_empty(), "{wrong:?}");
     assert_eq!(json["compared"], 60);
     // The generator covers what it should: most scenes are not rejected, and each feature is in some that run.
     assert!(json["counts"]["rejected"].as_u64().unwrap() < 100, "{}", json["counts"]);

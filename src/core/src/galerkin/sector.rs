@@ -268,7 +268,7 @@ impl<W: Witness> Marched for Alone<'_, W> {
         if witness.may_come_closer(step.from, step.length, trial.reach(&tables.rows, state)) {
             witness.go(step.from, step.length, table, Kind::Polynomial);
             trial.glide(table, &tables.rows, state, *witness);
-            if trial.find_minima(&table.basis, Kind::Polynomial, *tolerance) {
+            if trial.find_minima(&table.basis, true, *tolerance) {
                 trial.follow(tables, table, step.level, state, advance);
             }
             witness.passed(table, trial);
@@ -296,7 +296,7 @@ impl<W: Witness> Marched for Alone<'_, W> {
     fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
         let Self { marcher, tables, state, witness, demand: Demand { tolerance, .. } } = self;
         let level = tables.of_points(step.level, kind, marcher.trial.points());
-        if marcher.trial.find_minima(&level.basis, kind, *tolerance) {
+        if marcher.trial.find_minima(&level.basis, verdict.knows_between(kind, *tolerance), *tolerance) {
             let Marcher { trial, advance } = &mut **marcher;
             trial.follow(tables, level, step.level, state, advance);
         }

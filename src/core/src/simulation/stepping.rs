@@ -95,18 +95,19 @@ impl Simulation {
             let speed = &self.inputs.rotors[pair.body].speed;
             self.check_turning(index, step, step_size, speed, rotation.rate())?;
         }
+        let now = |error: Error| error.at_time(self.time);
         for (body, rotor) in self.inputs.rotors.iter().enumerate() {
             let (first, last) = (rotor.speed.at(0.0), rotor.speed.at(step_size));
             let reached = rotor.temperature_at(0.0);
             let until = rotor.temperature.first().map_or(0.0, |input| input.asked(step_size));
             if self.compiled.softens(body) {
-                self.compiled.check_temperature(body, until)?;
+                self.compiled.check_temperature(body, until).map_err(now)?;
             }
             let fastest = if first.abs() > last.abs() { first } else { last };
             if fastest.abs() > self.told.fastest[body] {
-                self.compiled.check_tip_speed(body, fastest)?;
+                self.compiled.check_tip_speed(body, fastest).map_err(now)?;
             }
-            self.check_step_size(body, step, [first, last, rotor.spin.at(0.0)], reached.min(until))?;
+            self.check_step_size(body, step, [first, last, rotor.spin.at(0.0)], reached.min(until)).map_err(now)?;
             let phase = rotor.excitation.get(1).map_or(0.0, |phase| {
                 let mut phase = *phase;
                 if !self.holds() {
@@ -116,7 +117,7 @@ impl Simulation {
             });
             self.check_excitation(body, step, [first, last], phase)?;
             if self.compiled.spins(body) {
-                self.compiled.check_speed(body, if first.abs() > last.abs() { first } else { last })?;
+                self.compiled.check_speed(body, fastest).map_err(now)?;
             }
         }
         Ok(())

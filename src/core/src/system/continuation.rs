@@ -176,8 +176,9 @@ impl System {
         for structure in &self.structures {
             let mut saved = structure.history.clone();
             structure.check(reader, &mut saved);
-            if !self.places_exist(structure, &saved.geometry.now.places) {
-                reader.refuse("a contact node is on a patch that its surface does not have");
+            let places = [&saved.geometry.now.places, &saved.geometry.before.places];
+            if !places.into_iter().all(|places| self.places_exist(structure, places)) {
+                reader.refuse("a contact node is nowhere on its surface");
             }
             let found = self.endless_of(structure, &saved.gap.now).zip(self.endless_of(structure, &saved.gap.before));
             endless = endless.zip(found).map(|(sum, (now, before))| sum + now + before);
@@ -194,7 +195,7 @@ impl System {
     fn places_exist(&self, structure: &Structure, places: &[ClosestPoint]) -> bool {
         let lanes = structure.modes().lanes();
         let surface = |index: usize| self.pairs[structure.pair_of[index / lanes]?].gap().spline();
-        places.iter().enumerate().all(|(index, place)| surface(index).is_none_or(|surface| surface.has_patch(*place)))
+        places.iter().enumerate().all(|(index, place)| surface(index).is_none_or(|surface| surface.has_place(*place)))
     }
 
     /// How many of the gaps of all structures, one after the other as [`Structure::gaps`], are infinite: those of padding lanes, of

@@ -276,10 +276,20 @@ impl Facing<'_> {
     fn lowest(&mut self, (trial, basis): (&Trial, &Basis), node: usize, pair: usize) -> f64 {
         let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
         let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
-        match trial.minimum(node) {
+        match trial.minimum(node).filter(|_| !self.has_jumped(trial, node, pair)) {
             Some(theta) => lowest.min(self.lowest_near((trial, basis), (node, pair), theta)),
             _ => lowest,
         }
+    }
+
+    /// Whether an input has jumped at the start of the step and taken the gap of a node along: there is no way from before to after.
+    fn has_jumped(&self, trial: &Trial, node: usize, pair: usize) -> bool {
+        let (at, moved) = (self.at(node, &self.record.drives[pair][0].0), trial.displacement(0, node));
+        let gap = match self.pairs[pair].gap() {
+            GapLaw::Revolution(law) => law.of_one(at, moved).0,
+            _ => return false,
+        };
+        (gap - trial.gap(0, node)).abs() > self.record.tolerance
     }
 
     /// Smallest gap of a node (m) within a step, near `theta` if its motion is not known in parts.

@@ -17,6 +17,8 @@ const INSTANT: f64 = 1e-2;
 /// Kinetic plus strain energy of the instant may be so many times what was supplied, as `check_energy` of the core has it: that of a
 /// step scheme equals what the scheme conserves up to the second order of the step only, and work on quasi-static modes is known a step late.
 const FACTOR: f64 = 4.0;
+/// The same of a scheme whose forces act an internal step later: quasi-static modes hold the strain of a force of which no work is booked yet.
+const INSTANT_LATER: f64 = 1.0;
 /// Rounding of gaps, as a fraction of the clearance.
 const GAP_ROUNDING: f64 = 1e-9;
 /// What the guide announces (chapter 12, "Losses only grow"): impacts may give back this fraction of the work of contact forces where the method is
@@ -110,6 +112,10 @@ pub(crate) struct Watch {
     residual: f64,
     /// Contact forces act, and their work is booked, one internal step after they are found.
     acts_later: bool,
+    /// Losses of a step are booked before the energy of the instant, which is that of the middle of two steps, has followed.
+    loses_later: bool,
+    /// Bound of the energy of the instant at the last communication point (J).
+    bound_before: f64,
     /// Energy of the instant that is to be explained at the next communication point: excess, energy, bound (J), time (s).
     pending: Option<[f64; 4]>,
     /// Largest energy beyond its bound: excess, energy, bound (J), time (s).
@@ -143,6 +149,8 @@ impl Watch {
             factor: factor(&trial.scene),
             residual: 0.0,
             acts_later: trial.scene.settings.time.scheme == Scheme::MasslessBoundary,
+            loses_later: trial.scene.settings.time.scheme == Scheme::CentralDifference,
+            bound_before: 0.0,
             pending: None,
             excess: None,
             infinite: None,
@@ -153,6 +161,7 @@ impl Watch {
     /// Of a simulation that was started.
     pub(crate) fn begin(&mut self, simulation: &Simulation) {
         self.step = simulation.system().step_size();
+        self.bound_before = self.factor * simulation.system().ledger().initial;
     }
 
     /// At a communication point.
@@ -179,8 +188,10 @@ impl Watch {
             self.residual = self.residual.max(ledger.residual(conserved).abs() / self.scale);
         }
         let supplied = ledger.initial + ledger.supplied() + ledger.curvature_work.value();
-        let bound =
-            self.factor * (supplied - ledger.impact_loss.value()).max(conserved).max(0.0) + INSTANT * self.scale;
+        let bound = self.factor * (supplied - ledger.impact_loss.value()).max(conserved).max(0.0)
+            + if self.acts_later { INSTANT_LATER } else { INSTANT } * self.scale;
+        let last = std::mem::replace(&mut self.bound_before, bound);
+        let bound = if self.loses_later { bound.max(last) } else { bound };
         // Work that is booked one internal step later is found in the bound of the next communication point.
         if let Some([_, energy, before, when]) = self.pending.take() {
             self.exceeds([energy - bound.max(before), energy, bound.max(before), when]);
@@ -251,7 +262,17 @@ fn promised(scene: &Scene, gap: f64) -> f64 {
         _ => 0.0,
     };
     let film = if solver(scene) == Solver::Film { film_inside(scene) } else { 0.0 };
-    thickness + gap * (GAP_ROUNDING + tolerance) + film
+    thickness + gap * GAP_ROUNDING + loosest_gap(scene, gap) * tolerance + film
+}
+
+/// What the tolerance is a share of (m): the smallest clearance of each structure, of which the widest counts for the smallest gap of all.
+fn loosest_gap(scene: &Scene, gap: f64) -> f64 {
+    let contacts = &scene.settings.contacts;
+    let of = |master: &str| {
+        let own = contacts.iter().filter(|contact| contact.master == master);
+        own.map(ContactSettings::nominal_gap).fold(f64::INFINITY, f64::min)
+    };
+    contacts.iter().map(|contact| of(&contact.master)).filter(|gap| gap.is_finite()).fold(gap, f64::max)
 }
 
 /// How deep `film` may leave a node inside without a warning (m).

@@ -1,6 +1,6 @@
 //! How good a step is that has been solved: its error, what switches leave, and what came near between the points.
 
-use super::{Obstacle, Trial};
+use super::{Kind, Obstacle, Trial};
 use crate::galerkin::basis::{Basis, POINTS};
 use crate::galerkin::kernels::AddProduct;
 use crate::galerkin::level::Level;
@@ -36,6 +36,13 @@ pub struct Verdict {
     pub factorisations: usize,
 }
 
+impl Verdict {
+    /// Whether motion between the points of the step is known: its force is a polynomial, and its error is within the tolerance (m).
+    pub fn knows_between(&self, kind: Kind, tolerance: f64) -> bool {
+        kind == Kind::Polynomial && self.error <= tolerance
+    }
+}
+
 impl Trial {
     /// Error, switches, and near misses of a step that is solved.
     pub fn judge(&mut self, (level, rows): (&Level, &Rows), obstacle: &impl Obstacle, verdict: &mut Verdict) {
@@ -47,7 +54,7 @@ impl Trial {
             let pushes = |point: usize| self.multiplier(point, node) > 0.0;
             let (any, all) = ((0..count).any(pushes), (0..count).all(pushes));
             if !any {
-                verdict.near |= self.comes_near(basis, node);
+                verdict.near |= self.comes_near(level, node);
                 continue;
             }
             pushed = true;
@@ -104,12 +111,16 @@ impl Trial {
     }
 
     /// Whether the gap of an open node comes near zero between the points.
-    fn comes_near(&self, basis: &Basis, node: usize) -> bool {
+    fn comes_near(&self, level: &Level, node: usize) -> bool {
+        let basis = &level.basis;
         let mut gaps = [0.0; POINTS];
         let gaps = &mut gaps[..basis.count()];
         gaps.iter_mut().enumerate().for_each(|(point, gap)| *gap = self.gap(point, node));
         if !gaps[0].is_finite() || !gaps[1].is_finite() {
             return false;
+        }
+        if basis.degree == 1 {
+            return gaps[0].min(gaps[1]) < NEAR * self.bulge(level.step, node);
         }
         // Between its points a cubic leaves their range by less than half of it, and what it leaves out is less than all of it.
         let extremes = |(low, high): (f64, f64), gap: &f64| (gap.min(low), gap.max(high));
@@ -120,6 +131,14 @@ impl Trial {
         let sum = |weights: &[f64; POINTS]| gaps.iter().zip(weights).map(|(gap, weight)| gap * weight).sum::<f64>();
         let left = NEAR * sum(&basis.left_out).abs();
         basis.between.iter().any(|weights| sum(weights) < left)
+    }
+
+    /// By how much the gap of a node leaves the straight line through its two ends within the step (m): a parabola with the velocity at its start.
+    fn bulge(&self, step: f64, node: usize) -> f64 {
+        let velocity = super::three(&self.velocities, node);
+        let (from, to, normal) = (self.displacement(0, node), self.displacement(1, node), self.normal(1, node));
+        let bent: f64 = (0..3).map(|c| normal[c] * (step * velocity[c] - (to[c] - from[c]))).sum();
+        0.25 * bent.abs()
     }
 }
 

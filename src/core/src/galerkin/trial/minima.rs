@@ -58,11 +58,14 @@ impl Trial {
     }
 
     /// Find nodes that may come closer between the points of a step than at them by more than a share of `tolerance` (m); whether there are any.
-    pub fn find_minima(&mut self, basis: &Basis, kind: Kind, tolerance: f64) -> bool {
+    ///
+    /// None where `known` is false: the polynomials of a step with a constant force, or of one that misses the tolerance, say nothing of what is
+    /// between their points.
+    pub fn find_minima(&mut self, basis: &Basis, known: bool, tolerance: f64) -> bool {
         self.minima.at.fill(f64::NAN);
         self.minima.parts = 0;
         let mut found = false;
-        for node in (0..self.nodes()).filter(|_| kind == Kind::Polynomial) {
+        for node in (0..self.nodes()).filter(|_| known) {
             let open = |point: usize| self.multiplier(point, node) == 0.0 && self.gap(point, node).is_finite();
             if !(0..basis.count()).all(open) {
                 continue;

@@ -226,6 +226,10 @@ impl Trial {
             }
         }
         if kind == Kind::Polynomial {
+            // The straight line of two points says nothing of what swings between them: velocities do.
+            if level.basis.degree == 1 {
+                self.find_start(rows, state);
+            }
             self.judge((level, rows), obstacle, &mut verdict);
         }
         verdict

@@ -45,6 +45,8 @@ pub const REACH: f64 = 0.25;
 /// A node this far (in patches) beyond an edge of an open surface is still on it, so that rounding does not decide for nodes
 /// that stand exactly on it.
 const EDGE_TOLERANCE: f64 = 1e-9;
+/// Rounding of saved places at the borders of patches (in patches).
+const BORDER: f64 = 1e-6;
 
 /// The two ends of a row of data points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -264,6 +266,12 @@ impl SurfaceSpline {
     /// Whether a place is on a patch that exists.
     pub fn has_patch(&self, place: ClosestPoint) -> bool {
         place.patch[0] < self.columns() && place.patch[1] < self.along - 1
+    }
+
+    /// Whether a place is on this surface, or where it goes on beyond its first or last ring; up to rounding.
+    pub fn has_place(&self, place: ClosestPoint) -> bool {
+        let within = |value: f64, [low, high]: [f64; 2]| (low - BORDER..=high + BORDER).contains(&value);
+        self.has_patch(place) && within(place.s, [0.0, 1.0]) && within(place.t, self.span(place.patch[1]))
     }
 
     /// ClosestPoint at about the angle and the axial position of a point (m), on the edge for points beyond it, or the nearest

@@ -135,7 +135,7 @@ impl SurfaceSpline {
 
     /// Range of t in the patches of a ring, with what goes on beyond the first and the last one.
     #[inline]
-    fn span(&self, ring: usize) -> [f64; 2] {
+    pub(super) fn span(&self, ring: usize) -> [f64; 2] {
         let low = if ring == 0 { -self.reach } else { 0.0 };
         [low, if ring + 2 == self.along { 1.0 + self.reach } else { 1.0 }]
     }

@@ -583,7 +583,7 @@ impl Marched for Marching<'_> {
         verdict
     }
 
-    fn take(&mut self, step: Step, kind: Kind, _: &Verdict) -> f64 {
+    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
         let level = &self.together.tables[0][0].levels[step.level];
         let points = if kind == Kind::Constant { 1 } else { level.basis.degree };
         self.together.casings.iter_mut().for_each(|casing| casing.weigh(points));
@@ -593,6 +593,7 @@ impl Marched for Marching<'_> {
             dropped += if kind == Kind::Constant { whole.dropped() } else { 0.0 };
         }
         let (mut of_wholes, tolerance) = (dropped, self.together.demand.tolerance);
+        let known = verdict.knows_between(kind, tolerance);
         self.each((step, kind), |facing, (trial, state), tables, disk| {
             let own = if kind == Kind::Constant && disk.is_none() {
                 trial.dropped(tables.rows.residual(), state)
@@ -602,7 +603,7 @@ impl Marched for Marching<'_> {
             closed += if kind == Kind::Constant { trial.closed() } else { 0.0 };
             dropped += own;
             let level = &tables.levels[step.level];
-            trial.find_minima(&level.basis, kind, tolerance);
+            trial.find_minima(&level.basis, known, tolerance);
             facing.took(&Taken {
                 level,
                 kind,
@@ -635,7 +636,7 @@ impl Marching<'_> {
         self.find_gaps(step, kind, points, false);
         self.each((step, kind), |facing, (trial, _), tables, _| {
             let level = &tables.levels[step.level];
-            trial.find_minima(&level.basis, kind, tolerance);
+            trial.find_minima(&level.basis, true, tolerance);
             facing.passed(level, trial);
         });
     }
