@@ -113,6 +113,17 @@ impl Obstacle for Facing<'_> {
         one_by_one(self, lanes, moved, gaps, normals);
     }
 
+    fn gap_within(&self, node: usize, theta: f64, moved: [f64; 3]) -> Option<f64> {
+        let pair = self.pair_of[node]?;
+        let [from, length] = self.record.step;
+        let drive = self.record.courses[pair].at(from + length * theta).0;
+        match self.pairs[pair].gap() {
+            GapLaw::Fixed(law) => Some(law.gaps[node] + dot(law.normals[node], moved)),
+            GapLaw::Revolution(law) => Some(law.of_one(self.at(node, &drive), moved).0),
+            GapLaw::Spline(_) | GapLaw::Open(_) => None,
+        }
+    }
+
     fn direction(&mut self, node: usize, point: usize, sliding: &Sliding) -> [f64; 3] {
         let Some(pair) = self.pair_of[node] else { return sliding.normal };
         let friction = self.pairs[pair].friction();
@@ -232,8 +243,8 @@ impl Witness for Facing<'_> {
 
     fn passed(&mut self, level: &Level, trial: &Trial) {
         for (node, pair) in self.pair_of.iter().enumerate() {
-            if let Some(pair) = *pair {
-                let lowest = self.lowest((trial, &level.basis), node, pair);
+            if pair.is_some() {
+                let lowest = self.lowest((trial, &level.basis), node);
                 self.record.tallies[node].lowest = lowest;
             }
         }
@@ -250,7 +261,7 @@ impl Witness for Facing<'_> {
         for (node, pair) in self.pair_of.iter().enumerate() {
             let Some(pair) = *pair else { continue };
             let points = step.trial.points();
-            self.record.tallies[node].lowest = self.lowest((step.trial, &step.level.basis), node, pair);
+            self.record.tallies[node].lowest = self.lowest((step.trial, &step.level.basis), node);
             let comes = (1..=points).find(|i| step.trial.multiplier(*i, node) > 0.0);
             if comes.is_some_and(|i| self.was_behind(step.trial, node, pair, i)) {
                 self.record.behind_edge = Some(node);
@@ -273,39 +284,29 @@ const CLOSER: f64 = 0.25;
 
 impl Facing<'_> {
     /// Smallest gap of a node (m) up to now and at the points of a step, and between them where it stays open.
-    fn lowest(&mut self, (trial, basis): (&Trial, &Basis), node: usize, pair: usize) -> f64 {
+    fn lowest(&self, (trial, basis): (&Trial, &Basis), node: usize) -> f64 {
         let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
         let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
-        match trial.minimum(node).filter(|_| !self.has_jumped(trial, node, pair)) {
-            Some(theta) => lowest.min(self.lowest_near((trial, basis), (node, pair), theta)),
+        match trial.minimum(node).filter(|_| !self.has_jumped(trial, node)) {
+            Some(theta) => lowest.min(self.lowest_near((trial, basis), node, theta)),
             _ => lowest,
         }
     }
 
     /// Whether an input has jumped at the start of the step and taken the gap of a node along: there is no way from before to after.
-    fn has_jumped(&self, trial: &Trial, node: usize, pair: usize) -> bool {
-        let (at, moved) = (self.at(node, &self.record.drives[pair][0].0), trial.displacement(0, node));
-        let gap = match self.pairs[pair].gap() {
-            GapLaw::Revolution(law) => law.of_one(at, moved).0,
-            _ => return false,
-        };
-        (gap - trial.gap(0, node)).abs() > self.record.tolerance
+    fn has_jumped(&self, trial: &Trial, node: usize) -> bool {
+        let start = self.gap_within(node, 0.0, trial.displacement(0, node));
+        start.is_some_and(|gap| (gap - trial.gap(0, node)).abs() > self.record.tolerance)
     }
 
     /// Smallest gap of a node (m) within a step, near `theta` if its motion is not known in parts.
     ///
     /// A surface of revolution and the displacements are not polynomials of time: gaps are evaluated. Those to other surfaces are a polynomial.
-    fn lowest_near(&self, (trial, basis): (&Trial, &Basis), (node, pair): (usize, usize), theta: f64) -> f64 {
-        let ([from, length], course) = (self.record.step, &self.record.courses[pair]);
+    fn lowest_near(&self, (trial, basis): (&Trial, &Basis), node: usize, theta: f64) -> f64 {
         let mut lowest = f64::INFINITY;
         let mut look = |theta: f64| {
-            let drive = course.at(from + length * theta).0;
-            let (at, moved) = (self.at(node, &drive), trial.displacement_within(basis, node, theta));
-            let gap = match self.pairs[pair].gap() {
-                GapLaw::Fixed(law) => law.gaps[node] + dot(law.normals[node], moved),
-                GapLaw::Revolution(law) => law.of_one(at, moved).0,
-                GapLaw::Spline(_) | GapLaw::Open(_) => trial.gap_within(basis, node, theta),
-            };
+            let moved = trial.displacement_within(basis, node, theta);
+            let gap = self.gap_within(node, theta, moved).unwrap_or_else(|| trial.gap_within(basis, node, theta));
             lowest = lowest.min(gap);
             gap
         };

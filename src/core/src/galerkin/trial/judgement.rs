@@ -54,7 +54,7 @@ impl Trial {
             let pushes = |point: usize| self.multiplier(point, node) > 0.0;
             let (any, all) = ((0..count).any(pushes), (0..count).all(pushes));
             if !any {
-                verdict.near |= self.comes_near(level, node);
+                verdict.near |= self.comes_near(level, node, obstacle);
                 continue;
             }
             pushed = true;
@@ -111,7 +111,7 @@ impl Trial {
     }
 
     /// Whether the gap of an open node comes near zero between the points.
-    fn comes_near(&self, level: &Level, node: usize) -> bool {
+    fn comes_near(&self, level: &Level, node: usize, obstacle: &impl Obstacle) -> bool {
         let basis = &level.basis;
         let mut gaps = [0.0; POINTS];
         let gaps = &mut gaps[..basis.count()];
@@ -120,7 +120,9 @@ impl Trial {
             return false;
         }
         if basis.degree == 1 {
-            return gaps[0].min(gaps[1]) < NEAR * self.bulge(level.step, node);
+            let (lowest, bend) = self.bend_of_gap(level.step, node, [gaps[0], gaps[1]], obstacle);
+            // A parabola with this bend goes below its ends and its middle by a quarter of it at most.
+            return lowest < 0.25 * NEAR * bend;
         }
         // Between its points a cubic leaves their range by less than half of it, and what it leaves out is less than all of it.
         let extremes = |(low, high): (f64, f64), gap: &f64| (gap.min(low), gap.max(high));
@@ -133,12 +135,18 @@ impl Trial {
         basis.between.iter().any(|weights| sum(weights) < left)
     }
 
-    /// By how much the gap of a node leaves the straight line through its two ends within the step (m): a parabola with the velocity at its start.
-    fn bulge(&self, step: f64, node: usize) -> f64 {
+    /// Smallest gap of a node at the ends and in the middle of the step (m), and by how much that in the middle leaves the straight line
+    /// between the ends (m). Displacements are a parabola with the velocity at the start; a surface that is known at the points alone rests.
+    fn bend_of_gap(&self, step: f64, node: usize, ends: [f64; 2], obstacle: &impl Obstacle) -> (f64, f64) {
         let velocity = super::three(&self.velocities, node);
         let (from, to, normal) = (self.displacement(0, node), self.displacement(1, node), self.normal(1, node));
-        let bent: f64 = (0..3).map(|c| normal[c] * (step * velocity[c] - (to[c] - from[c]))).sum();
-        0.25 * bent.abs()
+        let bent: [f64; 3] = std::array::from_fn(|c| 0.25 * (step * velocity[c] - (to[c] - from[c])));
+        let moved = std::array::from_fn(|c| 0.5 * (from[c] + to[c]) + bent[c]);
+        let line = 0.5 * (ends[0] + ends[1]);
+        let middle = obstacle
+            .gap_within(node, 0.5, moved)
+            .unwrap_or_else(|| line + (0..3).map(|c| normal[c] * bent[c]).sum::<f64>());
+        (ends[0].min(ends[1]).min(middle), (middle - line).abs())
     }
 }
 

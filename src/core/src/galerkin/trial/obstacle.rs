@@ -12,6 +12,11 @@ pub trait Obstacle {
         one_by_one(self, lanes, moved, gaps, normals);
     }
 
+    /// Gap (m) to a node displaced by `moved` (m) after a share `theta` of the step, where that is known between the points.
+    fn gap_within(&self, _node: usize, _theta: f64, _moved: [f64; 3]) -> Option<f64> {
+        None
+    }
+
     /// Whether directions of sliding turn within a step, and ask for [`Sliding::way`].
     fn turns(&self) -> bool {
         false
