@@ -16,6 +16,7 @@ type Finished<'a> = (&'a Row, &'a Figures);
 /// Processor time per simulated time (s/s) with three significant digits.
 pub fn rate(seconds: f64) -> String {
     match seconds {
+        _ if seconds < 0.00995 => format!("{seconds:.2e}"),
         _ if seconds < 0.995 => format!("{seconds:.3}"),
         _ if seconds < 9.95 => format!("{seconds:.2}"),
         _ if seconds < 99.5 => format!("{seconds:.1}"),
@@ -184,7 +185,7 @@ mod tests {
 
     #[test]
     fn rates_keep_three_digits() {
-        assert_eq!([0.1234, 1.234, 12.34, 1234.5].map(rate), ["0.123", "1.23", "12.3", "1234"]);
+        assert_eq!([1.284e-5, 0.1234, 1.234, 12.34, 1234.5].map(rate), ["1.28e-5", "0.123", "1.23", "12.3", "1234"]);
     }
 
     #[test]

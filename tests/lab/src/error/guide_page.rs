@@ -28,7 +28,7 @@ pub(super) fn write(study: &Study, directory: &Path) -> Result<()> {
         MACHINE.0,
         MACHINE.1,
         format!(
-            "{}, {} processors, {}. The study took {seconds} of processor time.",
+            "{}, processors used: {}, {}. The study took {seconds} of processor time.",
             fact("processor"),
             fact("processors available"),
             fact("date")
