@@ -36,7 +36,7 @@ impl Simulation {
                 structure,
                 self.compiled.structure_name(structure),
                 if self.is_marched() {
-                    "Use less friction, another longest step, or the solver coulomb"
+                    "Use less friction, a larger `tolerance`, another longest step, or the solver coulomb"
                 } else {
                     "Use less friction, another internal step or the solver coulomb"
                 },
@@ -93,7 +93,11 @@ impl Simulation {
             StepFailure::Unsolved { structure, sector } => self.unsolved(
                 structure,
                 &self.sector_name(structure, sector),
-                "Use less friction or another internal step",
+                if self.is_marched() {
+                    "Use less friction, a larger `tolerance`, or another longest step"
+                } else {
+                    "Use less friction or another internal step"
+                },
             ),
         }
     }
