@@ -23,7 +23,7 @@ const DRAWN_DISPLACEMENT: f64 = 0.12;
 const MODES_SHOWN: usize = 4;
 
 /// Error against run time as the guide shows it.
-const ERROR_PICTURE: &str = include_str!("../../../docs/error/rotor37-paper-light-steps.svg");
+const ERROR_PICTURE: &str = include_str!("../../../docs/error/rotor37-light-steps.svg");
 
 /// Results of a run, found by what they stand for rather than by name.
 pub struct Results<'a> {
@@ -133,8 +133,8 @@ pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, Stri
 fn error_study() -> Figure {
     // The picture has its own paper and its own legend.
     let body = format!("<div class=\"scroll adapts\">{ERROR_PICTURE}</div>");
-    let caption = "Error against run time of every fixed-step method on a light rub of the paper's model of rotor 37, as the laboratory measured it \
-                   (docs/error-study.md of the sources). The demo does not measure it again. On this machine and for this scene \
+    let caption = "Error against run time of adaptive steps, fixed steps and the paper's method on a light rub of rotor 37 as it ships, measured \
+                   once (docs/error-study.md of the sources). The demo does not measure it again. On this machine and for this scene \
                    <code>tiprub study error builtin:rotor37</code> does, with <code>--quick</code> in minutes."
         .to_owned();
     Figure { body, caption }
