@@ -65,10 +65,14 @@ impl Error {
 
     /// The same, with the time at which it was found (s).
     pub(crate) fn at_time(self, time: f64) -> Self {
-        let at = |problem: &str| format!("at t = {} s {problem}", shown(time));
+        let time = shown(time);
         match self {
-            Self::Invalid { what, problem, remedy } => Self::Invalid { what, problem: at(&problem), remedy },
-            Self::Unstable { problem, remedy } => Self::Unstable { problem: at(&problem), remedy },
+            Self::Invalid { what, problem, remedy } => {
+                Self::Invalid { what: format!("{what} at t = {time} s"), problem, remedy }
+            }
+            Self::Unstable { problem, remedy } => {
+                Self::Unstable { problem: format!("at t = {time} s {problem}"), remedy }
+            }
             other => other,
         }
     }

@@ -147,6 +147,14 @@ impl Rows {
         self.add_up(&self.magnitudes, [&sums.coefficients[0]], [one]);
     }
 
+    /// Velocities of the rows at the end of a step without forces (m/s).
+    pub fn end_velocities(&self, level: &Level, state: &SectorState, sums: &mut Sums<1>) {
+        let [a, b, ..] = &level.modes.end[1];
+        let ([to], [one]) = (&mut sums.coefficients, &mut sums.rows);
+        self.instructions.run(Weigh { tables: [a, b], state: [&state.position, &state.velocity], to });
+        self.add_up(&self.by_mode, [to], [one]);
+    }
+
     /// Forces on all modes, filled up to whole registers, for sets of forces on the rows `rows` (N).
     pub fn modal_forces<const N: usize>(&self, rows: &[usize], forces: [&[f64]; N], sums: [&mut [f64]; N]) {
         let stride = self.all.len().next_multiple_of(PADDED);

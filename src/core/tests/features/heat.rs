@@ -222,7 +222,7 @@ fn temperatures_beyond_all_stiffness_are_refused() {
     let mut run = warm(&given, 100.0);
     set(&mut run, "rotor_temperature", 950.0);
     let error = run.do_step(0.0, 1e-3).unwrap_err().to_string();
-    assert!(error.starts_with("variable `rotor_temperature`: 950 K with softening"), "{error}");
+    assert!(error.starts_with("variable `rotor_temperature` at t = 0 s: 950 K with softening"), "{error}");
     let mut hot = Simulation::new(&given).unwrap();
     set(&mut hot, "rotor_temperature", 950.0);
     assert!(hot.initialise(0.0).is_err());

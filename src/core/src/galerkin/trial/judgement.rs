@@ -135,18 +135,24 @@ impl Trial {
         basis.between.iter().any(|weights| sum(weights) < left)
     }
 
-    /// Smallest gap of a node at the ends and in the middle of the step (m), and by how much that in the middle leaves the straight line
-    /// between the ends (m). Displacements are a parabola with the velocity at the start; a surface that is known at the points alone rests.
+    /// Smallest gap of a node at the ends and in the middle of the step (m), and by how much that in the middle can leave the straight line
+    /// between the ends (m): what the node does, a cubic with the velocities at both ends, and what the surface does. They are not set off
+    /// against each other, because a cubic is no more than an estimate. A surface that is known at the points alone rests.
+    ///
+    /// The velocity at the end is that without forces; where nobody knows it, displacements are a parabola.
     fn bend_of_gap(&self, step: f64, node: usize, ends: [f64; 2], obstacle: &impl Obstacle) -> (f64, f64) {
-        let velocity = super::three(&self.velocities, node);
         let (from, to, normal) = (self.displacement(0, node), self.displacement(1, node), self.normal(1, node));
-        let bent: [f64; 3] = std::array::from_fn(|c| 0.25 * (step * velocity[c] - (to[c] - from[c])));
-        let moved = std::array::from_fn(|c| 0.5 * (from[c] + to[c]) + bent[c]);
+        let velocity = super::three(&self.velocities, node);
+        let end: [f64; 3] = if self.knows_end {
+            self.reach.0.three(0, node, self.nodes())
+        } else {
+            std::array::from_fn(|c| 2.0 * (to[c] - from[c]) / step - velocity[c])
+        };
+        let bent = 0.125 * step * (0..3).map(|c| normal[c] * (velocity[c] - end[c])).sum::<f64>();
+        let straight = std::array::from_fn(|c| 0.5 * (from[c] + to[c]));
         let line = 0.5 * (ends[0] + ends[1]);
-        let middle = obstacle
-            .gap_within(node, 0.5, moved)
-            .unwrap_or_else(|| line + (0..3).map(|c| normal[c] * bent[c]).sum::<f64>());
-        (ends[0].min(ends[1]).min(middle), (middle - line).abs())
+        let middle = obstacle.gap_within(node, 0.5, straight).unwrap_or(line);
+        (ends[0].min(ends[1]).min(middle + bent), bent.abs() + (middle - line).abs())
     }
 }
 

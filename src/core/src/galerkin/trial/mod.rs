@@ -93,6 +93,8 @@ pub struct Trial {
     amounts: Vec<f64>,
     sums: Sums<MOST>,
     reach: (Sums<1>, Vec<f64>),
+    /// Its sums are the velocities at the end of the step (m/s).
+    knows_end: bool,
     /// Weights of the work of forces at each point.
     ways: [[f64; POINTS]; POINTS],
     /// Displacements at each point without the residual flexibility (m), where they are asked for.
@@ -163,6 +165,7 @@ impl Trial {
             amounts: Vec::with_capacity(3 * lanes.len()),
             sums: Sums::new(modes, nodes),
             reach: (Sums::new(modes, nodes), rows()),
+            knows_end: false,
             ways: [[0.0; POINTS]; POINTS],
             inert: std::array::from_fn(|_| rows()),
             withdrawn: rows(),
@@ -229,6 +232,8 @@ impl Trial {
             // The straight line of two points says nothing of what swings between them: velocities do.
             if level.basis.degree == 1 {
                 self.find_start(rows, state);
+                rows.end_velocities(level, state, &mut self.reach.0);
+                self.knows_end = true;
             }
             self.judge((level, rows), obstacle, &mut verdict);
         }
@@ -277,6 +282,7 @@ impl Trial {
     /// Where the rows go without forces at points 1 … s, unless somebody else knows (no `rows`), and a guess of these: as at the start.
     pub fn begin(&mut self, (level, kind): (&Level, Kind), rows: Option<&Rows>, state: &SectorState) {
         let compliance = level.compliance_of(kind);
+        self.knows_end = false;
         self.ways = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
         self.lanes = compliance.lanes();
         let (begun, lanes) = (&mut self.begun, self.lanes);
