@@ -1,6 +1,6 @@
 //! How good a step is that has been solved: its error, what switches leave, and what came near between the points.
 
-use super::{Kind, Obstacle, Trial};
+use super::{Between, Kind, Obstacle, Trial};
 use crate::galerkin::basis::{Basis, POINTS};
 use crate::galerkin::kernels::AddProduct;
 use crate::galerkin::level::Level;
@@ -139,20 +139,23 @@ impl Trial {
     /// between the ends (m): what the node does, a cubic with the velocities at both ends, and what the surface does. They are not set off
     /// against each other, because a cubic is no more than an estimate. A surface that is known at the points alone rests.
     ///
-    /// The velocity at the end is that without forces; where nobody knows it, displacements are a parabola.
+    /// The velocity at the end is that without forces; where nobody knows it, displacements are a parabola. Modes that turn too fast for the step
+    /// count as far as they swing.
     fn bend_of_gap(&self, step: f64, node: usize, ends: [f64; 2], obstacle: &impl Obstacle) -> (f64, f64) {
         let (from, to, normal) = (self.displacement(0, node), self.displacement(1, node), self.normal(1, node));
         let velocity = super::three(&self.velocities, node);
-        let end: [f64; 3] = if self.knows_end {
-            self.reach.0.three(0, node, self.nodes())
+        let Between { velocities, swings, known } = &self.between;
+        let (end, swing) = if *known {
+            (velocities.three(0, node, self.nodes()), swings.three(0, node, self.nodes()))
         } else {
-            std::array::from_fn(|c| 2.0 * (to[c] - from[c]) / step - velocity[c])
+            (std::array::from_fn(|c| 2.0 * (to[c] - from[c]) / step - velocity[c]), [0.0; 3])
         };
         let bent = 0.125 * step * (0..3).map(|c| normal[c] * (velocity[c] - end[c])).sum::<f64>();
+        let swing: f64 = (0..3).map(|c| normal[c].abs() * swing[c]).sum();
         let straight = std::array::from_fn(|c| 0.5 * (from[c] + to[c]));
         let line = 0.5 * (ends[0] + ends[1]);
         let middle = obstacle.gap_within(node, 0.5, straight).unwrap_or(line);
-        (ends[0].min(ends[1]).min(middle + bent), bent.abs() + (middle - line).abs())
+        (ends[0].min(ends[1]).min(middle + bent), bent.abs() + (middle - line).abs() + swing)
     }
 }
 

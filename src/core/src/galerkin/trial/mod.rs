@@ -93,8 +93,7 @@ pub struct Trial {
     amounts: Vec<f64>,
     sums: Sums<MOST>,
     reach: (Sums<1>, Vec<f64>),
-    /// Its sums are the velocities at the end of the step (m/s).
-    knows_end: bool,
+    between: Between,
     /// Weights of the work of forces at each point.
     ways: [[f64; POINTS]; POINTS],
     /// Displacements at each point without the residual flexibility (m), where they are asked for.
@@ -111,6 +110,16 @@ pub struct Trial {
     /// Of steps of a higher degree; and slopes of the polynomials through the points at the end of the step (1/s).
     steady: Option<Box<Steady>>,
     end_slopes: [f64; POINTS],
+}
+
+/// What rows do between the two ends of a step without forces.
+#[derive(Debug, Clone)]
+struct Between {
+    /// Velocities at the end (m/s).
+    velocities: Sums<1>,
+    /// How far modes swing that turn too fast for the step (m).
+    swings: Sums<1>,
+    known: bool,
 }
 
 /// Forces, λ, gaps and normals of the nodes at the start.
@@ -165,7 +174,7 @@ impl Trial {
             amounts: Vec::with_capacity(3 * lanes.len()),
             sums: Sums::new(modes, nodes),
             reach: (Sums::new(modes, nodes), rows()),
-            knows_end: false,
+            between: Between { velocities: Sums::new(modes, nodes), swings: Sums::new(modes, nodes), known: false },
             ways: [[0.0; POINTS]; POINTS],
             inert: std::array::from_fn(|_| rows()),
             withdrawn: rows(),
@@ -232,8 +241,10 @@ impl Trial {
             // The straight line of two points says nothing of what swings between them: velocities do.
             if level.basis.degree == 1 {
                 self.find_start(rows, state);
-                rows.end_velocities(level, state, &mut self.reach.0);
-                self.knows_end = true;
+                let Between { velocities, swings, known } = &mut self.between;
+                rows.end_velocities(level, state, velocities);
+                rows.reach_of(level.step, state, swings);
+                *known = true;
             }
             self.judge((level, rows), obstacle, &mut verdict);
         }
@@ -282,7 +293,7 @@ impl Trial {
     /// Where the rows go without forces at points 1 … s, unless somebody else knows (no `rows`), and a guess of these: as at the start.
     pub fn begin(&mut self, (level, kind): (&Level, Kind), rows: Option<&Rows>, state: &SectorState) {
         let compliance = level.compliance_of(kind);
-        self.knows_end = false;
+        self.between.known = false;
         self.ways = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
         self.lanes = compliance.lanes();
         let (begun, lanes) = (&mut self.begun, self.lanes);
