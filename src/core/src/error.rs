@@ -63,7 +63,7 @@ impl Error {
         Self::Invalid { what: what.into(), problem: problem.into(), remedy: remedy.into() }
     }
 
-    /// The same, with the time at which it was found (s).
+    /// Adds the time (s) to the error.
     pub(crate) fn at_time(self, time: f64) -> Self {
         let time = shown(time);
         match self {

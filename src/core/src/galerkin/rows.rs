@@ -25,7 +25,7 @@ pub struct Rows {
     all: Vec<usize>,
 }
 
-/// Angle by which a mode may turn within a step that shows how it moves (rad).
+/// Largest phase angle of a mode over a step that resolves its motion (rad).
 const RESOLVED: f64 = 2.0;
 
 /// Coefficients of all modes, and what they add up to; made once.
@@ -140,11 +140,11 @@ impl Rows {
 
     /// How far each row can be from where it rests, whenever, as long as nothing pushes (m): the amplitudes of all modes together.
     pub fn reach(&self, state: &SectorState, sums: &mut Sums<1>) {
-        self.reach_of(f64::INFINITY, state, sums);
+        self.unresolved_amplitudes(f64::INFINITY, state, sums);
     }
 
-    /// The same of the modes that turn by more than [`RESOLVED`] within a step of this length (s): its two ends say nothing of where they are between.
-    pub fn reach_of(&self, step: f64, state: &SectorState, sums: &mut Sums<1>) {
+    /// Sums the amplitudes of the modes that turn by more than `RESOLVED` within a step of this length (s): displacements of the rows (m).
+    pub fn unresolved_amplitudes(&self, step: f64, state: &SectorState, sums: &mut Sums<1>) {
         let [amplitudes] = &mut sums.coefficients;
         let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));
         for (amplitude, ([rate, per_frequency], (q, v))) in amplitudes.iter_mut().zip(modes) {

@@ -296,7 +296,7 @@ impl<W: Witness> Marched for Alone<'_, W> {
     fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
         let Self { marcher, tables, state, witness, demand: Demand { tolerance, .. } } = self;
         let level = tables.of_points(step.level, kind, marcher.trial.points());
-        if marcher.trial.find_minima(&level.basis, verdict.knows_between(kind, *tolerance), *tolerance) {
+        if marcher.trial.find_minima(&level.basis, verdict.resolves_motion(kind, *tolerance), *tolerance) {
             let Marcher { trial, advance } = &mut **marcher;
             trial.follow(tables, level, step.level, state, advance);
         }

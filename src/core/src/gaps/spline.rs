@@ -268,7 +268,7 @@ impl Persist for ClosestPoint {
         self.s.restore(reader);
         self.t.restore(reader);
     }
-    /// Where its surface is, is known to the system alone.
+    /// Checks the numbers only: the surface is unknown here.
     fn check(&self, reader: &mut Reader) {
         let mut place = *self;
         place.restore(reader);

@@ -293,7 +293,7 @@ impl Facing<'_> {
         }
     }
 
-    /// Whether an input has jumped at the start of the step and taken the gap of a node along: there is no way from before to after.
+    /// Returns whether a held input has jumped at the start of the step and changed the gap of a node by more than the tolerance.
     fn has_jumped(&self, trial: &Trial, node: usize) -> bool {
         let start = self.gap_within(node, 0.0, trial.displacement(0, node));
         start.is_some_and(|gap| (gap - trial.gap(0, node)).abs() > self.record.tolerance)

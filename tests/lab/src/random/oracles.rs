@@ -17,7 +17,7 @@ const INSTANT: f64 = 1e-2;
 /// Kinetic plus strain energy of the instant may be so many times what was supplied, as `check_energy` of the core has it: that of a
 /// step scheme equals what the scheme conserves up to the second order of the step only, and work on quasi-static modes is known a step late.
 const FACTOR: f64 = 4.0;
-/// The same of a scheme whose forces act an internal step later: quasi-static modes hold the strain of a force of which no work is booked yet.
+/// The same for a scheme whose forces act one internal step later: quasi-static modes hold the strain energy of a force whose work is not counted yet.
 const INSTANT_LATER: f64 = 1.0;
 /// Rounding of gaps, as a fraction of the clearance.
 const GAP_ROUNDING: f64 = 1e-9;
@@ -112,7 +112,7 @@ pub(crate) struct Watch {
     residual: f64,
     /// Contact forces act, and their work is booked, one internal step after they are found.
     acts_later: bool,
-    /// Losses of a step are booked before the energy of the instant, which is that of the middle of two steps, has followed.
+    /// The losses of a step are counted before the instantaneous energy, a mean over two steps, has decreased.
     loses_later: bool,
     /// Bound of the energy of the instant at the last communication point (J).
     bound_before: f64,
@@ -265,7 +265,7 @@ fn promised(scene: &Scene, gap: f64) -> f64 {
     thickness + gap * GAP_ROUNDING + loosest_gap(scene, gap) * tolerance + film
 }
 
-/// What the tolerance is a share of (m): the smallest clearance of each structure, of which the widest counts for the smallest gap of all.
+/// Clearance that the tolerance is a fraction of (m): the smallest one of each structure, and the largest of these.
 fn loosest_gap(scene: &Scene, gap: f64) -> f64 {
     let contacts = &scene.settings.contacts;
     let of = |master: &str| {

@@ -1,6 +1,6 @@
 //! How good a step is that has been solved: its error, what switches leave, and what came near between the points.
 
-use super::{Between, Kind, Obstacle, Trial};
+use super::{FreeMotion, Kind, Obstacle, Trial};
 use crate::galerkin::basis::{Basis, POINTS};
 use crate::galerkin::kernels::AddProduct;
 use crate::galerkin::level::Level;
@@ -37,8 +37,9 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Whether motion between the points of the step is known: its force is a polynomial, and its error is within the tolerance (m).
-    pub fn knows_between(&self, kind: Kind, tolerance: f64) -> bool {
+    /// Returns whether the polynomials of the step describe the motion between its points: its force is a polynomial, and its error is within
+    /// the tolerance (m).
+    pub fn resolves_motion(&self, kind: Kind, tolerance: f64) -> bool {
         kind == Kind::Polynomial && self.error <= tolerance
     }
 }
@@ -121,7 +122,7 @@ impl Trial {
         }
         if basis.degree == 1 {
             let (lowest, bend) = self.bend_of_gap(level.step, node, [gaps[0], gaps[1]], obstacle);
-            // A parabola with this bend goes below its ends and its middle by a quarter of it at most.
+            // A parabola with this deviation goes below its ends and its middle by a quarter of it at most.
             return lowest < 0.25 * NEAR * bend;
         }
         // Between its points a cubic leaves their range by less than half of it, and what it leaves out is less than all of it.
@@ -135,27 +136,27 @@ impl Trial {
         basis.between.iter().any(|weights| sum(weights) < left)
     }
 
-    /// Smallest gap of a node at the ends and in the middle of the step (m), and by how much that in the middle can leave the straight line
-    /// between the ends (m): what the node does, a cubic with the velocities at both ends, and what the surface does. They are not set off
-    /// against each other, because a cubic is no more than an estimate. A surface that is known at the points alone rests.
+    /// Estimates the smallest gap of a node at the ends and in the middle of the step (m), and by how much the gap in the middle can deviate from
+    /// the straight line between the ends (m). The deviation adds three magnitudes, which may not cancel because they are estimates: the node's
+    /// path, a cubic with the velocities at both ends; the motion of the surface; and the amplitudes of modes that the step does not resolve.
     ///
-    /// The velocity at the end is that without forces; where nobody knows it, displacements are a parabola. Modes that turn too fast for the step
-    /// count as far as they swing.
+    /// The velocity at the end is that of free motion. If it is unknown, the path is a parabola. Surfaces that are known at the points only are
+    /// taken to be at rest.
     fn bend_of_gap(&self, step: f64, node: usize, ends: [f64; 2], obstacle: &impl Obstacle) -> (f64, f64) {
         let (from, to, normal) = (self.displacement(0, node), self.displacement(1, node), self.normal(1, node));
         let velocity = super::three(&self.velocities, node);
-        let Between { velocities, swings, known } = &self.between;
-        let (end, swing) = if *known {
-            (velocities.three(0, node, self.nodes()), swings.three(0, node, self.nodes()))
+        let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &self.free_motion;
+        let (end, amplitude) = if *is_known {
+            (end_velocities.three(0, node, self.nodes()), unresolved_amplitudes.three(0, node, self.nodes()))
         } else {
             (std::array::from_fn(|c| 2.0 * (to[c] - from[c]) / step - velocity[c]), [0.0; 3])
         };
         let bent = 0.125 * step * (0..3).map(|c| normal[c] * (velocity[c] - end[c])).sum::<f64>();
-        let swing: f64 = (0..3).map(|c| normal[c].abs() * swing[c]).sum();
+        let amplitude: f64 = (0..3).map(|c| normal[c].abs() * amplitude[c]).sum();
         let straight = std::array::from_fn(|c| 0.5 * (from[c] + to[c]));
         let line = 0.5 * (ends[0] + ends[1]);
         let middle = obstacle.gap_within(node, 0.5, straight).unwrap_or(line);
-        (ends[0].min(ends[1]).min(middle + bent), bent.abs() + (middle - line).abs() + swing)
+        (ends[0].min(ends[1]).min(middle + bent), bent.abs() + (middle - line).abs() + amplitude)
     }
 }
 

@@ -59,13 +59,13 @@ impl Trial {
 
     /// Find nodes that may come closer between the points of a step than at them by more than a share of `tolerance` (m); whether there are any.
     ///
-    /// None where `known` is false: the polynomials of a step with a constant force, or of one that misses the tolerance, say nothing of what is
-    /// between their points.
-    pub fn find_minima(&mut self, basis: &Basis, known: bool, tolerance: f64) -> bool {
+    /// Finds none if `is_resolved` is false: the polynomials of a step with a constant force, or of a step that misses the tolerance, do not
+    /// describe the motion between its points.
+    pub fn find_minima(&mut self, basis: &Basis, is_resolved: bool, tolerance: f64) -> bool {
         self.minima.at.fill(f64::NAN);
         self.minima.parts = 0;
         let mut found = false;
-        for node in (0..self.nodes()).filter(|_| known) {
+        for node in (0..self.nodes()).filter(|_| is_resolved) {
             let open = |point: usize| self.multiplier(point, node) == 0.0 && self.gap(point, node).is_finite();
             if !(0..basis.count()).all(open) {
                 continue;

@@ -93,7 +93,7 @@ pub struct Trial {
     amounts: Vec<f64>,
     sums: Sums<MOST>,
     reach: (Sums<1>, Vec<f64>),
-    between: Between,
+    free_motion: FreeMotion,
     /// Weights of the work of forces at each point.
     ways: [[f64; POINTS]; POINTS],
     /// Displacements at each point without the residual flexibility (m), where they are asked for.
@@ -112,14 +112,15 @@ pub struct Trial {
     end_slopes: [f64; POINTS],
 }
 
-/// What rows do between the two ends of a step without forces.
+/// Free motion of the contact rows over a step of degree 1.
 #[derive(Debug, Clone)]
-struct Between {
+struct FreeMotion {
     /// Velocities at the end (m/s).
-    velocities: Sums<1>,
-    /// How far modes swing that turn too fast for the step (m).
-    swings: Sums<1>,
-    known: bool,
+    end_velocities: Sums<1>,
+    /// Summed amplitudes of the modes that the step does not resolve (m).
+    unresolved_amplitudes: Sums<1>,
+    /// Whether the two belong to the step that is tried.
+    is_known: bool,
 }
 
 /// Forces, λ, gaps and normals of the nodes at the start.
@@ -174,7 +175,11 @@ impl Trial {
             amounts: Vec::with_capacity(3 * lanes.len()),
             sums: Sums::new(modes, nodes),
             reach: (Sums::new(modes, nodes), rows()),
-            between: Between { velocities: Sums::new(modes, nodes), swings: Sums::new(modes, nodes), known: false },
+            free_motion: FreeMotion {
+                end_velocities: Sums::new(modes, nodes),
+                unresolved_amplitudes: Sums::new(modes, nodes),
+                is_known: false,
+            },
             ways: [[0.0; POINTS]; POINTS],
             inert: std::array::from_fn(|_| rows()),
             withdrawn: rows(),
@@ -238,13 +243,13 @@ impl Trial {
             }
         }
         if kind == Kind::Polynomial {
-            // The straight line of two points says nothing of what swings between them: velocities do.
+            // Two points give a straight line, which cannot show the motion in between.
             if level.basis.degree == 1 {
                 self.find_start(rows, state);
-                let Between { velocities, swings, known } = &mut self.between;
-                rows.end_velocities(level, state, velocities);
-                rows.reach_of(level.step, state, swings);
-                *known = true;
+                let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
+                rows.end_velocities(level, state, end_velocities);
+                rows.unresolved_amplitudes(level.step, state, unresolved_amplitudes);
+                *is_known = true;
             }
             self.judge((level, rows), obstacle, &mut verdict);
         }
@@ -293,7 +298,7 @@ impl Trial {
     /// Where the rows go without forces at points 1 … s, unless somebody else knows (no `rows`), and a guess of these: as at the start.
     pub fn begin(&mut self, (level, kind): (&Level, Kind), rows: Option<&Rows>, state: &SectorState) {
         let compliance = level.compliance_of(kind);
-        self.between.known = false;
+        self.free_motion.is_known = false;
         self.ways = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
         self.lanes = compliance.lanes();
         let (begun, lanes) = (&mut self.begun, self.lanes);

@@ -12,7 +12,7 @@ pub trait Obstacle {
         one_by_one(self, lanes, moved, gaps, normals);
     }
 
-    /// Gap (m) to a node displaced by `moved` (m) after a share `theta` of the step, where that is known between the points.
+    /// Gap (m) of a node displaced by `moved` (m) at the fraction `theta` of the step. `None` if it is known at the points only.
     fn gap_within(&self, _node: usize, _theta: f64, _moved: [f64; 3]) -> Option<f64> {
         None
     }

@@ -268,7 +268,7 @@ impl SurfaceSpline {
         place.patch[0] < self.columns() && place.patch[1] < self.along - 1
     }
 
-    /// Whether a place is on this surface, or where it goes on beyond its first or last ring; up to rounding.
+    /// Returns whether a place is on this surface or on its extension beyond the first or last ring, up to rounding.
     pub fn has_place(&self, place: ClosestPoint) -> bool {
         let within = |value: f64, [low, high]: [f64; 2]| (low - BORDER..=high + BORDER).contains(&value);
         self.has_patch(place) && within(place.s, [0.0, 1.0]) && within(place.t, self.span(place.patch[1]))

@@ -593,7 +593,7 @@ impl Marched for Marching<'_> {
             dropped += if kind == Kind::Constant { whole.dropped() } else { 0.0 };
         }
         let (mut of_wholes, tolerance) = (dropped, self.together.demand.tolerance);
-        let known = verdict.knows_between(kind, tolerance);
+        let is_resolved = verdict.resolves_motion(kind, tolerance);
         self.each((step, kind), |facing, (trial, state), tables, disk| {
             let own = if kind == Kind::Constant && disk.is_none() {
                 trial.dropped(tables.rows.residual(), state)
@@ -603,7 +603,7 @@ impl Marched for Marching<'_> {
             closed += if kind == Kind::Constant { trial.closed() } else { 0.0 };
             dropped += own;
             let level = &tables.levels[step.level];
-            trial.find_minima(&level.basis, known, tolerance);
+            trial.find_minima(&level.basis, is_resolved, tolerance);
             facing.took(&Taken {
                 level,
                 kind,
