@@ -29,6 +29,9 @@ fn clearances() -> Vec<Case> {
             // A tolerance that is a fraction of such clearances is far below the rounding of displacements.
             let expected = if method.is_galerkin() && gap < 1e-11 {
                 Expected::either(against, ["the contact problem", "no solution"])
+            } else if method.solver == Solver::Film && gap < 1e-18 {
+                // So does film, which leaves nodes inside by rounding: many times such a clearance.
+                Expected::either(against, ["film has left contact node", "Use solver"])
             } else {
                 Expected::right(against)
             };

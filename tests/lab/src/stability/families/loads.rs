@@ -279,7 +279,10 @@ fn shapes() -> Vec<Case> {
                 // Bumps of three or thirty clearances.
                 let expected = if depth > 1.0 {
                     let deep: &[&str] = &["inside the casing", "flank", "Check gap, casing shape"];
-                    Expected::either_as(against, &[deep, &["displaced", "around the axis", "Check casing shape"]])
+                    let around: &[&str] = &["displaced", "around the axis", "Check casing shape"];
+                    // Tips that vibrate this much slide back and forth, which ends the run as well.
+                    let sliding: &[&str] = &["friction has put", "less friction"];
+                    Expected::either_as(against, &[deep, around, sliding])
                 } else {
                     Expected::right(against)
                 };
