@@ -95,10 +95,12 @@ fn flight(method: Method, speed: f64, mass: f64) -> Result<Vec<Check>> {
         nodes = (0..count).fold(nodes, |most, node| worse(most, apart(row(node), exact) / size(exact)));
     }
     let kinetic = 0.5 * mass * size(velocity).powi(2);
+    // Adaptive steps round the velocity once per step; recurrences add increments of the displacement.
+    let rounding = if method.is_galerkin() { 300.0 * 3.7 * f64::EPSILON } else { 1e-13 };
     Ok(vec![
         Check::at_most("centre from x = vt", off, 1e-12),
         Check::at_most("any node from x = vt", nodes, 1e-12),
-        Check::at_most("velocity", apart(vector(&simulation, "body.velocity"), velocity) / size(velocity), 1e-13),
+        Check::at_most("velocity", apart(vector(&simulation, "body.velocity"), velocity) / size(velocity), rounding),
         Check::at_most(
             "kinetic energy",
             (real(&simulation, "kinetic_energy") - kinetic).abs() / kinetic.max(f64::MIN_POSITIVE),

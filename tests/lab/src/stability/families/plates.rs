@@ -40,13 +40,17 @@ fn balances() -> Vec<Case> {
             for speed in [0.01, 1.0, 10.0, 100.0] {
                 let balance = Balance { method, friction, speed, share: 1.0 };
                 // 100 m/s dent the plates by more than what counts as small.
-                let expected = if speed > 50.0 {
-                    Expected::refused([
-                        "left_plate, which carries a surface, is displaced",
-                        "Check positions and velocity",
-                    ])
-                } else {
-                    Expected::right("momentum and energy kept, forces of pairs add up, contact takes energy")
+                let against = "momentum and energy kept, forces of pairs add up, contact takes energy";
+                let displaced: &[&str] =
+                    &["left_plate, which carries a surface, is displaced", "Check positions and velocity"];
+                // Sliding stops at the impact, which laws without sticking do not describe: they end beyond 1 % of the energy exchanged.
+                let sliding: &[&str] = &["friction has put", "less friction"];
+                let slides = friction >= 1.0 && method.solver != Solver::Coulomb;
+                let expected = match (speed > 50.0, slides) {
+                    (true, true) => Expected::refused_as(&[displaced, sliding]),
+                    (true, false) => Expected::refused_as(&[displaced]),
+                    (false, true) => Expected::either_as(against, &[sliding]),
+                    (false, false) => Expected::right(against),
                 };
                 let expected = unless_few_modes(method, expected);
                 let name = format!("free/balance/µ={friction}/v={speed}/{}", method.name());
