@@ -464,3 +464,28 @@ def test_an_interrupt_leaves_nothing(work, tmp_path):
     assert not list((tmp_path / "temporary").iterdir()) and not list((tmp_path / "kept").iterdir())
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such signals there")
+def test_an_interrupt_while_the_program_starts_leaves_no_process(monkeypatch, tmp_path):
+    fake = tmp_path / "tiprub"
+    fake.write_text("#!/bin/sh\nexec sleep 60\n")
+    fake.chmod(0o755)
+    started = []
+
+    class Interrupted(subprocess.Popen):
+        def __init__(self, *words, **more):
+            super().__init__(*words, **more)
+            started.append(self.pid)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setenv("TIPRUB", str(fake))
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            module.inspect("scene.toml")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    with pytest.raises(ProcessLookupError):
+        os.kill(started[0], 0)

@@ -7,10 +7,12 @@ import html
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import sysconfig
 import tempfile
+import threading
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Iterable, Iterator, Mapping, Optional
@@ -203,6 +205,26 @@ def called(name: str, file: "os.PathLike[str]") -> Iterator[None]:
         raise Error(*words, error.exit_code) from None
 
 
+@contextlib.contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Within it an interrupt (Ctrl-C) waits; it is raised on leaving.
+
+    `subprocess.Popen` loses the process that it has started when it is interrupted itself.
+    """
+    previous = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(previous):
+        yield
+        return
+    waiting: list[tuple[int, Any]] = []
+    signal.signal(signal.SIGINT, lambda number, frame: waiting.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+        if waiting:
+            previous(*waiting[0])
+
+
 def call(words: Iterable[str], files: Iterable[str] = (), quiet: bool = False) -> dict[str, Any]:
     """Run a command; its JSON object.
 
@@ -218,21 +240,26 @@ def call(words: Iterable[str], files: Iterable[str] = (), quiet: bool = False) -
     inherited = sys.stderr is sys.__stderr__ and sys.stderr is not None
     stderr = subprocess.DEVNULL if quiet else None if inherited else subprocess.PIPE
     with tempfile.TemporaryFile() as answer:
+        process = None
         try:
-            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=answer, stderr=stderr)
-        except ValueError as error:
-            raise Error("tiprub", f"cannot be asked: {error}", "Names and values hold no zero bytes", 2) from None
-        except OSError as error:
-            raise Error(command[0], f"cannot be started: {error}", "Name the program in the environment variable TIPRUB") from error
-        with process:
-            try:
-                for line in process.stderr or ():
-                    if sys.stderr is not None:
-                        sys.stderr.write(line.decode("utf-8", "replace"))
-                process.wait()
-            except BaseException:
+            with _interrupts_wait():
+                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=answer, stderr=stderr)
+            for line in process.stderr or ():
+                if sys.stderr is not None:
+                    sys.stderr.write(line.decode("utf-8", "replace"))
+            process.wait()
+        except BaseException as error:
+            if process is not None:
                 process.kill()
-                raise
+                process.wait()
+            elif isinstance(error, ValueError):
+                raise Error("tiprub", f"cannot be asked: {error}", "Names and values hold no zero bytes", 2) from None
+            elif isinstance(error, OSError):
+                raise Error(command[0], f"cannot be started: {error}", "Name the program in the environment variable TIPRUB") from error
+            raise
+        finally:
+            if process is not None and process.stderr is not None:
+                process.stderr.close()
         answer.seek(0)
         content = answer.read()
     try:
