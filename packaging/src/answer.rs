@@ -17,15 +17,15 @@ pub struct Line {
     pub meaning: String,
 }
 
-/// The five lines of a run.
-pub fn lines(recording: &Recording) -> [Line; 5] {
+/// The five lines of a run whose steps may leave closed contact open or inside by up to `tolerance` (m).
+pub fn lines(recording: &Recording, tolerance: f64) -> [Line; 5] {
     let found = extremes(recording);
     let extreme = |name: &str| found.iter().find(|extreme| extreme.name == name);
     [
         force(extreme("largest_total_normal_force")),
         heat(recording),
         torque(recording),
-        clearance(recording, &found),
+        clearance(recording, &found, tolerance.max(ROUNDING)),
         growth(recording),
     ]
 }
@@ -99,15 +99,18 @@ fn torque(recording: &Recording) -> Line {
     Line { name: "torque", value, meaning }
 }
 
-fn clearance(recording: &Recording, found: &[Extreme]) -> Line {
+fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Line {
     let least = found.iter().find(|extreme| extreme.name == "smallest_clearance");
     let (value, meaning) = match least {
-        // Contact that is closed has a clearance of rounding.
-        Some(extreme) if extreme.value.abs() < ROUNDING => {
+        Some(extreme) if extreme.value.abs() < tolerance => {
             let column = recording.column("clearance_minimum").unwrap_or_default();
-            let touch = column.iter().zip(&recording.times).find(|(clearance, _)| **clearance < ROUNDING);
+            let touch = column.iter().zip(&recording.times).find(|(clearance, _)| **clearance < tolerance);
             let first = touch.map_or(extreme.time, |(_, time)| *time);
-            (Some((0.0, "m")), format!("smallest: tips touch, first at t = {} s", six_digits(first)))
+            // Contact that is closed has a clearance of rounding.
+            let is_rounding = extreme.value.abs() < ROUNDING;
+            let value = if is_rounding { 0.0 } else { extreme.value };
+            let within = if is_rounding { "" } else { " within the tolerance of the steps" };
+            (Some((value, "m")), format!("smallest: tips touch{within}, first at t = {} s", six_digits(first)))
         }
         Some(extreme) => (Some((extreme.value, "m")), format!("smallest, {}", at(extreme))),
         None => (None, "some contact nodes meet nothing; --all lists clearances node by node".to_owned()),
@@ -167,7 +170,7 @@ mod tests {
             &[1.0, 5.0, -5.0, 1e-4, 1.0, 1.0],
             &[1.0, 1234.5678, -6.0, 1e-4, 1.0, 1.0],
         ];
-        let lines = lines(&recording(&names, &rows));
+        let lines = lines(&recording(&names, &rows), 0.0);
         let text = text(&lines);
         let values: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().take(2).collect()).collect();
         // 4 N s in 0.5 s; the mean of −1 to −6 N m; (3 + 3)/(2 + 1) J.
@@ -178,8 +181,22 @@ mod tests {
     }
 
     #[test]
+    fn a_clearance_within_the_tolerance_is_contact_and_a_deeper_one_is_not() {
+        let at = |clearance: f64| {
+            let rows: [&[f64]; 3] = [&[1e-4], &[clearance], &[1e-4]];
+            text(&lines(&recording(&["clearance_minimum"], &rows), 1e-7))
+        };
+        assert!(
+            at(-6e-9).contains("-6e-9 m") && at(-6e-9).contains("tips touch within the tolerance"),
+            "{}",
+            at(-6e-9)
+        );
+        assert!(!at(-6e-7).contains("touch") && at(-6e-7).contains("smallest, at t = 0.5 s"), "{}", at(-6e-7));
+    }
+
+    #[test]
     fn what_a_scene_does_not_have_is_a_dash_with_its_reason() {
-        let lines = lines(&recording(&["front.torque", "rear.torque"], &[&[0.0, 0.0], &[1.0, -3.0]]));
+        let lines = lines(&recording(&["front.torque", "rear.torque"], &[&[0.0, 0.0], &[1.0, -3.0]]), 0.0);
         let text = text(&lines);
         assert!(text.contains("heat       -                no contact"), "{text}");
         assert!(text.contains("torque     -2 N m") && text.contains("front.torque 1, rear.torque -3"), "{text}");

@@ -58,7 +58,7 @@ pub enum Command {
                             tiprub reduce blade --help\n\n\
                             docs/models.md describes models of your own; docs/rom-file.md writes a ROM from Python.")]
     Reduce(ReduceArguments),
-    /// Package a scene as .fmu files. Nothing is compiled: the library is generic, scene and ROM are data.
+    /// Package a scene as .fmu files. Scene and ROM are data for one FMU library, which is built once where it is missing.
     #[command(after_help = "Examples:\n  tiprub package scene.toml                 both FMUs in this directory\n  \
                             tiprub package scene.toml --fmi 3 -o rub.fmu\n  \
                             tiprub package scene.toml --arrays        FMI 3 variables as arrays\n  \

@@ -185,7 +185,7 @@ fn describe_scene(scene: &Scene, measure: bool, console: &Console) -> Result<Des
         scalars(Causality::Output)
     );
     for reversed in simulation.if_reversed() {
-        let _ = writeln!(text, "  turned back   {reversed}");
+        let _ = writeln!(text, "  if reversed   {reversed}");
     }
     let mut roms = Vec::new();
     for (rom, structure) in scene.roms.iter().zip(&settings.structures) {

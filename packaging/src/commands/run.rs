@@ -3,7 +3,10 @@
 use std::{path::Path, time::Instant};
 
 use serde_json::{Map, Value, json};
-use tiprub_core::{Scene, Warning};
+use tiprub_core::{
+    Scene, Warning,
+    settings::{ContactSettings, SceneSettings, Scheme, TOLERANCE},
+};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
@@ -18,6 +21,17 @@ use tiprub_shell::{
 use tiprub_study::estimate::{self, Estimate};
 
 use crate::{answer, cli::RunArguments, scene_features};
+
+/// What adaptive steps may leave a closed contact open or inside by (m); 0 with fixed steps.
+fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
+    if settings.time.scheme != Scheme::Galerkin {
+        return 0.0;
+    }
+    let given = set.iter().find(|(name, _)| name == "tolerance").and_then(|(_, value)| value.parse().ok());
+    let gap = |contact: &ContactSettings| contact.nominal_gap();
+    let smallest = settings.contacts.iter().map(gap).filter(|gap| *gap > 0.0).fold(f64::INFINITY, f64::min);
+    if smallest.is_finite() { given.or(settings.time.tolerance).unwrap_or(TOLERANCE) * smallest } else { 0.0 }
+}
 
 /// Load, run, write the CSV, sum up.
 ///
@@ -58,7 +72,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     // A parameter of the command line replaces what the scene has.
     let is_set = arguments.set.iter().any(|(name, _)| name == "scheme");
     let scheme = if is_set { "set on the command line".to_owned() } else { scene_features::scheme(&scene.settings) };
-    let answer = answer::lines(&run.recording);
+    let answer = answer::lines(&run.recording, allowed_error(&scene.settings, &arguments.set));
     let [warnings, warning_details] = warnings_json(&run.warnings);
     let estimates = estimated(&scene, arguments, &schedule, console)?;
     let mut json = json!({

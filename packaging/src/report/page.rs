@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use tiprub_core::settings::{SceneSettings, Scheme, TOLERANCE};
 use tiprub_core::variables::Quantity;
 use tiprub_figure::{STYLE, escape};
 use tiprub_shell::Result;
@@ -53,7 +54,7 @@ fn header(input: &ReportInput<'_>) -> String {
             format!("{} s", rounded(stepping / simulated)),
             "of stepping, on one core".to_string(),
         ),
-        ("per internal step".into(), format!("{} µs", rounded(per_step)), "whole disk, native".into()),
+        ("per internal step".into(), format!("{} µs", rounded(per_step)), step_of(settings).into()),
     ];
     if let Some((_, peak)) = results.extremes(Quantity::NormalForcePeak) {
         cards.push((
@@ -160,10 +161,14 @@ fn run_section(input: &ReportInput<'_>) -> String {
         ("communication steps", format!("{} of H = {} s", schedule.count, scientific(schedule.step))),
         ("internal steps", native.internal_steps.to_string()),
         ("stepping time", format!("{} s", rounded(stepping))),
-        ("time per internal step", format!("{} µs", rounded(1e6 * stepping / native.internal_steps as f64))),
+        ("computing time per internal step", format!("{} µs", rounded(1e6 * stepping / native.internal_steps as f64))),
         ("computing per simulated second", format!("{} s", rounded(stepping / simulated))),
     ];
-    if let Some(step) = results.last(Quantity::InternalStep) {
+    let settings = &input.scene.settings;
+    if settings.time.scheme == Scheme::Galerkin {
+        let tolerance = settings.time.tolerance.unwrap_or(TOLERANCE);
+        rows.insert(2, ("adaptive steps", format!("tolerance {} of the clearance", scientific(tolerance))));
+    } else if let Some(step) = results.last(Quantity::InternalStep) {
         rows.insert(2, ("internal step h", format!("{} s", scientific(step))));
     }
     let energies = [
@@ -195,6 +200,11 @@ fn run_section(input: &ReportInput<'_>) -> String {
     html
 }
 
+/// What an internal step of a scene moves.
+fn step_of(settings: &SceneSettings) -> &'static str {
+    if settings.time.scheme == Scheme::Galerkin { "one blade, native" } else { "whole disk, native" }
+}
+
 /// Both models and methods at the end of the same run.
 fn paper_part(input: &ReportInput<'_>, own: &Results<'_>) -> String {
     let Some((table, run)) = input.paper else { return String::new() };
@@ -211,7 +221,18 @@ fn paper_part(input: &ReportInput<'_>, own: &Results<'_>) -> String {
         let _ = write!(html, "<tr><td>{label}</td><td>{own}</td><td>{paper}</td></tr>");
     }
     let times = [input.native, run].map(|run| rounded(1e6 * run.stepping.as_secs_f64() / run.internal_steps as f64));
-    let _ = write!(html, "<tr><td>time per internal step (µs)</td><td>{}</td><td>{}</td></tr>", times[0], times[1]);
+    let simulated = input.schedule.stop - input.schedule.start;
+    let rates = [input.native, run].map(|run| rounded(run.stepping.as_secs_f64() / simulated));
+    let _ = write!(
+        html,
+        "<tr><td>computing per simulated second (s)</td><td>{}</td><td>{}</td></tr>\
+         <tr><td>computing time per internal step (µs)</td><td>{} ({})</td><td>{} (whole disk)</td></tr>",
+        rates[0],
+        rates[1],
+        times[0],
+        step_of(&input.scene.settings).trim_end_matches(", native"),
+        times[1]
+    );
     html.push_str("</tbody></table>");
     html
 }

@@ -90,11 +90,11 @@ impl Simulation {
             ("casing", "its clearance")
         };
         format!(
-            "film has left contact node {} inside the {surface} by {:.2e} m, {:.0} % of {length}: it checks penetration only once, and \
+            "film has left contact node {} inside the {surface} by {:.2e} m, {} of {length}: it checks penetration only once, and \
              forces on other nodes pushed this one in",
             self.compiled.node_name(structure, node),
             share * self.system.clearance_of(structure, node),
-            100.0 * share
+            if share < 10.0 { format!("{:.0} %", 100.0 * share) } else { format!("{share:.1e} times the size") }
         )
     }
 
