@@ -5,7 +5,7 @@ mod table;
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
-use tiprub_core::{Error, Scene, Simulation};
+use tiprub_core::{Error, Scene, Simulation, settings::Scheme};
 use tiprub_shell::{
     native::{self, Given},
     schedule::Schedule,
@@ -34,8 +34,20 @@ pub struct LeftOut {
     /// Which one.
     pub effect: &'static Effect,
     /// What it would add, or why this scene cannot have it as it stands; `None` where keys alone do not do it.
-    pub cost: Option<Result<Cost, String>>,
+    pub cost: Option<Result<Cost, Refusal>>,
 }
+
+/// Why a scene cannot have an effect.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// What refused it.
+    pub reason: String,
+    /// Whether the same scene with fixed steps could have it.
+    pub allowed_with_fixed_steps: bool,
+}
+
+/// Internal step with which scenes are tried with fixed steps (s): short enough for any scheme to start.
+const TRIED_STEP: f64 = 1.0e-8;
 
 /// Sizes of a scene.
 struct Sizes {
@@ -57,12 +69,15 @@ pub fn left_out(scene: &Scene, measure: bool) -> tiprub_core::Result<Vec<LeftOut
         .collect())
 }
 
-fn cost(scene: &Scene, with: fn(&mut Scene), own: &Sizes, measure: bool) -> Result<Cost, String> {
+fn cost(scene: &Scene, with: fn(&mut Scene), own: &Sizes, measure: bool) -> Result<Cost, Refusal> {
     let mut other = scene.clone();
     with(&mut other);
-    let found = sizes(&other, measure).map_err(|error| match error {
-        Error::Invalid { what, problem, .. } => format!("{what}: {problem}"),
-        other => other.to_string(),
+    let found = sizes(&other, measure).map_err(|error| {
+        let reason = match error {
+            Error::Invalid { what, problem, .. } => format!("{what}: {problem}"),
+            other => other.to_string(),
+        };
+        Refusal { reason, allowed_with_fixed_steps: starts_with_fixed_steps(other) }
     })?;
     Ok(Cost {
         variables: found.variables - own.variables,
@@ -70,6 +85,16 @@ fn cost(scene: &Scene, with: fn(&mut Scene), own: &Sizes, measure: bool) -> Resu
         state: found.state - own.state,
         time: found.seconds.zip(own.seconds).map(|(with, without)| with / without),
     })
+}
+
+/// Whether a scene with adaptive steps starts with fixed ones.
+fn starts_with_fixed_steps(mut scene: Scene) -> bool {
+    let time = &mut scene.settings.time;
+    if time.scheme != Scheme::Galerkin {
+        return false;
+    }
+    (time.scheme, time.step, time.tolerance) = (Scheme::ModalExact, TRIED_STEP, None);
+    sizes(&scene, false).is_ok()
 }
 
 fn sizes(scene: &Scene, measure: bool) -> tiprub_core::Result<Sizes> {
@@ -105,10 +130,17 @@ pub fn text(all: &[LeftOut]) -> String {
     text
 }
 
-fn told(cost: Option<&Result<Cost, String>>) -> String {
+fn told(cost: Option<&Result<Cost, Refusal>>) -> String {
     match cost {
         None => String::new(),
-        Some(Err(why)) => format!("\n  {:<51} not supported by this scene: {why}", ""),
+        Some(Err(Refusal { reason, allowed_with_fixed_steps })) => {
+            let what = if *allowed_with_fixed_steps {
+                "needs fixed steps (`time.scheme = \"modal-exact\"` and `time.step`)"
+            } else {
+                "not supported by this scene"
+            };
+            format!("\n  {:<51} {what}: {reason}", "")
+        }
         Some(Ok(Cost { variables, bytes, state, time })) => {
             let time = time.map_or(String::new(), |time| format!(", {time:.2} times the time per step"));
             format!("\n  {:<51} costs {variables:+} variables, {bytes:+} bytes, state {state:+} bytes{time}", "")
@@ -122,7 +154,9 @@ pub fn json(all: &[LeftOut]) -> Value {
         let group = if effect.group == Group::Physics { "physics" } else { "machinery" };
         let cost = match cost {
             None => Value::Null,
-            Some(Err(why)) => json!({ "refused": why }),
+            Some(Err(Refusal { reason, allowed_with_fixed_steps })) => {
+                json!({ "refused": reason, "allowed_with_fixed_steps": allowed_with_fixed_steps })
+            }
             Some(Ok(cost)) => json!({
                 "variables": cost.variables, "bytes": cost.bytes, "state_bytes": cost.state, "time": cost.time,
             }),
@@ -189,8 +223,15 @@ mod tests {
         let whirl = of("whirl of the shaft").unwrap().cost.as_ref().unwrap().as_ref().unwrap();
         assert!(whirl.variables >= 4 && whirl.bytes > 0 && whirl.state > 0, "{whirl:?}");
         let spin = of("centrifugal stiffening").unwrap().cost.as_ref().unwrap().as_ref().unwrap_err();
-        assert!(spin.contains("spin"), "{spin}");
+        assert!(spin.reason.contains("spin"), "{spin:?}");
         assert!(of("energy balance").is_none() && of("temperature of the casing").is_none());
+        let mut adaptive = round(tiprub_test_models::rich_blade(4));
+        adaptive.settings.time.scheme = Scheme::Galerkin;
+        let all_adaptive = left_out(&adaptive, false).unwrap();
+        let excitation = all_adaptive.iter().find(|one| one.effect.name == "excitation by engine orders").unwrap();
+        let refusal = excitation.cost.as_ref().unwrap().as_ref().unwrap_err();
+        assert!(refusal.allowed_with_fixed_steps && !spin.allowed_with_fixed_steps, "{refusal:?}");
+        assert!(text(&all_adaptive).contains("needs fixed steps"));
         assert!(text(&all).contains("left out here") && json(&all)[0]["name"].is_string());
     }
 }
