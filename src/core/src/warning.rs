@@ -97,6 +97,9 @@ topics! {
     Sticking "sticking"
         "Tips slide more slowly than they vibrate, and the sliding law does not model sticking."
         "The solver `coulomb`, or a higher speed.";
+    StiffnessAtRest "stiffness-at-rest"
+        "The rotor turns faster than a fifth of its first natural frequency, and the scene gives it the stiffness of rest."
+        "`spin = { stiffening = true, growth = true }` with a ROM that has spin matrices, or nothing where gap and stiffness are those at speed.";
     RigidContact "rigid-contact"
         "Modes that follow contact immediately leave some directions of the contact nodes rigid: contact that needs them loses energy."
         "A ROM of the kind free-interface, or fewer contact nodes or patches.";

@@ -337,7 +337,7 @@ impl Simulation {
                 shown(self.time),
                 shown(crate::ranges::EXCITED_ANGLE)
             ),
-            "Use a smaller internal_step_max, a lower order, a lower speed or a phase that changes more slowly",
+            "Use a smaller internal_step_max (time.step), a lower order, a lower speed or a phase that changes more slowly",
         ))
     }
 

@@ -8,6 +8,7 @@ mod compile;
 mod contour;
 mod drive;
 mod failures;
+mod fast_rotation;
 mod fingerprint;
 mod inputs;
 mod limits;
@@ -263,6 +264,7 @@ impl Simulation {
         self.check_launch(parameters.scheme)?;
         self.follow_reference_speeds(&self.references())?;
         self.warnings = self.check_limits(&parameters)?;
+        self.warn_of_fast_rotation();
         self.warn_of_sticking(&parameters);
         self.warn_of_tolerance(&parameters);
         self.begin_telling(&parameters);

@@ -197,7 +197,7 @@ impl Simulation {
                      {stride:.3e} rad that its tips or the cells of the coating are wide: cells between would stay unworn",
                     shown(self.time)
                 ),
-                "Use fewer cells around, a lower speed or a smaller internal_step_max",
+                "Use fewer cells around, a lower speed or a smaller internal_step_max (time.step)",
             ));
         }
         if turned <= scale {
@@ -206,11 +206,10 @@ impl Simulation {
         let (scene, plan) = (&self.compiled.scene, &self.compiled.plan);
         let (what, remedy) = if rotation != 0.0 && passed <= scale {
             let prefix = plan.pair_prefix(&scene.settings, pair);
-            let remedy = "Turn the shape more slowly, or use a smaller internal_step_max";
-            (format!("variable `{prefix}casing_shape_rotation`"), remedy)
+            (format!("variable `{prefix}casing_shape_rotation`"), "Turn the shape more slowly, or use")
         } else {
             let prefix = plan.body_prefix(scene, plan.pairs[pair].body);
-            (format!("variable `{prefix}speed`"), "Use a lower speed or a smaller internal_step_max")
+            (format!("variable `{prefix}speed`"), "Use a lower speed or")
         };
         Err(Error::invalid(
             what,
@@ -219,7 +218,7 @@ impl Simulation {
                  shape {scale:.3e} rad wide",
                 shown(self.time)
             ),
-            remedy,
+            format!("{remedy} a smaller internal_step_max (time.step) than {:.3e} s", step * scale / turned),
         ))
     }
 

@@ -4,6 +4,7 @@ use crate::blades::{crowded, energy, on_a_ring, round, with_step};
 use nalgebra::DMatrix;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::settings::{ExcitationSettings, Scheme, Solver};
+use tiprub_core::warning::Topic;
 use tiprub_core::{Error, Scene, Simulation};
 use tiprub_test_models::{self as models, bits, disk, go, real, reference, saved, set, try_started};
 
@@ -149,9 +150,27 @@ fn a_refused_friction_leaves_the_limits_of_the_one_in_use() {
 }
 
 #[test]
+fn fast_rotors_with_the_stiffness_of_rest_are_warned_of() {
+    let mut scene = models::rub(3);
+    let model = ModalModel::from_rom(&scene.roms[0], 1e-3).unwrap();
+    let lowest = model.frequencies.iter().copied().fold(f64::INFINITY, f64::min);
+    let warned = |scene: &Scene| {
+        let simulation = try_started(scene).unwrap();
+        simulation.warnings().iter().any(|warning| warning.topic() == Topic::StiffnessAtRest)
+    };
+    for (share, expected) in [(0.19, false), (-0.19, false), (0.21, true), (-0.21, true)] {
+        scene.settings.structures[0].speed = share * lowest;
+        assert_eq!(warned(&scene), expected, "{share}");
+    }
+    scene.settings.silence = vec![Topic::StiffnessAtRest.id().to_owned()];
+    assert!(!warned(&scene));
+}
+
+#[test]
 fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
     let mut scene = with_step(models::rub(3), 8e-6);
     scene.settings.contacts[0].friction = 0.0;
+    scene.settings.silence = vec![Topic::StiffnessAtRest.id().to_owned()];
     // ω_max·h = 2 lies at 7.96e-6 s.
     scene.settings.experiment.communication_step = 5e-6;
     let mut simulation = try_started(&scene).unwrap();
@@ -322,6 +341,7 @@ fn digging_in_is_told_with_its_friction() {
         let mut scene = with_step(models::round(rom.clone()), 1e-7);
         scene.settings.structures[0].speed = speed;
         scene.settings.contacts[0].friction = 0.9;
+        scene.settings.silence = vec![Topic::StiffnessAtRest.id().to_owned()];
         let warnings = try_started(&scene).unwrap().warnings().to_vec();
         assert!(warnings.len() <= 1, "{warnings:?}");
         told.extend(warnings);

@@ -1,0 +1,47 @@
+//! Rotors that turn fast for their first natural frequency and have the stiffness of rest: warned of at the start.
+
+use super::Simulation;
+use super::compile::Compiled;
+use crate::rom::Frame;
+use crate::settings::Motion;
+use crate::warning::Topic;
+use crate::{Warning, shown};
+
+/// Largest Ω/ω₁ without a warning. Southwell's theorem gives ω₁(Ω)² ≈ ω₁² + BΩ² with B of 1.5 to 6 for blades: up to a quarter more
+/// stiffness at 0.2.
+const SLOW: f64 = 0.2;
+
+impl Simulation {
+    /// Rotors whose stiffness at speed differs from that at rest, which the scene gives them.
+    pub(super) fn warn_of_fast_rotation(&mut self) {
+        let speeds = self.speeds().into_iter().enumerate();
+        let warnings = speeds.filter_map(|(body, speed)| self.compiled.fast_rotation(body, speed));
+        self.warnings.extend(warnings);
+    }
+}
+
+impl Compiled {
+    /// The warning of a rotor that starts at `speed` (rad/s).
+    fn fast_rotation(&self, body: usize, speed: f64) -> Option<Warning> {
+        let (structure, rom) = self.body(body);
+        let ratio = speed.abs() / self.bodies[body].lowest_frequency();
+        let turns = structure.motion == Motion::Rotating && rom.frame == Frame::Cylindrical;
+        if !turns || structure.spin.stiffening || ratio <= SLOW {
+            return None;
+        }
+        let problem = format!(
+            "{} starts at speed {} rad/s, {ratio:.2} of its first natural frequency, with the stiffness of a rotor at rest. \
+             Centrifugal stiffening and growth can change contact forces by tens of per cent",
+            self.rotor_name(body),
+            shown(speed),
+        );
+        let remedy = if rom.extras.spin.is_some() {
+            "Set `spin = { stiffening = true, growth = true }` of the structure, with a fixed-step scheme"
+        } else if self.bodies[body].disk.is_some() {
+            "Coupled sectors have no effects of spin: reduce matrices that were computed at speed, and silence this warning"
+        } else {
+            "Use a ROM with spin matrices (reduce --spin) and `spin = { stiffening = true, growth = true }`, with a fixed-step scheme"
+        };
+        Some(Warning::new(Topic::StiffnessAtRest, problem, remedy))
+    }
+}
