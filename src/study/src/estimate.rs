@@ -127,17 +127,19 @@ pub fn json_of(estimates: &[Estimate]) -> Value {
     estimates.iter().map(Estimate::json).collect::<serde_json::Map<_, _>>().into()
 }
 
-/// One line for reports.
+/// One line for reports: errors of this run, then those that the ROM has from another run.
 pub fn told(estimates: &[Estimate]) -> String {
-    let all: Vec<String> = estimates.iter().map(Estimate::told).collect();
-    let mut text = format!("estimated error of the displacements: {}", all.join(", "));
-    let of_rom = |one: &&Estimate| one.found_on.is_some();
-    if let Some(found_on) = estimates.iter().find_map(|one| one.found_on.as_ref()) {
-        let which: Vec<&str> = estimates.iter().filter(of_rom).map(Estimate::words).collect();
+    let list = |of_rom: bool| {
+        let chosen = estimates.iter().filter(|one| one.found_on.is_some() == of_rom);
+        chosen.map(Estimate::told).collect::<Vec<_>>().join(", ")
+    };
+    let found_on = estimates.iter().find_map(|one| one.found_on.as_ref());
+    let of_rom = found_on.map(|found_on| {
         let found_on = if found_on.is_empty() { "an unnamed rub" } else { found_on };
-        text.push_str(&format!(" ({} as the ROM has it, found on {found_on})", which.join(" and ")));
-    }
-    text
+        format!("from the ROM, for {found_on}: {}", list(true))
+    });
+    let parts: Vec<String> = [Some(list(false)).filter(|own| !own.is_empty()), of_rom].into_iter().flatten().collect();
+    format!("estimated error of the displacements: {}", parts.join("; "))
 }
 
 /// What a ROM says of itself; empty where it says nothing.
@@ -325,22 +327,25 @@ mod tests {
         assert_eq!(all[1], known, "what the run tells stays");
         let told = told(&all);
         assert!(
-            told.ends_with(
-                "modes unknown, patches along the chord 1.00 %, mesh 5.00 % (mesh as the ROM has it, found on a light rub)"
-            ),
+            told.ends_with("modes unknown, patches along the chord 1.00 %; from the ROM, for a light rub: mesh 5.00 %"),
             "{told}"
         );
         let told = super::told(&of_rom(&rom));
         assert!(
             told.contains(
-                "steps unknown, modes unknown, patches along the chord 2.00 %, rows of patches across the thickness unknown, mesh \
-                 5.00 % (patches along the chord and mesh as"
+                "steps unknown, modes unknown, rows of patches across the thickness unknown; from the ROM, for a light rub: \
+                 patches along the chord 2.00 %, mesh 5.00 %"
             ),
             "{told}"
         );
         rom.checks.rub_errors = Some(RubErrors { rows: Some(0.28), ..RubErrors::default() });
         let told = super::told(&of_rom(&rom));
-        assert!(told.contains("rows of patches across the thickness 28.00 %, mesh unknown (rows of"), "{told}");
+        assert!(
+            told.ends_with(
+                "mesh unknown; from the ROM, for an unnamed rub: rows of patches across the thickness 28.00 %"
+            ),
+            "{told}"
+        );
         rom.checks.rub_errors = Some(RubErrors { found_on: "nothing".into(), ..RubErrors::default() });
         assert!(of_rom(&rom).is_empty());
     }
