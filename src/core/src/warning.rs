@@ -177,10 +177,11 @@ impl Warning {
         Self { text: text.into(), ..self }
     }
 
-    /// With something else to do about it; the whole text stays.
+    /// With something else to do about it, also at the end of the whole text if that ends with what there was to do.
     pub fn with_remedy(self, remedy: impl Into<String>) -> Self {
-        let [problem, _] = self.lines;
-        Self { lines: [problem, remedy.into()], ..self }
+        let ([problem, before], remedy) = (self.lines, remedy.into());
+        let text = self.text.strip_suffix(&before).map(|explanation| format!("{explanation}{remedy}"));
+        Self { lines: [problem, remedy], text: text.unwrap_or(self.text), ..self }
     }
 
     /// At another level.
