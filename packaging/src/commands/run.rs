@@ -105,7 +105,8 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
         format!("\n{outputs}\n{}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
     } else {
         let told = if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::told(&estimates)) };
-        let hint = if arguments.estimate { "" } else { "\nestimated error of this run, from coarser runs: --estimate" };
+        let hint =
+            if arguments.estimate { "" } else { "\nerrors of this run, estimated from coarser runs: --estimate" };
         format!("{}{told}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))
     };
     let (text, rest) = if to_stdout { (run.recording.to_csv(), String::new()) } else { (answer::text(&answer), rest) };

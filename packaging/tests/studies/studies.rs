@@ -209,7 +209,7 @@ fn errors_of_a_file(root: &Path, told: &str) {
     statement(
         "own-model error of the steps of the scene as it stands (refined: steps; not refined: modes, nodes, mesh)",
     );
-    assert!(statement("what its ROM says of itself").contains("found on rotor37_rub"));
+    assert!(statement("what its ROM says of itself").contains("from the ROM, for rotor37_rub"));
     for name in ["index.html", "results.json", "cheapest.csv", "own-model.csv", "tables.md"] {
         let text = fs::read_to_string(root.join("study-error").join(name)).unwrap().to_lowercase();
         assert!(!text.contains("total"), "{name}: {:?}", text.split("total").next().unwrap().lines().last());

@@ -32,7 +32,7 @@ pub enum Error {
         remedy: String,
     },
     /// The state became non-finite during a step.
-    #[error("the state became non-finite between t = {} s and t = {} s. {remedy}", shown(*last_good_time), shown(*time))]
+    #[error("the state became non-finite between t = {} s and t = {} s. {remedy}", shown_time(*last_good_time), shown_time(*time))]
     NonFinite {
         /// The last communication point with a finite state (s).
         last_good_time: f64,
@@ -65,7 +65,7 @@ impl Error {
 
     /// Adds the time (s) to the error.
     pub(crate) fn at_time(self, time: f64) -> Self {
-        let time = shown(time);
+        let time = shown_time(time);
         match self {
             Self::Invalid { what, problem, remedy } => {
                 Self::Invalid { what: format!("{what} at t = {time} s"), problem, remedy }
@@ -96,12 +96,27 @@ pub fn shown(value: f64) -> String {
     if plain { format!("{value}") } else { format!("{value:e}") }
 }
 
+/// A time (s) for people: as [`shown`], without the digits beyond the 12th that sums of steps leave.
+pub fn shown_time(time: f64) -> String {
+    shown(format!("{time:.11e}").parse().unwrap_or(time))
+}
+
 /// Result of this floor.
 pub type Result<T, E = Error> = core::result::Result<T, E>;
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_lose_the_rounding_of_sums() {
+        for (time, text) in
+            [(0.0007400000000000001, "0.00074"), (1000.00074, "1000.00074"), (0.0, "0"), (-1e-9, "-1e-9")]
+        {
+            assert_eq!(shown_time(time), text);
+        }
+        assert_eq!(shown_time(f64::INFINITY), "inf");
+    }
 
     #[test]
     fn numbers_are_short_and_read_back() {

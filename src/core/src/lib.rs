@@ -29,7 +29,7 @@ pub mod system;
 pub mod variables;
 pub mod warning;
 
-pub use error::{Error, Result, shown};
+pub use error::{Error, Result, shown, shown_time};
 pub use ledger::{Ledger, Sum};
 pub use rom::Rom;
 pub use settings::Scene;

@@ -5,7 +5,7 @@ use crate::ledger::Ledger;
 use crate::settings::{Scheme, Solver};
 use crate::system::Loss;
 use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown};
+use crate::{Error, Result, Warning, shown_time};
 
 /// Energy of the instant may be so many times what was put in: that of modal-exact is cos²(ωh/2) of it, a fourth at ωh = 2π/3, the end of
 /// what a step resolves; that of central differences at least 1 − (ωh/2)². What is beyond is in modes that the step passes over.
@@ -31,7 +31,7 @@ impl Simulation {
         let problem = format!(
             "up to t = {} s normals that turn and surfaces that curve within internal steps have added {curvature:.3e} J that no input brings \
              (curvature work){}, beside {work:.3e} J of net work of {who}: this net work may be wrong by as much, and in its sign",
-            shown(time),
+            shown_time(time),
             self.of_set(set)
         );
         self.told.curvature = true;
@@ -52,8 +52,8 @@ impl Simulation {
                 "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, where it was {:.4e} J at the start \
                  and work less friction and damping supplied {:.4e} J: modes that the internal step of {:.3e} s does not resolve \
                  have taken energy that is not there",
-                shown(time),
-                shown(self.time),
+                shown_time(time),
+                shown_time(self.time),
                 self.of_set(set),
                 self.energies[set].now,
                 self.initial_energies[set],

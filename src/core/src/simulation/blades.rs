@@ -12,7 +12,7 @@ use crate::dynamics::sectors::Sectors;
 use crate::ranges::SOFTENED;
 use crate::rom::Watched;
 use crate::settings::{InitialSettings, Scheme, StructureSettings};
-use crate::{Error, Result, Rom, shown};
+use crate::{Error, Result, Rom, shown, shown_time};
 
 /// Modal load per kelvin of coupled sectors, on nodal diameter 0; empty where a scene does not heat them.
 pub fn disk_heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
@@ -334,7 +334,7 @@ impl Simulation {
             format!(
                 "the excitation of order {} turns by {angle:.3e} rad in one internal step of {step:.3e} s at t = {} s, beyond {}",
                 shown(order),
-                shown(self.time),
+                shown_time(self.time),
                 shown(crate::ranges::EXCITED_ANGLE)
             ),
             "Use a smaller internal_step_max (time.step), a lower order, a lower speed or a phase that changes more slowly",

@@ -6,7 +6,7 @@ use crate::plausibility::{self, Slip};
 use crate::system::StepFailure;
 use crate::variables::Causality;
 use crate::warning::{Topic, Warning};
-use crate::{Error, Result, shown};
+use crate::{Error, Result, shown_time};
 
 /// How far a surface around an axis goes on ([`crate::gaps::surface_spline::REACH`]), and what to do about a node further out.
 pub const OUT_OF_REACH: &str = "a quarter of its axial extent, as far as it goes on along its tangents";
@@ -125,7 +125,7 @@ impl Simulation {
             let start = variable.reference as usize;
             let values = &self.values[start..start + variable.len()];
             if let Some(element) = values.iter().position(|value| !value.is_finite()) {
-                let problem = format!("{} at t = {} s", values[element], shown(time));
+                let problem = format!("{} at t = {} s", values[element], shown_time(time));
                 let remedy = "Look at loads, inputs and internal step; restore a saved state or reset first";
                 return Err(Error::invalid(format!("output `{}`", variable.element_name(element)), problem, remedy));
             }

@@ -3,7 +3,7 @@
 use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::{Phase, Simulation};
 use crate::system::{Curved, Pair, StepFailure};
-use crate::{Error, shown};
+use crate::{Error, shown_time};
 
 const AGAIN: &str = "Restore a saved state or reset first";
 
@@ -20,7 +20,7 @@ impl Simulation {
         }
         let (problem, remedy) = self.told_failure(failure);
         Error::Unstable {
-            problem: format!("at t = {} s (last good time {} s) {problem}", shown(time), shown(self.time)),
+            problem: format!("at t = {} s (last good time {} s) {problem}", shown_time(time), shown_time(self.time)),
             remedy: format!("{remedy}. {AGAIN}"),
         }
     }

@@ -6,7 +6,7 @@ use crate::galerkin::sector::shortest;
 use crate::settings::Scheme;
 use crate::variables::Quantity;
 use crate::warning::Topic;
-use crate::{Error, Result, Warning, shown};
+use crate::{Error, Result, Warning, shown, shown_time};
 
 /// What shortest steps leave, as a share of the clearance per length (1/s): where errors stop to follow the tolerance. A blade with 18
 /// modes that rubs (`core/tests/galerkin/main.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
@@ -62,7 +62,7 @@ impl Simulation {
                 "the communication step of {} s from t = {} s takes more internal steps{of_whom} than steps_at_most = {most}; it was \
                  not done",
                 shown(length),
-                shown(self.time)
+                shown_time(self.time)
             ),
             remedy: format!(
                 "Repeat it with a shorter communication step, a larger steps_at_most (0: any number) or {other}"
@@ -102,7 +102,7 @@ impl Simulation {
         let problem = format!(
             "up to t = {} s {} of {} steps have missed the tolerance of {}: the shortest, {} s, a thousandth of the longest, were \
              taken all the same",
-            shown(time),
+            shown_time(time),
             effort.missed,
             effort.steps,
             shown(self.value_of(Quantity::Tolerance, 0)),

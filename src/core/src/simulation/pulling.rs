@@ -19,7 +19,7 @@ use super::Simulation;
 use crate::settings::{Preset, Scheme, Solver};
 use crate::system::StepFailure;
 use crate::warning::Topic;
-use crate::{Result, Warning, shown};
+use crate::{Result, Warning, shown_time};
 
 /// Shares from which pulling is told, and from which it ends a run that is not the paper's.
 const TOLD: f64 = 0.03;
@@ -52,7 +52,7 @@ impl Simulation {
                     let problem = self.left_inside(structure, node, share);
                     let then =
                         if goes_on { String::new() } else { format!(". From {:.0} % on the run ends", 100.0 * INSIDE) };
-                    let problem = format!("up to t = {} s {problem}{then}", shown(time));
+                    let problem = format!("up to t = {} s {problem}{then}", shown_time(time));
                     let remedy = self.against_pulling(structure);
                     self.note(Warning::new(Topic::FilmInside, problem, remedy));
                 }
@@ -65,7 +65,7 @@ impl Simulation {
                 let problem = self.pulls(structure, node, share);
                 let then =
                     if is_paper { String::new() } else { format!(". From {:.0} % on the run ends", 100.0 * REFUSED) };
-                let problem = format!("up to t = {} s {problem}{then}", shown(time));
+                let problem = format!("up to t = {} s {problem}{then}", shown_time(time));
                 self.note(Warning::new(Topic::FilmPulls, problem, self.against_pulling(structure)));
             }
         }

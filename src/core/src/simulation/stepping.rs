@@ -5,7 +5,7 @@ use super::{Communication, MOST_STEPS, Phase, Progress, Simulation, TIME_TOLERAN
 use crate::laws::coating::Coating;
 use crate::system::StepFailure;
 use crate::warning::Topic;
-use crate::{Error, Result, Warning, ranges, shown};
+use crate::{Error, Result, Warning, ranges, shown, shown_time};
 
 /// A run is warned of once u_θ²/2r is this share of the clearance.
 const CURVED_SHARE: f64 = 0.05;
@@ -127,7 +127,7 @@ impl Simulation {
         if !(step_size.is_finite() && step_size > 0.0) {
             return Err(Error::invalid(
                 "communicationStepSize",
-                format!("{} s at t = {} s", shown(step_size), shown(self.time)),
+                format!("{} s at t = {} s", shown(step_size), shown_time(self.time)),
                 "Give a finite communication step > 0",
             ));
         }
@@ -144,7 +144,7 @@ impl Simulation {
                 format!(
                     "{} s at t = {} s is below {} s, where rounding of positions is taken for motion",
                     shown(step_size),
-                    shown(self.time),
+                    shown_time(self.time),
                     shown(ranges::SHORTEST_STEP)
                 ),
                 "Give a longer communication step; leave out what rounding leaves of a sum of steps",
@@ -158,7 +158,7 @@ impl Simulation {
                 format!(
                     "{} s does not change the time {} s by as much in double precision",
                     shown(step_size),
-                    shown(current_time)
+                    shown_time(current_time)
                 ),
                 "Use a longer communication step or a start time closer to 0",
             ));
@@ -195,7 +195,7 @@ impl Simulation {
                 format!(
                     "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, more than the \
                      {stride:.3e} rad that its tips or the cells of the coating are wide: cells between would stay unworn",
-                    shown(self.time)
+                    shown_time(self.time)
                 ),
                 "Use fewer cells around, a lower speed or a smaller internal_step_max (time.step)",
             ));
@@ -216,7 +216,7 @@ impl Simulation {
             format!(
                 "the rotor turns {turned:.3e} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
                  shape {scale:.3e} rad wide",
-                shown(self.time)
+                shown_time(self.time)
             ),
             format!("{remedy} a smaller internal_step_max (time.step) than {:.3e} s", step * scale / turned),
         ))
@@ -335,7 +335,7 @@ impl Simulation {
             let problem = format!(
                 "at t = {} s contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, \
                  which misses u²/2r = {:.2e} m, {:.0} % of the clearance",
-                shown(time),
+                shown_time(time),
                 self.compiled.node_name(most.structure, most.node),
                 self.sector_name(most.structure, most.sector),
                 most.moved,

@@ -9,7 +9,7 @@
 use super::{Phase, Simulation};
 use crate::settings::Scheme;
 use crate::variables::{Causality, Kind, Quantity, Variability};
-use crate::{Error, Result, shown};
+use crate::{Error, Result, shown, shown_time};
 
 /// By how much inputs are moved, as a share of what moves gaps by a clearance: 2⁻²⁰, so that sums with usual values are exact. Rounding in
 /// gaps is some 1e-7 of it, more on splines.
@@ -192,7 +192,10 @@ impl Simulation {
     /// March the last communication step in `twin`, with inputs moved by `moved` times `seed`.
     fn march_again(&mut self, twin: &mut Self, inputs: &[u32], seed: &[f64], moved: f64) -> Result<()> {
         let lost = |error: Error| Error::Unstable {
-            problem: format!("the communication step to t = {} s cannot be marched again: {error}", shown(self.time)),
+            problem: format!(
+                "the communication step to t = {} s cannot be marched again: {error}",
+                shown_time(self.time)
+            ),
             remedy: "Do without derivatives over this step".to_owned(),
         };
         if self.tangent.follows {
