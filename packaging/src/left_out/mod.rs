@@ -40,7 +40,7 @@ pub struct LeftOut {
 /// Why a scene cannot have an effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// What refused it.
+    /// The rule that excludes it; with adaptive steps also what excludes it with fixed ones.
     pub reason: String,
     /// Whether the same scene with fixed steps could have it.
     pub allowed_with_fixed_steps: bool,
@@ -72,13 +72,7 @@ pub fn left_out(scene: &Scene, measure: bool) -> tiprub_core::Result<Vec<LeftOut
 fn cost(scene: &Scene, with: fn(&mut Scene), own: &Sizes, measure: bool) -> Result<Cost, Refusal> {
     let mut other = scene.clone();
     with(&mut other);
-    let found = sizes(&other, measure).map_err(|error| {
-        let reason = match error {
-            Error::Invalid { what, problem, .. } => format!("{what}: {problem}"),
-            other => other.to_string(),
-        };
-        Refusal { reason, allowed_with_fixed_steps: starts_with_fixed_steps(other) }
-    })?;
+    let found = sizes(&other, measure).map_err(|error| refusal(other, error))?;
     Ok(Cost {
         variables: found.variables - own.variables,
         bytes: found.bytes - own.bytes,
@@ -87,14 +81,26 @@ fn cost(scene: &Scene, with: fn(&mut Scene), own: &Sizes, measure: bool) -> Resu
     })
 }
 
-/// Whether a scene with adaptive steps starts with fixed ones.
-fn starts_with_fixed_steps(mut scene: Scene) -> bool {
+/// Why a scene is rejected. One with adaptive steps is also tried with fixed steps.
+fn refusal(mut scene: Scene, error: Error) -> Refusal {
+    let mut reason = words(error);
     let time = &mut scene.settings.time;
     if time.scheme != Scheme::Galerkin {
-        return false;
+        return Refusal { reason, allowed_with_fixed_steps: false };
     }
     (time.scheme, time.step, time.tolerance) = (Scheme::ModalExact, TRIED_STEP, None);
-    sizes(&scene, false).is_ok()
+    let with_fixed_steps = sizes(&scene, false).map_err(words);
+    if let Some(other) = with_fixed_steps.as_ref().err().filter(|other| **other != reason) {
+        let _ = write!(reason, ". With fixed steps, {other}");
+    }
+    Refusal { reason, allowed_with_fixed_steps: with_fixed_steps.is_ok() }
+}
+
+fn words(error: Error) -> String {
+    match error {
+        Error::Invalid { what, problem, .. } => format!("{what}: {problem}"),
+        other => other.to_string(),
+    }
 }
 
 fn sizes(scene: &Scene, measure: bool) -> tiprub_core::Result<Sizes> {
@@ -228,9 +234,15 @@ mod tests {
         let mut adaptive = round(tiprub_test_models::rich_blade(4));
         adaptive.settings.time.scheme = Scheme::Galerkin;
         let all_adaptive = left_out(&adaptive, false).unwrap();
-        let excitation = all_adaptive.iter().find(|one| one.effect.name == "excitation by engine orders").unwrap();
-        let refusal = excitation.cost.as_ref().unwrap().as_ref().unwrap_err();
-        assert!(refusal.allowed_with_fixed_steps && !spin.allowed_with_fixed_steps, "{refusal:?}");
+        let refused = |name: &str| {
+            let found = all_adaptive.iter().find(|one| one.effect.name == name).unwrap();
+            found.cost.as_ref().unwrap().as_ref().unwrap_err()
+        };
+        let excitation = refused("excitation by engine orders");
+        assert!(excitation.allowed_with_fixed_steps && excitation.reason.contains("galerkin"), "{excitation:?}");
+        // The ROM has no spin matrices either.
+        let spin = refused("centrifugal stiffening");
+        assert!(!spin.allowed_with_fixed_steps && spin.reason.contains("With fixed steps, "), "{spin:?}");
         assert!(text(&all_adaptive).contains("needs fixed steps"));
         assert!(text(&all).contains("left out here") && json(&all)[0]["name"].is_string());
     }

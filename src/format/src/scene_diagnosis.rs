@@ -155,7 +155,10 @@ fn unknown_key(document: &Document, place: &ClosestPoint, name: &str, accepted: 
     let path = if is_key { place.path.clone() } else { format!("{}.{name}", place.path) };
     let span = document.places().into_iter().find(|other| other.path == path).map(|other| other.span);
     let mut remedy = suggestion::remedy(name, accepted);
-    if let Some(field) = FIELDS.iter().find(|field| field.key() == name) {
+    let table = if is_key { place.fields.rsplit_once('.').map_or("", |(table, _)| table) } else { &place.fields };
+    if FIELDS.iter().any(|field| field.key() == name && field.table() == table) {
+        remedy = format!("`{name}` belongs to another `kind` of {}. {remedy}", header(table));
+    } else if let Some(field) = FIELDS.iter().find(|field| field.key() == name) {
         remedy = format!("`{name}` belongs to {}. {remedy}", header(field.table()));
     }
     document.error(span.or(Some(place.span.clone())), &path, "unknown key".into(), remedy)

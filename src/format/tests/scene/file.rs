@@ -89,7 +89,16 @@ fn unknown_keys_get_a_suggestion() {
     refused("order = 2", "ordr = 2", ":7:45", &["surface[1].shape.ordr: unknown key", "Did you mean `order`?"]);
     refused("[[contact]]", "[[contacts]]", ":8:3", &["contacts: unknown key", "Did you mean `contact`?"]);
     refused("step = 1e-6", "step = 1e-6\nfriction = 0.1", ":14:1", &["time.friction", "belongs to [[contact]]"]);
-    refused("kind = \"lobes\", ", "kind = \"circular\", ", ":7:30", &["surface[1].shape.amplitude: unknown key"]);
+    refused(
+        "kind = \"lobes\", ",
+        "kind = \"circular\", ",
+        ":7:30",
+        &[
+            "surface[1].shape.amplitude: unknown key",
+            "belongs to another `kind` of `shape`",
+            "No more keys are accepted",
+        ],
+    );
 }
 
 #[test]
