@@ -42,12 +42,9 @@ pub struct LeftOut {
 pub struct Refusal {
     /// The rule that excludes it; with adaptive steps also what excludes it with fixed ones.
     pub reason: String,
-    /// Whether the same scene with fixed steps could have it.
+    /// Whether the rules allow it in the same scene with fixed steps, whose length is not judged.
     pub allowed_with_fixed_steps: bool,
 }
-
-/// Internal step with which scenes are tried with fixed steps (s): short enough for any scheme to start.
-const TRIED_STEP: f64 = 1.0e-8;
 
 /// Sizes of a scene.
 struct Sizes {
@@ -81,15 +78,15 @@ fn cost(scene: &Scene, with: fn(&mut Scene), own: &Sizes, measure: bool) -> Resu
     })
 }
 
-/// Why a scene is rejected. One with adaptive steps is also tried with fixed steps.
+/// Why a scene is rejected. The rules are also asked about one with adaptive steps if it had fixed ones.
 fn refusal(mut scene: Scene, error: Error) -> Refusal {
     let mut reason = words(error);
     let time = &mut scene.settings.time;
     if time.scheme != Scheme::Galerkin {
         return Refusal { reason, allowed_with_fixed_steps: false };
     }
-    (time.scheme, time.step, time.tolerance) = (Scheme::ModalExact, TRIED_STEP, None);
-    let with_fixed_steps = sizes(&scene, false).map_err(words);
+    (time.scheme, time.tolerance) = (Scheme::ModalExact, None);
+    let with_fixed_steps = Simulation::new(&scene).map_err(words);
     if let Some(other) = with_fixed_steps.as_ref().err().filter(|other| **other != reason) {
         let _ = write!(reason, ". With fixed steps, {other}");
     }

@@ -110,9 +110,12 @@ mod tests {
 
     #[test]
     fn times_lose_the_rounding_of_sums() {
-        for (time, text) in
-            [(0.0007400000000000001, "0.00074"), (1_000_000.000_000_1, "1.0000000000001e6"), (0.0, "0"), (-1e-9, "-1e-9")]
-        {
+        for (time, text) in [
+            (0.0007400000000000001, "0.00074"),
+            (1_000_000.000_000_1, "1.0000000000001e6"),
+            (0.0, "0"),
+            (-1e-9, "-1e-9"),
+        ] {
             assert_eq!(shown_time(time), text);
         }
         assert_eq!(shown_time(f64::INFINITY), "inf");
