@@ -1,8 +1,11 @@
 //! Instances as the importer holds them, and the guard around every call on one.
 
+use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::{Mutex, TryLockError};
+
+use tiprub_core::shown_time;
 
 use super::float_environment::StandardFloats;
 use super::log::{Log, Sink};
@@ -170,18 +173,21 @@ pub(crate) fn enter<T>(
         let outcome = rule.check(slave.phase()).and_then(|()| action(&mut slave, instance));
         Ok((outcome, slave.take_notes(), slave.time()))
     }));
-    let (outcome, notes, at) = match call {
-        Ok(Ok((outcome, notes, time))) => (outcome, notes, format!(" (t = {time} s)")),
-        Ok(Err(refusal)) => (Err(refusal), Vec::new(), String::new()),
-        Err(payload) => (Err(Refusal::error(panics::describe(&*payload))), Vec::new(), String::new()),
+    let (outcome, notes, time) = match call {
+        Ok(Ok((outcome, notes, time))) => (outcome, notes, Some(time)),
+        Ok(Err(refusal)) => (Err(refusal), Vec::new(), None),
+        Err(payload) => (Err(Refusal::error(panics::describe(&*payload))), Vec::new(), None),
     };
-    for (status, message) in notes {
+    // Calls without a message allocate nothing.
+    let emit = |status, message: &dyn Display| {
+        let at = time.map_or(String::new(), |time| format!(" (t = {} s)", shown_time(time)));
         instance.log.emit(status, &format!("{}{at}: {message}", rule.name));
-    }
+    };
+    notes.iter().for_each(|(status, message)| emit(*status, message));
     match outcome {
         Ok((status, value)) => (status, Some(value)),
         Err(refusal) => {
-            instance.log.emit(refusal.status, &format!("{}{at}: {refusal}", rule.name));
+            emit(refusal.status, &refusal);
             (refusal.status, None)
         }
     }

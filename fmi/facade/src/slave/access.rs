@@ -1,7 +1,7 @@
 //! Reading and setting variables: every request is checked in full before anything is read or written.
 
-use tiprub_core::Error;
 use tiprub_core::variables::{Causality, Kind, Variability, Variable};
+use tiprub_core::{Error, shown};
 
 use super::{Dialect, Phase, Refusal, Result, Slave};
 use crate::unit::Unit;
@@ -43,7 +43,12 @@ impl Value for f64 {
         if !self.is_finite() {
             Some(format!("{self} is not finite. Set a finite number"))
         } else if *self < min || *self > max {
-            Some(format!("{self}{unit} is outside {min} to {max}{unit}. Set a value within"))
+            Some(format!(
+                "{}{unit} is outside {} to {}{unit}. Set a value within",
+                shown(*self),
+                shown(min),
+                shown(max)
+            ))
         } else {
             None
         }

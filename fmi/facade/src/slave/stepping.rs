@@ -1,6 +1,7 @@
 //! Communication steps: whole, or internal step by internal step for FMI 3.0 intermediate updates.
 
 use tiprub_core::simulation::Progress;
+use tiprub_core::{shown, shown_time};
 
 use super::{Phase, Refusal, Result, Slave, Status};
 
@@ -29,8 +30,12 @@ impl Slave {
             let allowance = STOP_TOLERANCE * step_size + STOP_ROUNDING * stop.abs();
             if end - stop > allowance {
                 return Err(Refusal::error(format!(
-                    "the step from t = {current_time} s by {step_size} s ends at {end} s, beyond the stop time {stop} s \
-                     given at initialisation. Step less far, or initialise without a stop time"
+                    "the step from t = {} s by {} s ends at {} s, beyond the stop time {} s given at initialisation. Step \
+                     less far, or initialise without a stop time",
+                    shown_time(current_time),
+                    shown(step_size),
+                    shown_time(end),
+                    shown_time(stop)
                 )));
             }
         }
@@ -79,7 +84,7 @@ impl Slave {
             Err(refusal) if refusal.status == Status::Discard && matches!(self.phase, Phase::Updating { .. }) => {
                 self.end_step(true)?;
                 let time = self.unit.time();
-                self.note(Status::Ok, format!("ended early at t = {time} s: {refusal}"));
+                self.note(Status::Ok, format!("ended early at t = {} s: {refusal}", shown_time(time)));
                 Ok(None)
             }
             outcome => outcome.map(Some),
