@@ -178,10 +178,15 @@ pub(crate) fn enter<T>(
         Ok(Err(refusal)) => (Err(refusal), Vec::new(), None),
         Err(payload) => (Err(Refusal::error(panics::describe(&*payload))), Vec::new(), None),
     };
-    // Calls without a message allocate nothing.
+    // Calls without a message allocate nothing. The text is written in the standard environment, for it is arithmetic too;
+    // the callback has the caller's.
     let emit = |status, message: &dyn Display| {
-        let at = time.map_or(String::new(), |time| format!(" (t = {} s)", shown_time(time)));
-        instance.log.emit(status, &format!("{}{at}: {message}", rule.name));
+        let text = {
+            let _floats = StandardFloats::enter();
+            let at = time.map_or(String::new(), |time| format!(" (t = {} s)", shown_time(time)));
+            format!("{}{at}: {message}", rule.name)
+        };
+        instance.log.emit(status, &text);
     };
     notes.iter().for_each(|(status, message)| emit(*status, message));
     match outcome {
