@@ -66,13 +66,20 @@ impl Slave {
                 }
                 return Err(error.into());
             }
-            Err(error) => {
-                self.phase = Phase::Failed { last_good };
-                return Err(error.into());
-            }
+            Err(error) => return Err(self.fail(last_good, error)),
         };
         self.phase = Phase::Updating { stop, reached: progress.time, fresh: progress.finished };
         Ok(progress)
+    }
+
+    /// Ends all stepping until a saved state is restored or the instance is reset, and returns the refusal that says so.
+    fn fail(&mut self, last_good: f64, error: tiprub_core::Error) -> Refusal {
+        self.phase = Phase::Failed { last_good };
+        let Refusal { status, message } = error.into();
+        Refusal {
+            status,
+            message: format!("{message}. Restore a saved state or reset the instance before the next step"),
+        }
     }
 
     /// March one internal step; `None` where the internal steps allowed are used up, and the communication step has ended early.
@@ -99,7 +106,7 @@ impl Slave {
         let last_good = self.unit.time();
         if let Phase::Updating { stop, .. } = self.phase {
             if early {
-                self.unit.end_step_early().inspect_err(|_| self.phase = Phase::Failed { last_good })?;
+                self.unit.end_step_early().map_err(|error| self.fail(last_good, error))?;
             }
             self.phase = Phase::Stepping { stop };
             self.hear();

@@ -60,7 +60,7 @@ impl Simulation {
                 self.supplied(set),
                 self.system.step_size()
             ),
-            remedy: "Use a smaller internal step (internal_step_max). Restore a saved state or reset first".to_owned(),
+            remedy: "Use a smaller internal step (internal_step_max)".to_owned(),
         })
     }
 

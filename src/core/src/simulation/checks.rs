@@ -126,7 +126,7 @@ impl Simulation {
             let values = &self.values[start..start + variable.len()];
             if let Some(element) = values.iter().position(|value| !value.is_finite()) {
                 let problem = format!("{} at t = {} s", values[element], shown_time(time));
-                let remedy = "Look at loads, inputs and internal step; restore a saved state or reset first";
+                let remedy = "Check loads, inputs and the internal step";
                 return Err(Error::invalid(format!("output `{}`", variable.element_name(element)), problem, remedy));
             }
         }

@@ -5,8 +5,6 @@ use super::{Phase, Simulation};
 use crate::system::{Curved, Pair, StepFailure};
 use crate::{Error, shown_time};
 
-const AGAIN: &str = "Restore a saved state or reset first";
-
 impl Simulation {
     /// The error of a step that should have ended at `time`; the simulation is of no use until restored or reset.
     pub(super) fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
@@ -15,13 +13,13 @@ impl Simulation {
             return Error::NonFinite {
                 last_good_time: self.time,
                 time,
-                remedy: "Restore a saved state or reset, and use a smaller internal step or smaller loads".to_owned(),
+                remedy: "Use a smaller internal step or smaller loads".to_owned(),
             };
         }
         let (problem, remedy) = self.told_failure(failure);
         Error::Unstable {
             problem: format!("at t = {} s (last good time {} s) {problem}", shown_time(time), shown_time(self.time)),
-            remedy: format!("{remedy}. {AGAIN}"),
+            remedy,
         }
     }
 
