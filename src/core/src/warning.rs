@@ -242,6 +242,8 @@ impl PartialEq for Warning {
     }
 }
 
+impl Eq for Warning {}
+
 impl std::fmt::Display for Warning {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         out.write_str(&self.text)

@@ -175,6 +175,7 @@ impl Console {
 
     /// Print a failure: text on stderr, and with `--json` the object on stdout.
     pub fn fail(&self, failure: &Failure) {
+        self.warn(&failure.warnings);
         let _ = writeln!(std::io::stderr(), "error: {}", printable(&failure.to_string()));
         self.answer(failure);
     }

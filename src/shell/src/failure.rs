@@ -2,6 +2,10 @@
 
 use std::{fmt, path::Path};
 
+use tiprub_core::Warning;
+
+use crate::console::warnings_json;
+
 /// Why a command did not do what it was asked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
@@ -13,6 +17,8 @@ pub struct Failure {
     pub remedy: String,
     /// True when the command line itself was wrong (exit code 2), false when the work failed (exit code 1).
     pub usage: bool,
+    /// Warnings of the work up to the failure: they often name its cause.
+    pub warnings: Vec<Warning>,
 }
 
 /// What cannot be done with a file that is only read.
@@ -24,12 +30,19 @@ pub type Result<T, E = Failure> = std::result::Result<T, E>;
 impl Failure {
     /// The work failed: exit code 1.
     pub fn new(what: impl fmt::Display, problem: impl fmt::Display, remedy: impl fmt::Display) -> Self {
-        Self { what: what.to_string(), problem: problem.to_string(), remedy: remedy.to_string(), usage: false }
+        let (what, problem, remedy) = (what.to_string(), problem.to_string(), remedy.to_string());
+        Self { what, problem, remedy, usage: false, warnings: Vec::new() }
     }
 
     /// The command line is wrong: exit code 2.
     pub fn usage(what: impl fmt::Display, problem: impl fmt::Display, remedy: impl fmt::Display) -> Self {
         Self { usage: true, ..Self::new(what, problem, remedy) }
+    }
+
+    /// The same failure after work that had these warnings.
+    #[must_use]
+    pub fn with_warnings(self, warnings: Vec<Warning>) -> Self {
+        Self { warnings, ..self }
     }
 
     /// An error of a lower floor whose text already names what, where and the remedy, met while handling `what`.
@@ -70,9 +83,13 @@ impl Failure {
 
     /// The same as a JSON object, for `--json`.
     pub fn to_json(&self) -> serde_json::Value {
-        serde_json::json!({
+        let mut json = serde_json::json!({
             "error": { "what": self.what, "problem": self.problem, "remedy": self.remedy, "exit_code": self.exit_code() }
-        })
+        });
+        if !self.warnings.is_empty() {
+            [json["warnings"], json["warning_details"]] = warnings_json(&self.warnings);
+        }
+        json
     }
 }
 

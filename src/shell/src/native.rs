@@ -40,7 +40,7 @@ pub struct Given<'a> {
 /// Run `scene` over the schedule with other start values and inputs over time.
 ///
 /// # Errors
-/// Unknown or wrong settings, refused scenes, a state that became non-finite.
+/// Unknown or wrong settings, refused scenes, a step that failed: its failure carries the warnings up to then.
 pub fn run(scene: &Scene, schedule: &Schedule, given: Given<'_>, progress: &dyn Fn(usize)) -> Result<NativeRun> {
     let name = scene.settings.name.clone();
     let in_scene = |error: tiprub_core::Error| Failure::from_core(format!("scene `{name}`"), error);
@@ -78,7 +78,10 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: Given<'_>, progress: &dyn 
                 driver.step(&mut simulation, [time, next])?;
             }
             let clock = Instant::now();
-            simulation.do_step(time, next - time).map_err(in_scene)?;
+            if let Err(error) = simulation.do_step(time, next - time) {
+                warnings.extend(simulation.take_notes());
+                return Err(in_scene(error).with_warnings(warnings));
+            }
             let taken = clock.elapsed();
             (stepping, slowest) = (stepping + taken, slowest.max(taken));
         }
