@@ -6,7 +6,7 @@ use tiprub_core::settings::{ADAPTIVE_STEP, Preset, SceneSettings, Scheme, Solver
 use tiprub_core::{Rom, Scene};
 
 use crate::load::BUILTIN_PREFIX;
-use crate::scene_diagnosis::{Document, check_brackets, diagnose, position, requirement};
+use crate::scene_diagnosis::{Document, check_brackets, diagnose, position};
 use crate::{Error, Result};
 
 /// Keys that a file may leave out.
@@ -89,7 +89,11 @@ fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document
     let why = scheme_reason.as_ref().map_or(String::new(), |reason| format!(" ({reason})"));
     let problem = format!("missing: the scheme is `{}`{why}, which has fixed steps", scheme.name());
     let galerkin = if scheme_reason.is_some() { "" } else { ", or use scheme = \"galerkin\", which needs none" };
-    Err(document.refusal(STEP, problem, format!("Add `step = ...` to [time]: {}{galerkin}", requirement(STEP))))
+    Err(document.refusal(
+        STEP,
+        problem,
+        format!("Add `step = 1e-6` (s) to [time], and check it with `tiprub run --estimate`{galerkin}"),
+    ))
 }
 
 /// Line and column, from 1, of the key at this path (indices from 1) in the text of a scene; `None` where it is not there.
