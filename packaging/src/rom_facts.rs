@@ -268,12 +268,13 @@ impl RomFacts {
         ends.into_iter().max_by(|a, b| a.position[1].total_cmp(&b.position[1]))
     }
 
-    /// "0.080 (closed at tip_2, nodal diameter 0, sliding in +θ)".
+    /// "0.080 (closed at tip_2, nodal diameter 0, sliding in +θ); 0.310 (closed at tip_1, nodal diameter 0, sliding in −θ)".
     pub(crate) fn digging_text(&self) -> String {
         let told = |Digging { friction, closed, sense }: &Digging| {
             format!("{friction:.3} (closed at {closed}, sliding in {})", ["+θ", "−θ"][*sense])
         };
-        self.least_lock_up().map_or("none".to_owned(), told)
+        let senses: Vec<String> = self.lock_up.iter().flatten().map(told).collect();
+        if senses.is_empty() { "none".to_owned() } else { senses.join("; ") }
     }
 
     /// What the limits hold for.
