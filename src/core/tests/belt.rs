@@ -15,7 +15,7 @@ use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
-use tiprub_reference::closed::belt::Belt;
+use tiprub_reference::closed::belt::{Belt, ThrownBlock};
 
 const MASS: f64 = 2.0;
 const OMEGA: f64 = 50.0;
@@ -132,48 +132,6 @@ const FLEXIBILITY: f64 = 4e-6;
 const FORCE: f64 = 2.0;
 const THROWN: f64 = 0.5;
 
-/// The block on a belt that stands still, with a contact without mass that gives way by G: while it sticks its contact node u = q + Gf
-/// stays, where it slides f is that of friction. Where the node is at multiples of `every` (s), and how often it stops.
-fn thrown_along(every: f64, count: usize) -> (Vec<f64>, usize) {
-    let swing = |w: f64, q: f64, v: f64, s: f64| {
-        [q * (w * s).cos() + v / w * (w * s).sin(), v * (w * s).cos() - q * w * (w * s).sin()]
-    };
-    let stiff = (OMEGA * OMEGA + 1.0 / (MASS * FLEXIBILITY)).sqrt();
-    let share = 1.0 / (MASS * FLEXIBILITY * stiff * stiff);
-    let (mut q, mut v, mut u, mut force, mut start) = (0.0, THROWN, 0.0, 0.0, 0.0);
-    let (mut sticks, mut stops) = (true, 0);
-    let mut positions = Vec::new();
-    while positions.len() < count {
-        let rest = if sticks { share * u } else { force / (MASS * OMEGA * OMEGA) };
-        let at = |s: f64| -> [f64; 2] {
-            let [x, w] = swing(if sticks { stiff } else { OMEGA }, q - rest, v, s);
-            [x + rest, w]
-        };
-        // Sticking ends where the force is that of sliding, and sliding where the block stops.
-        let left = |s: f64| if sticks { FORCE - (u - at(s)[0]).abs() / FLEXIBILITY } else { -force * at(s)[1] };
-        let (grain, end) = (1e-3 / stiff, every * count as f64 - start);
-        let mut high = grain;
-        while left(high) > 0.0 && high < end {
-            high += grain;
-        }
-        let mut low = high - grain;
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            *(if left(middle) > 0.0 { &mut low } else { &mut high }) = middle;
-        }
-        while positions.len() < count && every * (positions.len() + 1) as f64 <= start + high {
-            let s = every * (positions.len() + 1) as f64 - start;
-            positions.push(if sticks { u } else { at(s)[0] + FLEXIBILITY * force });
-        }
-        [q, v] = at(high);
-        (u, start) = (if sticks { u } else { q + FLEXIBILITY * force }, start + high);
-        force = if sticks { FORCE * (u - q).signum() } else { 0.0 };
-        stops += usize::from(!sticks && positions.len() < count);
-        sticks = !sticks;
-    }
-    (positions, stops)
-}
-
 /// A block whose contact node has no mass, and a node that touches nothing: its gap is what a tolerance is a share of.
 fn by_tolerance(tolerance: f64, longest: f64) -> System {
     let fast = 1e5;
@@ -206,12 +164,13 @@ fn by_tolerance(tolerance: f64, longest: f64) -> System {
 #[test]
 fn by_a_tolerance_a_flexible_contact_sticks_and_slips_as_its_closed_form() {
     let (longest, count) = (2e-3, 500);
-    let (exact, stops) = thrown_along(longest, count);
-    told!("it stops {stops} times");
+    let block = ThrownBlock { mass: MASS, omega: OMEGA, flexibility: FLEXIBILITY, friction: FORCE, velocity: THROWN };
+    let exact = block.motion(longest, count);
+    told!("it stops {} times", exact.stops);
     for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
         let mut system = by_tolerance(tolerance, longest);
         let mut worst = 0.0_f64;
-        for exact in &exact {
+        for exact in &exact.positions {
             system.step(&[Drive::default()]).unwrap();
             worst = worst.max((system.bank().row(0, 0) - exact).abs());
         }

@@ -155,6 +155,8 @@ pub enum ErrorScene {
     Carpenter,
     /// The bouncing bar.
     BouncingBar,
+    /// A block on a belt that sticks and slides.
+    Belt,
     /// The cube between two rings.
     Cube,
     /// Rotor 37 with the default model, touching lightly.
@@ -179,7 +181,7 @@ pub enum ErrorScene {
 
 impl ErrorScene {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Rotor37Light,
         Self::Rotor37Heavy,
         Self::Rotor37PaperLight,
@@ -190,6 +192,7 @@ impl ErrorScene {
         Self::Cube,
         Self::Carpenter,
         Self::BouncingBar,
+        Self::Belt,
     ];
 }
 

@@ -65,6 +65,29 @@ fn bars_converge_to_the_exact_solution_with_the_elements_and_to_the_reference_wi
 }
 
 #[test]
+fn a_sticking_block_converges_to_its_closed_form() {
+    let root = tempfile::tempdir().unwrap();
+    let json = study(root.path(), &["belt"]);
+    let scene = &json["results"]["scenes"][0];
+    let rows = scene["rows"].as_array().unwrap();
+    let adaptive: Vec<f64> = rows
+        .iter()
+        .filter(|row| row["competitor"] == "galerkin + coulomb")
+        .map(|row| row["total_error"].as_f64().unwrap())
+        .collect();
+    // A tolerance is relative to the clearance of 1 mm, and an error here to displacements of some 10 mm.
+    assert!(adaptive.len() == 4 && adaptive[3] < 1e-6, "{adaptive:?}");
+    assert!(adaptive.iter().zip([1e-2, 1e-3, 1e-4, 1e-5]).all(|(error, tolerance)| *error < tolerance), "{adaptive:?}");
+    let of_steps = |competitor| -> Vec<f64> {
+        values(scene, competitor, "error_of_steps").into_iter().filter_map(|(_, error)| error).collect()
+    };
+    for competitor in ["modal-exact + coulomb", "massless-boundary + coulomb"] {
+        let errors = of_steps(competitor);
+        assert!(errors.len() == 5 && errors[4] < 0.02 * errors[0], "{competitor}: {errors:?}");
+    }
+}
+
+#[test]
 fn film_levels_off_in_a_rub_where_lcp_converges() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), &["rotor37-paper-light"]);

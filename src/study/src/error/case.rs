@@ -1,7 +1,7 @@
 //! What every scene of the study offers: its sizes, its steps, and a run of any competitor.
 
 use super::{
-    competitor::{Competitor, Family},
+    competitor::{Competitor, DEFAULT, Family, TOLERANT},
     run::{Run, Trace},
 };
 
@@ -49,6 +49,16 @@ pub trait Case {
 
     /// Internal steps per sample of the references: the product's, and the outside one's where the scene has one.
     fn reference_divisions(&self, size: usize) -> (u32, u32);
+
+    /// The first reference.
+    fn first(&self) -> Competitor {
+        DEFAULT
+    }
+
+    /// The method with adaptive steps, which solves the equations of its family.
+    fn tolerant(&self) -> Competitor {
+        TOLERANT
+    }
 
     /// The second reference, and the competitors at a size.
     fn second(&self) -> Competitor {

@@ -9,7 +9,7 @@ use tiprub_shell::{
 
 use super::{
     case::Case,
-    competitor::{Competitor, DEFAULT, FINEST, Family, TOLERANT},
+    competitor::{Competitor, FINEST, Family},
     run::{self, Trace},
 };
 
@@ -180,9 +180,9 @@ fn timed(repetitions: usize) -> f64 {
 fn of_references(case: &dyn Case, size: usize) -> f64 {
     let (division, outside) = case.reference_divisions(size);
     let second = if case.second_trace().is_some() { 0.0 } else { units(case, size, case.second(), outside) };
-    let own = units(case, size, DEFAULT, division);
-    let tolerant = case.competitors(size).contains(&TOLERANT);
-    let finest = if tolerant { units(case, size, TOLERANT, FINEST) } else { 0.0 };
+    let own = units(case, size, case.first(), division);
+    let tolerant = case.competitors(size).contains(&case.tolerant());
+    let finest = if tolerant { units(case, size, case.tolerant(), FINEST) } else { 0.0 };
     own * (1 + case.families(size).len()) as f64 + second + finest
 }
 
@@ -250,18 +250,20 @@ fn refer(case: &dyn Case, size: usize) -> Result<References> {
             )
         })
     };
-    let first = trace(DEFAULT, division)?;
+    let first = trace(case.first(), division)?;
     let second = case.second_trace().map_or_else(|| trace(case.second(), outside), Ok)?;
     // Equations that are refused at this size have no limit; their rows say why.
     let limits =
         case.families(size).into_iter().map(|family| Some((family, trace(family.reference(), division).ok()?)));
     let mut limits: Vec<(Family, Trace)> = limits.flatten().collect();
-    let tolerant = case.competitors(size).contains(&TOLERANT).then(|| trace(TOLERANT, FINEST).ok()).flatten();
+    let by_tolerance = case.tolerant();
+    let tolerant = case.competitors(size).contains(&by_tolerance).then(|| trace(by_tolerance, FINEST).ok()).flatten();
     let mut massless_apart = None;
     if let Some(finest) = tolerant {
-        let other = limits.iter().position(|limit| limit.0 == Family::MASSLESS).map(|index| limits.swap_remove(index));
+        let family = by_tolerance.family();
+        let other = limits.iter().position(|limit| limit.0 == family).map(|index| limits.swap_remove(index));
         massless_apart = other.map(|(_, other)| apart(&other, &finest));
-        limits.push((Family::MASSLESS, finest));
+        limits.push((family, finest));
     }
     Ok(References {
         apart: [apart(&second, &first), windows_apart(&second, &first, case.impulse_window())],

@@ -262,7 +262,7 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
              {:.1e} away.",
             case.title(),
             case.size_name(),
-            competitor::DEFAULT.name(),
+            case.first().name(),
             case.interval() / f64::from(case.reference_divisions(standard).0),
             case.second().name(),
             case.interval() / f64::from(case.reference_divisions(standard).1),
@@ -277,7 +277,7 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
         own.away(family)
             .map_or_else(String::new, |away| format!(" {what} tends to a limit of its own, {away:.1e} away."))
     };
-    let mut limits = away(Family::MASSLESS, "massless-boundary") + &away(Family::STICKING, "coulomb");
+    let mut limits = away(case.tolerant().family(), "massless-boundary") + &away(Family::STICKING, "coulomb");
     if let Some(apart) = own.massless_apart {
         limits.push_str(&format!(
             " galerkin tends to that of massless-boundary: two fine runs are {apart:.1e} apart. Every method is held against its own limit."
@@ -303,13 +303,16 @@ fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let mut all = meeting(case, found);
     all.extend(massless(case, found));
     all.extend(limits(case, found));
-    all.push(Statement {
-        expected: format!("{title}: lcp neither penetrates nor pulls at any internal step of any run"),
-        found: format!("deepest {deepest:.1e} m, least force {least:.1e} N in {} runs", ran.len()),
-        // The surface of a coating is there to be penetrated.
-        holds: (!case.is_coated())
-            .then(|| !ran.is_empty() && ran.iter().all(|one| one.penetration <= 0.0 && one.adhesion >= 0.0)),
-    });
+    let takes_part = found.rows.iter().any(|row| lcp.contains(&row.competitor));
+    all.extend(takes_part.then(|| {
+        Statement {
+            expected: format!("{title}: lcp neither penetrates nor pulls at any internal step of any run"),
+            found: format!("deepest {deepest:.1e} m, least force {least:.1e} N in {} runs", ran.len()),
+            // The surface of a coating is there to be penetrated.
+            holds: (!case.is_coated())
+                .then(|| !ran.is_empty() && ran.iter().all(|one| one.penetration <= 0.0 && one.adhesion >= 0.0)),
+        }
+    }));
     all.extend(ranking::floor(case, found));
     all.extend(window::statement(case));
     all
@@ -346,7 +349,7 @@ fn meeting(case: &dyn Case, found: &Measured) -> Vec<Statement> {
 /// What has no mass of the contact nodes tends to a limit of its own, which two schemes share.
 fn massless(case: &dyn Case, found: &Measured) -> Vec<Statement> {
     let (own, title) = (&found.references[case.standard()], case.title());
-    let Some(away) = own.away(Family::MASSLESS).filter(|_| Kind::of_steps(case) == Kind::OfOwn) else {
+    let Some(away) = own.away(case.tolerant().family()).filter(|_| Kind::of_steps(case) == Kind::OfOwn) else {
         return Vec::new();
     };
     let between = Statement::remark(

@@ -143,7 +143,7 @@ pub fn references(case: &dyn Case, found: &Measured) -> Table {
     let caption = format!(
         "{}: references, {} and {}, and what the number of {} leaves out",
         case.title(),
-        super::competitor::DEFAULT.name(),
+        case.first().name(),
         case.second().name(),
         case.size_name()
     );
@@ -165,7 +165,7 @@ pub fn references(case: &dyn Case, found: &Measured) -> Table {
             size.to_string(),
             displacements,
             impulses,
-            away(Family::MASSLESS),
+            away(case.tolerant().family()),
             own.massless_apart.map_or_else(|| "-".into(), |apart| format!("{apart:.1e}")),
             away(Family::STICKING),
             truncation,
@@ -209,7 +209,7 @@ pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
         "standard_size": case.sizes()[case.standard()],
         "window": case.interval() * case.samples() as f64,
         "references_apart": found.references.iter().map(|own| own.apart).collect::<Vec<_>>(),
-        "massless_boundary_away": found.references.iter().map(|own| own.away(Family::MASSLESS)).collect::<Vec<_>>(),
+        "massless_boundary_away": found.references.iter().map(|own| own.away(case.tolerant().family())).collect::<Vec<_>>(),
         "massless_apart": found.references.iter().map(|own| own.massless_apart).collect::<Vec<_>>(),
         "coulomb_away": found.references.iter().map(|own| own.away(Family::STICKING)).collect::<Vec<_>>(),
         "reference_from_truth": found.truncation,

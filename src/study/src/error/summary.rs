@@ -5,7 +5,7 @@ use tiprub_figure::table::Table;
 
 use super::{
     case::Case,
-    competitor::{Competitor, PAPER, TOLERANT},
+    competitor::{Competitor, PAPER},
     measure::{Figures, Measured, Row},
     ranking::{self, Kind, TARGETS, cheapest, that_tell},
 };
@@ -120,12 +120,13 @@ fn cells<'a>(
         None if readable.is_empty() => ["none".into(), "below the distance of the references".into()],
         None => ["none".into(), String::new()],
     };
-    let without = || if all.iter().any(|row| row.competitor == TOLERANT) { "not reached" } else { "-" }.to_owned();
+    let without =
+        || if all.iter().any(|row| row.competitor == case.tolerant()) { "not reached" } else { "-" }.to_owned();
     first
         .into_iter()
         .chain([
             any.map_or_else(String::new, time),
-            best(Some(TOLERANT)).map_or_else(without, time),
+            best(Some(case.tolerant())).map_or_else(without, time),
             paper.map_or_else(|| paper_misses(all), time),
             factor.unwrap_or_else(|| "-".into()),
         ])

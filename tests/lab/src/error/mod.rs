@@ -1,6 +1,7 @@
 //! Error against run time of built-in scenes and standard problems, beside methods that share nothing with the product.
 
 pub(crate) mod bars;
+mod belt;
 mod built_in;
 mod communication;
 pub(crate) mod cube;
@@ -14,6 +15,7 @@ pub(crate) mod stage;
 mod turning;
 
 use bars::Bars;
+use belt::Belt;
 use built_in::BuiltIn;
 use case::Case;
 use cube::Cube;
@@ -102,6 +104,7 @@ fn case_of(
         ErrorScene::StageCoarse => Ok(Box::new(stage::stage(quick, cache, console)?)),
         ErrorScene::Cube => Ok(Box::new(Cube::new(quick, cache, console)?)),
         ErrorScene::Carpenter => Ok(Box::new(Bars::carpenter(quick).map_err(never)?)),
+        ErrorScene::Belt => Ok(Box::new(Belt::new(quick))),
         ErrorScene::BouncingBar => Ok(Box::new(Bars::bouncing(quick).map_err(never)?)),
     }
 }
