@@ -166,6 +166,7 @@ pub fn limits(scenes: &[(&dyn Case, &Measured)]) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::competitor::TOLERANT;
 
     fn row(competitor: Competitor, step: f64, outcome: Result<f64, &str>) -> Row {
         let figures = |error: f64| Figures {
