@@ -15,7 +15,7 @@ pub struct SectorState {
     pub multipliers: Vec<f64>,
     /// Gaps of the nodes (m).
     pub gaps: Vec<f64>,
-    /// Normals of the nodes.
+    /// Normals of the nodes that push, for which their forces were found.
     pub normals: Vec<f64>,
     /// Slopes of the forces over the last step (N/s), where contacts may stick; else empty.
     pub slopes: Vec<f64>,

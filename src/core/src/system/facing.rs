@@ -378,9 +378,8 @@ impl Facing<'_> {
             let (place, motion) = (self.record.places[i][node], &motions[i]);
             let point = gap.contact_point(at, moved, place);
             self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
-            // Without friction it is what the normal has turned since the force was found: work of curvature, not heat.
-            let tangential: [f64; 3] =
-                std::array::from_fn(|c| if slides { force[c] - normal_force * normal[c] } else { 0.0 });
+            // By the normal for which the force was found: what it turned since then is work of curvature, not heat.
+            let tangential = if slides { trial.friction_force(i, node) } else { [0.0; 3] };
             let wrench = gap.wrench(at, point, force);
             let length = step.level.step
                 * if step.kind == Kind::Constant { f64::from(u8::from(i == 1)) } else { basis.weights[i] };

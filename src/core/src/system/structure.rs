@@ -51,9 +51,11 @@ pub struct Pace {
     pub level: Vec<u64>,
     /// Slopes of contact forces over the last step (N/s), `[row · lanes + lane]`.
     pub slopes: Vec<f64>,
+    /// Normals for which the contact forces were found, `[row · lanes + lane]`.
+    pub normals: Vec<f64>,
 }
 
-persist_fields!(Pace { bank, largest, level, slopes });
+persist_fields!(Pace { bank, largest, level, slopes, normals });
 
 impl Pace {
     fn new(sectors: usize, contacts: usize) -> Self {
@@ -62,6 +64,7 @@ impl Pace {
             largest: vec![0.0; sectors],
             level: vec![0; sectors],
             slopes: vec![0.0; 3 * contacts],
+            normals: vec![0.0; 3 * contacts],
         }
     }
 
@@ -195,7 +198,7 @@ impl Structure {
             let index = self.index(node, sector);
             state.multipliers[node] = self.history.multiplier[index];
             state.gaps[node] = self.history.gap.before[index];
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.history.geometry.before.normal_at(index));
+            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.three(&self.pace.normals, node, sector));
             state.forces[3 * node..3 * node + 3].copy_from_slice(&self.three(&self.history.force.now, node, sector));
         }
         for (row, slope) in state.slopes.iter_mut().enumerate() {
@@ -214,8 +217,9 @@ impl Structure {
             self.history.multiplier[index] = state.multipliers[node];
             self.lowest_in_span[index] = lowest(node);
             for component in 0..3 {
-                self.history.force.now[(3 * node + component) * self.lanes + sector] =
-                    state.forces[3 * node + component];
+                let (row, of_state) = ((3 * node + component) * self.lanes + sector, 3 * node + component);
+                self.history.force.now[row] = state.forces[of_state];
+                self.pace.normals[row] = state.normals[of_state];
             }
         }
     }
@@ -238,6 +242,7 @@ impl Structure {
         self.pace.largest.fill(0.0);
         self.pace.level.fill(0);
         self.pace.slopes.fill(0.0);
+        self.pace.normals.fill(0.0);
     }
 
     /// There was no step before: gaps and predictions are those of the start.

@@ -1,6 +1,6 @@
 //! Smallest clearances and largest forces of communication steps: those within internal steps, not only at their points.
 
-use super::{H, SECTORS, scene};
+use super::{H, SECTORS, run, scene};
 use tiprub_core::settings::{Scheme, Shape};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::disk::Disk;
@@ -75,5 +75,19 @@ fn extremes_do_not_depend_on_the_longest_step() {
             println!("{name}, {tolerance:e}: clearance off by {:.3} um, largest force by {force:.1e}", 1e6 * gap);
             assert!(gap < tolerance * GAP && force < 3.0 * tolerance, "{name}, {tolerance:e}: {gap:e} m, {force:e}");
         }
+    }
+}
+
+#[test]
+fn runs_with_friction_close_to_zero() {
+    let end = |friction: f64| {
+        let mut scene = scene(Scheme::Galerkin, H, 1e-2);
+        scene.settings.contacts[0].friction = friction;
+        run(&scene, |_, _| {})
+    };
+    let without = end(0.0);
+    for friction in [1e-300, 1e-12, 1e-9, 1e-8, 1e-7] {
+        let found = end(friction);
+        assert!((found.impulse / without.impulse - 1.0).abs() < 1e-3, "µ = {friction:e}");
     }
 }

@@ -42,6 +42,18 @@ impl Trial {
         if point == 0 { three(&self.begun.normals, node) } else { self.lane(&self.normals, point, node) }
     }
 
+    /// The unit normal for which its force was found: force − λ · normal is friction.
+    fn solved_normal(&self, point: usize, node: usize) -> [f64; 3] {
+        if point == 0 { three(&self.begun.normals, node) } else { self.lane(&self.solved_normals, point, node) }
+    }
+
+    /// Friction force on it (N).
+    pub fn friction_force(&self, point: usize, node: usize) -> [f64; 3] {
+        let (force, multiplier) = (self.force(point, node), self.multiplier(point, node));
+        let normal = self.solved_normal(point, node);
+        std::array::from_fn(|c| force[c] - multiplier * normal[c])
+    }
+
     /// Its displacement (m); at the start only where something pushes.
     pub fn displacement(&self, point: usize, node: usize) -> [f64; 3] {
         if point == 0 { three(&self.start, node) } else { self.lane(&self.moved, point, node) }
@@ -100,7 +112,9 @@ impl Trial {
     pub fn leave(&mut self, state: &mut SectorState) {
         let points = self.points();
         for node in 0..self.nodes() {
-            let (force, normal) = (self.force(points, node), self.normal(points, node));
+            let pushes = self.multiplier(points, node) > 0.0;
+            let normal = if pushes { self.solved_normal(points, node) } else { [0.0; 3] };
+            let force = self.force(points, node);
             state.forces[3 * node..3 * node + 3].copy_from_slice(&force);
             state.normals[3 * node..3 * node + 3].copy_from_slice(&normal);
             for (component, slope) in state.slopes.iter_mut().skip(3 * node).take(3).enumerate() {

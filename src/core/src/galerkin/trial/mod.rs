@@ -70,6 +70,8 @@ pub struct Trial {
     moved: Vec<f64>,
     gaps: Vec<f64>,
     normals: Vec<f64>,
+    /// Normals for which the forces were found: those of the displacements one pass earlier.
+    solved_normals: Vec<f64>,
     /// Gaps without the forces, linear from where they are; gaps with them.
     without: Vec<f64>,
     with: Vec<f64>,
@@ -123,7 +125,7 @@ struct FreeMotion {
     is_known: bool,
 }
 
-/// Forces, λ, gaps and normals of the nodes at the start.
+/// Forces, λ, gaps and normals (those for which the forces were found) of the nodes at the start.
 #[derive(Debug, Clone, PartialEq)]
 struct Contacts {
     forces: Vec<f64>,
@@ -158,6 +160,7 @@ impl Trial {
             moved: three(),
             gaps: width(),
             normals: three(),
+            solved_normals: three(),
             without: width(),
             with: width(),
             multipliers: width(),
@@ -391,6 +394,7 @@ impl Trial {
         obstacle: &mut impl Obstacle,
         verdict: &mut Verdict,
     ) -> bool {
+        self.keep_normals();
         if self.sticking.is_some() {
             return self.solve_sticking(compliance, obstacle, verdict);
         }
@@ -446,6 +450,12 @@ impl Trial {
             forces.zip(directions).for_each(|(force, (direction, value))| *force = direction * value);
         }
         true
+    }
+
+    /// Stores the normals for which forces are about to be found.
+    fn keep_normals(&mut self) {
+        let stride = 3 * self.lanes.width();
+        self.solved_normals[..stride].copy_from_slice(&self.normals[..stride]);
     }
 
     /// What modes with inertia move by at the points.

@@ -179,6 +179,7 @@ impl Trial {
     /// Forces that keep closed nodes closed, sticking ones in place and sliding ones rubbed.
     fn solve_steady(&mut self, own: &mut Steady, compliance: &Compliance, obstacle: &impl Obstacle) -> bool {
         let lanes = self.lanes;
+        self.keep_normals();
         self.members.clear();
         let closed = (0..lanes.len()).filter(|lane| own.status[lanes.place(*lane).1] != Status::Open);
         self.members.extend(closed);

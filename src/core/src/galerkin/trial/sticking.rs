@@ -222,9 +222,7 @@ impl Trial {
                 let terms = self.ways[point].iter().zip(&slips);
                 let slip =
                     terms.fold([0.0; 3], |sum, (weight, slip)| std::array::from_fn(|c| sum[c] + weight * slip[c]));
-                let (force, normal) = (self.force(point, node), self.normal(point, node));
-                let multiplier = self.multiplier(point, node);
-                let tangential: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
+                let tangential = self.friction_force(point, node);
                 own += dot(tangential, slip);
                 moved += dot(tangential, tangential).sqrt() * dot(pushed, pushed).sqrt();
             }
