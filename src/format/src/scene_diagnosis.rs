@@ -27,7 +27,7 @@ pub(crate) fn position(text: &str, offset: usize) -> (usize, usize) {
 }
 
 /// A key, table or value of the document. `fields` is the path without indices, as in [`FIELDS`].
-struct ClosestPoint<'a> {
+struct TomlNode<'a> {
     path: String,
     fields: String,
     span: Range<usize>,
@@ -76,26 +76,26 @@ impl<'a> Document<'a> {
         }
     }
 
-    fn places(&self) -> Vec<ClosestPoint<'a>> {
+    fn places(&self) -> Vec<TomlNode<'a>> {
         let mut places = Vec::new();
         collect_table(self.root, "", "", &mut places);
         places
     }
 
     /// The narrowest place that covers `span`; of equals the deepest.
-    fn covering(&self, span: &Range<usize>) -> Option<ClosestPoint<'a>> {
-        let covers = |place: &ClosestPoint| place.span.start <= span.start && span.end <= place.span.end;
+    fn covering(&self, span: &Range<usize>) -> Option<TomlNode<'a>> {
+        let covers = |place: &TomlNode| place.span.start <= span.start && span.end <= place.span.end;
         let candidates = self.places().into_iter().filter(covers);
         candidates.min_by_key(|place| (place.span.len(), std::cmp::Reverse(place.path.matches(['.', '[']).count())))
     }
 }
 
-fn collect_table<'a>(table: &'a DeTable<'a>, path: &str, fields: &str, places: &mut Vec<ClosestPoint<'a>>) {
+fn collect_table<'a>(table: &'a DeTable<'a>, path: &str, fields: &str, places: &mut Vec<TomlNode<'a>>) {
     for (key, value) in table {
         let name: &str = key.get_ref();
         let join = |head: &str| if head.is_empty() { name.to_owned() } else { format!("{head}.{name}") };
         let (path, fields) = (join(path), join(fields));
-        places.push(ClosestPoint {
+        places.push(TomlNode {
             path: path.clone(),
             fields: fields.clone(),
             span: key.span(),
@@ -105,8 +105,8 @@ fn collect_table<'a>(table: &'a DeTable<'a>, path: &str, fields: &str, places: &
     }
 }
 
-fn collect_value<'a>(value: &'a Spanned<DeValue<'a>>, path: &str, fields: &str, places: &mut Vec<ClosestPoint<'a>>) {
-    places.push(ClosestPoint { path: path.into(), fields: fields.into(), span: value.span(), value: value.get_ref() });
+fn collect_value<'a>(value: &'a Spanned<DeValue<'a>>, path: &str, fields: &str, places: &mut Vec<TomlNode<'a>>) {
+    places.push(TomlNode { path: path.into(), fields: fields.into(), span: value.span(), value: value.get_ref() });
     match value.get_ref() {
         DeValue::Table(table) => collect_table(table, path, fields, places),
         DeValue::Array(array) => {
@@ -139,7 +139,7 @@ pub(crate) fn diagnose(document: &Document, error: &toml::de::Error) -> Error {
     wrong_value(document, place, message)
 }
 
-fn missing(document: &Document, place: Option<ClosestPoint>, name: &str) -> Error {
+fn missing(document: &Document, place: Option<TomlNode>, name: &str) -> Error {
     let (path, fields) = place.as_ref().map_or(("", ""), |place| (&place.path, &place.fields));
     let join = |head: &str| if head.is_empty() { name.to_owned() } else { format!("{head}.{name}") };
     let remedy = match FIELDS.iter().find(|field| field.path == join(fields)) {
@@ -149,7 +149,7 @@ fn missing(document: &Document, place: Option<ClosestPoint>, name: &str) -> Erro
     document.error(place.as_ref().map(|place| place.span.clone()), &join(path), "missing".into(), remedy)
 }
 
-fn unknown_key(document: &Document, place: &ClosestPoint, name: &str, accepted: &[&str]) -> Error {
+fn unknown_key(document: &Document, place: &TomlNode, name: &str, accepted: &[&str]) -> Error {
     // The span is that of the key itself, or (in `shape`) that of the table which holds it.
     let is_key = place.path.rsplit('.').next() == Some(name);
     let path = if is_key { place.path.clone() } else { format!("{}.{name}", place.path) };
@@ -164,7 +164,7 @@ fn unknown_key(document: &Document, place: &ClosestPoint, name: &str, accepted: 
     document.error(span.or(Some(place.span.clone())), &path, "unknown key".into(), remedy)
 }
 
-fn wrong_value(document: &Document, place: ClosestPoint, message: &str) -> Error {
+fn wrong_value(document: &Document, place: TomlNode, message: &str) -> Error {
     let rest = message.strip_prefix("invalid type: ").or(message.strip_prefix("invalid value: "));
     let (found, expected) = rest.and_then(|rest| rest.rsplit_once(", expected ")).unzip();
     let place = match found {
@@ -201,7 +201,7 @@ pub(crate) fn check_brackets(document: &Document) -> Result<(), Error> {
         return Err(document.error(Some(key.span()), name, problem, format!("Write {}", header(name))));
     }
     let example =
-        |place: &ClosestPoint| INNER_TABLES.iter().find(|(table, _)| place.fields == *table).map(|(_, text)| *text);
+        |place: &TomlNode| INNER_TABLES.iter().find(|(table, _)| place.fields == *table).map(|(_, text)| *text);
     match document.places().into_iter().find(|place| example(place).is_some() && !place.value.is_table()) {
         Some(place) => {
             let problem = format!("{} found, a table expected", place.value.type_str());
@@ -213,7 +213,7 @@ pub(crate) fn check_brackets(document: &Document) -> Result<(), Error> {
 }
 
 /// The first value below `path` that the library would describe as `found`.
-fn culprit<'a>(document: &Document<'a>, path: &str, found: &str) -> Option<ClosestPoint<'a>> {
+fn culprit<'a>(document: &Document<'a>, path: &str, found: &str) -> Option<TomlNode<'a>> {
     let below = format!("{path}.");
     document
         .places()

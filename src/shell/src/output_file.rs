@@ -48,8 +48,8 @@ pub fn try_directory(path: &Path) -> Result<()> {
 /// As [`begin`].
 pub fn try_target(target: &Path) -> Result<()> {
     match place(target)? {
-        ClosestPoint::File(path) => try_directory(&parent(&path)),
-        ClosestPoint::Stream => Ok(()),
+        OutputTarget::File(path) => try_directory(&parent(&path)),
+        OutputTarget::Stream => Ok(()),
     }
 }
 
@@ -59,32 +59,32 @@ pub fn try_target(target: &Path) -> Result<()> {
 /// What is there is no file.
 pub fn only_a_file(target: &Path) -> Result<()> {
     match place(target)? {
-        ClosestPoint::File(_) => Ok(()),
-        ClosestPoint::Stream => Err(Failure::new(target.display(), "is a pipe or a device, not a file", "Remove it")),
+        OutputTarget::File(_) => Ok(()),
+        OutputTarget::Stream => Err(Failure::new(target.display(), "is a pipe or a device, not a file", "Remove it")),
     }
 }
 
 /// What already is under the name of a target.
-enum ClosestPoint {
+enum OutputTarget {
     /// Nothing, or a file to replace, at this path (symbolic links resolved).
     File(PathBuf),
     /// Something that takes bytes but is no file: a device or a pipe.
     Stream,
 }
 
-fn place(target: &Path) -> Result<ClosestPoint> {
+fn place(target: &Path) -> Result<OutputTarget> {
     let path = destination(target).map_err(|error| Failure::file(target, "cannot be written", &error))?;
     let is_directory = || Failure::new(target.display(), "is a directory", "Name a file");
     match fs::metadata(&path) {
         Ok(metadata) if metadata.is_dir() => Err(is_directory()),
-        Ok(metadata) if metadata.is_file() => Ok(ClosestPoint::File(path)),
-        Ok(_) => Ok(ClosestPoint::Stream),
+        Ok(metadata) if metadata.is_file() => Ok(OutputTarget::File(path)),
+        Ok(_) => Ok(OutputTarget::Stream),
         Err(error) if error.kind() == io::ErrorKind::NotFound => match path.file_name() {
-            Some(_) if !target.as_os_str().as_encoded_bytes().ends_with(b"/") => Ok(ClosestPoint::File(path)),
+            Some(_) if !target.as_os_str().as_encoded_bytes().ends_with(b"/") => Ok(OutputTarget::File(path)),
             _ => Err(is_directory()),
         },
         // A file where a directory should be: said by whoever makes the directory.
-        Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(ClosestPoint::File(path)),
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(OutputTarget::File(path)),
         Err(error) => Err(Failure::file(target, "cannot be written", &error)),
     }
 }
@@ -189,13 +189,13 @@ fn link(_file: &File, _path: &Path) -> io::Result<()> {
 pub fn begin(target: &Path) -> Result<Draft> {
     let place = place(target)?;
     let directory = match &place {
-        ClosestPoint::File(path) => parent(path),
-        ClosestPoint::Stream => std::env::temp_dir(),
+        OutputTarget::File(path) => parent(path),
+        OutputTarget::Stream => std::env::temp_dir(),
     };
     create_directory(&directory)?;
     let draft = Draft::new(&directory).and_then(|draft| match &place {
-        ClosestPoint::File(path) => keep_permissions(&draft.file, path).map(|()| draft),
-        ClosestPoint::Stream => Ok(draft),
+        OutputTarget::File(path) => keep_permissions(&draft.file, path).map(|()| draft),
+        OutputTarget::Stream => Ok(draft),
     });
     draft.map_err(|error| Failure::file(target, "cannot write there", &error))
 }
@@ -213,7 +213,7 @@ fn keep_permissions(file: &File, target: &Path) -> io::Result<()> {
 /// # Errors
 /// The rename failed, and the temporary file is gone and an older target untouched; or a device or pipe took only a part.
 pub fn persist(draft: Draft, target: &Path) -> Result<()> {
-    let ClosestPoint::File(path) = place(target)? else { return copy_into_stream(draft, target) };
+    let OutputTarget::File(path) = place(target)? else { return copy_into_stream(draft, target) };
     let named = draft.name(&parent(&path));
     let renamed = named.and_then(|named| named.persist(path).map_err(|error| error.error));
     renamed.map_err(|error| Failure::file(target, "cannot be put in place", &error))

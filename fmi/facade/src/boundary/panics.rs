@@ -10,10 +10,10 @@ use std::sync::Once;
 
 /// Where the last panic of a thread happened: the end of the file's path, its length, the line. Without a destructor, so
 /// that the library can be unloaded while threads that used it live on.
-type ClosestPoint = ([u8; 48], usize, u32);
+type PanicPlace = ([u8; 48], usize, u32);
 
 thread_local! {
-    static PLACE: Cell<ClosestPoint> = const { Cell::new(([0; 48], 0, 0)) };
+    static PLACE: Cell<PanicPlace> = const { Cell::new(([0; 48], 0, 0)) };
 }
 
 static HOOK: Once = Once::new();

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::Axis;
-use super::source::ClosestPoint;
+use super::source::SourceLine;
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
 use crate::{Error, Result};
@@ -20,7 +20,7 @@ pub(super) struct DraftElement {
     /// Index of the material, where one is known.
     pub material: Option<usize>,
     /// Where it stands.
-    pub place: ClosestPoint,
+    pub place: SourceLine,
 }
 
 /// A mesh as read.
@@ -59,7 +59,7 @@ pub(super) struct Numbered {
 
 impl Draft {
     /// Add a node. The same number may come again with the same coordinates.
-    pub(crate) fn add_node(&mut self, number: u64, position: [f64; 3], place: &dyn Fn() -> ClosestPoint) -> Result<()> {
+    pub(crate) fn add_node(&mut self, number: u64, position: [f64; 3], place: &dyn Fn() -> SourceLine) -> Result<()> {
         if let Some(&index) = self.index.get(&number) {
             if self.positions[index].map(f64::to_bits) == position.map(f64::to_bits) {
                 return Ok(());

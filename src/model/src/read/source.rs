@@ -8,20 +8,20 @@ use crate::{Error, Result};
 
 /// A line of a file, for messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct ClosestPoint {
+pub(super) struct SourceLine {
     /// Name of the file, as it was asked for.
     pub file: Arc<str>,
     /// Line, from 1.
     pub line: usize,
 }
 
-impl fmt::Display for ClosestPoint {
+impl fmt::Display for SourceLine {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{}:{}", self.file, self.line)
     }
 }
 
-impl ClosestPoint {
+impl SourceLine {
     /// What is wrong here, and what to do about it.
     pub(super) fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         Error::Read { place: self.to_string(), problem: problem.into(), remedy: remedy.into() }

@@ -14,7 +14,7 @@ use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
 
 /// A place of the lattice: row, column and layer, doubled, so that the middles of edges have whole numbers.
-pub(super) type ClosestPoint = [usize; 3];
+pub(super) type LatticeIndex = [usize; 3];
 
 /// The lattice with the numbers of its parts.
 pub(super) struct Lattice<'a> {
@@ -62,7 +62,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// Elements as places, from a row outwards.
-    fn prisms(&self, first_row: usize) -> Vec<Vec<ClosestPoint>> {
+    fn prisms(&self, first_row: usize) -> Vec<Vec<LatticeIndex>> {
         let mut prisms = Vec::new();
         for row in first_row..self.rows() {
             let [columns, layers] = self.extent(row);
@@ -94,7 +94,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// Places of a prism's nodes in the order of its kind.
-    fn prism(&self, corners: [[usize; 2]; 3], layer: usize) -> Vec<ClosestPoint> {
+    fn prism(&self, corners: [[usize; 2]; 3], layer: usize) -> Vec<LatticeIndex> {
         let end = |layer: usize| corners.map(|[row, column]| [2 * row, 2 * column, 2 * layer]);
         let mut places = [end(layer), end(layer + 1)].concat();
         if self.kind == ElementKind::Penta15 {
@@ -106,10 +106,10 @@ impl<'a> Lattice<'a> {
 
     fn mesh(&self, first_row: usize) -> Result<SectorMesh> {
         let prisms = self.prisms(first_row);
-        let places: BTreeSet<ClosestPoint> = prisms.iter().flatten().copied().collect();
-        let numbers: BTreeMap<ClosestPoint, usize> =
+        let places: BTreeSet<LatticeIndex> = prisms.iter().flatten().copied().collect();
+        let numbers: BTreeMap<LatticeIndex, usize> =
             places.iter().enumerate().map(|(number, place)| (*place, number)).collect();
-        let element = |places: &Vec<ClosestPoint>| Element {
+        let element = |places: &Vec<LatticeIndex>| Element {
             kind: self.kind,
             nodes: places.iter().map(|place| numbers[place]).collect(),
         };
@@ -118,11 +118,11 @@ impl<'a> Lattice<'a> {
             elements: prisms.iter().map(element).collect(),
             sets: BTreeMap::new(),
         };
-        let numbered = |wanted: &dyn Fn(ClosestPoint) -> bool| -> Vec<usize> {
+        let numbered = |wanted: &dyn Fn(LatticeIndex) -> bool| -> Vec<usize> {
             numbers.iter().filter(|(place, _)| wanted(**place)).map(|(_, &number)| number).collect()
         };
         let [blade_columns, blade_layers] = self.extent(self.hub).map(|range| 2 * range.start..=2 * range.end);
-        let of_blade = |[row, column, layer]: ClosestPoint| {
+        let of_blade = |[row, column, layer]: LatticeIndex| {
             row >= 2 * self.hub && blade_columns.contains(&column) && blade_layers.contains(&layer)
         };
         let layers = self.counts.layers();

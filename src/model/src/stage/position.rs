@@ -1,7 +1,7 @@
 //! Where the places of a sector's lattice lie.
 
 use super::geometry::CamberPoint;
-use super::lattice::{ClosestPoint, Lattice};
+use super::lattice::{LatticeIndex, Lattice};
 
 /// Linear between two values.
 fn mix(from: f64, to: f64, share: f64) -> f64 {
@@ -23,7 +23,7 @@ fn real(number: usize) -> f64 {
 
 impl Lattice<'_> {
     /// Cartesian coordinates of a place (m).
-    pub(super) fn position(&self, [row, column, layer]: ClosestPoint) -> [f64; 3] {
+    pub(super) fn position(&self, [row, column, layer]: LatticeIndex) -> [f64; 3] {
         let [row, column, layer] = [row, column, layer].map(|doubled| 0.5 * real(doubled));
         let radius = self.radius(row);
         let [z, theta] = if row > real(self.hub) {

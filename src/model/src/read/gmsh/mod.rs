@@ -14,7 +14,7 @@ use elements::{GmshElement, gmsh_element};
 use numbers::Numbers;
 
 use super::draft::{Draft, DraftElement};
-use super::source::{ClosestPoint, about};
+use super::source::{SourceLine, about};
 use crate::Result;
 
 /// A geometric entity: dimension and tag.
@@ -100,7 +100,7 @@ impl<'a> Sections<'a> {
 
     fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> crate::Error {
         // The line just taken.
-        ClosestPoint { file: Arc::clone(&self.file), line: (self.line - 1).max(1) }.error(problem, remedy)
+        SourceLine { file: Arc::clone(&self.file), line: (self.line - 1).max(1) }.error(problem, remedy)
     }
 
     fn rest(&self) -> &'a [u8] {
@@ -156,7 +156,7 @@ impl<'a> Sections<'a> {
         }
         match core::str::from_utf8(inside) {
             Ok(rest) => Ok(Some((name, Numbers::Text { file, rest, line }))),
-            Err(_) => Err(ClosestPoint { file, line }.error(format!("${name} is not text"), "Write the mesh again")),
+            Err(_) => Err(SourceLine { file, line }.error(format!("${name} is not text"), "Write the mesh again")),
         }
     }
 }

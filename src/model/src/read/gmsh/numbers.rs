@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::source::ClosestPoint;
+use super::super::source::SourceLine;
 use crate::{Error, Result};
 
 /// Where the numbers of one section come from.
@@ -19,7 +19,7 @@ impl<'a> Numbers<'a> {
     pub(super) fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         match self {
             Self::Text { file, line, .. } => {
-                ClosestPoint { file: Arc::clone(file), line: *line }.error(problem, remedy)
+                SourceLine { file: Arc::clone(file), line: *line }.error(problem, remedy)
             }
             Self::Bytes { file, offset, .. } => {
                 Error::Read { place: format!("{file}, byte {offset}"), problem: problem.into(), remedy: remedy.into() }
@@ -28,10 +28,10 @@ impl<'a> Numbers<'a> {
     }
 
     /// Where we are, as a place for later messages.
-    pub(super) fn place(&self) -> ClosestPoint {
+    pub(super) fn place(&self) -> SourceLine {
         match self {
-            Self::Text { file, line, .. } => ClosestPoint { file: Arc::clone(file), line: *line },
-            Self::Bytes { file, offset, .. } => ClosestPoint { file: format!("{file}, byte").into(), line: *offset },
+            Self::Text { file, line, .. } => SourceLine { file: Arc::clone(file), line: *line },
+            Self::Bytes { file, offset, .. } => SourceLine { file: format!("{file}, byte").into(), line: *offset },
         }
     }
 

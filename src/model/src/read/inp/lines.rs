@@ -5,7 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::super::source::{ClosestPoint, Open, beside, text_of};
+use super::super::source::{SourceLine, Open, beside, text_of};
 use crate::Result;
 
 /// Files included within each other at most this deep, and this many in all.
@@ -25,7 +25,7 @@ pub(super) struct Card {
     /// Name in upper case without blanks, and value as written, if any.
     pub parameters: Vec<(String, Option<String>)>,
     /// Where the keyword stands.
-    pub place: ClosestPoint,
+    pub place: SourceLine,
     /// Data lines without comments and empty ones.
     pub data: Vec<DataLine>,
 }
@@ -36,7 +36,7 @@ pub(super) struct DataLine {
     /// The line without blanks around it.
     pub text: String,
     /// Where it stands.
-    pub place: ClosestPoint,
+    pub place: SourceLine,
 }
 
 impl DataLine {
@@ -109,7 +109,7 @@ struct Reader<'a> {
     known: HashSet<u64>,
     /// Bytes of files whose contents were included before.
     repeated: usize,
-    before_first_keyword: Option<ClosestPoint>,
+    before_first_keyword: Option<SourceLine>,
 }
 
 impl Reader<'_> {
@@ -117,10 +117,10 @@ impl Reader<'_> {
         let (text, name) = (text_of(bytes), Arc::from(path.display().to_string()));
         self.active.push(path);
         // A keyword line that ends with a comma goes on in the next line.
-        let mut keyword: Option<(String, ClosestPoint)> = None;
+        let mut keyword: Option<(String, SourceLine)> = None;
         for (index, line) in text.lines().enumerate() {
             let line = line.trim();
-            let place = ClosestPoint { file: Arc::clone(&name), line: index + 1 };
+            let place = SourceLine { file: Arc::clone(&name), line: index + 1 };
             if line.starts_with("**") || line.is_empty() {
                 continue;
             }
@@ -140,14 +140,14 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn data(&mut self, line: &str, place: ClosestPoint) {
+    fn data(&mut self, line: &str, place: SourceLine) {
         match self.cards.last_mut() {
             Some(card) => card.data.push(DataLine { text: line.to_owned(), place }),
             None => _ = self.before_first_keyword.get_or_insert(place),
         }
     }
 
-    fn keyword(&mut self, line: Option<(String, ClosestPoint)>) -> Result<()> {
+    fn keyword(&mut self, line: Option<(String, SourceLine)>) -> Result<()> {
         let Some((text, place)) = line else { return Ok(()) };
         let mut parts = text.split(',');
         let words: Vec<String> = parts.next().unwrap_or("").split_whitespace().map(str::to_uppercase).collect();
@@ -171,7 +171,7 @@ impl Reader<'_> {
         self.open_beside(&written, &card.place)
     }
 
-    fn open_beside(&mut self, written: &str, place: &ClosestPoint) -> Result<()> {
+    fn open_beside(&mut self, written: &str, place: &SourceLine) -> Result<()> {
         let current = self.active.last().cloned().unwrap_or_default();
         let path = beside(&current, written);
         self.count += 1;

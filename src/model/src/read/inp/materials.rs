@@ -1,6 +1,6 @@
 //! Isotropic elastic materials, with tables over temperature.
 
-use super::super::source::{ClosestPoint, number};
+use super::super::source::{SourceLine, number};
 use super::lines::Card;
 use crate::Result;
 use crate::material::Material;
@@ -9,14 +9,14 @@ use crate::material::Material;
 #[derive(Debug)]
 struct Table<const N: usize> {
     rows: Vec<([f64; N], Option<f64>)>,
-    place: ClosestPoint,
+    place: SourceLine,
 }
 
 /// A material as read, in the file's units.
 #[derive(Debug)]
 pub(super) struct DeckMaterial {
     name: String,
-    place: ClosestPoint,
+    place: SourceLine,
     elastic: Option<Table<2>>,
     density: Option<Table<1>>,
     expansion: Option<Table<1>>,

@@ -18,7 +18,7 @@ use sets::Sets;
 use vocabulary::{ElementType, Unread, element_type, unread};
 
 use super::draft::{Draft, DraftElement};
-use super::source::{ClosestPoint, Open, number};
+use super::source::{SourceLine, Open, number};
 use crate::Result;
 use crate::material::Material;
 
@@ -46,7 +46,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], temperature: Option<f64>, open: Op
 struct Section {
     set: String,
     material: String,
-    place: ClosestPoint,
+    place: SourceLine,
 }
 
 #[derive(Debug, Default)]

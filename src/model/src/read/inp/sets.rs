@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::draft::Draft;
-use super::super::source::ClosestPoint;
+use super::super::source::SourceLine;
 use super::lines::Card;
 use crate::Result;
 
@@ -16,10 +16,10 @@ pub(super) fn local_name(name: &str) -> &str {
 enum Member {
     Number(u64),
     /// A number written in a set of its own, which must exist.
-    Written(u64, ClosestPoint),
+    Written(u64, SourceLine),
     /// First, last, increment; what does not exist in between is not missed.
     Range(u64, u64, u64),
-    Set(String, ClosestPoint),
+    Set(String, SourceLine),
 }
 
 /// Sets of one kind by name, in upper case.
@@ -81,7 +81,7 @@ impl Family {
     }
 
     /// Numbers of the members of a set that exist.
-    pub(super) fn members(&self, set: &str, place: &ClosestPoint, draft: &Draft) -> Result<BTreeSet<u64>> {
+    pub(super) fn members(&self, set: &str, place: &SourceLine, draft: &Draft) -> Result<BTreeSet<u64>> {
         let every: Vec<u64> = draft.elements.iter().map(|element| element.number).collect();
         self.resolve(local_name(set), place, &every, &|number| !draft.nodes_of(number).is_empty())
     }
@@ -89,7 +89,7 @@ impl Family {
     fn resolve(
         &self,
         set: &str,
-        place: &ClosestPoint,
+        place: &SourceLine,
         every: &[u64],
         exists: &dyn Fn(u64) -> bool,
     ) -> Result<BTreeSet<u64>> {
@@ -131,7 +131,7 @@ impl Family {
 impl Sets {
     /// Every node set, and every element set as the set of its nodes.
     pub(crate) fn into_node_sets(self, draft: &mut Draft) -> Result<()> {
-        let nowhere = ClosestPoint { file: "".into(), line: 0 };
+        let nowhere = SourceLine { file: "".into(), line: 0 };
         let mut node_sets = BTreeMap::new();
         for name in self.elements.sets.keys() {
             let members = self.elements.members(name, &nowhere, draft)?;

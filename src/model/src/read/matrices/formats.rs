@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::entries::Entries;
-use super::super::source::{ClosestPoint, about, number, text_of};
+use super::super::source::{SourceLine, about, number, text_of};
 use crate::Result;
 
 /// What the rows of a matrix are.
@@ -34,7 +34,7 @@ pub(super) fn read_matrix(path: &Path, bytes: &[u8]) -> Result<RawMatrix> {
     let lines = text
         .lines()
         .enumerate()
-        .map(|(index, line)| (line.trim(), ClosestPoint { file: Arc::clone(&file), line: index + 1 }));
+        .map(|(index, line)| (line.trim(), SourceLine { file: Arc::clone(&file), line: index + 1 }));
     if text.starts_with("%%MatrixMarket") {
         return matrix_market(path, lines);
     }
@@ -58,13 +58,13 @@ fn values(line: &str) -> impl Iterator<Item = &str> {
     line.split([',', ' ', '\t']).filter(|value| !value.is_empty())
 }
 
-fn wrong_line(line: &str, place: &ClosestPoint, wanted: &str) -> crate::Error {
+fn wrong_line(line: &str, place: &SourceLine, wanted: &str) -> crate::Error {
     place.error(format!("`{line}` is not {wanted}"), "Correct the line, or write the matrix again")
 }
 
 /// NIST, Matrix Market exchange formats: coordinate format.
-fn matrix_market<'a>(path: &Path, mut lines: impl Iterator<Item = (&'a str, ClosestPoint)>) -> Result<RawMatrix> {
-    let (header, place) = lines.next().unwrap_or(("", ClosestPoint { file: "".into(), line: 0 }));
+fn matrix_market<'a>(path: &Path, mut lines: impl Iterator<Item = (&'a str, SourceLine)>) -> Result<RawMatrix> {
+    let (header, place) = lines.next().unwrap_or(("", SourceLine { file: "".into(), line: 0 }));
     let words: Vec<String> = header.split_whitespace().skip(1).map(str::to_lowercase).collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let symmetric = match words.as_slice() {
@@ -114,7 +114,7 @@ fn matrix_market<'a>(path: &Path, mut lines: impl Iterator<Item = (&'a str, Clos
 }
 
 /// ROW COLUMN VALUE, rows and columns from 1.
-fn entry(line: &str, place: &ClosestPoint) -> Result<(usize, usize, f64)> {
+fn entry(line: &str, place: &SourceLine) -> Result<(usize, usize, f64)> {
     let mut fields = values(line);
     let (row, column, value, rest) = (fields.next(), fields.next(), fields.next(), fields.next());
     let index = |text: Option<&str>| text.and_then(|text| text.parse::<usize>().ok()).filter(|&index| index >= 1);
@@ -126,7 +126,7 @@ fn entry(line: &str, place: &ClosestPoint) -> Result<(usize, usize, f64)> {
     }
 }
 
-fn counted<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, ClosestPoint)>) -> Result<RawMatrix> {
+fn counted<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, SourceLine)>) -> Result<RawMatrix> {
     let items = lines.map(|(line, place)| entry(line, &place)).collect::<Result<Vec<_>>>()?;
     let order = items.iter().map(|entry| entry.0.max(entry.1) + 1).max().unwrap_or(0);
     if order > 3 * items.len() {
@@ -155,7 +155,7 @@ fn check_repeated(path: &Path, items: &[(usize, usize, f64)], name: impl Fn(usiz
 }
 
 /// NODE, DOF, NODE, DOF, VALUE.
-fn named<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, ClosestPoint)>) -> Result<RawMatrix> {
+fn named<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, SourceLine)>) -> Result<RawMatrix> {
     let (mut labels, mut index, mut entries) = (Vec::new(), HashMap::new(), Entries::default());
     for (line, place) in lines {
         let fields: Vec<&str> = values(line).collect();
@@ -192,7 +192,7 @@ pub(super) fn read_dofs(path: &Path, bytes: &[u8]) -> Result<Vec<(u64, u64)>> {
         text.lines().enumerate().map(|(index, line)| (index + 1, line.trim())).filter(|(_, line)| !line.is_empty());
     let dof = |(line, text): (usize, &str)| {
         let parts = text.split_once('.').and_then(|(node, dof)| Some((node.parse().ok()?, dof.parse().ok()?)));
-        parts.ok_or_else(|| wrong_line(text, &ClosestPoint { file: Arc::clone(&file), line }, "NODE.DOF"))
+        parts.ok_or_else(|| wrong_line(text, &SourceLine { file: Arc::clone(&file), line }, "NODE.DOF"))
     };
     let dofs: Vec<(u64, u64)> = lines.map(dof).collect::<Result<_>>()?;
     let mut sorted = dofs.clone();

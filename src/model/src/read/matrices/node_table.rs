@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use super::super::source::{ClosestPoint, about, number, open_file, text_of};
+use super::super::source::{SourceLine, about, number, open_file, text_of};
 use super::super::{Axis, Units, mesh_file};
 use crate::Result;
 
@@ -61,7 +61,7 @@ fn of_table(path: &Path, text: &str) -> Result<NodeTable> {
     let mut table = NodeTable { numbers: Vec::new(), positions: Vec::new(), sets: BTreeMap::new(), notes: Vec::new() };
     let mut seen = BTreeSet::new();
     for (index, line) in text.lines().map(str::trim).enumerate() {
-        let place = || ClosestPoint { file: Arc::clone(&file), line: index + 1 };
+        let place = || SourceLine { file: Arc::clone(&file), line: index + 1 };
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
