@@ -2,18 +2,18 @@
 
 use std::path::Path;
 
-use tiprub_core::simulation::Courses;
+use tiprub_core::simulation::InputCourses;
 use tiprub_core::{Result, Simulation, Warning};
-use tiprub_fmi_facade::{Loaded, Unit};
+use tiprub_fmi_facade::{CoSimulationUnit, Loaded};
 
 /// A compiled scene.
-struct Rub(Simulation);
+struct RubUnit(Simulation);
 
 /// The scene of the resources, compiled.
 pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
     let loaded = tiprub_format::load_resources(resources).map_err(|error| error.to_string())?;
     let scene = loaded.scene;
-    let unit = move || -> Result<Box<dyn Unit>> { Ok(Box::new(Rub(Simulation::new(&scene)?))) };
+    let unit = move || -> Result<Box<dyn CoSimulationUnit>> { Ok(Box::new(RubUnit(Simulation::new(&scene)?))) };
     Ok(Loaded {
         unit: Box::new(unit),
         token: loaded.token,
@@ -22,8 +22,8 @@ pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
     })
 }
 
-impl Unit for Rub {
-    tiprub_fmi_facade::delegate!(Courses);
+impl CoSimulationUnit for RubUnit {
+    tiprub_fmi_facade::delegate!(InputCourses);
 
     fn warnings(&self) -> &[Warning] {
         self.0.warnings()

@@ -6,13 +6,13 @@ use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 use crate::text::clean;
 
 /// An XML element without text content: model descriptions have attributes only.
-pub(crate) struct Element {
+pub(crate) struct XmlElement {
     name: &'static str,
     attributes: Vec<(&'static str, String)>,
-    children: Vec<Element>,
+    children: Vec<XmlElement>,
 }
 
-impl Element {
+impl XmlElement {
     pub(crate) fn new(name: &'static str) -> Self {
         Self { name, attributes: Vec::new(), children: Vec::new() }
     }
@@ -36,12 +36,12 @@ impl Element {
         self.with_some(key, (!value.is_empty()).then_some(value))
     }
 
-    pub(crate) fn child(mut self, child: Element) -> Self {
+    pub(crate) fn child(mut self, child: XmlElement) -> Self {
         self.children.push(child);
         self
     }
 
-    pub(crate) fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
+    pub(crate) fn children(mut self, children: impl IntoIterator<Item = XmlElement>) -> Self {
         self.children.extend(children);
         self
     }

@@ -1,14 +1,14 @@
 //! What stands beside `modelDescription.xml`: terminals of FMI 3.0, and the list of related files of FMI-LS-REF.
 
 use crate::Description;
-use crate::element::Element;
-use crate::row::{Row, rows};
+use crate::element::XmlElement;
+use crate::row::{DescribedVariable, rows};
 
 /// Member of a terminal: its name there, the variable's name without prefix and index, kind (FMI 3.0, section 2.4.9.2.2).
-type Member = (&'static str, &'static str, &'static str);
+type TerminalMember = (&'static str, &'static str, &'static str);
 
 /// Terminal, its text, its members. Forces, torques and heat go out of the unit: they act on what is connected.
-type Terminal = (&'static str, &'static str, &'static [Member]);
+type Terminal = (&'static str, &'static str, &'static [TerminalMember]);
 
 /// Of each rotor.
 const TERMINALS: [Terminal; 2] = [
@@ -74,25 +74,30 @@ pub fn fmi3_terminals(description: &Description) -> Option<String> {
         let turns = rows.iter().any(|row| row.name == format!("{prefix}speed"));
         TERMINALS.iter().filter(|_| turns).filter_map(port).chain(patches).collect::<Vec<_>>()
     };
-    let terminals = Element::new("Terminals").children(prefixes.iter().flat_map(of_prefix)).unless_empty()?;
-    Some(Element::new("fmiTerminalsAndIcons").with("fmiVersion", "3.0").child(terminals).document())
+    let terminals = XmlElement::new("Terminals").children(prefixes.iter().flat_map(of_prefix)).unless_empty()?;
+    Some(XmlElement::new("fmiTerminalsAndIcons").with("fmiVersion", "3.0").child(terminals).document())
 }
 
 /// A terminal with those members that the scene has; a single one connects nothing.
-fn terminal_of(rows: &[Row], (name, text, members): &Terminal, prefix: &str, index: Option<&str>) -> Option<Element> {
+fn terminal_of(
+    rows: &[DescribedVariable],
+    (name, text, members): &Terminal,
+    prefix: &str,
+    index: Option<&str>,
+) -> Option<XmlElement> {
     let suffix = index.map_or(String::new(), |index| format!("[{index}]"));
-    let member = |(name, base, kind): &Member| {
+    let member = |(name, base, kind): &TerminalMember| {
         let variable = format!("{prefix}{base}{suffix}");
         rows.iter().any(|row| row.name == variable).then(|| {
-            Element::new("TerminalMemberVariable")
+            XmlElement::new("TerminalMemberVariable")
                 .with("variableName", variable)
                 .with("memberName", name)
                 .with("variableKind", kind)
         })
     };
-    let members: Vec<Element> = members.iter().filter_map(member).collect();
+    let members: Vec<XmlElement> = members.iter().filter_map(member).collect();
     (members.len() > 1).then(|| {
-        Element::new("Terminal")
+        XmlElement::new("Terminal")
             .with("name", format!("{prefix}{name}{suffix}"))
             .with("matchingRule", "bus")
             .with("description", text)
@@ -114,13 +119,13 @@ fn parts(name: &str) -> (&str, &str, Option<&str>) {
 /// (`related`: path from its root, MIME type, role, description) is what.
 pub fn references_manifest(related: &[(&str, &str, &str, &str)]) -> String {
     let file = |(path, kind, role, text): &(&str, &str, &str, &str)| {
-        Element::new("Related")
+        XmlElement::new("Related")
             .with("type", kind)
             .with("source", format!("../../{path}"))
             .with("role", role)
             .with("description", text)
     };
-    Element::new("fmiReferences")
+    XmlElement::new("fmiReferences")
         .with("xmlns:fmi-ls", "http://fmi-standard.org/fmi-ls-manifest")
         .with("fmi-ls:fmi-ls-name", "org.fmi-standard.fmi-ls-ref")
         .with("fmi-ls:fmi-ls-version", "1.0.0-alpha.1")

@@ -1,10 +1,10 @@
 //! `modelDescription.xml` of FMI 2.0 for co-simulation.
 
-use tiprub_core::variables::Kind;
+use tiprub_core::variables::DataType;
 
 use crate::Description;
-use crate::element::Element;
-use crate::row::{Row, causality, rows_without_time, variability};
+use crate::element::XmlElement;
+use crate::row::{DescribedVariable, causality, rows_without_time, variability};
 use crate::shared::{default_experiment, enumerations, items, log_categories, root_attributes, unit_definitions};
 use crate::text::number;
 
@@ -12,7 +12,7 @@ use crate::text::number;
 /// not among the variables.
 pub fn fmi2_xml(description: &Description) -> String {
     let rows = rows_without_time(description.table);
-    let root = Element::new("fmiModelDescription")
+    let root = XmlElement::new("fmiModelDescription")
         .with("fmiVersion", "2.0")
         .with("modelName", description.model_name)
         .with("guid", description.token);
@@ -22,13 +22,13 @@ pub fn fmi2_xml(description: &Description) -> String {
         .children(type_definitions(description))
         .child(log_categories())
         .child(default_experiment(description))
-        .child(Element::new("ModelVariables").children(rows.iter().map(scalar_variable)))
+        .child(XmlElement::new("ModelVariables").children(rows.iter().map(scalar_variable)))
         .child(model_structure(&rows))
         .document()
 }
 
-fn co_simulation(description: &Description) -> Element {
-    Element::new("CoSimulation")
+fn co_simulation(description: &Description) -> XmlElement {
+    XmlElement::new("CoSimulation")
         .with("modelIdentifier", description.identifier)
         .with("needsExecutionTool", "false")
         .with("canHandleVariableCommunicationStepSize", "true")
@@ -42,19 +42,19 @@ fn co_simulation(description: &Description) -> Element {
         .with("providesDirectionalDerivative", "false")
 }
 
-fn type_definitions(description: &Description) -> Option<Element> {
+fn type_definitions(description: &Description) -> Option<XmlElement> {
     let definition = |enumeration: &'static tiprub_core::variables::Enumeration| {
-        Element::new("SimpleType")
+        XmlElement::new("SimpleType")
             .with("name", enumeration.name)
             .with_text("description", enumeration.description)
-            .child(Element::new("Enumeration").children(items(enumeration)))
+            .child(XmlElement::new("Enumeration").children(items(enumeration)))
     };
-    Element::new("TypeDefinitions").children(enumerations(description).into_iter().map(definition)).unless_empty()
+    XmlElement::new("TypeDefinitions").children(enumerations(description).into_iter().map(definition)).unless_empty()
 }
 
-fn scalar_variable(row: &Row) -> Element {
+fn scalar_variable(row: &DescribedVariable) -> XmlElement {
     let variable = row.variable;
-    Element::new("ScalarVariable")
+    XmlElement::new("ScalarVariable")
         .with("name", &row.name)
         .with("valueReference", row.reference.to_string())
         .with_text("description", &variable.description)
@@ -64,33 +64,33 @@ fn scalar_variable(row: &Row) -> Element {
         .child(typed(row))
 }
 
-fn typed(row: &Row) -> Element {
+fn typed(row: &DescribedVariable) -> XmlElement {
     let variable = row.variable;
     let [min, max] = row.bounds();
     let element = match variable.kind {
-        Kind::Real => Element::new("Real")
+        DataType::Real => XmlElement::new("Real")
             .with_some("quantity", row.quantity())
             .with_some("unit", row.unit())
             .with_some("displayUnit", row.display_unit())
             .with_some("min", min)
             .with_some("max", max)
             .with_some("nominal", variable.nominal.map(number)),
-        Kind::Integer => Element::new("Integer").with_some("min", min).with_some("max", max),
-        Kind::Boolean => Element::new("Boolean"),
-        Kind::String => Element::new("String"),
-        Kind::Enumeration(enumeration) => Element::new("Enumeration").with("declaredType", enumeration.name),
+        DataType::Integer => XmlElement::new("Integer").with_some("min", min).with_some("max", max),
+        DataType::Boolean => XmlElement::new("Boolean"),
+        DataType::String => XmlElement::new("String"),
+        DataType::Enumeration(enumeration) => XmlElement::new("Enumeration").with("declaredType", enumeration.name),
     };
     element.with_some("start", row.start.as_ref())
 }
 
 /// Outputs and initial unknowns by index.
-fn model_structure(rows: &[Row]) -> Element {
-    let unknown = |row: &Row| Element::new("Unknown").with("index", row.index.to_string());
-    let output = |row: &Row| unknown(row).with("dependencies", row.output_dependencies());
-    let initial = |row: &Row| unknown(row).with_some("dependencies", row.initial_dependencies());
+fn model_structure(rows: &[DescribedVariable]) -> XmlElement {
+    let unknown = |row: &DescribedVariable| XmlElement::new("Unknown").with("index", row.index.to_string());
+    let output = |row: &DescribedVariable| unknown(row).with("dependencies", row.output_dependencies());
+    let initial = |row: &DescribedVariable| unknown(row).with_some("dependencies", row.initial_dependencies());
     let outputs = rows.iter().filter(|row| row.is_output()).map(output);
     let initial_unknowns = rows.iter().filter(|row| row.is_initial_unknown()).map(initial);
-    Element::new("ModelStructure")
-        .children(Element::new("Outputs").children(outputs).unless_empty())
-        .children(Element::new("InitialUnknowns").children(initial_unknowns).unless_empty())
+    XmlElement::new("ModelStructure")
+        .children(XmlElement::new("Outputs").children(outputs).unless_empty())
+        .children(XmlElement::new("InitialUnknowns").children(initial_unknowns).unless_empty())
 }

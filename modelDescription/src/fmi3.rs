@@ -1,17 +1,17 @@
 //! `modelDescription.xml` of FMI 3.0 for co-simulation.
 
-use tiprub_core::variables::{Causality, Kind, Variability};
+use tiprub_core::variables::{Causality, DataType, Variability};
 
 use crate::Description;
-use crate::element::Element;
-use crate::row::{Row, causality, rows, variability};
+use crate::element::XmlElement;
+use crate::row::{DescribedVariable, causality, rows, variability};
 use crate::shared::{default_experiment, enumerations, items, log_categories, root_attributes, unit_definitions};
 use crate::text::number;
 
 /// The model description of FMI 3.0, with arrays as arrays or flattened as the description asks.
 pub fn fmi3_xml(description: &Description) -> String {
     let rows = rows(description.table, description.fmi3_arrays);
-    let root = Element::new("fmiModelDescription")
+    let root = XmlElement::new("fmiModelDescription")
         .with("fmiVersion", "3.0")
         .with("modelName", description.model_name)
         .with("instantiationToken", description.token);
@@ -21,13 +21,13 @@ pub fn fmi3_xml(description: &Description) -> String {
         .children(type_definitions(description))
         .child(log_categories())
         .child(default_experiment(description))
-        .child(Element::new("ModelVariables").children(rows.iter().map(variable)))
+        .child(XmlElement::new("ModelVariables").children(rows.iter().map(variable)))
         .child(model_structure(&rows))
         .document()
 }
 
-fn co_simulation(description: &Description) -> Element {
-    Element::new("CoSimulation")
+fn co_simulation(description: &Description) -> XmlElement {
+    XmlElement::new("CoSimulation")
         .with("modelIdentifier", description.identifier)
         .with("needsExecutionTool", "false")
         .with("canBeInstantiatedOnlyOncePerProcess", "false")
@@ -44,26 +44,26 @@ fn co_simulation(description: &Description) -> Element {
         .with("hasEventMode", "false")
 }
 
-fn type_definitions(description: &Description) -> Option<Element> {
+fn type_definitions(description: &Description) -> Option<XmlElement> {
     let definition = |enumeration: &'static tiprub_core::variables::Enumeration| {
-        Element::new("EnumerationType")
+        XmlElement::new("EnumerationType")
             .with("name", enumeration.name)
             .with_text("description", enumeration.description)
             .children(items(enumeration))
     };
-    Element::new("TypeDefinitions").children(enumerations(description).into_iter().map(definition)).unless_empty()
+    XmlElement::new("TypeDefinitions").children(enumerations(description).into_iter().map(definition)).unless_empty()
 }
 
-fn variable(row: &Row) -> Element {
+fn variable(row: &DescribedVariable) -> XmlElement {
     let variable = row.variable;
     let name = match variable.kind {
-        Kind::Real => "Float64",
-        Kind::Integer => "Int64",
-        Kind::Boolean => "Boolean",
-        Kind::String => "String",
-        Kind::Enumeration(_) => "Enumeration",
+        DataType::Real => "Float64",
+        DataType::Integer => "Int64",
+        DataType::Boolean => "Boolean",
+        DataType::String => "String",
+        DataType::Enumeration(_) => "Enumeration",
     };
-    let mut element = Element::new(name)
+    let mut element = XmlElement::new(name)
         .with("name", &row.name)
         .with("valueReference", row.reference.to_string())
         .with_text("description", &variable.description)
@@ -72,7 +72,7 @@ fn variable(row: &Row) -> Element {
         .with_some("initial", row.initial())
         .with_some("intermediateUpdate", takes_part_in_intermediate_updates(row).then_some("true"))
         .with_some("declaredType", row.type_name());
-    if matches!(variable.kind, Kind::Real | Kind::Integer) {
+    if matches!(variable.kind, DataType::Real | DataType::Integer) {
         let [min, max] = row.bounds();
         element = element
             .with_some("quantity", row.quantity())
@@ -82,11 +82,11 @@ fn variable(row: &Row) -> Element {
             .with_some("max", max)
             .with_some("nominal", variable.nominal.map(number));
     }
-    let dimension = row.dimension.map(|size| Element::new("Dimension").with("start", size.to_string()));
+    let dimension = row.dimension.map(|size| XmlElement::new("Dimension").with("start", size.to_string()));
     match (variable.kind, &row.start) {
         // The start of texts is an element, one per array element.
-        (Kind::String, Some(text)) => {
-            let start = |_| Element::new("Start").with("value", text);
+        (DataType::String, Some(text)) => {
+            let start = |_| XmlElement::new("Start").with("value", text);
             element.children(dimension).children((0..row.dimension.unwrap_or(1)).map(start))
         }
         (_, start) => element.with_some("start", start.as_ref()).children(dimension),
@@ -94,17 +94,19 @@ fn variable(row: &Row) -> Element {
 }
 
 /// In intermediate update mode continuous inputs may be set and continuous outputs read.
-fn takes_part_in_intermediate_updates(row: &Row) -> bool {
+fn takes_part_in_intermediate_updates(row: &DescribedVariable) -> bool {
     matches!(row.variable.causality, Causality::Input | Causality::Output)
         && row.variable.variability == Variability::Continuous
 }
 
 /// Outputs and initial unknowns by value reference.
-fn model_structure(rows: &[Row]) -> Element {
-    let unknown = |name, row: &Row| Element::new(name).with("valueReference", row.reference.to_string());
-    let output = |row: &Row| unknown("Output", row).with("dependencies", row.output_dependencies());
-    let initial = |row: &Row| unknown("InitialUnknown", row).with_some("dependencies", row.initial_dependencies());
-    Element::new("ModelStructure")
+fn model_structure(rows: &[DescribedVariable]) -> XmlElement {
+    let unknown =
+        |name, row: &DescribedVariable| XmlElement::new(name).with("valueReference", row.reference.to_string());
+    let output = |row: &DescribedVariable| unknown("Output", row).with("dependencies", row.output_dependencies());
+    let initial =
+        |row: &DescribedVariable| unknown("InitialUnknown", row).with_some("dependencies", row.initial_dependencies());
+    XmlElement::new("ModelStructure")
         .children(rows.iter().filter(|row| row.is_output()).map(output))
         .children(rows.iter().filter(|row| row.is_initial_unknown()).map(initial))
 }

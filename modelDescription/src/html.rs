@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use quick_xml::escape::escape;
 use tiprub_core::Rom;
-use tiprub_core::rom::Frame;
-use tiprub_core::variables::{Causality, Kind, Span, Start, Variable};
+use tiprub_core::rom::DisplacementFrame;
+use tiprub_core::variables::{Causality, DataType, Span, StartValue, Variable};
 
 use crate::Description;
 use crate::row::{meaning_of_span, rows, variability};
@@ -128,12 +128,12 @@ pub(crate) fn array_name(variable: &Variable) -> String {
 /// Unit with the display unit in brackets, or the data type of what is not a number.
 pub(crate) fn unit(variable: &Variable) -> String {
     match (variable.kind, variable.unit) {
-        (Kind::Integer, _) => "whole number".into(),
-        (Kind::Boolean, _) => "true or false".into(),
-        (Kind::String, _) => "text".into(),
-        (Kind::Enumeration(_), _) => "choice".into(),
-        (Kind::Real, None) => "-".into(),
-        (Kind::Real, Some(unit)) => match variable.display.and_then(|index| unit.display.get(index)) {
+        (DataType::Integer, _) => "whole number".into(),
+        (DataType::Boolean, _) => "true or false".into(),
+        (DataType::String, _) => "text".into(),
+        (DataType::Enumeration(_), _) => "choice".into(),
+        (DataType::Real, None) => "-".into(),
+        (DataType::Real, Some(unit)) => match variable.display.and_then(|index| unit.display.get(index)) {
             Some((display, _)) => format!("{} ({display})", unit.name),
             None => unit.name.into(),
         },
@@ -142,7 +142,7 @@ pub(crate) fn unit(variable: &Variable) -> String {
 
 /// Legal values in words.
 pub(crate) fn range(variable: &Variable) -> String {
-    if let Kind::Enumeration(enumeration) = variable.kind {
+    if let DataType::Enumeration(enumeration) = variable.kind {
         let item = |(index, (name, _)): (usize, &(&str, &str))| format!("{} = {name}", index + 1);
         return enumeration.items.iter().enumerate().map(item).collect::<Vec<_>>().join(", ");
     }
@@ -158,15 +158,15 @@ pub(crate) fn range(variable: &Variable) -> String {
 pub(crate) fn start(variable: &Variable) -> String {
     match &variable.start {
         None => String::new(),
-        Some(Start::Real(values)) => match values.as_slice() {
+        Some(StartValue::Real(values)) => match values.as_slice() {
             [] => String::new(),
             [first, rest @ ..] if rest.iter().all(|value| value.to_bits() == first.to_bits()) => readable(*first),
             [first, .., last] => format!("{}, ..., {}", readable(*first), readable(*last)),
             [only] => readable(*only),
         },
-        Some(Start::Integer(value)) => value.to_string(),
-        Some(Start::Boolean(value)) => value.to_string(),
-        Some(Start::String(value)) => value.clone(),
+        Some(StartValue::Integer(value)) => value.to_string(),
+        Some(StartValue::Boolean(value)) => value.to_string(),
+        Some(StartValue::String(value)) => value.clone(),
     }
 }
 
@@ -192,8 +192,8 @@ fn structures(page: &mut String, description: &Description) {
 
 fn structure(page: &mut String, name: &str, rom: &Rom) {
     let frame = match rom.frame {
-        Frame::Cylindrical => "radial, tangential, axial",
-        Frame::Cartesian => "x, y, z",
+        DisplacementFrame::Cylindrical => "radial, tangential, axial",
+        DisplacementFrame::Cartesian => "x, y, z",
     };
     let nodes = match rom.extras.grid {
         Some(grid) => format!("a grid of {} around and {} along", grid.around, grid.along),

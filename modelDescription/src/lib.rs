@@ -52,7 +52,7 @@ pub struct Description<'a> {
     /// Licence.
     pub license: &'a str,
     /// Proposal for the importer.
-    pub experiment: Experiment,
+    pub experiment: DefaultExperiment,
     /// Internal step (s), where it is the same for every communication step that is a multiple of it.
     pub fixed_internal_step: Option<f64>,
     /// Friction heat is told by the thermal patches of the ROMs, not by a grid of its own.
@@ -73,7 +73,7 @@ pub struct Description<'a> {
 
 /// Default experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Experiment {
+pub struct DefaultExperiment {
     /// Start time (s).
     pub start: f64,
     /// Stop time (s).

@@ -1,7 +1,7 @@
 //! Rows of the variable table as a description lists them: arrays as one row or as their elements.
 
 use tiprub_core::VariableTable;
-use tiprub_core::variables::{Causality, Kind, Span, Start, Variability, Variable};
+use tiprub_core::variables::{Causality, DataType, Span, StartValue, Variability, Variable};
 
 use crate::text::number;
 
@@ -9,7 +9,7 @@ use crate::text::number;
 pub(crate) const ONE: &str = "1";
 
 /// A variable of the description: a scalar, an element of an array, or a whole array.
-pub(crate) struct Row<'a> {
+pub(crate) struct DescribedVariable<'a> {
     pub name: String,
     pub reference: u32,
     /// Number of elements for a whole array.
@@ -22,13 +22,13 @@ pub(crate) struct Row<'a> {
 }
 
 /// Every variable in order of value references; `arrays` keeps arrays whole.
-pub(crate) fn rows(table: &VariableTable, arrays: bool) -> Vec<Row<'_>> {
+pub(crate) fn rows(table: &VariableTable, arrays: bool) -> Vec<DescribedVariable<'_>> {
     let mut rows = Vec::new();
     for variable in table.variables() {
         let elements = if arrays { 1 } else { variable.len() };
         for (element, reference) in (0..elements).zip(variable.reference..) {
             let whole = arrays && variable.dimension.is_some();
-            rows.push(Row {
+            rows.push(DescribedVariable {
                 name: if whole { variable.name.clone() } else { variable.element_name(element) },
                 reference,
                 dimension: variable.dimension.filter(|_| whole),
@@ -43,7 +43,7 @@ pub(crate) fn rows(table: &VariableTable, arrays: bool) -> Vec<Row<'_>> {
 
 /// The same without time, as scalars: in FMI 2.0 the independent variable is optional, and old versions of FMI
 /// Library report errors at it.
-pub(crate) fn rows_without_time(table: &VariableTable) -> Vec<Row<'_>> {
+pub(crate) fn rows_without_time(table: &VariableTable) -> Vec<DescribedVariable<'_>> {
     let mut rows = rows(table, false);
     rows.retain(|row| row.variable.causality != Causality::Independent);
     for (index, row) in rows.iter_mut().enumerate() {
@@ -55,14 +55,14 @@ pub(crate) fn rows_without_time(table: &VariableTable) -> Vec<Row<'_>> {
 fn start(variable: &Variable, elements: std::ops::Range<usize>) -> Option<String> {
     let repeated = |text: String| vec![text; elements.len()].join(" ");
     Some(match variable.start.as_ref()? {
-        Start::Real(values) => values[elements].iter().map(|value| number(*value)).collect::<Vec<_>>().join(" "),
-        Start::Integer(value) => repeated(value.to_string()),
-        Start::Boolean(value) => repeated(value.to_string()),
-        Start::String(text) => text.clone(),
+        StartValue::Real(values) => values[elements].iter().map(|value| number(*value)).collect::<Vec<_>>().join(" "),
+        StartValue::Integer(value) => repeated(value.to_string()),
+        StartValue::Boolean(value) => repeated(value.to_string()),
+        StartValue::String(text) => text.clone(),
     })
 }
 
-impl Row<'_> {
+impl DescribedVariable<'_> {
     /// Whether it belongs to the list of outputs of the model structure.
     pub(crate) fn is_output(&self) -> bool {
         self.variable.causality == Causality::Output
@@ -92,7 +92,7 @@ impl Row<'_> {
 
     /// The name of the unit: "1" for reals without dimension (as FMI 3.0 proposes), none for other types.
     pub(crate) fn unit(&self) -> Option<&'static str> {
-        let real = self.variable.kind == Kind::Real;
+        let real = self.variable.kind == DataType::Real;
         real.then(|| self.variable.unit.map_or(ONE, |unit| unit.name))
     }
 
@@ -104,7 +104,9 @@ impl Row<'_> {
     /// Legal values as the type writes them.
     pub(crate) fn bounds(&self) -> [Option<String>; 2] {
         [self.variable.min, self.variable.max].map(|bound| {
-            bound.map(|bound| if self.variable.kind == Kind::Integer { format!("{bound:.0}") } else { number(bound) })
+            bound.map(
+                |bound| if self.variable.kind == DataType::Integer { format!("{bound:.0}") } else { number(bound) },
+            )
         })
     }
 
@@ -117,7 +119,7 @@ impl Row<'_> {
     /// The enumeration of an enumeration variable.
     pub(crate) fn type_name(&self) -> Option<&'static str> {
         match self.variable.kind {
-            Kind::Enumeration(enumeration) => Some(enumeration.name),
+            DataType::Enumeration(enumeration) => Some(enumeration.name),
             _ => None,
         }
     }

@@ -1,9 +1,9 @@
 //! What both versions of the standard describe alike.
 
-use tiprub_core::variables::{Enumeration, Kind, Unit, Variable};
+use tiprub_core::variables::{DataType, Enumeration, Variable, VariableUnit};
 
 use crate::Description;
-use crate::element::Element;
+use crate::element::XmlElement;
 use crate::row::ONE;
 use crate::text::number;
 
@@ -17,7 +17,7 @@ pub const LOG_CATEGORIES: [(&str, &str); 5] = [
 ];
 
 /// Attributes of the root element after those that differ between the versions.
-pub(crate) fn root_attributes(element: Element, description: &Description) -> Element {
+pub(crate) fn root_attributes(element: XmlElement, description: &Description) -> XmlElement {
     element
         .with_text("description", description.description)
         .with_text("author", description.author)
@@ -30,34 +30,35 @@ pub(crate) fn root_attributes(element: Element, description: &Description) -> El
 }
 
 /// Units in order of first use.
-pub(crate) fn unit_definitions(description: &Description) -> Option<Element> {
-    let mut units: Vec<&'static Unit> = Vec::new();
+pub(crate) fn unit_definitions(description: &Description) -> Option<XmlElement> {
+    let mut units: Vec<&'static VariableUnit> = Vec::new();
     for unit in description.table.variables().iter().filter_map(|variable| variable.unit) {
         if units.iter().all(|known| known.name != unit.name) {
             units.push(unit);
         }
     }
-    let without = |variable: &Variable| variable.kind == Kind::Real && variable.unit.is_none();
+    let without = |variable: &Variable| variable.kind == DataType::Real && variable.unit.is_none();
     let one = description.table.variables().iter().any(without);
-    let one = one.then(|| Element::new("Unit").with("name", ONE).child(Element::new("BaseUnit")));
-    Element::new("UnitDefinitions").children(units.into_iter().map(unit_definition).chain(one)).unless_empty()
+    let one = one.then(|| XmlElement::new("Unit").with("name", ONE).child(XmlElement::new("BaseUnit")));
+    XmlElement::new("UnitDefinitions").children(units.into_iter().map(unit_definition).chain(one)).unless_empty()
 }
 
-fn unit_definition(unit: &Unit) -> Element {
-    let mut base = Element::new("BaseUnit");
+fn unit_definition(unit: &VariableUnit) -> XmlElement {
+    let mut base = XmlElement::new("BaseUnit");
     for (key, exponent) in ["kg", "m", "s", "rad", "K"].into_iter().zip(unit.exponents) {
         base = base.with_some(key, (exponent != 0).then(|| exponent.to_string()));
     }
-    let display =
-        |(name, factor): &(&str, f64)| Element::new("DisplayUnit").with("name", name).with("factor", number(*factor));
-    Element::new("Unit").with("name", unit.name).child(base).children(unit.display.iter().map(display))
+    let display = |(name, factor): &(&str, f64)| {
+        XmlElement::new("DisplayUnit").with("name", name).with("factor", number(*factor))
+    };
+    XmlElement::new("Unit").with("name", unit.name).child(base).children(unit.display.iter().map(display))
 }
 
 /// Enumerations in order of first use.
 pub(crate) fn enumerations(description: &Description) -> Vec<&'static Enumeration> {
     let mut enumerations: Vec<&'static Enumeration> = Vec::new();
     for variable in description.table.variables() {
-        if let Kind::Enumeration(enumeration) = variable.kind
+        if let DataType::Enumeration(enumeration) = variable.kind
             && enumerations.iter().all(|known| known.name != enumeration.name)
         {
             enumerations.push(enumeration);
@@ -67,9 +68,9 @@ pub(crate) fn enumerations(description: &Description) -> Vec<&'static Enumeratio
 }
 
 /// The items of an enumeration; values count from 1.
-pub(crate) fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = Element> {
+pub(crate) fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = XmlElement> {
     enumeration.items.iter().enumerate().map(|(index, (name, description))| {
-        Element::new("Item")
+        XmlElement::new("Item")
             .with("name", name)
             .with("value", (index + 1).to_string())
             .with_text("description", description)
@@ -77,16 +78,16 @@ pub(crate) fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = E
 }
 
 /// The log categories.
-pub(crate) fn log_categories() -> Element {
+pub(crate) fn log_categories() -> XmlElement {
     let category = |(name, description): (&str, &str)| {
-        Element::new("Category").with("name", name).with("description", description)
+        XmlElement::new("Category").with("name", name).with("description", description)
     };
-    Element::new("LogCategories").children(LOG_CATEGORIES.map(category))
+    XmlElement::new("LogCategories").children(LOG_CATEGORIES.map(category))
 }
 
 /// The default experiment.
-pub(crate) fn default_experiment(description: &Description) -> Element {
-    Element::new("DefaultExperiment")
+pub(crate) fn default_experiment(description: &Description) -> XmlElement {
+    XmlElement::new("DefaultExperiment")
         .with("startTime", number(description.experiment.start))
         .with("stopTime", number(description.experiment.stop))
         .with("stepSize", number(description.experiment.step))

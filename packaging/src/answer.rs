@@ -8,7 +8,7 @@ use tiprub_shell::{
 
 /// One line of the answer.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Line {
+pub struct AnswerLine {
     /// What it is about: a word.
     pub name: &'static str,
     /// Its value and unit; `None` where the scene does not have it.
@@ -18,7 +18,7 @@ pub struct Line {
 }
 
 /// The five lines of a run whose steps may leave closed contact open or inside by up to `tolerance` (m).
-pub fn lines(recording: &Recording, tolerance: f64) -> [Line; 5] {
+pub fn lines(recording: &Recording, tolerance: f64) -> [AnswerLine; 5] {
     let found = extremes(recording);
     let extreme = |name: &str| found.iter().find(|extreme| extreme.name == name);
     [
@@ -31,8 +31,8 @@ pub fn lines(recording: &Recording, tolerance: f64) -> [Line; 5] {
 }
 
 /// The lines as text.
-pub fn text(lines: &[Line]) -> String {
-    let line = |Line { name, value, meaning }: &Line| {
+pub fn text(lines: &[AnswerLine]) -> String {
+    let line = |AnswerLine { name, value, meaning }: &AnswerLine| {
         let value = value.map_or("-".to_owned(), |(value, unit)| format!("{} {unit}", six_digits(value)));
         format!("{name:<10} {:<16} {meaning}\n", value.trim_end())
     };
@@ -40,8 +40,8 @@ pub fn text(lines: &[Line]) -> String {
 }
 
 /// The lines for programs: an object of values, `null` where there is none.
-pub fn json(lines: &[Line]) -> Value {
-    let one = |line: &Line| (line.name.to_owned(), json!(line.value.map(|(value, _)| value)));
+pub fn json(lines: &[AnswerLine]) -> Value {
+    let one = |line: &AnswerLine| (line.name.to_owned(), json!(line.value.map(|(value, _)| value)));
     lines.iter().map(one).collect::<serde_json::Map<_, _>>().into()
 }
 
@@ -49,7 +49,7 @@ fn at(extreme: &Extreme) -> String {
     format!("at t = {} s", six_digits(extreme.time))
 }
 
-fn force(largest: Option<&Extreme>) -> Line {
+fn force(largest: Option<&Extreme>) -> AnswerLine {
     let (value, meaning) = match largest {
         Some(extreme) if extreme.value == 0.0 => (Some((0.0, "N")), "nothing touched".to_owned()),
         Some(extreme) => {
@@ -58,17 +58,17 @@ fn force(largest: Option<&Extreme>) -> Line {
         }
         None => (None, "the scene has no contact force".to_owned()),
     };
-    Line { name: "force", value, meaning }
+    AnswerLine { name: "force", value, meaning }
 }
 
-fn heat(recording: &Recording) -> Line {
+fn heat(recording: &Recording) -> AnswerLine {
     let total = recording.column("friction_loss").and_then(|column| column.last().copied());
     let powers = || recording.column("friction_power").map(|powers| integral(recording, &powers));
     let (value, meaning) = match total.or_else(powers) {
         Some(heat) => (Some((heat, "J")), "friction heat of the whole run"),
         None => (None, "no contact of the scene has friction"),
     };
-    Line { name: "heat", value, meaning: meaning.to_owned() }
+    AnswerLine { name: "heat", value, meaning: meaning.to_owned() }
 }
 
 /// Integral of a mean over each communication step.
@@ -76,7 +76,7 @@ fn integral(recording: &Recording, means: &[f64]) -> f64 {
     recording.times.windows(2).zip(&means[1..]).map(|(ends, mean)| (ends[1] - ends[0]) * mean).sum()
 }
 
-fn torque(recording: &Recording) -> Line {
+fn torque(recording: &Recording) -> AnswerLine {
     let is_torque = |name: &&String| *name == "torque" || name.ends_with(".torque");
     let length = recording.times.last().copied().unwrap_or(0.0) - recording.times.first().copied().unwrap_or(0.0);
     let mean = |name: &String| {
@@ -96,10 +96,10 @@ fn torque(recording: &Recording) -> Line {
             )
         }
     };
-    Line { name: "torque", value, meaning }
+    AnswerLine { name: "torque", value, meaning }
 }
 
-fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Line {
+fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> AnswerLine {
     let least = found.iter().find(|extreme| extreme.name == "smallest_clearance");
     let (value, meaning) = match least {
         Some(extreme) if extreme.value.abs() < tolerance => {
@@ -115,14 +115,14 @@ fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Line {
         Some(extreme) => (Some((extreme.value, "m")), format!("smallest, {}", at(extreme))),
         None => (None, "some contact nodes meet nothing; --all lists clearances node by node".to_owned()),
     };
-    Line { name: "clearance", value, meaning }
+    AnswerLine { name: "clearance", value, meaning }
 }
 
 /// Clearances (m) below this are those of closed contact.
 const ROUNDING: f64 = 1e-12;
 
 /// Largest vibration energy of the last third of the run against that of the third before.
-fn growth(recording: &Recording) -> Line {
+fn growth(recording: &Recording) -> AnswerLine {
     let energies = recording.column("kinetic_energy").zip(recording.column("strain_energy"));
     let ratio = energies.and_then(|(kinetic, strain)| {
         let energy: Vec<f64> = kinetic.iter().zip(&strain).map(|(kinetic, strain)| kinetic + strain).collect();
@@ -142,7 +142,7 @@ fn growth(recording: &Recording) -> Line {
         Some(_) => (None, "nothing vibrates before the last third of the run".to_owned()),
         None => (None, "needs `outputs.energies = true` and three communication steps".to_owned()),
     };
-    Line { name: "growth", value, meaning }
+    AnswerLine { name: "growth", value, meaning }
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! Options of `tiprub reduce casing` and `tiprub thermal`: a ring described on the command line.
 
-use crate::shared_arguments::{MaterialChoice, MeshSize, Written, axial, pair};
+use crate::shared_arguments::{MaterialChoice, MeshSize, OutputArguments, axial, pair};
 use clap::{Args, ValueEnum};
 use tiprub_model::{
     CasingOptions,
-    casing::{ContactRings, Contour, Flange, RingCounts, Support},
+    casing::{ContactRings, Flange, InnerContour, RingCounts, RingSupport},
     element::ElementKind,
 };
 
@@ -16,7 +16,7 @@ const MARGIN: f64 = 0.1;
 pub struct RingArguments {
     /// Inner contour as points z:r in m, by growing z (the tip of rotor 37 and the design gap when absent).
     #[arg(long, value_name = "Z:R,Z:R,...", value_parser = contour, allow_hyphen_values = true)]
-    pub contour: Option<Contour>,
+    pub contour: Option<InnerContour>,
     /// Radial thickness of the shell (m) [default: 0.004].
     #[arg(long, value_name = "M", value_parser = length)]
     pub thickness: Option<f64>,
@@ -67,7 +67,7 @@ pub struct CasingArguments {
     pub fixed_interface_modes: Option<usize>,
     /// What is written; a casing other than casing37 is called casing.
     #[command(flatten)]
-    pub written: Written,
+    pub written: OutputArguments,
 }
 
 /// A flange, or none.
@@ -142,12 +142,12 @@ impl CasingArguments {
 }
 
 impl SupportChoice {
-    fn support(self) -> Support {
+    fn support(self) -> RingSupport {
         match self {
-            Self::Low => Support::Low,
-            Self::High => Support::High,
-            Self::Both => Support::Both,
-            Self::Free => Support::Free,
+            Self::Low => RingSupport::Low,
+            Self::High => RingSupport::High,
+            Self::Both => RingSupport::Both,
+            Self::Free => RingSupport::Free,
         }
     }
 }
@@ -161,14 +161,14 @@ impl ElementChoice {
     }
 }
 
-fn contour(text: &str) -> Result<Contour, String> {
+fn contour(text: &str) -> Result<InnerContour, String> {
     let example = "give points z:r in m by growing z, for example -0.02:0.256,0.04:0.245";
     let point = |text: &str| -> Option<[f64; 2]> {
         let (z, r) = text.split_once(':')?;
         Some([z.trim().parse().ok()?, r.trim().parse().ok()?])
     };
     let points: Option<Vec<[f64; 2]>> = text.split(',').map(point).collect();
-    Contour::new(&points.ok_or(example)?).map_err(|error| error.to_string())
+    InnerContour::new(&points.ok_or(example)?).map_err(|error| error.to_string())
 }
 
 fn length(text: &str) -> Result<f64, String> {

@@ -262,7 +262,7 @@ mod tests {
     use clap::CommandFactory;
 
     use super::*;
-    use crate::{reduce_arguments::Model, shared_arguments::MeshSize};
+    use crate::{reduce_arguments::ModelToReduce, shared_arguments::MeshSize};
 
     fn parse(line: &str) -> Result<Cli, clap::Error> {
         Cli::try_parse_from(std::iter::once("tiprub").chain(line.split_whitespace()))
@@ -370,7 +370,7 @@ mod tests {
         assert_eq!(run.set, [("speed".into(), "-2".into()), ("name".into(), "a=b".into())]);
         assert_eq!(run.stop, Some(1e-3));
         let Command::Reduce(reduce) = parse("reduce rotor37 --mesh 10x2x14").unwrap().command else { panic!("reduce") };
-        let Model::Rotor37(rotor) = reduce.model else { panic!("rotor37") };
+        let ModelToReduce::Rotor37(rotor) = reduce.model else { panic!("rotor37") };
         assert_eq!(rotor.mesh, Some(MeshSize([10, 2, 14])));
     }
 

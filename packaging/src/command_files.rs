@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result, output_file,
-    places::{Identity, Named, apart, identity, outputs},
+    places::{Identity, NamedFile, apart, identity, outputs},
 };
 
 use crate::{
@@ -13,7 +13,7 @@ use crate::{
     commands::{demo, package::targets, study::directory},
     fmu::FmiVersion,
     library,
-    shared_arguments::Written,
+    shared_arguments::OutputArguments,
 };
 
 /// Extensions of what a study writes.
@@ -27,13 +27,14 @@ pub fn check(command: &Command) -> Result<()> {
     match command {
         Command::Run(arguments) => {
             let csv = arguments.csv.clone().filter(|path| path != Path::new("-"));
-            let inputs = Named::option("--inputs", &arguments.inputs);
-            let read: Vec<Named> = scene(&arguments.scene).into_iter().chain(inputs).collect();
-            outputs(&read, &Vec::from_iter(Named::option("--csv", &csv)))
+            let inputs = NamedFile::option("--inputs", &arguments.inputs);
+            let read: Vec<NamedFile> = scene(&arguments.scene).into_iter().chain(inputs).collect();
+            outputs(&read, &Vec::from_iter(NamedFile::option("--csv", &csv)))
         }
         Command::Reduce(arguments) => outputs(&arguments.model.files(), &written(arguments.model.written())),
         Command::Demo(arguments) => {
-            let files: Vec<Named> = demo::FILES.map(|name| Named::new("--out", arguments.out.join(name))).to_vec();
+            let files: Vec<NamedFile> =
+                demo::FILES.map(|name| NamedFile::new("--out", arguments.out.join(name))).to_vec();
             apart(&libraries(&arguments.libraries)?, &files)?;
             output_file::try_directory(&arguments.out)
         }
@@ -41,7 +42,7 @@ pub fn check(command: &Command) -> Result<()> {
             StudyCommand::Map(own) => study(&own.scene, &directory("map", &own.common), Vec::new()),
             StudyCommand::Convergence(own) => {
                 let read = scene(&own.study.scene).into_iter().chain(own.from.files()).collect::<Vec<_>>();
-                outputs(&read, &Vec::from_iter(Named::option("--into", &own.study.into)))?;
+                outputs(&read, &Vec::from_iter(NamedFile::option("--into", &own.study.into)))?;
                 study(&own.study.scene, &directory("convergence", &own.study.common), own.from.files())
             }
             StudyCommand::Stability(own) => study(&own.scene, &directory("stability", &own.common), Vec::new()),
@@ -52,7 +53,7 @@ pub fn check(command: &Command) -> Result<()> {
         Command::Package(arguments) => package(arguments),
         Command::Thermal(arguments) => {
             let targets = targets(arguments.fmi, &arguments.output, &arguments.name())?;
-            let read: Vec<Named> = arguments.files().into_iter().chain(libraries(&arguments.libraries)?).collect();
+            let read: Vec<NamedFile> = arguments.files().into_iter().chain(libraries(&arguments.libraries)?).collect();
             outputs(&read, &fmus(&targets))
         }
         Command::Inspect(_) => Ok(()),
@@ -65,36 +66,36 @@ fn package(arguments: &PackageArguments) -> Result<()> {
     targets(arguments.fmi, &arguments.output, "model")?;
     let read = libraries(&arguments.libraries)?;
     let name = scene_source::settings(&arguments.scene)?.name;
-    let read: Vec<Named> = scene(&arguments.scene).into_iter().chain(read).collect();
+    let read: Vec<NamedFile> = scene(&arguments.scene).into_iter().chain(read).collect();
     outputs(&read, &fmus(&targets(arguments.fmi, &arguments.output, &name)?))
 }
 
-fn fmus(targets: &[(FmiVersion, PathBuf)]) -> Vec<Named> {
-    targets.iter().map(|(_, path)| Named::new("--output", path)).collect()
+fn fmus(targets: &[(FmiVersion, PathBuf)]) -> Vec<NamedFile> {
+    targets.iter().map(|(_, path)| NamedFile::new("--output", path)).collect()
 }
 
 /// The libraries that are named on the command line.
-fn libraries(arguments: &LibraryArguments) -> Result<Vec<Named>> {
-    Ok(library::given(arguments)?.into_iter().map(|path| Named::new("--library", path)).collect())
+fn libraries(arguments: &LibraryArguments) -> Result<Vec<NamedFile>> {
+    Ok(library::given(arguments)?.into_iter().map(|path| NamedFile::new("--library", path)).collect())
 }
 
 /// The files of a scene.
-fn scene(argument: &str) -> Vec<Named> {
+fn scene(argument: &str) -> Vec<NamedFile> {
     let files = scene_source::files(argument).into_iter();
     files
         .enumerate()
-        .map(|(index, path)| Named::new(if index == 0 { "SCENE" } else { "a ROM of SCENE" }, path))
+        .map(|(index, path)| NamedFile::new(if index == 0 { "SCENE" } else { "a ROM of SCENE" }, path))
         .collect()
 }
 
 /// The files that `reduce` was told to write.
-fn written(arguments: &Written) -> Vec<Named> {
+fn written(arguments: &OutputArguments) -> Vec<NamedFile> {
     let options = [("--output", &arguments.output), ("--inp", &arguments.inp), ("--vtk", &arguments.vtk)];
-    options.into_iter().filter_map(|(role, path)| Named::option(role, path)).collect()
+    options.into_iter().filter_map(|(role, path)| NamedFile::option(role, path)).collect()
 }
 
 /// A study names its files itself, in one directory: what is read must not be there under a name of that kind.
-fn study(argument: &str, out: &Path, more: Vec<Named>) -> Result<()> {
+fn study(argument: &str, out: &Path, more: Vec<NamedFile>) -> Result<()> {
     let replaced = |path: &PathBuf| {
         let kind = path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
         STUDY_FILES.contains(&kind.as_str())

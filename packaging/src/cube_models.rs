@@ -1,12 +1,12 @@
 //! The bodies of the cube between two rings, as `tiprub reduce` makes them.
 
 use tiprub_gallery::reduction;
-use tiprub_model::cube::{CubeOptions, MassMatrix, RingOptions, Side};
+use tiprub_model::cube::{CubeOptions, MassMatrix, RingOptions, RingSide};
 use tiprub_shell::{Result, console::Console};
 
 use crate::{
-    reduce_arguments::{CubeArguments, MassChoice, RingArguments},
-    reduced::Reduced,
+    reduce_arguments::{CubeArguments, CubeRingArguments, MassChoice},
+    reduced::ReducedModel,
     shared_arguments::KindChoice,
 };
 
@@ -17,7 +17,7 @@ const CLAMPED: &str = "CLAMPED";
 ///
 /// # Errors
 /// Whatever the reduction refuses.
-pub fn cube(arguments: &CubeArguments, console: &Console) -> Result<Reduced> {
+pub fn cube(arguments: &CubeArguments, console: &Console) -> Result<ReducedModel> {
     let options = CubeOptions {
         patches: arguments.contact_patches,
         kind: KindChoice::kind(arguments.kind, arguments.contact_patches.is_some()),
@@ -25,14 +25,14 @@ pub fn cube(arguments: &CubeArguments, console: &Console) -> Result<Reduced> {
         mass: mass(arguments.mass_matrix),
         ..CubeOptions::default()
     };
-    Ok(Reduced::general(reduction::cube(&options, console)?, None))
+    Ok(ReducedModel::general(reduction::cube(&options, console)?, None))
 }
 
 /// A ring.
 ///
 /// # Errors
 /// Whatever the reduction refuses.
-pub fn ring(arguments: &RingArguments, side: Side, console: &Console) -> Result<Reduced> {
+pub fn ring(arguments: &CubeRingArguments, side: RingSide, console: &Console) -> Result<ReducedModel> {
     let defaults = RingOptions::new(side);
     let options = RingOptions {
         modes: arguments.modes.unwrap_or(defaults.modes),
@@ -40,7 +40,7 @@ pub fn ring(arguments: &RingArguments, side: Side, console: &Console) -> Result<
         mass: mass(arguments.mass_matrix),
         ..defaults
     };
-    Ok(Reduced::general(reduction::cube_ring(&options, console)?, Some(CLAMPED)))
+    Ok(ReducedModel::general(reduction::cube_ring(&options, console)?, Some(CLAMPED)))
 }
 
 fn mass(choice: Option<MassChoice>) -> MassMatrix {

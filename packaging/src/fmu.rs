@@ -8,13 +8,13 @@ use tiprub_core::{
     variables::Quantity,
     warning::{self, Warning},
 };
-use tiprub_fmi_host::archive::{self, Entry};
+use tiprub_fmi_host::archive::{self, ArchiveEntry};
 use tiprub_model_description::{
-    Description, Experiment, fmi2_xml, fmi3_terminals, fmi3_xml, html, references_manifest,
+    DefaultExperiment, Description, fmi2_xml, fmi3_terminals, fmi3_xml, html, references_manifest,
 };
 use tiprub_shell::{
     Failure, Result,
-    native::{self, Given},
+    native::{self, RunInputs},
     schedule::Schedule,
 };
 
@@ -79,7 +79,7 @@ impl FmiVersion {
 
 /// A scene made ready for packaging.
 #[derive(Debug)]
-pub struct Package<'a> {
+pub struct FmuPackage<'a> {
     scene: &'a Scene,
     /// ROMs as the FMU holds them.
     roms: Vec<Rom>,
@@ -91,7 +91,7 @@ pub struct Package<'a> {
     generated: String,
 }
 
-impl<'a> Package<'a> {
+impl<'a> FmuPackage<'a> {
     /// Compile and initialise the scene (which refuses what an FMU instance would refuse), and run the reference.
     ///
     /// # Errors
@@ -108,7 +108,7 @@ impl<'a> Package<'a> {
             schedule.count = reference_steps;
             schedule.stop = schedule.start + reference_steps as f64 * schedule.step;
         }
-        let reference_csv = native::run(scene, &schedule, Given::default(), &|_| {})?.recording.to_csv();
+        let reference_csv = native::run(scene, &schedule, RunInputs::default(), &|_| {})?.recording.to_csv();
         let generated = generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())?;
         Ok(Self {
             scene,
@@ -156,7 +156,7 @@ impl<'a> Package<'a> {
     }
 
     /// Files of the .fmu in their order.
-    fn entries(&self, version: FmiVersion, arrays: bool) -> Vec<Entry> {
+    fn entries(&self, version: FmiVersion, arrays: bool) -> Vec<ArchiveEntry> {
         let resources = tiprub_format::resource_files(self.scene, arrays);
         let token = tiprub_format::instantiation_token(&resources);
         let description = self.description(&token, arrays);
@@ -191,7 +191,7 @@ impl<'a> Package<'a> {
             author: "The tiprub developers",
             copyright: "Copyright (c) 2026 The tiprub developers",
             license: env!("CARGO_PKG_LICENSE"),
-            experiment: Experiment {
+            experiment: DefaultExperiment {
                 start: settings.experiment.start,
                 stop: settings.experiment.stop,
                 step: settings.experiment.communication_step,
@@ -217,7 +217,7 @@ pub fn contents(
     resources: Vec<(String, Vec<u8>)>,
     reference: Option<(&str, usize)>,
     model: Related,
-) -> Vec<Entry> {
+) -> Vec<ArchiveEntry> {
     let identifier = description.identifier;
     let name = format!("documentation/{identifier}_ref.csv");
     let told = reference.map(|(_, steps)| {
@@ -235,21 +235,22 @@ pub fn contents(
         FmiVersion::Two => (fmi2_xml(description), "2.0", "model.png"),
         FmiVersion::Three => (fmi3_xml(description), "3.0", "terminalsAndIcons/icon.png"),
     };
-    let mut entries = vec![Entry::new("modelDescription.xml", xml), Entry::new(icon, ICON)];
-    let library = |library: &Library| Entry::new(library.platform.place(number, identifier), library.bytes.as_slice());
+    let mut entries = vec![ArchiveEntry::new("modelDescription.xml", xml), ArchiveEntry::new(icon, ICON)];
+    let library =
+        |library: &Library| ArchiveEntry::new(library.platform.place(number, identifier), library.bytes.as_slice());
     entries.extend(libraries.iter().map(library));
     if let Some(terminals) = fmi3_terminals(description).filter(|_| version == FmiVersion::Three) {
-        entries.push(Entry::new("terminalsAndIcons/terminalsAndIcons.xml", terminals));
+        entries.push(ArchiveEntry::new("terminalsAndIcons/terminalsAndIcons.xml", terminals));
     }
-    entries.extend(resources.into_iter().map(|(name, bytes)| Entry::new(format!("resources/{name}"), bytes)));
-    entries.push(Entry::new("documentation/index.html", html(description)));
-    entries.extend(reference.map(|(csv, _)| Entry::new(name.as_str(), csv)));
+    entries.extend(resources.into_iter().map(|(name, bytes)| ArchiveEntry::new(format!("resources/{name}"), bytes)));
+    entries.push(ArchiveEntry::new("documentation/index.html", html(description)));
+    entries.extend(reference.map(|(csv, _)| ArchiveEntry::new(name.as_str(), csv)));
     entries.extend([
-        Entry::new("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml", references_manifest(&related)),
-        Entry::new("documentation/licenses/license.txt", LICENSE),
-        Entry::new("documentation/licenses/LICENSE-MIT.txt", LICENSE_MIT),
-        Entry::new("documentation/licenses/LICENSE-APACHE.txt", LICENSE_APACHE),
-        Entry::new("documentation/licenses/third-party.txt", THIRD_PARTY),
+        ArchiveEntry::new("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml", references_manifest(&related)),
+        ArchiveEntry::new("documentation/licenses/license.txt", LICENSE),
+        ArchiveEntry::new("documentation/licenses/LICENSE-MIT.txt", LICENSE_MIT),
+        ArchiveEntry::new("documentation/licenses/LICENSE-APACHE.txt", LICENSE_APACHE),
+        ArchiveEntry::new("documentation/licenses/third-party.txt", THIRD_PARTY),
     ]);
     entries
 }

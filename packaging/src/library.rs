@@ -44,14 +44,14 @@ const EXTENSIONS: [&str; 3] = ["so", "dll", "dylib"];
 
 /// What a library makes of the resources of an FMU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
+pub enum LibraryUnit {
     /// Contact of a scene.
     Scene,
     /// Heat conduction of a casing.
     Thermal,
 }
 
-impl Unit {
+impl LibraryUnit {
     /// Crate that the library is built of, and its file without prefix and extension.
     fn names(self) -> (&'static str, &'static str) {
         match self {
@@ -103,14 +103,14 @@ pub struct Library {
 /// # Errors
 /// No library found, the build failed, a file that is no shared library for a known platform, two for one platform, or
 /// none for a platform asked for.
-pub fn load(unit: Unit, arguments: &LibraryArguments, console: &Console) -> Result<Vec<Library>> {
+pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> Result<Vec<Library>> {
     let mut found: BTreeMap<Platform, (PathBuf, Vec<u8>)> = BTreeMap::new();
     let (files, _build) = find(unit, arguments, console)?;
     for path in files {
         let bytes =
             tiprub_format::read_file(&path, LARGEST).map_err(|error| Failure::file(&path, "cannot be read", &error))?;
         let platform = recognised(&path, &bytes)?;
-        if Unit::of_library(&bytes) != unit {
+        if LibraryUnit::of_library(&bytes) != unit {
             // A directory holds those of all units.
             if !arguments.library.contains(&path) {
                 continue;
@@ -202,7 +202,7 @@ enum Origin<'a> {
 }
 
 /// `sources` is the workspace that the program was compiled from, where it still is; `cache` keeps what was built.
-fn origin<'a>(unit: Unit, executable: &'a Path, sources: Option<&'a Path>, cache: Option<&Path>) -> Origin<'a> {
+fn origin<'a>(unit: LibraryUnit, executable: &'a Path, sources: Option<&'a Path>, cache: Option<&Path>) -> Origin<'a> {
     if let (Some(sources), Some(target)) = (sources, build::cargo_target(executable)) {
         return Origin::Target { sources, target };
     }
@@ -215,7 +215,7 @@ fn origin<'a>(unit: Unit, executable: &'a Path, sources: Option<&'a Path>, cache
 }
 
 /// Files, and the directory that they are in where it goes when they are read.
-fn find(unit: Unit, arguments: &LibraryArguments, console: &Console) -> Result<(Vec<PathBuf>, Option<TempDir>)> {
+fn find(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> Result<(Vec<PathBuf>, Option<TempDir>)> {
     if !arguments.library.is_empty() {
         return Ok((given(arguments)?, None));
     }
@@ -261,7 +261,7 @@ fn is_library(path: &Path) -> bool {
     path.extension().is_some_and(|extension| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
 
-fn installed(unit: Unit, executable: &Path) -> Vec<PathBuf> {
+fn installed(unit: LibraryUnit, executable: &Path) -> Vec<PathBuf> {
     let directory = executable.parent().unwrap_or(Path::new("."));
     let place = |platform: Platform| {
         let name = format!("{}{}", unit.prefix(), platform.file_name());
@@ -279,7 +279,7 @@ fn recognised(path: &Path, bytes: &[u8]) -> Result<Platform> {
     let platform = Platform::of_library(bytes)
         .ok_or_else(|| refused("not a whole 64-bit shared library for Linux, Windows or macOS"))?;
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    let name = name.strip_prefix(Unit::Thermal.prefix()).unwrap_or(name);
+    let name = name.strip_prefix(LibraryUnit::Thermal.prefix()).unwrap_or(name);
     let called = Platform::ALL.into_iter().find(|named| name == &*named.file_name());
     if called.is_some_and(|called| called != platform) {
         return Err(Failure::new(

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use tiprub_model::{
     Material,
-    read::{Axis, Units},
+    read::{EngineAxis, Units},
 };
-use tiprub_shell::{Failure, Result, places::Named};
+use tiprub_shell::{Failure, Result, places::NamedFile};
 use tiprub_study::arguments::{ConvergenceArguments, ErrorArguments};
 
-use crate::shared_arguments::{KindChoice, MaterialChoice, Written, axial, pair};
+use crate::shared_arguments::{KindChoice, MaterialChoice, OutputArguments, axial, pair};
 
 /// Arguments of `tiprub reduce blade`.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -31,7 +31,7 @@ pub struct BladeArguments {
     pub kept: KeptOptions,
     /// What is written.
     #[command(flatten)]
-    pub written: Written,
+    pub written: OutputArguments,
 }
 
 /// What blades are read from.
@@ -116,9 +116,9 @@ impl FromMesh {
     }
 
     /// All files that are read.
-    pub fn files(&self) -> Vec<Named> {
+    pub fn files(&self) -> Vec<NamedFile> {
         let own = self.blade.source(self.file.as_deref(), KeptOptions::default()).files();
-        own.into_iter().chain(self.others.iter().map(|path| Named::new("--other-mesh", path))).collect()
+        own.into_iter().chain(self.others.iter().map(|path| NamedFile::new("--other-mesh", path))).collect()
     }
 }
 
@@ -158,7 +158,7 @@ pub struct SectorArguments {
     pub kept: KeptOptions,
     /// What is written.
     #[command(flatten)]
-    pub written: Written,
+    pub written: OutputArguments,
 }
 
 /// Arguments of `tiprub reduce casing-mesh`.
@@ -190,7 +190,7 @@ pub struct CasingMeshArguments {
     pub kept: KeptOptions,
     /// What is written.
     #[command(flatten)]
-    pub written: Written,
+    pub written: OutputArguments,
 }
 
 /// Contact nodes of blades.
@@ -280,7 +280,7 @@ pub struct MatrixOptions {
 
 /// What is read of a model of one's own, whatever it becomes.
 #[derive(Debug, Clone)]
-pub struct Source<'a> {
+pub struct MeshSource<'a> {
     /// Mesh file.
     pub file: Option<&'a Path>,
     /// Options.
@@ -293,41 +293,41 @@ pub struct Source<'a> {
 
 impl BladeArguments {
     /// What is read.
-    pub fn source(&self) -> Source<'_> {
+    pub fn source(&self) -> MeshSource<'_> {
         self.blade.source(self.file.as_deref(), self.kept.clone())
     }
 }
 
 impl BladeOptions {
     /// What is read, with this mesh file.
-    pub fn source<'a>(&'a self, file: Option<&'a Path>, kept: KeptOptions) -> Source<'a> {
-        Source { file, model: &self.model, matrices: Some(&self.matrices), kept }
+    pub fn source<'a>(&'a self, file: Option<&'a Path>, kept: KeptOptions) -> MeshSource<'a> {
+        MeshSource { file, model: &self.model, matrices: Some(&self.matrices), kept }
     }
 }
 
 impl SectorArguments {
     /// What is read.
-    pub fn source(&self) -> Source<'_> {
+    pub fn source(&self) -> MeshSource<'_> {
         let file = self.file.as_deref();
-        Source { file, model: &self.model, matrices: Some(&self.matrices), kept: self.kept.clone() }
+        MeshSource { file, model: &self.model, matrices: Some(&self.matrices), kept: self.kept.clone() }
     }
 }
 
 impl CasingMeshArguments {
     /// What is read.
-    pub fn source(&self) -> Source<'_> {
-        Source { file: Some(&self.file), model: &self.model, matrices: None, kept: self.kept.clone() }
+    pub fn source(&self) -> MeshSource<'_> {
+        MeshSource { file: Some(&self.file), model: &self.model, matrices: None, kept: self.kept.clone() }
     }
 }
 
-impl<'a> Source<'a> {
+impl<'a> MeshSource<'a> {
     /// A mesh alone.
     pub fn mesh(file: &'a Path, model: &'a ModelOptions) -> Self {
         Self { file: Some(file), model, matrices: None, kept: KeptOptions::default() }
     }
 }
 
-impl Source<'_> {
+impl MeshSource<'_> {
     /// Name of the model.
     pub fn name(&self) -> String {
         if let Some(name) = &self.kept.name {
@@ -339,11 +339,11 @@ impl Source<'_> {
     }
 
     /// All files that are read.
-    pub fn files(&self) -> Vec<Named> {
-        let mesh = self.file.map(|path| Named::new("FILE", path));
+    pub fn files(&self) -> Vec<NamedFile> {
+        let mesh = self.file.map(|path| NamedFile::new("FILE", path));
         let mut parts = Vec::new();
         self.file.iter().for_each(|path| included::collect(path, &mut parts));
-        let parts = parts.into_iter().map(|path| Named::new("a file that FILE includes,", path));
+        let parts = parts.into_iter().map(|path| NamedFile::new("a file that FILE includes,", path));
         let matrices = self.matrices.into_iter().flat_map(|own| {
             // Without --dofs the list beside CalculiX's stiffness file is read.
             let storage = own.stiffness.as_ref().filter(|path| path.extension().is_some_and(|kind| kind == "sti"));
@@ -354,7 +354,7 @@ impl Source<'_> {
                 ("--nodes", own.nodes.clone()),
                 ("--dofs", dofs),
             ];
-            all.into_iter().filter_map(|(role, path)| Named::option(role, &path))
+            all.into_iter().filter_map(|(role, path)| NamedFile::option(role, &path))
         });
         mesh.into_iter().chain(parts).chain(matrices).collect()
     }
@@ -398,11 +398,11 @@ pub enum AxisChoice {
 
 impl ModelOptions {
     /// Engine axis in the file.
-    pub fn axis(&self) -> Axis {
+    pub fn axis(&self) -> EngineAxis {
         match self.axis {
-            Some(AxisChoice::X) => Axis::X,
-            Some(AxisChoice::Y) => Axis::Y,
-            Some(AxisChoice::Z) | None => Axis::Z,
+            Some(AxisChoice::X) => EngineAxis::X,
+            Some(AxisChoice::Y) => EngineAxis::Y,
+            Some(AxisChoice::Z) | None => EngineAxis::Z,
         }
     }
 

@@ -6,16 +6,16 @@ use tiprub_model::{
     Rotor37Options,
     cube::MassMatrix,
     cyclic::ModeSelection,
-    rotor37::{MeshCounts, Tip},
+    rotor37::{MeshCounts, TipContact},
     stage::StageOptions,
 };
-use tiprub_shell::places::Named;
+use tiprub_shell::places::NamedFile;
 use tiprub_study::arguments::positive;
 
 use crate::{
     casing_arguments::CasingArguments,
     own_arguments::{BladeArguments, CasingMeshArguments, SectorArguments},
-    shared_arguments::{KindChoice, MaterialChoice, MeshSize, Written, pair},
+    shared_arguments::{KindChoice, MaterialChoice, MeshSize, OutputArguments, pair},
 };
 
 /// Arguments of `tiprub reduce`.
@@ -23,12 +23,12 @@ use crate::{
 pub struct ReduceArguments {
     /// What to reduce.
     #[command(subcommand)]
-    pub model: Model,
+    pub model: ModelToReduce,
 }
 
 /// What can be reduced.
 #[derive(Debug, Subcommand)]
-pub enum Model {
+pub enum ModelToReduce {
     /// Blades of your own on a rigid hub: a mesh (CalculiX/Abaqus .inp, Gmsh 4.1 .msh), or matrices of any code.
     #[command(
         after_help = "Examples:\n  tiprub reduce blade blade.inp --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
@@ -67,10 +67,10 @@ pub enum Model {
     Cube(CubeArguments),
     /// The ring at its left.
     #[command(after_help = "Example:\n  tiprub reduce ring-left --modes 50 --static-responses 12")]
-    RingLeft(RingArguments),
+    RingLeft(CubeRingArguments),
     /// The ring at its right.
     #[command(after_help = "Example:\n  tiprub reduce ring-right --modes 50 --static-responses 12")]
-    RingRight(RingArguments),
+    RingRight(CubeRingArguments),
 }
 
 /// Arguments of `tiprub reduce rotor37`.
@@ -100,7 +100,7 @@ pub struct Rotor37Arguments {
     pub spin: Option<f64>,
     /// What is written.
     #[command(flatten)]
-    pub written: Written,
+    pub written: OutputArguments,
 }
 
 impl Rotor37Arguments {
@@ -114,9 +114,9 @@ impl Rotor37Arguments {
                 MeshCounts { chord, thickness, span }
             }),
             tip: match (self.contact_nodes, self.contact_patches, defaults.tip.counts()) {
-                (Some(nodes), ..) => Tip::Nodes(nodes),
+                (Some(nodes), ..) => TipContact::Nodes(nodes),
                 (None, patches, [own, rows]) => {
-                    Tip::patches([patches.unwrap_or(own), self.contact_rows.unwrap_or(rows)])
+                    TipContact::patches([patches.unwrap_or(own), self.contact_rows.unwrap_or(rows)])
                 }
             },
             kind: KindChoice::kind(self.kind, !of_the_paper),
@@ -136,9 +136,9 @@ impl StageArguments {
         let (_, defaults) = if self.coarse { builtin::stage_nodes(true) } else { builtin::stage() };
         let options = StageOptions {
             tip: match (self.contact_nodes, self.contact_patches) {
-                (Some(nodes), _) => Tip::Nodes(nodes),
+                (Some(nodes), _) => TipContact::Nodes(nodes),
                 (None, None) if has_nodes => defaults.tip,
-                (None, own) => Tip::patches([own.unwrap_or(patches), self.contact_rows.unwrap_or(rows)]),
+                (None, own) => TipContact::patches([own.unwrap_or(patches), self.contact_rows.unwrap_or(rows)]),
             },
             kind: KindChoice::kind(self.kind, !has_nodes),
             modes: self.modes.map_or(defaults.modes, ModeSelection::Families),
@@ -177,7 +177,7 @@ pub struct StageArguments {
     pub kind: Option<KindChoice>,
     /// What is written.
     #[command(flatten)]
-    pub written: Written,
+    pub written: OutputArguments,
 }
 
 /// Arguments of `tiprub reduce stage-casing`.
@@ -203,7 +203,7 @@ pub struct StageCasingArguments {
     pub material: Option<MaterialChoice>,
     /// What is written.
     #[command(flatten)]
-    pub written: Written,
+    pub written: OutputArguments,
 }
 
 /// Arguments of `tiprub reduce cube`.
@@ -223,12 +223,12 @@ pub struct CubeArguments {
     pub mass_matrix: Option<MassChoice>,
     /// What is written.
     #[command(flatten)]
-    pub written: Written,
+    pub written: OutputArguments,
 }
 
 /// Arguments of `tiprub reduce ring-left` and `ring-right`.
 #[derive(Debug, Args)]
-pub struct RingArguments {
+pub struct CubeRingArguments {
     /// Modes kept [default: 100].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
@@ -240,7 +240,7 @@ pub struct RingArguments {
     pub mass_matrix: Option<MassChoice>,
     /// What is written.
     #[command(flatten)]
-    pub written: Written,
+    pub written: OutputArguments,
 }
 
 /// Mass matrix of finite elements.
@@ -261,9 +261,9 @@ impl From<MassChoice> for MassMatrix {
     }
 }
 
-impl Model {
+impl ModelToReduce {
     /// What it writes.
-    pub fn written(&self) -> &Written {
+    pub fn written(&self) -> &OutputArguments {
         match self {
             Self::Blade(own) => &own.written,
             Self::Sector(own) => &own.written,
@@ -295,7 +295,7 @@ impl Model {
     }
 
     /// The files that describe it.
-    pub fn files(&self) -> Vec<Named> {
+    pub fn files(&self) -> Vec<NamedFile> {
         match self {
             Self::Blade(own) => own.source().files(),
             Self::Sector(own) => own.source().files(),

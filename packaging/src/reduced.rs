@@ -7,7 +7,7 @@ use tiprub_model::{
     cyclic::CyclicReduction,
     inp::{CyclicSymmetry, calculix_cyclic_input, calculix_input},
     spin::SpinCheck,
-    vtk::{self, Field},
+    vtk::{self, NodalField},
 };
 use tiprub_shell::{Failure, Result};
 
@@ -20,7 +20,7 @@ const DRAWN_MODES: usize = 3;
 
 /// A reduced model.
 #[derive(Debug)]
-pub struct Reduced {
+pub struct ReducedModel {
     /// The reduced-order model, checks included.
     pub rom: Rom,
     /// Mesh and material, where there is one mesh of one material.
@@ -40,7 +40,7 @@ pub struct Reduced {
     /// Sets of the two faces of a sector, for exported files.
     pub faces: Option<[String; 2]>,
     /// Mode shapes for pictures.
-    pub fields: Vec<Field>,
+    pub fields: Vec<NodalField>,
     /// What was read, where it was a file: for people, and for programs.
     pub read: (String, Value),
     /// Warnings.
@@ -49,11 +49,11 @@ pub struct Reduced {
     pub slips: Vec<Slip>,
 }
 
-impl Reduced {
+impl ReducedModel {
     /// From a general reduction; `clamped` is a set of its mesh.
     pub fn general(reduction: Reduction, clamped: Option<&str>) -> Self {
         let field = |(mode, number): (&tiprub_model::reduce::Mode, usize)| {
-            Field::vectors(format!("mode_{number}_{:.1}_Hz", mode.frequency), mode.shape.clone())
+            NodalField::vectors(format!("mode_{number}_{:.1}_Hz", mode.frequency), mode.shape.clone())
         };
         Self {
             fields: reduction.modes.iter().zip(1..).map(field).collect(),
@@ -83,7 +83,7 @@ impl Reduced {
         let fields = reduction.nodal_diameters.iter().flat_map(|found| {
             let shapes = found.shapes.iter().zip(&found.full_frequencies).zip(1..).take(DRAWN_MODES);
             shapes.flat_map(|((shape, frequency), number)| {
-                Field::mode(&format!("diameter_{}_mode_{number}_{frequency:.1}_Hz", found.number), shape)
+                NodalField::mode(&format!("diameter_{}_mode_{number}_{frequency:.1}_Hz", found.number), shape)
             })
         });
         Self {

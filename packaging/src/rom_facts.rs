@@ -6,14 +6,14 @@ use serde_json::{Value, json};
 use tiprub_core::{
     Rom,
     plausibility::{self, Slip},
-    rom::{ContactNode, Frame},
+    rom::{ContactNode, DisplacementFrame},
     stability,
     warning::{Topic, Warning},
 };
 use tiprub_shell::{Failure, Result};
 use tiprub_study::{
     estimate,
-    stability::structure::{Digging, Sliding, StepLimit, Structure},
+    stability::structure::{Digging, KnownContact, SingleStructure, StepLimit},
 };
 
 /// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
@@ -58,7 +58,7 @@ pub struct RomFacts {
     /// Internal step of every scheme below which all are accepted, with the contact given.
     pub step_limits: Vec<StepLimit>,
     /// The contact they hold for, where it was given.
-    pub sliding: Option<Sliding>,
+    pub sliding: Option<KnownContact>,
 }
 
 /// One row of the table of checks.
@@ -86,9 +86,9 @@ impl RomFacts {
     ///
     /// # Errors
     /// A ROM whose eigenproblem cannot be solved.
-    pub fn of(rom: &Rom, sliding: Option<Sliding>) -> Result<Self> {
+    pub fn of(rom: &Rom, sliding: Option<KnownContact>) -> Result<Self> {
         let in_rom = |error| Failure::from_core(format!("ROM `{}`", rom.name), error);
-        let structure = Structure::new(rom, rom.damping_ratio, 0.0).map_err(in_rom)?;
+        let structure = SingleStructure::new(rom, rom.damping_ratio, 0.0).map_err(in_rom)?;
         let hertz = |frequencies: &Vec<f64>| frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect();
         let by_nodal_diameter: Vec<Vec<f64>> = structure.frequencies.iter().map(hertz).collect();
         let mut frequencies = by_nodal_diameter.concat();
@@ -194,10 +194,10 @@ impl RomFacts {
         for node in rom.contact_nodes.iter().step_by(shown.max(1)) {
             let [a, b, c] = node.position;
             let place = match rom.frame {
-                Frame::Cylindrical => {
+                DisplacementFrame::Cylindrical => {
                     format!("r {a:.6} m, θ {b:.6} rad, z {c:.6} m, slope {:.4}", node.meridional_slope)
                 }
-                Frame::Cartesian => format!("x {a:.6} m, y {b:.6} m, z {c:.6} m"),
+                DisplacementFrame::Cartesian => format!("x {a:.6} m, y {b:.6} m, z {c:.6} m"),
             };
             let _ = writeln!(text, "    {:<24}{place}", node.name);
         }
@@ -206,7 +206,7 @@ impl RomFacts {
         text.push_str(&extras_text(rom));
         let _ = writeln!(text, "  largest frequency         {:.6e} rad/s", self.largest_angular_frequency);
         text.push_str(&self.steps_text());
-        if rom.frame == Frame::Cylindrical {
+        if rom.frame == DisplacementFrame::Cylindrical {
             let friction = self.solvable_friction.map_or("none".into(), |value| format!("{value}"));
             let _ = writeln!(text, "  contact solvable up to µ  {friction} (all nodes closed, tried up to 2)");
             let digging = self.digging_text();
@@ -280,7 +280,7 @@ impl RomFacts {
     /// What the limits hold for.
     pub(crate) fn steps_hold_for(&self) -> String {
         match self.sliding {
-            Some(Sliding { friction, speed }) if friction > 0.0 && !self.rom.is_cyclic() => {
+            Some(KnownContact { friction, speed }) if friction > 0.0 && !self.rom.is_cyclic() => {
                 let sense = if speed > 0.0 { "+θ" } else { "−θ" };
                 let sense = if speed == 0.0 { "either sense" } else { sense };
                 format!("of one sector, with µ = {friction} and sliding in {sense}")
@@ -337,7 +337,7 @@ impl RomFacts {
             let _ =
                 writeln!(text, "  {mode:>4}{number} {full:>12.3} {reduced:>14.3} {deviation:>22.5} {residual:>21.5}");
         }
-        if let Some(rest) = Worst::of(&checks, ROWS_SHOWN) {
+        if let Some(rest) = OmittedRows::of(&checks, ROWS_SHOWN) {
             let _ = writeln!(
                 text,
                 "  {} more, up to {:.1} Hz: deviation at most {:.5} %, residual at most {:.5} %",
@@ -409,14 +409,14 @@ impl RomFacts {
 
 /// What the rows of a long table of checks that are not shown amount to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Worst {
+pub(crate) struct OmittedRows {
     pub count: usize,
     pub frequency: f64,
     pub deviation: f64,
     pub residual: f64,
 }
 
-impl Worst {
+impl OmittedRows {
     /// The rows from `shown` on; `None` where there are none.
     pub fn of(checks: &[CheckRow], shown: usize) -> Option<Self> {
         let rest = checks.get(shown..).filter(|rest| !rest.is_empty())?;
@@ -457,7 +457,7 @@ pub(crate) fn order_text(rom: &Rom) -> String {
 
 /// Rows of patches around an axis, for people; nothing for contact nodes.
 fn rows_text(rom: &Rom) -> String {
-    if rom.frame == Frame::Cartesian || rom.contact_nodes.iter().any(|node| node.area <= 0.0) {
+    if rom.frame == DisplacementFrame::Cartesian || rom.contact_nodes.iter().any(|node| node.area <= 0.0) {
         return String::new();
     }
     let alone = match rom.rows() {

@@ -3,8 +3,8 @@
 use tiprub_core::{
     Rom, Scene,
     settings::{
-        CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Motion, Preset, SceneSettings, Scheme,
-        Solver, StructureSettings, SurfaceSettings, TOLERANCE,
+        BodyMotion, CoatingSettings, ContactSettings, CuttingSettings, InputInterpolation, Preset, SceneSettings,
+        Scheme, Solver, StructureSettings, SurfaceSettings, TOLERANCE,
     },
 };
 
@@ -48,7 +48,7 @@ pub fn scheme(settings: &SceneSettings) -> String {
 
 fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String>) {
     let name = &structure.name;
-    if structure.motion == Motion::Free {
+    if structure.motion == BodyMotion::Free {
         let [x, y, z] = structure.velocity;
         found.push(format!("`{name}` flies freely, at the start with {x}, {y}, {z} m/s along x, y, z"));
     }
@@ -91,7 +91,7 @@ fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String
     if structure.softening > 0.0 {
         found.push(format!("`{name}` softens: {} of its stiffness per kelvin", structure.softening));
     }
-    if structure.thermal && structure.motion == Motion::Rotating {
+    if structure.thermal && structure.motion == BodyMotion::Rotating {
         found.push(format!("`{name}` heats up: its temperature is an input"));
     } else if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
         found.push(format!("`{name}` heats up: temperatures of {} patches are inputs", thermal.patches.len()));
@@ -223,7 +223,7 @@ fn blades(coupled: bool, stiffens: bool) -> &'static str {
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
-    use tiprub_core::rom::{Frame, Harmonic, RomChecks, RomExtras};
+    use tiprub_core::rom::{DisplacementFrame, Harmonic, RomChecks, RomExtras};
 
     use super::*;
     use tiprub_gallery::scene_source::ROTOR37_ONE_ROW_SCENE;
@@ -291,7 +291,7 @@ mod tests {
             name: "pair".into(),
             origin: String::new(),
             sectors: 2,
-            frame: Frame::Cylindrical,
+            frame: DisplacementFrame::Cylindrical,
             mass: DMatrix::identity(1, 1),
             stiffness: DMatrix::identity(1, 1),
             contact_map: DMatrix::zeros(0, 1),

@@ -7,7 +7,7 @@ use tiprub_model::{Material, reduce::ReductionKind};
 
 /// What every reduction writes.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Args)]
-pub struct Written {
+pub struct OutputArguments {
     /// ROM file to write [default: NAME.rom.safetensors with the name of the model].
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tiprub_model::{CasingOptions, casing::CASING37};
-use tiprub_shell::places::Named;
+use tiprub_shell::places::NamedFile;
 
 use crate::{
     casing_arguments::RingArguments,
     cli::{FmiChoice, LibraryArguments},
-    own_arguments::{AxisChoice, ModelOptions, Source, UnitChoice},
+    own_arguments::{AxisChoice, MeshSource, ModelOptions, UnitChoice},
     shared_arguments::axial,
 };
 
@@ -89,8 +89,8 @@ impl ThermalArguments {
     }
 
     /// All files that are read.
-    pub fn files(&self) -> Vec<Named> {
+    pub fn files(&self) -> Vec<NamedFile> {
         let model = self.model();
-        self.file.as_deref().map_or_else(Vec::new, |file| Source::mesh(file, &model).files())
+        self.file.as_deref().map_or_else(Vec::new, |file| MeshSource::mesh(file, &model).files())
     }
 }

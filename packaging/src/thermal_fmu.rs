@@ -3,9 +3,9 @@
 use std::{env, path::Path};
 
 use tiprub_fmi_host::archive;
-use tiprub_model_description::{Description, Experiment};
+use tiprub_model_description::{DefaultExperiment, Description};
 use tiprub_shell::{Failure, Result};
-use tiprub_thermal::{Model, Simulation};
+use tiprub_thermal::{ConductionModel, ThermalSimulation};
 
 use crate::{
     fmu::{FmiVersion, contents, generation_date},
@@ -32,7 +32,7 @@ const STEPS: &str = "Heat is held over a step, so that what is handed over is it
 /// A model made ready for packaging.
 #[derive(Debug)]
 pub struct ThermalPackage<'a> {
-    simulation: Simulation,
+    simulation: ThermalSimulation,
     libraries: &'a [Library],
     generated: String,
 }
@@ -42,8 +42,8 @@ impl<'a> ThermalPackage<'a> {
     ///
     /// # Errors
     /// The model is refused, or SOURCE_DATE_EPOCH is set to nonsense.
-    pub fn new(model: &Model, libraries: &'a [Library]) -> Result<Self> {
-        let simulation = Simulation::new(model.clone());
+    pub fn new(model: &ConductionModel, libraries: &'a [Library]) -> Result<Self> {
+        let simulation = ThermalSimulation::new(model.clone());
         let simulation = simulation.map_err(|error| Failure::from_core(format!("model `{}`", model.name), error))?;
         Ok(Self { simulation, libraries, generated: generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())? })
     }
@@ -74,7 +74,7 @@ impl<'a> ThermalPackage<'a> {
             author: "The tiprub developers",
             copyright: "Copyright (c) 2026 The tiprub developers",
             license: env!("CARGO_PKG_LICENSE"),
-            experiment: Experiment { start: 0.0, stop: 100.0, step: 0.1 },
+            experiment: DefaultExperiment { start: 0.0, stop: 100.0, step: 0.1 },
             fixed_internal_step: None,
             patches_of_roms: true,
             table: self.simulation.table(),

@@ -1,10 +1,10 @@
 //! The calls that both standards have, under their names there.
 
 macro_rules! calls_of_both {
-    (exit: $exit:ident, reset: $reset:ident, terminate: $terminate:ident, free: $free:ident,
+    (slave: $slave:ident, exit: $exit:ident, reset: $reset:ident, terminate: $terminate:ident, free: $free:ident,
      save: $save:ident, restore: $restore:ident,
      size: $size:ident, serialise: $serialise:ident, deserialise: $deserialise:ident,) => {
-        impl Slave<'_> {
+        impl $slave<'_> {
             /// Leave Initialization Mode.
             pub fn exit(&self) -> i32 {
                 // SAFETY: the instance is alive.
@@ -25,7 +25,7 @@ macro_rules! calls_of_both {
 
             /// Into a new state.
             #[track_caller]
-            pub fn save(&self) -> State {
+            pub fn save(&self) -> StatePointer {
                 let mut state = std::ptr::null_mut();
                 // SAFETY: a place for the state.
                 self.expect(unsafe { (self.api.$save)(self.handle, &raw mut state) });
@@ -33,14 +33,14 @@ macro_rules! calls_of_both {
             }
 
             /// From a state.
-            pub fn restore(&self, state: State) -> i32 {
+            pub fn restore(&self, state: StatePointer) -> i32 {
                 // SAFETY: the instance is alive; the library must bear any state.
                 unsafe { (self.api.$restore)(self.handle, state) }
             }
 
             /// The bytes of a state.
             #[track_caller]
-            pub fn serialise(&self, state: State) -> Vec<u8> {
+            pub fn serialise(&self, state: StatePointer) -> Vec<u8> {
                 let mut size = 0;
                 // SAFETY: a place for the size.
                 self.expect(unsafe { (self.api.$size)(self.handle, state, &raw mut size) });
@@ -51,7 +51,7 @@ macro_rules! calls_of_both {
             }
 
             /// Bytes into a new state.
-            pub fn deserialise(&self, bytes: &[u8]) -> (i32, State) {
+            pub fn deserialise(&self, bytes: &[u8]) -> (i32, StatePointer) {
                 let (mut state, size) = (std::ptr::null_mut(), bytes.len());
                 // SAFETY: an array of that size, a place for the state.
                 let status = unsafe { (self.api.$deserialise)(self.handle, bytes.as_ptr(), size, &raw mut state) };
@@ -72,7 +72,7 @@ macro_rules! calls_of_both {
             }
         }
 
-        impl Drop for Slave<'_> {
+        impl Drop for $slave<'_> {
             fn drop(&mut self) {
                 // SAFETY: the instance is NULL or alive and not used any more; the context came from a box.
                 unsafe {

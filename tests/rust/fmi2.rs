@@ -4,13 +4,13 @@
 use std::ffi::CString;
 use std::path::Path;
 
-use crate::scene::Resources;
+use crate::scene::UnpackedResources;
 use crate::{Journal, journal2, pointer};
-use tiprub_fmi_host::api::{Fmi2Api, Fmi2Callbacks, Instance, State};
+use tiprub_fmi_host::api::{Fmi2Api, Fmi2Callbacks, InstancePointer, StatePointer};
 
 /// What the instantiation is given; change a field to try something else.
 #[derive(Debug, Clone)]
-pub struct Arguments {
+pub struct Fmi2Arguments {
     /// `instanceName`.
     pub name: Option<CString>,
     /// `fmuType`.
@@ -23,9 +23,9 @@ pub struct Arguments {
     pub logging_on: i32,
 }
 
-impl Arguments {
+impl Fmi2Arguments {
     /// Proper ones.
-    pub fn new(resources: &Resources) -> Self {
+    pub fn new(resources: &UnpackedResources) -> Self {
         let text = |text: String| Some(CString::new(text).expect("no NUL"));
         Self {
             name: text("rub".into()),
@@ -39,11 +39,11 @@ impl Arguments {
 
 /// One instance; freed when dropped.
 #[derive(Debug)]
-pub struct Slave<'a> {
+pub struct Fmi2TestSlave<'a> {
     /// The functions.
     pub api: &'a Fmi2Api,
     /// The instance.
-    pub handle: Instance,
+    pub handle: InstancePointer,
     context: *mut Journal,
 }
 
@@ -54,17 +54,17 @@ pub fn load(path: &Path) -> Fmi2Api {
 }
 
 calls_of_both! {
-    exit: fmi2ExitInitializationMode, reset: fmi2Reset, terminate: fmi2Terminate, free: fmi2FreeInstance,
+    slave: Fmi2TestSlave, exit: fmi2ExitInitializationMode, reset: fmi2Reset, terminate: fmi2Terminate, free: fmi2FreeInstance,
     save: fmi2GetFMUstate, restore: fmi2SetFMUstate,
     size: fmi2SerializedFMUstateSize, serialise: fmi2SerializeFMUstate, deserialise: fmi2DeSerializeFMUstate,
 }
 
-impl<'a> Slave<'a> {
+impl<'a> Fmi2TestSlave<'a> {
     /// Instantiate; on failure the messages.
     ///
     /// # Errors
     /// All messages logged.
-    pub fn try_new(api: &'a Fmi2Api, arguments: &Arguments) -> Result<Self, String> {
+    pub fn try_new(api: &'a Fmi2Api, arguments: &Fmi2Arguments) -> Result<Self, String> {
         let context = Box::into_raw(Box::new(Journal::default()));
         let callbacks = Fmi2Callbacks {
             logger: journal2 as *const _,
@@ -73,7 +73,7 @@ impl<'a> Slave<'a> {
             stepFinished: std::ptr::null(),
             componentEnvironment: context.cast(),
         };
-        let Arguments { name, kind, token, location, logging_on } = arguments;
+        let Fmi2Arguments { name, kind, token, location, logging_on } = arguments;
         // SAFETY: all pointers are valid for the call or NULL, which the library must bear.
         let handle = unsafe {
             (api.fmi2Instantiate)(
@@ -92,13 +92,13 @@ impl<'a> Slave<'a> {
 
     /// Instantiate the scene of the tests.
     #[track_caller]
-    pub fn new(api: &'a Fmi2Api, resources: &Resources) -> Self {
-        Self::try_new(api, &Arguments::new(resources)).unwrap_or_else(|log| panic!("{log}"))
+    pub fn new(api: &'a Fmi2Api, resources: &UnpackedResources) -> Self {
+        Self::try_new(api, &Fmi2Arguments::new(resources)).unwrap_or_else(|log| panic!("{log}"))
     }
 
     /// Instantiate and initialise, start time 0, no stop time.
     #[track_caller]
-    pub fn initialised(api: &'a Fmi2Api, resources: &Resources) -> Self {
+    pub fn initialised(api: &'a Fmi2Api, resources: &UnpackedResources) -> Self {
         let slave = Self::new(api, resources);
         slave.initialise();
         slave

@@ -4,13 +4,13 @@
 use std::ffi::{CString, c_void};
 use std::path::Path;
 
-use crate::scene::Resources;
+use crate::scene::UnpackedResources;
 use crate::{Journal, OK, journal3, pointer};
-use tiprub_fmi_host::api::{Fmi3Api, Instance, State, Update};
+use tiprub_fmi_host::api::{Fmi3Api, InstancePointer, StatePointer, Update};
 
 /// What the instantiation is given; change a field to try something else.
 #[derive(Debug, Clone)]
-pub struct Arguments {
+pub struct Fmi3Arguments {
     /// `instanceName`.
     pub name: Option<CString>,
     /// `instantiationToken`.
@@ -23,13 +23,13 @@ pub struct Arguments {
     pub early_return: bool,
     /// `requiredIntermediateVariables`.
     pub intermediate: Vec<u32>,
-    /// `intermediateUpdate`; it is given the importer's [`Context`].
+    /// `intermediateUpdate`; it is given the importer's [`CallbackContext`].
     pub update: Option<Update>,
 }
 
-impl Arguments {
+impl Fmi3Arguments {
     /// Proper ones.
-    pub fn new(resources: &Resources) -> Self {
+    pub fn new(resources: &UnpackedResources) -> Self {
         let text = |text: String| Some(CString::new(text).expect("no NUL"));
         Self {
             name: text("rub".into()),
@@ -46,13 +46,13 @@ impl Arguments {
 /// What `instanceEnvironment` points to; begins with the journal, so that the logger finds it.
 #[derive(Debug)]
 #[repr(C)]
-pub struct Context {
+pub struct CallbackContext {
     /// Messages.
     pub journal: Journal,
     /// The functions, for callbacks.
     pub api: *const Fmi3Api,
     /// The instance, for callbacks.
-    pub handle: Instance,
+    pub handle: InstancePointer,
     /// Whatever a test's callback wants to note.
     pub notes: Vec<f64>,
     /// Whatever a test's callback wants to know.
@@ -76,13 +76,13 @@ pub struct Step {
 
 /// One instance; freed when dropped.
 #[derive(Debug)]
-pub struct Slave<'a> {
+pub struct Fmi3TestSlave<'a> {
     /// The functions.
     pub api: &'a Fmi3Api,
     /// The instance.
-    pub handle: Instance,
+    pub handle: InstancePointer,
     /// What callbacks are given.
-    pub context: *mut Context,
+    pub context: *mut CallbackContext,
 }
 
 /// Load the library.
@@ -92,31 +92,31 @@ pub fn load(path: &Path) -> Fmi3Api {
 }
 
 calls_of_both! {
-    exit: fmi3ExitInitializationMode, reset: fmi3Reset, terminate: fmi3Terminate, free: fmi3FreeInstance,
+    slave: Fmi3TestSlave, exit: fmi3ExitInitializationMode, reset: fmi3Reset, terminate: fmi3Terminate, free: fmi3FreeInstance,
     save: fmi3GetFMUState, restore: fmi3SetFMUState,
     size: fmi3SerializedFMUStateSize, serialise: fmi3SerializeFMUState, deserialise: fmi3DeserializeFMUState,
 }
 
-impl AsMut<Journal> for Context {
+impl AsMut<Journal> for CallbackContext {
     fn as_mut(&mut self) -> &mut Journal {
         &mut self.journal
     }
 }
 
-impl<'a> Slave<'a> {
+impl<'a> Fmi3TestSlave<'a> {
     /// Instantiate; on failure the messages.
     ///
     /// # Errors
     /// All messages logged.
-    pub fn try_new(api: &'a Fmi3Api, arguments: &Arguments) -> Result<Self, String> {
-        let context = Box::into_raw(Box::new(Context {
+    pub fn try_new(api: &'a Fmi3Api, arguments: &Fmi3Arguments) -> Result<Self, String> {
+        let context = Box::into_raw(Box::new(CallbackContext {
             journal: Journal::default(),
             api,
             handle: std::ptr::null_mut(),
             notes: Vec::new(),
             wish: 0.0,
         }));
-        let Arguments { name, token, path, event_mode, early_return, intermediate, update } = arguments;
+        let Fmi3Arguments { name, token, path, event_mode, early_return, intermediate, update } = arguments;
         // SAFETY: all pointers are valid for the call or NULL, which the library must bear.
         let handle = unsafe {
             (api.fmi3InstantiateCoSimulation)(
@@ -142,8 +142,8 @@ impl<'a> Slave<'a> {
 
     /// Instantiate the scene of the tests.
     #[track_caller]
-    pub fn new(api: &'a Fmi3Api, resources: &Resources) -> Self {
-        Self::try_new(api, &Arguments::new(resources)).unwrap_or_else(|log| panic!("{log}"))
+    pub fn new(api: &'a Fmi3Api, resources: &UnpackedResources) -> Self {
+        Self::try_new(api, &Fmi3Arguments::new(resources)).unwrap_or_else(|log| panic!("{log}"))
     }
 
     /// From instantiated to ready for steps.

@@ -10,9 +10,9 @@ mod scenes;
 use std::fmt::Write as _;
 use std::fs;
 
-use tiprub_core::variables::{Causality, Kind, Variable};
+use tiprub_core::variables::{Causality, DataType, Variable};
 use tiprub_core::{Scene, Simulation};
-use tiprub_tests::scene::Resources;
+use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{OK, fmi2, fmi3, root, shipped};
 
 /// Lengths of the communication steps (s): internal steps of one and two lengths, and back.
@@ -53,17 +53,17 @@ fn elements(row: &Variable) -> impl Iterator<Item = u32> + use<> {
 
 fn outputs(simulation: &Simulation) -> Vec<u32> {
     let rows = simulation.table().variables().iter();
-    rows.filter(|row| row.causality == Causality::Output && row.kind == Kind::Real).flat_map(elements).collect()
+    rows.filter(|row| row.causality == Causality::Output && row.kind == DataType::Real).flat_map(elements).collect()
 }
 
 /// What a scene can be stepped by.
-trait Face {
+trait SteppedBy {
     fn set(&mut self, reference: u32, value: f64, slope: Option<f64>);
     fn step(&mut self, time: f64, length: f64);
     fn get(&self, references: &[u32]) -> Vec<f64>;
 }
 
-impl Face for Simulation {
+impl SteppedBy for Simulation {
     fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) {
         self.set_real(reference, value).unwrap();
         if let Some(slope) = slope {
@@ -80,7 +80,7 @@ impl Face for Simulation {
     }
 }
 
-impl Face for fmi2::Slave<'_> {
+impl SteppedBy for fmi2::Fmi2TestSlave<'_> {
     fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) {
         self.expect(self.set_reals(&[reference], &[value]));
         if let Some(slope) = slope {
@@ -89,7 +89,7 @@ impl Face for fmi2::Slave<'_> {
     }
 
     fn step(&mut self, time: f64, length: f64) {
-        let status = fmi2::Slave::step(self, time, length);
+        let status = fmi2::Fmi2TestSlave::step(self, time, length);
         assert_eq!(status, OK, "{}", self.log());
     }
 
@@ -98,14 +98,14 @@ impl Face for fmi2::Slave<'_> {
     }
 }
 
-impl Face for fmi3::Slave<'_> {
+impl SteppedBy for fmi3::Fmi3TestSlave<'_> {
     /// FMI 3.0 has no derivatives of inputs.
     fn set(&mut self, reference: u32, value: f64, _slope: Option<f64>) {
         self.expect(self.set_reals(&[reference], &[value]));
     }
 
     fn step(&mut self, time: f64, length: f64) {
-        let step = fmi3::Slave::step(self, time, length);
+        let step = fmi3::Fmi3TestSlave::step(self, time, length);
         assert_eq!(step.status, OK, "{}", self.log());
     }
 
@@ -115,7 +115,7 @@ impl Face for fmi3::Slave<'_> {
 }
 
 /// Digest of all real outputs at all communication points (FNV-1a, 64 bit), and those of the last one.
-fn run(scene: &Scene, face: &mut impl Face, derivatives: bool) -> (u64, Vec<f64>) {
+fn run(scene: &Scene, face: &mut impl SteppedBy, derivatives: bool) -> (u64, Vec<f64>) {
     let table = Simulation::new(scene).unwrap();
     let (inputs, outputs) = (inputs(&table), outputs(&table));
     let (mut time, mut digest, mut last) = (0.0, 0xcbf2_9ce4_8422_2325_u64, Vec::new());
@@ -195,10 +195,10 @@ fn both_faces_of_the_library_give_the_bits_of_the_core() {
     let path = shipped();
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
     for scene in scenes::all() {
-        let resources = Resources::of(&scene, false);
-        let mut two = fmi2::Slave::initialised(&api2, &resources);
+        let resources = UnpackedResources::of(&scene, false);
+        let mut two = fmi2::Fmi2TestSlave::initialised(&api2, &resources);
         assert_eq!(run(&scene, &mut two, true).0, native(&scene, true).0, "FMI 2.0, {}", scene.settings.name);
-        let mut three = fmi3::Slave::new(&api3, &resources);
+        let mut three = fmi3::Fmi3TestSlave::new(&api3, &resources);
         three.initialise();
         assert_eq!(run(&scene, &mut three, false).0, native(&scene, false).0, "FMI 3.0, {}", scene.settings.name);
     }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use tempfile::TempDir;
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomChecks, RomExtras, Thermal};
-use tiprub_core::settings::{Motion, StructureSettings};
+use tiprub_core::rom::{ContactGrid, ContactNode, DisplacementFrame, RomChecks, RomExtras, Thermal, ThermalPatch};
+use tiprub_core::settings::{BodyMotion, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
 /// Radius of the blade tips (m).
@@ -42,7 +42,7 @@ pub fn rom() -> Rom {
         name: "toy".into(),
         origin: "three point masses on springs".into(),
         sectors: 6,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         mass,
         stiffness,
         damping_ratio: 0.01,
@@ -124,7 +124,7 @@ pub fn ring() -> Rom {
         name: "ring".into(),
         origin: "breathing and two nodal diameters".into(),
         sectors: 1,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         mass: DMatrix::from_diagonal_element(3, 3, 0.5),
         stiffness: DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&stiffness)),
         damping_ratio: 0.02,
@@ -135,7 +135,7 @@ pub fn ring() -> Rom {
             thermal: Some(Thermal {
                 loads: DMatrix::from_fn(3, PATCHES, |mode, patch| [130.0, 40.0, -30.0][mode] * (1.0 + patch as f64)),
                 patches: (0..PATCHES)
-                    .map(|patch| Patch {
+                    .map(|patch| ThermalPatch {
                         angle: [quarter * patch as f64, quarter * (patch + 1) as f64],
                         axial: [-0.01, 0.05],
                     })
@@ -154,7 +154,7 @@ pub fn warm_scene() -> Scene {
     scene.settings.structures.push(StructureSettings {
         name: "ring".into(),
         rom: "ring.rom.safetensors".into(),
-        motion: Motion::Still,
+        motion: BodyMotion::Still,
         thermal: true,
         ..StructureSettings::default()
     });
@@ -173,13 +173,13 @@ pub fn reference(name: &str) -> u32 {
 
 /// An unpacked FMU's resources.
 #[derive(Debug)]
-pub struct Resources {
+pub struct UnpackedResources {
     directory: TempDir,
     /// The token that belongs to them.
     pub token: String,
 }
 
-impl Resources {
+impl UnpackedResources {
     /// Write the scene of the tests.
     #[track_caller]
     pub fn new(arrays: bool) -> Self {
@@ -194,7 +194,7 @@ impl Resources {
 
     /// Write a model of heat conduction.
     #[track_caller]
-    pub fn of_thermal(model: &tiprub_thermal::Model, arrays: bool) -> Self {
+    pub fn of_thermal(model: &tiprub_thermal::ConductionModel, arrays: bool) -> Self {
         Self::of_files(&tiprub_format::thermal_resource_files(model, arrays))
     }
 

@@ -1,4 +1,4 @@
-//! The C ABIs of FMI 2.0 (44 functions) and FMI 3.0 (75 functions) over one neutral slave, for any [`Unit`].
+//! The C ABIs of FMI 2.0 (44 functions) and FMI 3.0 (75 functions) over one neutral slave, for any [`CoSimulationUnit`].
 //!
 //! ```text
 //! fmi2/  fmi3/     one expression per exported function, no unsafe block
@@ -10,7 +10,7 @@
 //!     unit         what a simulation offers to be driven so
 //! ```
 //!
-//! A shared library is a crate that implements [`Unit`] and says how to load it with [`library`]. The functions of the
+//! A shared library is a crate that implements [`CoSimulationUnit`] and says how to load it with [`library`]. The functions of the
 //! standards are exported from there: this crate holds all of them but the two that make an instance, since only these have to
 //! know the unit. Several such libraries live in one process without knowing of each other.
 //!
@@ -30,19 +30,21 @@ mod slave;
 #[forbid(unsafe_code)]
 mod unit;
 
-pub use unit::{Load, Loaded, Unit};
+pub use unit::{CoSimulationUnit, Load, Loaded};
 
 /// Types of the two functions that a library exports itself, for [`library`] alone.
 #[doc(hidden)]
 pub mod abi {
-    pub use tiprub_core::{Result, VariableTable, simulation::Progress};
+    pub use tiprub_core::{Result, VariableTable, simulation::StepProgress};
 
-    pub use crate::boundary::{Environment, Fmi2Logger, Fmi3Logger, Handle, In, IntermediateUpdate, Text};
+    pub use crate::boundary::{
+        Fmi2Logger, Fmi3Logger, ImporterEnvironment, In, InstanceHandle, IntermediateUpdate, TextArgument,
+    };
     pub use crate::fmi2::Boolean as Boolean2;
     pub use crate::fmi2::common::{CallbackFunctions, instantiate_unit as fmi2_instantiate};
     pub use crate::fmi3::Boolean as Boolean3;
     pub use crate::fmi3::common::instantiate_unit as fmi3_instantiate;
-    pub use crate::slave::Status;
+    pub use crate::slave::FmiStatus;
 }
 
 /// Make the crate a library of FMI: exports what makes an instance, by a function of type [`Load`].
@@ -52,14 +54,14 @@ macro_rules! library {
         #[unsafe(no_mangle)]
         #[allow(non_snake_case, clippy::too_many_arguments, reason = "the standard's")]
         extern "C" fn fmi2Instantiate(
-            instanceName: $crate::abi::Text,
+            instanceName: $crate::abi::TextArgument,
             fmuType: i32,
-            fmuGUID: $crate::abi::Text,
-            fmuResourceLocation: $crate::abi::Text,
+            fmuGUID: $crate::abi::TextArgument,
+            fmuResourceLocation: $crate::abi::TextArgument,
             functions: $crate::abi::In<$crate::abi::CallbackFunctions>,
             _visible: $crate::abi::Boolean2,
             loggingOn: $crate::abi::Boolean2,
-        ) -> $crate::abi::Handle {
+        ) -> $crate::abi::InstanceHandle {
             $crate::abi::fmi2_instantiate(
                 $load,
                 instanceName,
@@ -74,19 +76,19 @@ macro_rules! library {
         #[unsafe(no_mangle)]
         #[allow(non_snake_case, clippy::too_many_arguments, reason = "the standard's")]
         extern "C" fn fmi3InstantiateCoSimulation(
-            instanceName: $crate::abi::Text,
-            instantiationToken: $crate::abi::Text,
-            resourcePath: $crate::abi::Text,
+            instanceName: $crate::abi::TextArgument,
+            instantiationToken: $crate::abi::TextArgument,
+            resourcePath: $crate::abi::TextArgument,
             _visible: $crate::abi::Boolean3,
             loggingOn: $crate::abi::Boolean3,
             eventModeUsed: $crate::abi::Boolean3,
             earlyReturnAllowed: $crate::abi::Boolean3,
             requiredIntermediateVariables: $crate::abi::In<u32>,
             nRequiredIntermediateVariables: usize,
-            instanceEnvironment: $crate::abi::Environment,
+            instanceEnvironment: $crate::abi::ImporterEnvironment,
             logMessage: Option<$crate::abi::Fmi3Logger>,
             intermediateUpdate: Option<$crate::abi::IntermediateUpdate>,
-        ) -> $crate::abi::Handle {
+        ) -> $crate::abi::InstanceHandle {
             $crate::abi::fmi3_instantiate(
                 $load,
                 instanceName,
@@ -105,7 +107,7 @@ macro_rules! library {
     };
 }
 
-/// The methods of [`Unit`] that a simulation `self.0` has by the same names: all but those in which units differ. `$courses` is
+/// The methods of [`CoSimulationUnit`] that a simulation `self.0` has by the same names: all but those in which units differ. `$courses` is
 /// what its inputs do over time.
 #[macro_export]
 macro_rules! delegate {
@@ -176,7 +178,7 @@ macro_rules! delegate {
             self.0.time()
         }
 
-        fn advance(&mut self) -> $crate::abi::Result<$crate::abi::Progress> {
+        fn advance(&mut self) -> $crate::abi::Result<$crate::abi::StepProgress> {
             self.0.advance()
         }
 

@@ -4,16 +4,16 @@ use std::any::Any;
 use std::path::Path;
 
 use tiprub_core::variables::VariableTable;
-use tiprub_core::{Result, Warning, simulation::Progress};
+use tiprub_core::{Result, Warning, simulation::StepProgress};
 
 /// A unit of co-simulation: variables by reference, communication steps marched internal step by internal step, its state as
 /// bytes. Which calls are legal when is the façade's business.
 ///
 /// It asks for no `Debug`: texts of a whole simulation that nobody reads would be a tenth of a library.
 ///
-/// Life: made by a [`Load`], then parameters and inputs → [`Unit::initialise`] → any number of communication steps
-/// → ([`Unit::reset`] and again).
-pub trait Unit: Send {
+/// Life: made by a [`Load`], then parameters and inputs → [`CoSimulationUnit::initialise`] → any number of communication steps
+/// → ([`CoSimulationUnit::reset`] and again).
+pub trait CoSimulationUnit: Send {
     /// All variables.
     fn table(&self) -> &VariableTable;
 
@@ -26,61 +26,61 @@ pub trait Unit: Send {
     /// Read an integer or an item of an enumeration.
     ///
     /// # Errors
-    /// As [`Unit::real`].
+    /// As [`CoSimulationUnit::real`].
     fn integer(&self, reference: u32) -> Result<i32>;
 
     /// Read a boolean.
     ///
     /// # Errors
-    /// As [`Unit::real`].
+    /// As [`CoSimulationUnit::real`].
     fn boolean(&self, reference: u32) -> Result<bool>;
 
     /// Read a text.
     ///
     /// # Errors
-    /// As [`Unit::real`].
+    /// As [`CoSimulationUnit::real`].
     fn string(&self, reference: u32) -> Result<&str>;
 
     /// Set one element of a real input or parameter.
     ///
     /// # Errors
-    /// As [`Unit::real`]; not settable, or not a value it may have. Nothing is changed then.
+    /// As [`CoSimulationUnit::real`]; not settable, or not a value it may have. Nothing is changed then.
     fn set_real(&mut self, reference: u32, value: f64) -> Result<()>;
 
     /// Set an integer or an item of an enumeration.
     ///
     /// # Errors
-    /// As [`Unit::set_real`].
+    /// As [`CoSimulationUnit::set_real`].
     fn set_integer(&mut self, reference: u32, value: i32) -> Result<()>;
 
     /// Set a boolean.
     ///
     /// # Errors
-    /// As [`Unit::set_real`].
+    /// As [`CoSimulationUnit::set_real`].
     fn set_boolean(&mut self, reference: u32, value: bool) -> Result<()>;
 
     /// Set a text.
     ///
     /// # Errors
-    /// As [`Unit::set_real`].
+    /// As [`CoSimulationUnit::set_real`].
     fn set_string(&mut self, reference: u32, value: &str) -> Result<()>;
 
     /// First time derivative of a continuous real input, until the input is set again.
     ///
     /// # Errors
-    /// As [`Unit::set_real`]; an order other than 1.
+    /// As [`CoSimulationUnit::set_real`]; an order other than 1.
     fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()>;
 
     /// First time derivative of a continuous real output at the last communication point.
     ///
     /// # Errors
-    /// As [`Unit::real`]; an order other than 1.
+    /// As [`CoSimulationUnit::real`]; an order other than 1.
     fn output_derivative(&self, reference: u32, order: i32) -> Result<f64>;
 
     /// What inputs do over time, derivatives included, to go back to where a set of values is refused as a whole.
     fn courses(&self) -> Box<dyn Any>;
 
-    /// Back to what [`Unit::courses`] gave at the same instant; values as read are set back before.
+    /// Back to what [`CoSimulationUnit::courses`] gave at the same instant; values as read are set back before.
     fn restore_courses(&mut self, courses: Box<dyn Any>);
 
     /// Check parameters, set the state to the start and compute outputs.
@@ -95,7 +95,7 @@ pub trait Unit: Send {
     /// Time of the last communication point, or of the internal step reached (s).
     fn time(&self) -> f64;
 
-    /// What is to be said of the parameters after [`Unit::initialise`].
+    /// What is to be said of the parameters after [`CoSimulationUnit::initialise`].
     fn warnings(&self) -> &[Warning];
 
     /// What is to be said since this was last called.
@@ -115,7 +115,7 @@ pub trait Unit: Send {
     ///
     /// # Errors
     /// The state is lost, or [`tiprub_core::Error::Exhausted`].
-    fn advance(&mut self) -> Result<Progress>;
+    fn advance(&mut self) -> Result<StepProgress>;
 
     /// Whether a communication step is under way.
     fn is_stepping(&self) -> bool;
@@ -135,7 +135,7 @@ pub trait Unit: Send {
     /// Length of every saved state (bytes).
     fn state_size(&self) -> usize;
 
-    /// Save the state into exactly [`Unit::state_size`] bytes.
+    /// Save the state into exactly [`CoSimulationUnit::state_size`] bytes.
     ///
     /// # Errors
     /// Another length.
@@ -161,7 +161,7 @@ pub trait Unit: Send {
 /// What the resources of an FMU hold.
 pub struct Loaded {
     /// Makes the unit of them: start values in place, nothing computed. Asked once the token is known to be theirs.
-    pub unit: Box<dyn FnOnce() -> Result<Box<dyn Unit>>>,
+    pub unit: Box<dyn FnOnce() -> Result<Box<dyn CoSimulationUnit>>>,
     /// Instantiation token that belongs to the resources.
     pub token: String,
     /// Whether the description of FMI 3.0 has arrays; else scalars, as FMI 2.0 has.

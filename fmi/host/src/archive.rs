@@ -16,14 +16,14 @@ use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
 /// One file inside the archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Entry {
+pub struct ArchiveEntry {
     /// Name with forward slashes, relative to the root of the archive.
     pub name: String,
     /// Contents.
     pub bytes: Vec<u8>,
 }
 
-impl Entry {
+impl ArchiveEntry {
     /// An entry with these contents.
     pub fn new(name: impl Into<String>, bytes: impl Into<Vec<u8>>) -> Self {
         Self { name: name.into(), bytes: bytes.into() }
@@ -35,7 +35,7 @@ impl Entry {
 ///
 /// # Errors
 /// A name that breaks the rules above, a file that is too large, or a disk that does not take it.
-pub fn write(target: &Path, entries: &[Entry]) -> Result<()> {
+pub fn write(target: &Path, entries: &[ArchiveEntry]) -> Result<()> {
     let mut archive = std::io::Cursor::new(Vec::new());
     write_into(&mut archive, entries).map_err(|failure| Failure { what: target.display().to_string(), ..failure })?;
     output_file::write(target, archive.into_inner())
@@ -45,7 +45,7 @@ pub fn write(target: &Path, entries: &[Entry]) -> Result<()> {
 ///
 /// # Errors
 /// As [`write()`].
-pub(crate) fn write_into(target: impl Write + Seek, entries: &[Entry]) -> Result<()> {
+pub(crate) fn write_into(target: impl Write + Seek, entries: &[ArchiveEntry]) -> Result<()> {
     check_names(entries)?;
     let mut writer = ZipWriter::new(target);
     for entry in entries {
@@ -60,7 +60,7 @@ pub(crate) fn write_into(target: impl Write + Seek, entries: &[Entry]) -> Result
     Ok(())
 }
 
-fn options(entry: &Entry) -> SimpleFileOptions {
+fn options(entry: &ArchiveEntry) -> SimpleFileOptions {
     // Deflating a picture or an empty file only makes it longer.
     let stored = entry.bytes.is_empty() || entry.name.ends_with(".png");
     let shared_library = entry.name.starts_with("binaries/");
@@ -72,7 +72,7 @@ fn options(entry: &Entry) -> SimpleFileOptions {
         .unix_permissions(if shared_library { 0o755 } else { 0o644 })
 }
 
-fn check_names(entries: &[Entry]) -> Result<()> {
+fn check_names(entries: &[ArchiveEntry]) -> Result<()> {
     let mut seen = BTreeSet::new();
     for entry in entries {
         let name = entry.name.as_str();
@@ -101,18 +101,18 @@ mod tests {
 
     use super::*;
 
-    fn sample() -> Vec<Entry> {
+    fn sample() -> Vec<ArchiveEntry> {
         let noise: Vec<u8> =
             (0..5000_u32).map(|i| u8::try_from(i.wrapping_mul(2_654_435_761) >> 24).unwrap()).collect();
         vec![
-            Entry::new("modelDescription.xml", "<fmiModelDescription/>".repeat(50)),
-            Entry::new("binaries/linux64/tiprub.so", noise),
-            Entry::new("resources/empty", ""),
-            Entry::new("model.png", [1, 2, 3]),
+            ArchiveEntry::new("modelDescription.xml", "<fmiModelDescription/>".repeat(50)),
+            ArchiveEntry::new("binaries/linux64/tiprub.so", noise),
+            ArchiveEntry::new("resources/empty", ""),
+            ArchiveEntry::new("model.png", [1, 2, 3]),
         ]
     }
 
-    fn bytes(entries: &[Entry]) -> Vec<u8> {
+    fn bytes(entries: &[ArchiveEntry]) -> Vec<u8> {
         let mut buffer = Cursor::new(Vec::new());
         write_into(&mut buffer, entries).unwrap();
         buffer.into_inner()
@@ -182,17 +182,17 @@ mod tests {
     #[test]
     fn names_that_importers_trip_over_are_refused() {
         for name in ["./a", "a//b", "/a", "a\\b", "../a", "", "a/", "ä", "c:a"] {
-            let failure = write_into(Cursor::new(Vec::new()), &[Entry::new(name, "x")]).unwrap_err();
+            let failure = write_into(Cursor::new(Vec::new()), &[ArchiveEntry::new(name, "x")]).unwrap_err();
             assert_eq!(failure.what, name);
         }
-        let twice = [Entry::new("a", "x"), Entry::new("a", "y")];
+        let twice = [ArchiveEntry::new("a", "x"), ArchiveEntry::new("a", "y")];
         assert!(write_into(Cursor::new(Vec::new()), &twice).unwrap_err().problem.contains("twice"));
     }
 
     #[test]
     fn a_refused_archive_leaves_no_file() {
         let root = tempfile::tempdir().unwrap();
-        assert!(write(&root.path().join("x.fmu"), &[Entry::new("./a", "x")]).is_err());
+        assert!(write(&root.path().join("x.fmu"), &[ArchiveEntry::new("./a", "x")]).is_err());
         assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 0);
     }
 }

@@ -6,8 +6,8 @@ use tiprub_shell::{Failure, Result, schedule::Schedule};
 
 use super::{
     UnpackedFmu, VariableType,
-    api::{Fmi2Api, Fmi2Callbacks, Instance},
-    slave::{MessageList, OutputGroup, Slave, c_text, check},
+    api::{Fmi2Api, Fmi2Callbacks, InstancePointer},
+    slave::{HostedSlave, MessageList, OutputGroup, c_text, check},
 };
 
 /// Co-simulation slave of fmi2Type.
@@ -61,7 +61,7 @@ fn logger() -> *const c_void {
 
 /// One FMI 2.0 co-simulation instance; freed when dropped.
 pub(super) struct Fmi2Slave {
-    component: Instance,
+    component: InstancePointer,
     messages: Box<MessageList>,
     /// The FMU may keep the pointer it was given.
     _callbacks: Box<Fmi2Callbacks>,
@@ -102,7 +102,7 @@ impl Drop for Fmi2Slave {
     }
 }
 
-impl Slave for Fmi2Slave {
+impl HostedSlave for Fmi2Slave {
     fn initialise(&mut self, schedule: &Schedule) -> Result<()> {
         // SAFETY: a live component, in the order the standard wants.
         let (setup, enter, exit) = unsafe {

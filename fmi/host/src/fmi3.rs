@@ -6,8 +6,8 @@ use tiprub_shell::{Failure, Result, schedule::Schedule};
 
 use super::{
     UnpackedFmu, VariableType,
-    api::{Fmi3Api, Instance, References},
-    slave::{MessageList, OutputGroup, Slave, c_text, check},
+    api::{Fmi3Api, InstancePointer, ReferencePointer},
+    slave::{HostedSlave, MessageList, OutputGroup, c_text, check},
 };
 
 /// The logger: the environment is the message list of the slave.
@@ -26,7 +26,7 @@ unsafe extern "C" fn log_message(
 
 /// One FMI 3.0 co-simulation instance; freed when dropped.
 pub(super) struct Fmi3Slave {
-    instance: Instance,
+    instance: InstancePointer,
     messages: Box<MessageList>,
     /// Last, so that the code is unloaded after everything else.
     api: Fmi3Api,
@@ -69,7 +69,7 @@ impl Fmi3Slave {
     fn get<T: Copy + Default>(
         &self,
         function: &str,
-        get: unsafe extern "C" fn(Instance, References, usize, *mut T, usize) -> i32,
+        get: unsafe extern "C" fn(InstancePointer, ReferencePointer, usize, *mut T, usize) -> i32,
         group: &OutputGroup,
     ) -> Result<Vec<T>> {
         let mut values = vec![T::default(); group.values];
@@ -89,7 +89,7 @@ impl Drop for Fmi3Slave {
     }
 }
 
-impl Slave for Fmi3Slave {
+impl HostedSlave for Fmi3Slave {
     fn initialise(&mut self, schedule: &Schedule) -> Result<()> {
         // SAFETY: a live instance, in the order the standard wants.
         let (enter, exit) = unsafe {

@@ -215,7 +215,7 @@ impl UnpackedFmu {
     }
 
     /// An instance of the FMU, of whichever version it is.
-    fn instance(&self) -> Result<Box<dyn slave::Slave>> {
+    fn instance(&self) -> Result<Box<dyn slave::HostedSlave>> {
         match self.description.fmi_version.as_str() {
             "2.0" => Ok(Box::new(fmi2::Fmi2Slave::new(self)?)),
             "3.0" => Ok(Box::new(fmi3::Fmi3Slave::new(self)?)),
@@ -248,9 +248,9 @@ fn inside(directory: &Path, name: &str) -> Result<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::archive::{self, Entry};
+    use crate::archive::{self, ArchiveEntry};
 
-    fn archive_with(entries: &[Entry]) -> (TempDir, PathBuf) {
+    fn archive_with(entries: &[ArchiveEntry]) -> (TempDir, PathBuf) {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("x.fmu");
         archive::write(&path, entries).unwrap();
@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn a_truncated_zip_is_named_with_a_remedy() {
-        let (_root, path) = archive_with(&[Entry::new("modelDescription.xml", "x".repeat(1000))]);
+        let (_root, path) = archive_with(&[ArchiveEntry::new("modelDescription.xml", "x".repeat(1000))]);
         let bytes = fs::read(&path).unwrap();
         for length in [0, 1, 30, bytes.len() / 2, bytes.len() - 1] {
             fs::write(&path, &bytes[..length]).unwrap();
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn flipped_bits_anywhere_never_panic() {
         let (_root, path) =
-            archive_with(&[Entry::new("modelDescription.xml", "<a/>".repeat(50)), Entry::new("b", "c")]);
+            archive_with(&[ArchiveEntry::new("modelDescription.xml", "<a/>".repeat(50)), ArchiveEntry::new("b", "c")]);
         let bytes = fs::read(&path).unwrap();
         for at in 0..bytes.len() {
             let mut damaged = bytes.clone();
@@ -284,7 +284,7 @@ mod tests {
 
     #[test]
     fn a_zip_that_is_no_fmu_is_named() {
-        let (_root, path) = archive_with(&[Entry::new("a.txt", "hello")]);
+        let (_root, path) = archive_with(&[ArchiveEntry::new("a.txt", "hello")]);
         assert!(UnpackedFmu::open(&path).unwrap_err().problem.contains("modelDescription.xml"));
     }
 
@@ -308,7 +308,7 @@ mod tests {
 
     #[test]
     fn a_bomb_is_refused_by_its_size_before_anything_is_unpacked() {
-        let (_root, path) = archive_with(&[Entry::new("resources/zeros", vec![0; 1 << 20])]);
+        let (_root, path) = archive_with(&[ArchiveEntry::new("resources/zeros", vec![0; 1 << 20])]);
         announce(&path, 3 << 30);
         let failure = UnpackedFmu::open(&path).unwrap_err();
         assert!(failure.what.contains("x.fmu") && failure.problem.contains("3221225472 bytes"), "{failure}");
@@ -327,7 +327,7 @@ mod tests {
     #[test]
     fn rejects_oversized_entries_before_unpacking() {
         for name in [DESCRIPTION, "resources/scene.toml", "resources/package.toml", "resources/a.safetensors"] {
-            let (_root, path) = archive_with(&[Entry::new(name, "\n".repeat(1 << 16))]);
+            let (_root, path) = archive_with(&[ArchiveEntry::new(name, "\n".repeat(1 << 16))]);
             announce(&path, 1 << 30);
             let resource = |name: &str| name.strip_prefix("resources/").and_then(tiprub_format::largest_resource);
             let failure = UnpackedFmu::open_part(&path, resource).unwrap_err();
@@ -338,7 +338,8 @@ mod tests {
 
     #[test]
     fn only_what_is_wanted_is_unpacked_and_all_of_it_checked() {
-        let (_root, path) = archive_with(&[Entry::new("a", "x".repeat(100)), Entry::new(DESCRIPTION, "no XML")]);
+        let (_root, path) =
+            archive_with(&[ArchiveEntry::new("a", "x".repeat(100)), ArchiveEntry::new(DESCRIPTION, "no XML")]);
         let root = tempfile::tempdir().unwrap();
         let mut archive = open_archive(&path).unwrap();
         let mut sizes = entries(&mut archive).unwrap();

@@ -18,7 +18,7 @@ pub enum Platform {
 }
 
 /// What a platform is called and made of.
-struct Facts {
+struct PlatformFacts {
     platform: Platform,
     /// Folder of FMI 3.0 (section 2.5.1.4.1).
     tuple: &'static str,
@@ -31,8 +31,8 @@ struct Facts {
     here: (&'static str, &'static str),
 }
 
-const FACTS: [Facts; 5] = [
-    Facts {
+const FACTS: [PlatformFacts; 5] = [
+    PlatformFacts {
         platform: Platform::X86_64Linux,
         tuple: "x86_64-linux",
         fmi2: "linux64",
@@ -41,7 +41,7 @@ const FACTS: [Facts; 5] = [
         architecture: Architecture::X86_64,
         here: ("linux", "x86_64"),
     },
-    Facts {
+    PlatformFacts {
         platform: Platform::X86_64Windows,
         tuple: "x86_64-windows",
         fmi2: "win64",
@@ -50,7 +50,7 @@ const FACTS: [Facts; 5] = [
         architecture: Architecture::X86_64,
         here: ("windows", "x86_64"),
     },
-    Facts {
+    PlatformFacts {
         platform: Platform::Aarch64Linux,
         tuple: "aarch64-linux",
         fmi2: "aarch64-linux",
@@ -59,7 +59,7 @@ const FACTS: [Facts; 5] = [
         architecture: Architecture::Aarch64,
         here: ("linux", "aarch64"),
     },
-    Facts {
+    PlatformFacts {
         platform: Platform::X86_64Darwin,
         tuple: "x86_64-darwin",
         fmi2: "darwin64",
@@ -68,7 +68,7 @@ const FACTS: [Facts; 5] = [
         architecture: Architecture::X86_64,
         here: ("macos", "x86_64"),
     },
-    Facts {
+    PlatformFacts {
         platform: Platform::Aarch64Darwin,
         tuple: "aarch64-darwin",
         fmi2: "aarch64-darwin",
@@ -91,7 +91,7 @@ impl Platform {
         all
     };
 
-    fn facts(self) -> &'static Facts {
+    fn facts(self) -> &'static PlatformFacts {
         &FACTS[self as usize]
     }
 
@@ -113,7 +113,7 @@ impl Platform {
 
     /// Where in an FMU of `version` (`"2.0"` or `"3.0"`) the library of `identifier` is.
     pub fn place(self, version: &str, identifier: &str) -> String {
-        let Facts { tuple, fmi2, extension, .. } = self.facts();
+        let PlatformFacts { tuple, fmi2, extension, .. } = self.facts();
         let folder = if version.starts_with('2') { fmi2 } else { tuple };
         format!("binaries/{folder}/{identifier}.{extension}")
     }

@@ -5,13 +5,13 @@ use tiprub_shell::{Failure, Result, schedule::Schedule};
 
 use super::{
     UnpackedFmu,
-    slave::{self, OutputGroup, Slave},
+    slave::{self, HostedSlave, OutputGroup},
 };
 
 /// A co-simulation instance; freed when dropped. A call that answers worse than Warning is a failure with the FMU's words.
 pub struct Session<'a> {
     fmu: &'a UnpackedFmu,
-    slave: Box<dyn Slave>,
+    slave: Box<dyn HostedSlave>,
     groups: Vec<OutputGroup>,
 }
 

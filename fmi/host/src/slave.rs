@@ -21,7 +21,7 @@ pub(super) struct OutputGroup {
 }
 
 /// A co-simulation instance of either FMI version.
-pub(super) trait Slave {
+pub(super) trait HostedSlave {
     /// From instantiated to step mode.
     fn initialise(&mut self, schedule: &Schedule) -> Result<()>;
     /// One communication step.
@@ -38,7 +38,7 @@ pub(super) trait Slave {
 
 /// Initialise, step over the schedule, record all numeric outputs at every communication point, terminate.
 pub(super) fn drive(
-    slave: &mut dyn Slave,
+    slave: &mut dyn HostedSlave,
     description: &ImportedDescription,
     schedule: &Schedule,
     progress: &dyn Fn(usize),

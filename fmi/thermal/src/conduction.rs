@@ -3,17 +3,18 @@
 use std::path::Path;
 
 use tiprub_core::{Result, Warning};
-use tiprub_fmi_facade::{Loaded, Unit};
-use tiprub_thermal::{Courses, Simulation};
+use tiprub_fmi_facade::{CoSimulationUnit, Loaded};
+use tiprub_thermal::{ThermalInputs, ThermalSimulation};
 
 /// A reduced model and its state.
-struct Conduction(Simulation);
+struct ConductionUnit(ThermalSimulation);
 
 /// The model of the resources.
 pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
     let loaded = tiprub_format::load_thermal_resources(resources).map_err(|error| error.to_string())?;
     let model = loaded.model;
-    let unit = move || -> Result<Box<dyn Unit>> { Ok(Box::new(Conduction(Simulation::new(model)?))) };
+    let unit =
+        move || -> Result<Box<dyn CoSimulationUnit>> { Ok(Box::new(ConductionUnit(ThermalSimulation::new(model)?))) };
     Ok(Loaded {
         unit: Box::new(unit),
         token: loaded.token,
@@ -22,8 +23,8 @@ pub(crate) fn load(resources: &Path) -> Result<Loaded, String> {
     })
 }
 
-impl Unit for Conduction {
-    tiprub_fmi_facade::delegate!(Courses);
+impl CoSimulationUnit for ConductionUnit {
+    tiprub_fmi_facade::delegate!(ThermalInputs);
 
     fn warnings(&self) -> &[Warning] {
         &[]

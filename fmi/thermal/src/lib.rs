@@ -1,4 +1,4 @@
-//! The library inside the thermal FMU: [`tiprub_thermal::Simulation`] behind the C ABIs of `tiprub-fmi-facade`.
+//! The library inside the thermal FMU: [`tiprub_thermal::ThermalSimulation`] behind the C ABIs of `tiprub-fmi-facade`.
 #![warn(unreachable_pub)]
 
 mod conduction;

@@ -1,17 +1,19 @@
 //! A synthetic table with every kind of variable, and a description around it.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{Frame, RomChecks};
+use tiprub_core::rom::{DisplacementFrame, RomChecks};
 use tiprub_core::variables::*;
 use tiprub_core::{Rom, VariableTable};
-use tiprub_model_description::{Description, Experiment};
+use tiprub_model_description::{DefaultExperiment, Description};
 use tiprub_test_models::{node, structure};
 
-pub static METRE: Unit =
-    Unit { name: "m", quantity: "Length", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("µm", 1e6)] };
-pub static SECOND: Unit = Unit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[] };
-pub static NEWTON: Unit = Unit { name: "N", quantity: "Force", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
-pub static SPEED: Unit = Unit {
+pub static METRE: VariableUnit =
+    VariableUnit { name: "m", quantity: "Length", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("µm", 1e6)] };
+pub static SECOND: VariableUnit =
+    VariableUnit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[] };
+pub static NEWTON: VariableUnit =
+    VariableUnit { name: "N", quantity: "Force", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
+pub static SPEED: VariableUnit = VariableUnit {
     name: "rad/s",
     quantity: "AngularVelocity",
     exponents: [0, 0, -1, 1, 0],
@@ -24,7 +26,7 @@ pub static SCHEME: Enumeration = Enumeration {
 };
 
 /// A scalar output without a start value; the tests change what they need.
-fn variable(name: &str, kind: Kind, causality: Causality, variability: Variability) -> Variable {
+fn variable(name: &str, kind: DataType, causality: Causality, variability: Variability) -> Variable {
     Variable {
         name: name.into(),
         reference: 0,
@@ -50,48 +52,54 @@ pub fn table() -> VariableTable {
     use Variability::*;
     let metres = |variable: Variable| Variable { unit: Some(&METRE), display: Some(1), ..variable };
     let mut variables = vec![
-        Variable { unit: Some(&SECOND), ..variable("time", Kind::Real, Independent, Continuous) },
+        Variable { unit: Some(&SECOND), ..variable("time", DataType::Real, Independent, Continuous) },
         Variable {
             unit: Some(&SPEED),
             display: Some(0),
-            start: Some(Start::Real(vec![1800.0])),
-            ..variable("rotor.speed", Kind::Real, Input, Continuous)
+            start: Some(StartValue::Real(vec![1800.0])),
+            ..variable("rotor.speed", DataType::Real, Input, Continuous)
         },
         Variable {
-            start: Some(Start::Real(vec![0.15])),
+            start: Some(StartValue::Real(vec![0.15])),
             min: Some(0.0),
             max: Some(2.0),
             description: "Friction coefficient: 0 ≤ µ & \"smooth\" < 2\nsecond line".into(),
-            ..variable("casing.friction", Kind::Real, Parameter, Tunable)
+            ..variable("casing.friction", DataType::Real, Parameter, Tunable)
         },
         metres(Variable {
             dimension: Some(3),
-            start: Some(Start::Real(vec![3.5e-4, 3.6e-4, 1e-7])),
+            start: Some(StartValue::Real(vec![3.5e-4, 3.6e-4, 1e-7])),
             min: Some(0.0),
-            ..variable("sector_gap", Kind::Real, Parameter, Fixed)
+            ..variable("sector_gap", DataType::Real, Parameter, Fixed)
         }),
-        Variable { start: Some(Start::Integer(2)), ..variable("scheme", Kind::Enumeration(&SCHEME), Parameter, Fixed) },
-        Variable { start: Some(Start::Boolean(true)), ..variable("energies", Kind::Boolean, Parameter, Fixed) },
         Variable {
-            start: Some(Start::String("a \"b\" <c>".into())),
-            ..variable("comment", Kind::String, Parameter, Fixed)
+            start: Some(StartValue::Integer(2)),
+            ..variable("scheme", DataType::Enumeration(&SCHEME), Parameter, Fixed)
+        },
+        Variable {
+            start: Some(StartValue::Boolean(true)),
+            ..variable("energies", DataType::Boolean, Parameter, Fixed)
+        },
+        Variable {
+            start: Some(StartValue::String("a \"b\" <c>".into())),
+            ..variable("comment", DataType::String, Parameter, Fixed)
         },
         metres(Variable {
             dimension: Some(3),
             span: Span::Window,
             nominal: Some(1e-4),
-            ..variable("blade[1].clearance", Kind::Real, Output, Continuous)
+            ..variable("blade[1].clearance", DataType::Real, Output, Continuous)
         }),
         Variable {
             unit: Some(&NEWTON),
             span: Span::Mean,
             nominal: Some(1e3),
-            ..variable("contact.force", Kind::Real, Output, Discrete)
+            ..variable("contact.force", DataType::Real, Output, Discrete)
         },
-        variable("steps", Kind::Integer, Output, Discrete),
-        variable("in_contact", Kind::Boolean, Output, Discrete),
-        Variable { start: Some(Start::Integer(36)), ..variable("sectors", Kind::Integer, Local, Constant) },
-        Variable { span: Span::Total, ..variable("wall_time", Kind::Real, Local, Discrete) },
+        variable("steps", DataType::Integer, Output, Discrete),
+        variable("in_contact", DataType::Boolean, Output, Discrete),
+        Variable { start: Some(StartValue::Integer(36)), ..variable("sectors", DataType::Integer, Local, Constant) },
+        Variable { span: Span::Total, ..variable("wall_time", DataType::Real, Local, Discrete) },
     ];
     let mut reference = 0;
     for variable in &mut variables {
@@ -113,7 +121,7 @@ pub fn rom() -> Rom {
         ..RomChecks::default()
     };
     let origin = "hex20 mesh of <many> nodes".into();
-    Rom { sectors: 36, frame: Frame::Cylindrical, damping_ratio: 0.001, checks, origin, ..rom }
+    Rom { sectors: 36, frame: DisplacementFrame::Cylindrical, damping_ratio: 0.001, checks, origin, ..rom }
 }
 
 pub fn description<'a>(table: &'a VariableTable, rom: &'a Rom, fmi3_arrays: bool) -> Description<'a> {
@@ -130,7 +138,7 @@ pub fn description<'a>(table: &'a VariableTable, rom: &'a Rom, fmi3_arrays: bool
         author: "The tiprub developers",
         copyright: "© the tiprub developers",
         license: "MIT OR Apache-2.0",
-        experiment: Experiment { start: 0.0, stop: 0.1, step: 1e-5 },
+        experiment: DefaultExperiment { start: 0.0, stop: 0.1, step: 1e-5 },
         fixed_internal_step: Some(1e-6),
         patches_of_roms: true,
         table,

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use tiprub_core::settings::OutputSettings;
-use tiprub_core::variables::{Causality, Kind, Span, Variable};
+use tiprub_core::variables::{Causality, DataType, Span, Variable};
 use tiprub_core::{Scene, Simulation, VariableTable};
 use tiprub_model_description::{fmi2_xml, fmi3_xml, html, meaning_of_span};
 use tiprub_test_models::started;
@@ -13,7 +13,7 @@ use tiprub_test_models::started;
 use crate::scene;
 
 fn outputs(table: &VariableTable) -> impl Iterator<Item = (u32, Span)> + '_ {
-    let real = |variable: &&Variable| variable.causality == Causality::Output && variable.kind == Kind::Real;
+    let real = |variable: &&Variable| variable.causality == Causality::Output && variable.kind == DataType::Real;
     table.variables().iter().filter(real).flat_map(|variable| {
         let elements = u32::try_from(variable.len()).unwrap();
         (variable.reference..variable.reference + elements).map(|reference| (reference, variable.span))
@@ -204,12 +204,12 @@ fn range(variable: &Variable) -> String {
 
 fn markdown_row(variable: &Variable) -> String {
     let unit = match (variable.kind, variable.unit) {
-        (Kind::Real, Some(unit)) => match variable.display {
+        (DataType::Real, Some(unit)) => match variable.display {
             Some(index) => format!("{} ({})", unit.name, unit.display[index].0),
             None => unit.name.to_owned(),
         },
-        (Kind::Real, None) => "-".to_owned(),
-        (Kind::Enumeration(choices), _) => {
+        (DataType::Real, None) => "-".to_owned(),
+        (DataType::Enumeration(choices), _) => {
             let item = |(index, (name, _)): (usize, &(&str, &str))| format!("{} = `{name}`", index + 1);
             choices.items.iter().enumerate().map(item).collect::<Vec<_>>().join(", ")
         }

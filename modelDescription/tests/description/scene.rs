@@ -1,10 +1,10 @@
 //! A scene with every option on, small blades in a small flexible casing, and what each option is.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{Patch, SUPPORT_ROWS, Support, Thermal, Watched};
+use tiprub_core::rom::{SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints};
 use tiprub_core::settings::*;
 use tiprub_core::{Rom, Scene, VariableTable};
-use tiprub_model_description::{Description, Experiment};
+use tiprub_model_description::{DefaultExperiment, Description};
 use tiprub_test_models as models;
 
 /// Every option on.
@@ -43,7 +43,7 @@ pub fn complete() -> Scene {
     let zeros = |columns: usize| DMatrix::zeros(SUPPORT_ROWS, columns);
     let patches = rom.extras.thermal.as_ref().map_or(0, |thermal| thermal.patches.len());
     let (stiffness, mass) = (zeros(rom.order()), zeros(rom.order()));
-    rom.extras.support = Some(Support { stiffness, mass, thermal: zeros(patches) });
+    rom.extras.support = Some(SupportRows { stiffness, mass, thermal: zeros(patches) });
     scene
 }
 
@@ -51,15 +51,15 @@ pub fn complete() -> Scene {
 pub fn rigid() -> Scene {
     let mut rom = models::blade(36);
     rom.extras.spin = Some(models::spin(rom.order()));
-    let whole = Patch { angle: [0.0, std::f64::consts::TAU], axial: [-1.0, 1.0] };
+    let whole = ThermalPatch { angle: [0.0, std::f64::consts::TAU], axial: [-1.0, 1.0] };
     rom.extras.thermal = Some(Thermal { loads: DMatrix::zeros(rom.order(), 1), patches: vec![whole] });
     let points = ["edge_1", "edge_2"].map(|name| models::node(name, rom.contact_nodes[0].position, 0.0)).to_vec();
     let two = |rows: usize| DMatrix::from_fn(rows * points.len(), rom.order(), |i, j| rom.contact_map[(i % 6, j)]);
     let (moved, stress) = (two(3), two(6));
-    rom.extras.watched = Some(Watched { map: moved, points: points.clone() });
+    rom.extras.watched = Some(WatchedPoints { map: moved, points: points.clone() });
     let static_stress = DMatrix::zeros(6 * points.len(), 1);
     (rom.extras.stress_thermal, rom.extras.stress_centrifugal) = (Some(static_stress.clone()), Some(static_stress));
-    rom.extras.stress = Some(Watched { map: stress, points });
+    rom.extras.stress = Some(WatchedPoints { map: stress, points });
     let mut scene = models::bumps(rom);
     let settings = &mut scene.settings;
     settings.structures[0].speed = 1800.0;
@@ -89,7 +89,7 @@ pub const OPTIONS: [Switch; 32] = [
     ("`tolerance`, or the scheme `galerkin`", |scene| scene.settings.time.tolerance = None),
     ("`motion = \"rotating\"`", |scene| {
         let rotor = &mut scene.settings.structures[0];
-        (rotor.motion, rotor.speed, rotor.spin) = (Motion::Still, 0.0, SpinSettings::default());
+        (rotor.motion, rotor.speed, rotor.spin) = (BodyMotion::Still, 0.0, SpinSettings::default());
         (rotor.whirl, rotor.axial_shift) = (false, false);
         (rotor.excitation, rotor.softening) = (None, 0.0);
         rotor.initial.clear();
@@ -179,7 +179,7 @@ pub fn description<'a>(table: &'a VariableTable, roms: &'a [Rom], fmi3_arrays: b
         author: "-",
         copyright: "-",
         license: "-",
-        experiment: Experiment { start: 0.0, stop: 0.1, step: 1e-5 },
+        experiment: DefaultExperiment { start: 0.0, stop: 0.1, step: 1e-5 },
         fixed_internal_step: None,
         patches_of_roms: true,
         table,

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
-use tiprub_core::variables::{Causality, Kind};
+use tiprub_core::variables::{Causality, DataType};
 use tiprub_model_description::{LOG_CATEGORIES, fmi2_xml, fmi3_xml, html};
 
 use crate::common;
@@ -138,7 +138,7 @@ fn starts_stand_exactly_where_they_must() {
         assert_eq!(variable.contains_key("initial"), !["input", "independent"].contains(&causality), "{variable:?}");
     }
     let table = common::table();
-    for variable in table.variables().iter().filter(|variable| variable.kind != Kind::String) {
+    for variable in table.variables().iter().filter(|variable| variable.kind != DataType::String) {
         let element = three.iter().find(|(_, a)| a.get("name").is_some_and(|name| *name == variable.name)).unwrap();
         let wanted = variable.is_settable() || variable.initial_is_exact() == Some(true);
         assert_eq!(element.1.contains_key("start"), wanted, "{}", variable.name);

@@ -16,8 +16,8 @@ use tiprub_gallery::{
 use tiprub_model::{Reduction, Rotor37Options};
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome, shown_path, warnings_json},
-    native::{self, Given, NativeRun},
+    console::{CommandOutcome, Console, shown_path, warnings_json},
+    native::{self, NativeRun, RunInputs},
     output_file,
     schedule::Schedule,
 };
@@ -25,7 +25,7 @@ use tiprub_study::estimate::{self, Estimate};
 
 use crate::{
     cli::DemoArguments,
-    fmu::{FmiVersion, Package},
+    fmu::{FmiVersion, FmuPackage},
     library,
     report::{
         input::{ImportedSummary, ReportFile, ReportInput},
@@ -70,26 +70,27 @@ impl Stopwatch {
 ///
 /// # Errors
 /// Any of the steps failed, or the runs do not agree bit for bit.
-pub fn run(arguments: &DemoArguments, console: &Console) -> Result<Outcome> {
+pub fn run(arguments: &DemoArguments, console: &Console) -> Result<CommandOutcome> {
     let directory = arguments.out.as_path();
     let scene_text = scene_text(arguments.revolutions)?;
     keep_changed_scene(&directory.join(SCENE_FILE), &scene_text)?;
     output_file::create_directory(directory)?;
     let mut watch = Stopwatch::default();
 
-    let libraries = watch
-        .measure("building the FMU library", || library::load(library::Unit::Scene, &arguments.libraries, console))?;
+    let libraries = watch.measure("building the FMU library", || {
+        library::load(library::LibraryUnit::Scene, &arguments.libraries, console)
+    })?;
     let reduction = watch.measure("reducing the blade", || reduction::rotor37(&Rotor37Options::default(), console))?;
     let scene = write_inputs(directory, &reduction, &scene_text)?;
     let schedule = Schedule::new(&scene.settings.experiment, None, None)?;
 
     let native = watch.measure("native run", || {
         let task = console.task("Native run", Some(schedule.count as u64));
-        native::run(&scene, &schedule, Given::default(), &|done| task.at(done as u64))
+        native::run(&scene, &schedule, RunInputs::default(), &|done| task.at(done as u64))
     })?;
     native.recording.write_csv(&directory.join(CSV_FILE))?;
 
-    let package = Package::new(&scene, &libraries)?;
+    let package = FmuPackage::new(&scene, &libraries)?;
     let mut imported = Vec::new();
     for version in [FmiVersion::Two, FmiVersion::Three] {
         let label = format!("FMI {}.0", version.digit());
@@ -178,7 +179,7 @@ impl Paper {
     fn run(schedule: &Schedule, console: &Console) -> Result<Self> {
         let scene = scene_source::load("builtin:rotor37-paper", &RomCache::off(), console)?;
         let task = console.task("Native run of the paper's model and method", Some(schedule.count as u64));
-        let run = native::run(&scene, schedule, Given::default(), &|done| task.at(done as u64))?;
+        let run = native::run(&scene, schedule, RunInputs::default(), &|done| task.at(done as u64))?;
         Ok(Self { scene, run })
     }
 }
@@ -221,7 +222,7 @@ impl Demo<'_> {
     }
 
     /// The result, or a failure if an FMU and the native run differ in any bit (the report is written either way).
-    fn outcome(&self) -> Result<Outcome> {
+    fn outcome(&self) -> Result<CommandOutcome> {
         if let Some(run) = self.imported.iter().find(|run| !run.agreement.is_exact()) {
             let (name, time) = run.agreement.first.clone().unwrap_or_default();
             return Err(Failure::new(
@@ -279,7 +280,7 @@ impl Demo<'_> {
             "estimated_errors": self.estimates.iter().map(Estimate::json).collect::<serde_json::Map<_, _>>(),
             "warnings": warnings_json(&self.native.warnings)[0],
         });
-        Ok(Outcome { text, warnings: self.native.warnings.clone(), json, ..Outcome::default() })
+        Ok(CommandOutcome { text, warnings: self.native.warnings.clone(), json, ..CommandOutcome::default() })
     }
 }
 

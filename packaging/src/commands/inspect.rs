@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use tiprub_core::{
     Scene, Simulation,
     plausibility::Slip,
-    settings::{ContactSettings, Motion, SceneSettings, StructureSettings},
+    settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings},
     variables::Causality,
     warning::{self, Warning},
 };
@@ -18,9 +18,9 @@ use tiprub_fmi_host::{UnpackedFmu, entries, open_archive};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome, warnings_json},
+    console::{CommandOutcome, Console, warnings_json},
 };
-use tiprub_study::stability::structure::Sliding;
+use tiprub_study::stability::structure::KnownContact;
 
 use crate::{cli::InspectArguments, left_out, rom_facts::RomFacts, scene_features};
 
@@ -36,7 +36,7 @@ enum FileKind {
 ///
 /// # Errors
 /// The file is missing, of no known kind, or damaged.
-pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
+pub fn run(arguments: &InspectArguments, console: &Console) -> Result<CommandOutcome> {
     let path = arguments.file.as_path();
     match kind(path)? {
         FileKind::Fmu => inspect_fmu(path, arguments.measure, console),
@@ -46,7 +46,7 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
             let warnings: Vec<Warning> = facts.warnings().into_iter().chain(slips.iter().map(Slip::warning)).collect();
             let [texts, details] = warnings_json(&warnings);
             let json = json!({ "kind": "rom", "rom": facts.to_json(), "warnings": texts, "warning_details": details });
-            Ok(Outcome { text: facts.to_text(), warnings, json, ..Outcome::default() })
+            Ok(CommandOutcome { text: facts.to_text(), warnings, json, ..CommandOutcome::default() })
         }
         FileKind::Scene => {
             let scene = arguments.options.load(path, &arguments.cache.cache(), console)?;
@@ -54,7 +54,7 @@ pub fn run(arguments: &InspectArguments, console: &Console) -> Result<Outcome> {
             let Described { text, warnings, json } =
                 described.map_err(|failure| scene_source::located(path, failure))?;
             let json = json!({ "kind": "scene", "scene": json });
-            Ok(Outcome { text, warnings, json, ..Outcome::default() })
+            Ok(CommandOutcome { text, warnings, json, ..CommandOutcome::default() })
         }
     }
 }
@@ -83,7 +83,7 @@ fn kind(path: &Path) -> Result<FileKind> {
     }
 }
 
-fn inspect_fmu(path: &Path, measure: bool, console: &Console) -> Result<Outcome> {
+fn inspect_fmu(path: &Path, measure: bool, console: &Console) -> Result<CommandOutcome> {
     let in_file = |failure: Failure| Failure { what: format!("{}: {}", path.display(), failure.what), ..failure };
     let files = entries(&mut open_archive(path)?).map_err(in_file)?;
     let resource = |name: &str| name.strip_prefix("resources/").and_then(tiprub_format::largest_resource);
@@ -134,7 +134,7 @@ fn inspect_fmu(path: &Path, measure: bool, console: &Console) -> Result<Outcome>
             .collect::<serde_json::Map<_, _>>(),
         "scene": resources.map(|scene| scene.json),
     });
-    Ok(Outcome { text, warnings, json, ..Outcome::default() })
+    Ok(CommandOutcome { text, warnings, json, ..CommandOutcome::default() })
 }
 
 /// The scene inside a tiprub FMU, checked against the token; `None` for FMUs of other tools.
@@ -190,7 +190,7 @@ fn describe_scene(scene: &Scene, measure: bool, console: &Console) -> Result<Des
     let mut roms = Vec::new();
     for (rom, structure) in scene.roms.iter().zip(&settings.structures) {
         let contact = settings.contacts.iter().find(|contact| contact.master == structure.name);
-        let sliding = contact.map(|contact| Sliding { friction: contact.friction, speed: structure.speed });
+        let sliding = contact.map(|contact| KnownContact { friction: contact.friction, speed: structure.speed });
         let facts = RomFacts::of(rom, sliding)?;
         let _ = write!(text, "\nstructure {}, {}", structure.name, facts.to_text());
         let mut json = facts.to_json();
@@ -235,7 +235,7 @@ fn scene_text(settings: &SceneSettings) -> String {
     settings.structures.iter().for_each(|structure| text.push_str(&structure_text(structure)));
     // Gaps and surfaces of what flies freely are in the ROMs.
     let flies = |contact: &ContactSettings| {
-        settings.master_of(contact).is_some_and(|structure| structure.motion == Motion::Free)
+        settings.master_of(contact).is_some_and(|structure| structure.motion == BodyMotion::Free)
     };
     for surface in &settings.surfaces {
         let mut contacts = settings.contacts.iter().filter(|contact| contact.slave == surface.name);
@@ -282,11 +282,11 @@ fn scene_text(settings: &SceneSettings) -> String {
 
 fn structure_text(structure: &StructureSettings) -> String {
     let motion = match structure.motion {
-        Motion::Rotating => {
+        BodyMotion::Rotating => {
             format!("speed {} rad/s ({:.1} rpm)", structure.speed, structure.speed * 30.0 / std::f64::consts::PI)
         }
-        Motion::Still => "stands still".into(),
-        Motion::Free => {
+        BodyMotion::Still => "stands still".into(),
+        BodyMotion::Free => {
             let [x, y, z] = structure.velocity;
             format!("flies freely, starts at {x}, {y}, {z} m/s")
         }
@@ -306,7 +306,7 @@ mod tests {
     use super::*;
     use tiprub_study::arguments::{CacheArguments, SceneOptions};
 
-    fn inspect(name: &str, contents: impl AsRef<[u8]>) -> Result<Outcome> {
+    fn inspect(name: &str, contents: impl AsRef<[u8]>) -> Result<CommandOutcome> {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join(name);
         fs::write(&path, contents).unwrap();

@@ -1,4 +1,4 @@
-//! One module per command; each turns its arguments into an [`Outcome`] or a [`Failure`].
+//! One module per command; each turns its arguments into an [`CommandOutcome`] or a [`Failure`].
 
 pub mod demo;
 pub mod inspect;
@@ -12,7 +12,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome},
+    console::{CommandOutcome, Console},
 };
 
 use crate::{cli::Command, command_files};
@@ -22,7 +22,7 @@ use crate::{cli::Command, command_files};
 ///
 /// # Errors
 /// What the command could not do. A defect of this program is one of them.
-pub fn run(command: &Command, console: &Console) -> Result<Outcome> {
+pub fn run(command: &Command, console: &Console) -> Result<CommandOutcome> {
     walled(|| {
         command_files::check(command)?;
         match command {
@@ -38,7 +38,7 @@ pub fn run(command: &Command, console: &Console) -> Result<Outcome> {
 }
 
 /// A panic ends in a failure like any other; where it began has been said on stderr.
-fn walled(work: impl FnOnce() -> Result<Outcome>) -> Result<Outcome> {
+fn walled(work: impl FnOnce() -> Result<CommandOutcome>) -> Result<CommandOutcome> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
         let problem = format!("a defect of this program stopped the work: {}", text.unwrap_or("no message"));
@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn a_panic_is_a_failure_of_the_work() {
-        let said: [fn() -> Result<Outcome>; 2] = [|| panic!("index {} too large", 7), || panic!("plain")];
+        let said: [fn() -> Result<CommandOutcome>; 2] = [|| panic!("index {} too large", 7), || panic!("plain")];
         for (panics, words) in said.into_iter().zip(["index 7 too large", "plain"]) {
             let failure = walled(panics).unwrap_err();
             assert_eq!(failure.exit_code(), 1);

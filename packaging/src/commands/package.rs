@@ -6,29 +6,29 @@ use serde_json::json;
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome, shown_path, warnings_json},
+    console::{CommandOutcome, Console, shown_path, warnings_json},
 };
 
 use crate::{
     cli::{FmiChoice, PackageArguments},
-    fmu::{FmiVersion, Package},
-    library::{self, Unit},
+    fmu::{FmiVersion, FmuPackage},
+    library::{self, LibraryUnit},
 };
 
 /// Load the scene, find the library, zip.
 ///
 /// # Errors
 /// A wrong scene, no library, or files that cannot be written.
-pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
+pub fn run(arguments: &PackageArguments, console: &Console) -> Result<CommandOutcome> {
     // What is wrong with the command line is said before any work; a library that has to be built waits for a scene that is right.
     targets(arguments.fmi, &arguments.output, "model")?;
     let given = !arguments.libraries.library.is_empty();
-    let libraries = given.then(|| library::load(Unit::Scene, &arguments.libraries, console)).transpose()?;
+    let libraries = given.then(|| library::load(LibraryUnit::Scene, &arguments.libraries, console)).transpose()?;
     let scene = arguments.options.load(&arguments.scene, &arguments.cache.cache(), console)?;
     let targets = targets(arguments.fmi, &arguments.output, &scene.settings.name)?;
-    let libraries = libraries.map_or_else(|| library::load(Unit::Scene, &arguments.libraries, console), Ok)?;
+    let libraries = libraries.map_or_else(|| library::load(LibraryUnit::Scene, &arguments.libraries, console), Ok)?;
     let package =
-        Package::new(&scene, &libraries).map_err(|failure| scene_source::located(&arguments.scene, failure))?;
+        FmuPackage::new(&scene, &libraries).map_err(|failure| scene_source::located(&arguments.scene, failure))?;
     let arrays = (arguments.arrays || arguments.scalars).then_some(arguments.arrays);
     for (version, path) in &targets {
         console.say(format_args!("Writing {}", path.display()));
@@ -48,7 +48,12 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<Outcome> {
     let json = json!({
         "model": scene.settings.name, "fmus": files, "platforms": platforms, "warnings": warnings, "warning_details": details,
     });
-    Ok(Outcome { text: text.join("\n"), warnings: package.warnings().to_vec(), json, ..Outcome::default() })
+    Ok(CommandOutcome {
+        text: text.join("\n"),
+        warnings: package.warnings().to_vec(),
+        json,
+        ..CommandOutcome::default()
+    })
 }
 
 pub(crate) fn size(path: &Path) -> u64 {

@@ -10,24 +10,24 @@ use tiprub_core::{
 use tiprub_gallery::{builtin, reduction};
 use tiprub_model::{
     Rotor37Options,
-    casing::{CLAMPED, Support},
-    rotor37::{MeshCounts, Tip},
+    casing::{CLAMPED, RingSupport},
+    rotor37::{MeshCounts, TipContact},
     stage::sector_mesh,
 };
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome, shown_path},
+    console::{CommandOutcome, Console, shown_path},
     output_file,
-    places::{self, Named},
+    places::{self, NamedFile},
 };
 
 use crate::{
     casing_arguments::CasingArguments,
     cube_models,
-    reduce_arguments::{Model, ReduceArguments, StageArguments, StageCasingArguments},
-    reduced::Reduced,
+    reduce_arguments::{ModelToReduce, ReduceArguments, StageArguments, StageCasingArguments},
+    reduced::ReducedModel,
     rom_facts::RomFacts,
-    shared_arguments::{MaterialChoice, Written},
+    shared_arguments::{MaterialChoice, OutputArguments},
     users_model,
 };
 
@@ -35,13 +35,14 @@ use crate::{
 ///
 /// # Errors
 /// Counts that do not fit the mesh, wrong files, or files that cannot be written.
-pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
+pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<CommandOutcome> {
     // What would fail after the work is said before it.
     let written = arguments.model.written();
     let output =
         &written.output.clone().unwrap_or_else(|| format!("{}.rom.safetensors", arguments.model.name()).into());
     let targets = [("--output", Some(output)), ("--inp", written.inp.as_ref()), ("--vtk", written.vtk.as_ref())];
-    let names: Vec<Named> = targets.into_iter().filter_map(|(role, path)| Some(Named::new(role, path?))).collect();
+    let names: Vec<NamedFile> =
+        targets.into_iter().filter_map(|(role, path)| Some(NamedFile::new(role, path?))).collect();
     places::apart(&arguments.model.files(), &names)?;
     targets.into_iter().filter_map(|(_, path)| path).try_for_each(|path| check_target(path, written.force))?;
     let start = Instant::now();
@@ -61,18 +62,18 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<Outcome> {
     }
     let mut warnings = reduced.warnings.clone();
     warnings.extend(warning::texts(&[facts.warnings(), slips].concat()));
-    if matches!(arguments.model, Model::Blade(_) | Model::Sector(_)) {
+    if matches!(arguments.model, ModelToReduce::Blade(_) | ModelToReduce::Sector(_)) {
         warnings.extend(facts.sense_warning());
     }
     warnings.extend(spin_warning(&reduced.spin_checks));
     console.warn_texts(&warnings);
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
     let (text, json) = (text(&reduced, &facts, &paths), json(&reduced, &facts, written, output, &warnings));
-    Ok(Outcome { text, json, ..Outcome::default() })
+    Ok(CommandOutcome { text, json, ..CommandOutcome::default() })
 }
 
 /// Refuse a model that is rarely meant, unless it `is_meant`: its slips are warnings then.
-fn check_slips(reduced: &Reduced, facts: &RomFacts, is_meant: bool) -> Result<Vec<Warning>> {
+fn check_slips(reduced: &ReducedModel, facts: &RomFacts, is_meant: bool) -> Result<Vec<Warning>> {
     let slips = [reduced.slips.clone(), facts.slips()].concat();
     match slips.first().filter(|_| !is_meant) {
         Some(Slip { what, problem, question }) => {
@@ -100,7 +101,7 @@ pub fn check_target(path: &Path, force: bool) -> Result<()> {
 }
 
 /// For people.
-fn text(reduced: &Reduced, facts: &RomFacts, paths: &[&Path]) -> String {
+fn text(reduced: &ReducedModel, facts: &RomFacts, paths: &[&Path]) -> String {
     let elements = reduced.mesh.as_ref().map(|(mesh, _)| format!(" {} elements,", mesh.elements.len()));
     let read = &reduced.read.0;
     let mut text = if read.is_empty() { facts.to_text() } else { format!("{read}\n\n{}", facts.to_text()) };
@@ -130,7 +131,13 @@ fn text(reduced: &Reduced, facts: &RomFacts, paths: &[&Path]) -> String {
 }
 
 /// For programs.
-fn json(reduced: &Reduced, facts: &RomFacts, written: &Written, output: &Path, warnings: &[String]) -> Value {
+fn json(
+    reduced: &ReducedModel,
+    facts: &RomFacts,
+    written: &OutputArguments,
+    output: &Path,
+    warnings: &[String],
+) -> Value {
     json!({
         "rom": facts.to_json(),
         "model": reduced.read.1,
@@ -156,58 +163,58 @@ fn json(reduced: &Reduced, facts: &RomFacts, written: &Written, output: &Path, w
     })
 }
 
-fn reduced(model: &Model, console: &Console) -> Result<Reduced> {
+fn reduced(model: &ModelToReduce, console: &Console) -> Result<ReducedModel> {
     let [left, right] = builtin::RINGS.map(|(_, side)| side);
     match model {
-        Model::Blade(own) => {
+        ModelToReduce::Blade(own) => {
             users_model::blade(own.file.as_deref(), &own.blade, (&own.tips, own.kept.clone()), console)
         }
-        Model::Sector(own) => users_model::sector(own, console),
-        Model::CasingMesh(own) => users_model::casing(own, console),
-        Model::Casing(own) => casing(own, console),
-        Model::Rotor37(own) => rotor37(&own.options(), console),
-        Model::Stage(own) => stage(own, console),
-        Model::StageCasing(own) => stage_casing(own, console),
-        Model::Cube(own) => cube_models::cube(own, console),
-        Model::RingLeft(own) => cube_models::ring(own, left, console),
-        Model::RingRight(own) => cube_models::ring(own, right, console),
+        ModelToReduce::Sector(own) => users_model::sector(own, console),
+        ModelToReduce::CasingMesh(own) => users_model::casing(own, console),
+        ModelToReduce::Casing(own) => casing(own, console),
+        ModelToReduce::Rotor37(own) => rotor37(&own.options(), console),
+        ModelToReduce::Stage(own) => stage(own, console),
+        ModelToReduce::StageCasing(own) => stage_casing(own, console),
+        ModelToReduce::Cube(own) => cube_models::cube(own, console),
+        ModelToReduce::RingLeft(own) => cube_models::ring(own, left, console),
+        ModelToReduce::RingRight(own) => cube_models::ring(own, right, console),
     }
 }
 
-fn casing(arguments: &CasingArguments, console: &Console) -> Result<Reduced> {
+fn casing(arguments: &CasingArguments, console: &Console) -> Result<ReducedModel> {
     let options = arguments.options();
-    let clamped = (options.support != Support::Free).then_some(CLAMPED);
-    Ok(Reduced::general(reduction::casing(&options, console)?, clamped))
+    let clamped = (options.support != RingSupport::Free).then_some(CLAMPED);
+    Ok(ReducedModel::general(reduction::casing(&options, console)?, clamped))
 }
 
 /// The bladed disk that ships.
-fn stage(arguments: &StageArguments, console: &Console) -> Result<Reduced> {
+fn stage(arguments: &StageArguments, console: &Console) -> Result<ReducedModel> {
     let (name, options) = arguments.options();
     let sector = sector_mesh(&options.sector).map_err(|error| reduction::failure("stage", error))?;
     let mut reduced = reduction::stage(&options, console)?;
     name.clone_into(&mut reduced.rom.name);
     let (nodes, mesh) = (sector.mesh.nodes.len(), Some((sector.mesh, options.material)));
-    Ok(Reduced::cyclic(reduced, mesh, nodes, Some("CLAMPED"), ["CYCLIC_LOW", "CYCLIC_HIGH"]))
+    Ok(ReducedModel::cyclic(reduced, mesh, nodes, Some("CLAMPED"), ["CYCLIC_LOW", "CYCLIC_HIGH"]))
 }
 
 /// The casing around it.
-fn stage_casing(arguments: &StageCasingArguments, console: &Console) -> Result<Reduced> {
+fn stage_casing(arguments: &StageCasingArguments, console: &Console) -> Result<ReducedModel> {
     let mut options = builtin::stage_casing(arguments.coarse);
     options.contact = arguments.contact_grid.unwrap_or(options.contact);
     options.patches = arguments.patches.unwrap_or(options.patches);
     options.fixed_interface_modes = arguments.fixed_interface_modes.unwrap_or(options.fixed_interface_modes);
     options.modes = arguments.modes.unwrap_or(options.modes);
     options.material = arguments.material.map_or(options.material.clone(), MaterialChoice::material);
-    Ok(Reduced::general(reduction::stage_casing(&options, console)?, Some(CLAMPED)))
+    Ok(ReducedModel::general(reduction::stage_casing(&options, console)?, Some(CLAMPED)))
 }
 
-fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduced> {
-    let reduced = Reduced::general(reduction::rotor37(options, console)?, Some("hub"));
+fn rotor37(options: &Rotor37Options, console: &Console) -> Result<ReducedModel> {
+    let reduced = ReducedModel::general(reduction::rotor37(options, console)?, Some("hub"));
     let (MeshCounts { chord, thickness, .. }, [patches, rows]) = (options.mesh, options.tip.counts());
-    let is_patch = !matches!(options.tip, Tip::Nodes(_));
+    let is_patch = !matches!(options.tip, TipContact::Nodes(_));
     let narrow = (is_patch && patches > chord + 1).then(|| users_model::narrow(patches, chord as f64, chord + 1));
     let narrow_rows = (rows > thickness + 1).then(|| users_model::narrow_rows(rows, thickness));
-    Ok(Reduced { warnings: narrow.into_iter().chain(narrow_rows).collect(), ..reduced })
+    Ok(ReducedModel { warnings: narrow.into_iter().chain(narrow_rows).collect(), ..reduced })
 }
 
 /// Share (%) by which frequencies or growth at speed may be off without a warning.

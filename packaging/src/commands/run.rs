@@ -10,10 +10,10 @@ use tiprub_core::{
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome, shown_path, warnings_json},
+    console::{CommandOutcome, Console, shown_path, warnings_json},
     extremes::{Extreme, extremes},
-    history::History,
-    native::{self, Given},
+    history::InputHistory,
+    native::{self, RunInputs},
     recording::shortest,
     schedule::Schedule,
 };
@@ -37,18 +37,18 @@ fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
 ///
 /// # Errors
 /// A wrong scene or option, a refused or diverged simulation, a file that cannot be written.
-pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
+pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome> {
     let to_stdout = arguments.csv.as_deref() == Some(Path::new("-"));
     if to_stdout && console.is_json() {
         return Err(Failure::usage("--csv -", "and --json both want stdout", "Give --csv a file"));
     }
     let scene = arguments.options.load(&arguments.scene, &arguments.cache.cache(), console)?;
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
-    let history = arguments.inputs.as_deref().map(History::read).transpose()?;
+    let history = arguments.inputs.as_deref().map(InputHistory::read).transpose()?;
     let clock = Instant::now();
     let run = {
         let task = console.task(&format!("Running {}", scene.settings.name), Some(schedule.count as u64));
-        let given = Given { settings: &arguments.set, history: history.as_ref() };
+        let given = RunInputs { settings: &arguments.set, history: history.as_ref() };
         let run = native::run(&scene, &schedule, given, &|done| task.at(done as u64));
         // The step of the file, unless the command line has another.
         let is_set = arguments.step.is_some() || arguments.set.iter().any(|(name, _)| name == "internal_step_max");
@@ -113,7 +113,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<Outcome> {
     if !estimates.is_empty() {
         json["estimated_errors"] = Value::Object(estimates.iter().map(Estimate::json).collect());
     }
-    Ok(Outcome { text, warnings: run.warnings, rest, json })
+    Ok(CommandOutcome { text, warnings: run.warnings, rest, json })
 }
 
 /// What stands behind the answer and the warnings.

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use tiprub_shell::{
     Result,
-    console::{Console, Outcome, shown_path},
+    console::{CommandOutcome, Console, shown_path},
     output_file,
 };
 use tiprub_study::{
     Study,
     arguments::StudyCommon,
-    convergence::{self, Judged, refine::Source},
+    convergence::{self, EstimatedRom, refine::RomSource},
     error, estimate, map, output, stability,
 };
 
@@ -25,7 +25,7 @@ use crate::{
 ///
 /// # Errors
 /// A run that fails, or files that cannot be written.
-pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
+pub fn run(arguments: &StudyArguments, console: &Console) -> Result<CommandOutcome> {
     type Work<'a> = Box<dyn Fn(&Console) -> Result<Study> + 'a>;
     let (name, common, work): (_, _, Work) = match &arguments.study {
         StudyCommand::Map(own) => ("map", &own.common, Box::new(|console| map::study(own, console))),
@@ -33,7 +33,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
             let given = own.from.is_given()?;
             let of = move |console: &Console| {
                 let source = BladeSource::of(&own.from);
-                error::study(&own.study, given.then_some(&source as &dyn Source), console)
+                error::study(&own.study, given.then_some(&source as &dyn RomSource), console)
             };
             ("error", &own.study.common, Box::new(of))
         }
@@ -46,7 +46,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<Outcome> {
 }
 
 /// The study that may also write a ROM.
-fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<Outcome> {
+fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOutcome> {
     let given = own.from.is_given()?;
     let directory = directory("convergence", &own.study.common);
     output_file::try_directory(&directory)?;
@@ -54,8 +54,8 @@ fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<Outcome> {
         check_target(path, own.study.force)?;
     }
     let source = BladeSource::of(&own.from);
-    let (study, Judged { rom, known }) =
-        convergence::study(&own.study, given.then_some(&source as &dyn Source), console)?;
+    let (study, EstimatedRom { rom, known }) =
+        convergence::study(&own.study, given.then_some(&source as &dyn RomSource), console)?;
     let mut outcome = output::write(&study, &directory)?;
     if let Some(path) = &own.study.into {
         output_file::write(path, tiprub_format::write_rom(&rom))?;

@@ -5,17 +5,17 @@ use std::fmt::Write as _;
 use serde_json::json;
 use tiprub_gallery::reduction;
 use tiprub_model::conduction::{
-    AMBIENT_FILM, Conduction, ConductionOptions, Conductor, GAS_FILM, MODES, reduce_mesh_conduction,
+    AMBIENT_FILM, ConductionOptions, ConductionReduction, Conductor, GAS_FILM, MODES, reduce_mesh_conduction,
     reduce_ring_conduction,
 };
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome, shown_path},
+    console::{CommandOutcome, Console, shown_path},
 };
 
 use crate::{
     commands::package::{size, targets},
-    library::{self, Unit},
+    library::{self, LibraryUnit},
     shared_arguments::MaterialChoice,
     thermal_arguments::ThermalArguments,
     thermal_fmu::ThermalPackage,
@@ -26,7 +26,7 @@ use crate::{
 ///
 /// # Errors
 /// A casing or a mesh that cannot be, no library, or files that cannot be written.
-pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
+pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<CommandOutcome> {
     let casing = arguments.ring.options();
     let name = arguments.name();
     let targets = targets(arguments.fmi, &arguments.output, &name)?;
@@ -67,7 +67,7 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
         reduce_mesh_conduction(&own.mesh, (own.set.as_deref(), heated), casing.patches, &options, listener)
     })?;
     console.warn_texts(&own.map_or(Vec::new(), |own| own.warnings));
-    let libraries = library::load(Unit::Thermal, &arguments.libraries, console)?;
+    let libraries = library::load(LibraryUnit::Thermal, &arguments.libraries, console)?;
     let package = ThermalPackage::new(&reduced.model, &libraries)?;
     for (version, path) in &targets {
         console.say(format_args!("Writing {}", path.display()));
@@ -83,12 +83,13 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<Outcome> {
         .collect();
     let platforms: Vec<&str> = libraries.iter().map(|library| library.platform.tuple()).collect();
     let json = json!({"model": facts_json(&reduced), "fmus": files, "platforms": platforms});
-    Ok(Outcome { text, json, ..Outcome::default() })
+    Ok(CommandOutcome { text, json, ..CommandOutcome::default() })
 }
 
 /// For people.
-fn facts(reduced: &Conduction) -> String {
-    let Conduction { model, counts: [nodes, elements], areas: [gas, air, heated], time_constants, checks } = reduced;
+fn facts(reduced: &ConductionReduction) -> String {
+    let ConductionReduction { model, counts: [nodes, elements], areas: [gas, air, heated], time_constants, checks } =
+        reduced;
     let mut text = format!(
         "{}: {nodes} nodes, {elements} elements, {} coordinates, {} patches\n  \
          heat capacity {:.1} J/K; in the gas {:.4} m2, {:.2} W/K; in the air {:.4} m2, {:.2} W/K; heated {:.4} m2\n  \
@@ -112,7 +113,7 @@ fn facts(reduced: &Conduction) -> String {
 }
 
 /// For programs.
-fn facts_json(reduced: &Conduction) -> serde_json::Value {
+fn facts_json(reduced: &ConductionReduction) -> serde_json::Value {
     let model = &reduced.model;
     json!({
         "name": model.name,

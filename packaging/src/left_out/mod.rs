@@ -7,11 +7,11 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 use tiprub_core::{Error, Scene, Simulation, settings::Scheme};
 use tiprub_shell::{
-    native::{self, Given},
+    native::{self, RunInputs},
     schedule::Schedule,
 };
 
-pub use table::{EFFECTS, Effect, Group};
+pub use table::{EFFECTS, Effect, RowGroup};
 
 /// Communication steps whose time is measured.
 const MEASURED_STEPS: usize = 100;
@@ -34,12 +34,12 @@ pub struct LeftOut {
     /// Which one.
     pub effect: &'static Effect,
     /// What it would add, or why this scene cannot have it as it stands; `None` where keys alone do not do it.
-    pub cost: Option<Result<Cost, Refusal>>,
+    pub cost: Option<Result<Cost, FeatureRefusal>>,
 }
 
 /// Why a scene cannot have an effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal {
+pub struct FeatureRefusal {
     /// The rule that excludes it; with adaptive steps also what excludes it with fixed ones.
     pub reason: String,
     /// Whether the rules allow it in the same scene with fixed steps, whose length is not judged.
@@ -47,7 +47,7 @@ pub struct Refusal {
 }
 
 /// Sizes of a scene.
-struct Sizes {
+struct SceneSizes {
     variables: i64,
     bytes: i64,
     state: i64,
@@ -66,7 +66,7 @@ pub fn left_out(scene: &Scene, measure: bool) -> tiprub_core::Result<Vec<LeftOut
         .collect())
 }
 
-fn cost(scene: &Scene, with: fn(&mut Scene), own: &Sizes, measure: bool) -> Result<Cost, Refusal> {
+fn cost(scene: &Scene, with: fn(&mut Scene), own: &SceneSizes, measure: bool) -> Result<Cost, FeatureRefusal> {
     let mut other = scene.clone();
     with(&mut other);
     let found = sizes(&other, measure).map_err(|error| refusal(other, error))?;
@@ -79,18 +79,18 @@ fn cost(scene: &Scene, with: fn(&mut Scene), own: &Sizes, measure: bool) -> Resu
 }
 
 /// Why a scene is rejected. The rules are also asked about one with adaptive steps if it had fixed ones.
-fn refusal(mut scene: Scene, error: Error) -> Refusal {
+fn refusal(mut scene: Scene, error: Error) -> FeatureRefusal {
     let mut reason = words(error);
     let time = &mut scene.settings.time;
     if time.scheme != Scheme::Galerkin {
-        return Refusal { reason, allowed_with_fixed_steps: false };
+        return FeatureRefusal { reason, allowed_with_fixed_steps: false };
     }
     (time.scheme, time.tolerance) = (Scheme::ModalExact, None);
     let with_fixed_steps = Simulation::new(&scene).map_err(words);
     if let Some(other) = with_fixed_steps.as_ref().err().filter(|other| **other != reason) {
         let _ = write!(reason, ". With fixed steps, {other}");
     }
-    Refusal { reason, allowed_with_fixed_steps: with_fixed_steps.is_ok() }
+    FeatureRefusal { reason, allowed_with_fixed_steps: with_fixed_steps.is_ok() }
 }
 
 fn words(error: Error) -> String {
@@ -100,12 +100,12 @@ fn words(error: Error) -> String {
     }
 }
 
-fn sizes(scene: &Scene, measure: bool) -> tiprub_core::Result<Sizes> {
+fn sizes(scene: &Scene, measure: bool) -> tiprub_core::Result<SceneSizes> {
     let count = |bytes: usize| i64::try_from(bytes).unwrap_or(i64::MAX);
     let mut simulation = Simulation::new(scene)?;
     simulation.initialise(scene.settings.experiment.start)?;
     let resources = tiprub_format::resource_files(scene, false);
-    Ok(Sizes {
+    Ok(SceneSizes {
         variables: count(simulation.table().references()),
         bytes: count(resources.iter().map(|(_, bytes)| bytes.len()).sum()),
         state: count(simulation.state_size()),
@@ -117,14 +117,14 @@ fn sizes(scene: &Scene, measure: bool) -> tiprub_core::Result<Sizes> {
 fn seconds(scene: &Scene) -> Option<f64> {
     let mut schedule = Schedule::new(&scene.settings.experiment, None, None).ok()?;
     schedule.count = schedule.count.min(MEASURED_STEPS);
-    let run = || Some(native::run(scene, &schedule, Given::default(), &|_| {}).ok()?.stepping.as_secs_f64());
+    let run = || Some(native::run(scene, &schedule, RunInputs::default(), &|_| {}).ok()?.stepping.as_secs_f64());
     Some(run()?.min(run()?))
 }
 
 /// The list as text.
 pub fn text(all: &[LeftOut]) -> String {
     let mut text = String::new();
-    for (group, title) in [(Group::Physics, "left out here"), (Group::Machinery, "machinery that is off")] {
+    for (group, title) in [(RowGroup::Physics, "left out here"), (RowGroup::Machinery, "machinery that is off")] {
         let _ = writeln!(text, "\n{title:<53} what it needs");
         for LeftOut { effect, cost } in all.iter().filter(|one| one.effect.group == group) {
             let _ = writeln!(text, "  {:<51} {}{}", effect.name, effect.takes, told(cost.as_ref()));
@@ -133,10 +133,10 @@ pub fn text(all: &[LeftOut]) -> String {
     text
 }
 
-fn told(cost: Option<&Result<Cost, Refusal>>) -> String {
+fn told(cost: Option<&Result<Cost, FeatureRefusal>>) -> String {
     match cost {
         None => String::new(),
-        Some(Err(Refusal { reason, allowed_with_fixed_steps })) => {
+        Some(Err(FeatureRefusal { reason, allowed_with_fixed_steps })) => {
             let what = if *allowed_with_fixed_steps {
                 "needs fixed steps (`time.scheme = \"modal-exact\"` and `time.step`)"
             } else {
@@ -154,10 +154,10 @@ fn told(cost: Option<&Result<Cost, Refusal>>) -> String {
 /// The list for programs.
 pub fn json(all: &[LeftOut]) -> Value {
     let one = |LeftOut { effect, cost }: &LeftOut| {
-        let group = if effect.group == Group::Physics { "physics" } else { "machinery" };
+        let group = if effect.group == RowGroup::Physics { "physics" } else { "machinery" };
         let cost = match cost {
             None => Value::Null,
-            Some(Err(Refusal { reason, allowed_with_fixed_steps })) => {
+            Some(Err(FeatureRefusal { reason, allowed_with_fixed_steps })) => {
                 json!({ "refused": reason, "allowed_with_fixed_steps": allowed_with_fixed_steps })
             }
             Some(Ok(cost)) => json!({
@@ -172,7 +172,7 @@ pub fn json(all: &[LeftOut]) -> Value {
 /// The table of the guide.
 pub fn markdown() -> String {
     let mut text = String::new();
-    for (group, title) in [(Group::Physics, "effect"), (Group::Machinery, "machinery")] {
+    for (group, title) in [(RowGroup::Physics, "effect"), (RowGroup::Machinery, "machinery")] {
         let _ = write!(text, "\n| {title} | what it takes |\n|---|---|\n");
         for effect in EFFECTS.iter().filter(|effect| effect.group == group) {
             let _ = writeln!(text, "| {} | {} |", effect.name, effect.takes);

@@ -3,14 +3,14 @@
 use tiprub_core::{
     Rom, Scene,
     settings::{
-        ContactSettings, ExcitationSettings, InitialSettings, InputInterpolation, LoadSettings, Motion, Scheme, Solver,
-        StructureSettings, SurfaceSettings,
+        BodyMotion, ContactSettings, ExcitationSettings, InitialSettings, InputInterpolation, LoadSettings, Scheme,
+        Solver, StructureSettings, SurfaceSettings,
     },
 };
 
 /// What a row is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Group {
+pub enum RowGroup {
     /// A physical effect.
     Physics,
     /// A part of the machinery.
@@ -22,7 +22,7 @@ pub struct Effect {
     /// Its name.
     pub name: &'static str,
     /// What it is about.
-    pub group: Group,
+    pub group: RowGroup,
     /// What it would take.
     pub takes: &'static str,
     /// Whether it means anything for a scene.
@@ -35,7 +35,7 @@ pub struct Effect {
 
 fn rotors(scene: &Scene) -> impl Iterator<Item = (&StructureSettings, &Rom)> {
     let all = scene.settings.structures.iter().zip(&scene.roms);
-    all.filter(|(structure, _)| structure.motion == Motion::Rotating)
+    all.filter(|(structure, _)| structure.motion == BodyMotion::Rotating)
 }
 
 fn rotates(scene: &Scene) -> bool {
@@ -44,7 +44,7 @@ fn rotates(scene: &Scene) -> bool {
 
 fn each_rotor(scene: &mut Scene, change: impl Fn(&mut StructureSettings)) {
     let all = scene.settings.structures.iter_mut();
-    all.filter(|structure| structure.motion == Motion::Rotating).for_each(change);
+    all.filter(|structure| structure.motion == BodyMotion::Rotating).for_each(change);
 }
 
 fn rotor(scene: &Scene, has: impl Fn(&StructureSettings) -> bool) -> bool {
@@ -52,7 +52,7 @@ fn rotor(scene: &Scene, has: impl Fn(&StructureSettings) -> bool) -> bool {
 }
 
 fn casing(scene: &Scene, has: impl Fn(&StructureSettings) -> bool) -> bool {
-    scene.settings.structures.iter().any(|structure| structure.motion == Motion::Still && has(structure))
+    scene.settings.structures.iter().any(|structure| structure.motion == BodyMotion::Still && has(structure))
 }
 
 fn flexible(scene: &Scene) -> bool {
@@ -61,7 +61,7 @@ fn flexible(scene: &Scene) -> bool {
 
 fn each_casing(scene: &mut Scene, change: impl Fn(&mut StructureSettings)) {
     let all = scene.settings.structures.iter_mut();
-    all.filter(|structure| structure.motion == Motion::Still).for_each(change);
+    all.filter(|structure| structure.motion == BodyMotion::Still).for_each(change);
 }
 
 fn contact(scene: &Scene, has: impl Fn(&ContactSettings) -> bool) -> bool {
@@ -86,11 +86,11 @@ const fn physics(
     concerns: fn(&Scene) -> bool,
     has: fn(&Scene) -> bool,
 ) -> Effect {
-    Effect { name, group: Group::Physics, takes, concerns, has, with: None }
+    Effect { name, group: RowGroup::Physics, takes, concerns, has, with: None }
 }
 
 const fn machinery(name: &'static str, takes: &'static str, has: fn(&Scene) -> bool) -> Effect {
-    Effect { name, group: Group::Machinery, takes, concerns: always, has, with: None }
+    Effect { name, group: RowGroup::Machinery, takes, concerns: always, has, with: None }
 }
 
 impl Effect {
@@ -126,7 +126,7 @@ pub static EFFECTS: &[Effect] = &[
     .by(|scene| {
         let sectors: Vec<usize> = scene.roms.iter().map(|rom| rom.sectors).collect();
         let all = scene.settings.structures.iter_mut().zip(sectors);
-        for (structure, sectors) in all.filter(|(structure, _)| structure.motion == Motion::Rotating) {
+        for (structure, sectors) in all.filter(|(structure, _)| structure.motion == BodyMotion::Rotating) {
             structure.frequency_factors = (0..sectors).map(|blade| [1.0, 1.001][blade % 2]).collect();
         }
     }),

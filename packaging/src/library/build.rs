@@ -14,13 +14,13 @@ use tiprub_fmi_host::Platform;
 use tiprub_format::{LIBRARY_MARK, LIBRARY_RELEASE};
 use tiprub_shell::{Failure, Result, console::Console, output_file};
 
-use super::{LARGEST, Unit, holds, is_library};
+use super::{LARGEST, LibraryUnit, holds, is_library};
 
 /// Lines of cargo's stderr kept for the error message.
 const LINES_KEPT: usize = 30;
 
 /// Where a library of these sources for this platform is kept between two commands.
-pub(super) fn kept(unit: Unit, directory: &Path) -> Option<PathBuf> {
+pub(super) fn kept(unit: LibraryUnit, directory: &Path) -> Option<PathBuf> {
     let name = format!("{}{}", unit.prefix(), Platform::here()?.file_name());
     let sources = LIBRARY_RELEASE.strip_prefix(LIBRARY_MARK)?.replace(", ", "-").replace(' ', "-");
     Some(directory.join("libraries").join(sources).join(name))
@@ -28,7 +28,7 @@ pub(super) fn kept(unit: Unit, directory: &Path) -> Option<PathBuf> {
 
 /// Build the library of a program that cargo installed, in a directory that goes afterwards, and keep it for the next command.
 pub(super) fn build_once(
-    unit: Unit,
+    unit: LibraryUnit,
     workspace: &Path,
     cache: Option<&Path>,
     console: &Console,
@@ -68,7 +68,7 @@ pub(super) fn cargo_target(executable: &Path) -> Option<&Path> {
 }
 
 /// Build the crate of the unit alone and return the library cargo reports.
-pub(super) fn build(unit: Unit, workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> {
+pub(super) fn build(unit: LibraryUnit, workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> {
     let task = console.task("Building the FMU library", None);
     let failed = |problem: String, remedy: &str| Failure::new("building the FMU library", problem, remedy);
     let mut child = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))

@@ -55,14 +55,14 @@ fn selects_libraries_of_a_directory_by_their_content() {
     std::fs::write(root.path().join("README.md"), "Libraries of all platforms.").unwrap();
     let directory = [root.path().to_path_buf()];
     let platforms = |libraries: Vec<Library>| Vec::from_iter(libraries.iter().map(|library| library.platform));
-    assert_eq!(platforms(load(Unit::Scene, &arguments(&directory, &[]), &console).unwrap()), Platform::ALL);
+    assert_eq!(platforms(load(LibraryUnit::Scene, &arguments(&directory, &[]), &console).unwrap()), Platform::ALL);
     let two = [Platform::Aarch64Darwin, Platform::X86_64Windows];
-    let chosen = platforms(load(Unit::Scene, &arguments(&directory, &two), &console).unwrap());
+    let chosen = platforms(load(LibraryUnit::Scene, &arguments(&directory, &two), &console).unwrap());
     assert_eq!(chosen, [Platform::X86_64Windows, Platform::Aarch64Darwin]);
     let one = [root.path().join("e.DLL")];
-    let missing = load(Unit::Scene, &arguments(&one, &two), &console).unwrap_err();
+    let missing = load(LibraryUnit::Scene, &arguments(&one, &two), &console).unwrap_err();
     assert!(missing.what.contains("aarch64-darwin") && missing.problem.contains("x86_64-windows"), "{missing}");
-    let twice = load(Unit::Scene, &arguments(&[one[0].clone(), one[0].clone()], &[]), &console).unwrap_err();
+    let twice = load(LibraryUnit::Scene, &arguments(&[one[0].clone(), one[0].clone()], &[]), &console).unwrap_err();
     assert!(twice.problem.contains("a second library for x86_64-windows"), "{twice}");
 }
 
@@ -75,7 +75,7 @@ fn installed_libraries_are_beside_the_program_or_in_its_prefix() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, "").unwrap();
     }
-    let found = installed(Unit::Scene, &program);
+    let found = installed(LibraryUnit::Scene, &program);
     let names: Vec<_> = found.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
     assert_eq!(names, ["x86_64-linux.so", "x86_64-windows.dll"]);
 }
@@ -85,11 +85,11 @@ fn installed_program_builds_and_caches_a_missing_library() {
     let root = tempfile::tempdir().unwrap();
     let [sources, cache] = ["sources", "cache"].map(|name| root.path().join(name));
     let program = root.path().join("bin/tiprub");
-    let origin = |sources, cache| origin(Unit::Scene, &program, sources, cache);
+    let origin = |sources, cache| origin(LibraryUnit::Scene, &program, sources, cache);
     assert_eq!(origin(None, Some(cache.as_path())), Origin::Nowhere);
     assert_eq!(origin(Some(sources.as_path()), Some(cache.as_path())), Origin::Sources(&sources));
-    let kept = build::kept(Unit::Scene, &cache).expect("this platform is known");
-    assert!(build::kept(Unit::Thermal, &cache).is_some_and(|other| other != kept));
+    let kept = build::kept(LibraryUnit::Scene, &cache).expect("this platform is known");
+    assert!(build::kept(LibraryUnit::Thermal, &cache).is_some_and(|other| other != kept));
     std::fs::create_dir_all(kept.parent().unwrap()).unwrap();
     std::fs::write(&kept, "").unwrap();
     // Also when the sources are gone.
@@ -117,7 +117,8 @@ fn a_library_of_another_release_is_refused_by_name_and_version() {
         bytes.truncate(64);
         std::fs::write(&path, [&bytes, FUNCTIONS, told.as_bytes()].concat()).unwrap();
         let refused =
-            load(Unit::Scene, &arguments(std::slice::from_ref(&path), &[]), &Console::new(true, false)).unwrap_err();
+            load(LibraryUnit::Scene, &arguments(std::slice::from_ref(&path), &[]), &Console::new(true, false))
+                .unwrap_err();
         assert!(refused.what.ends_with("old.so") && refused.problem.contains(named), "{refused}");
         assert!(refused.problem.ends_with(LIBRARY_RELEASE), "{refused}");
     }
@@ -127,7 +128,7 @@ fn a_library_of_another_release_is_refused_by_name_and_version() {
 fn a_file_that_is_no_library_is_refused_by_name() {
     let root = tempfile::tempdir().unwrap();
     let console = Console::new(true, false);
-    let refused = |path: PathBuf| load(Unit::Scene, &arguments(&[path], &[]), &console).unwrap_err();
+    let refused = |path: PathBuf| load(LibraryUnit::Scene, &arguments(&[path], &[]), &console).unwrap_err();
     std::fs::write(root.path().join("README.md"), "None yet.").unwrap();
     assert!(refused(root.path().to_path_buf()).problem.contains("holds no library"));
     let mut program = elf(62);
@@ -155,7 +156,7 @@ fn a_file_that_is_no_library_is_refused_by_name() {
     let other = refused(path.clone());
     assert!(other.what.ends_with("x86_64-linux.so") && other.problem.contains("aarch64-linux"), "{other}");
     std::fs::write(&path, elf(62)).unwrap();
-    assert!(load(Unit::Scene, &arguments(&[path], &[]), &console).is_ok());
+    assert!(load(LibraryUnit::Scene, &arguments(&[path], &[]), &console).is_ok());
     let missing = refused(root.path().join("none.so"));
     assert!(missing.what.ends_with("none.so") && missing.problem.contains("cannot be read"), "{missing}");
 }
@@ -167,7 +168,7 @@ fn libraries_of_both_units_are_told_apart() {
     let conducts = [elf(62), tiprub_format::THERMAL_FILE.as_bytes().to_vec()].concat();
     std::fs::write(&scene, elf(62)).unwrap();
     std::fs::write(&thermal, &conducts).unwrap();
-    for (unit, bytes, other) in [(Unit::Scene, elf(62), thermal), (Unit::Thermal, conducts, scene)] {
+    for (unit, bytes, other) in [(LibraryUnit::Scene, elf(62), thermal), (LibraryUnit::Thermal, conducts, scene)] {
         let found = load(unit, &arguments(&[root.path().to_path_buf()], &[]), &console).unwrap();
         assert!(found.len() == 1 && found[0].bytes == bytes, "{unit:?}");
         assert!(load(unit, &arguments(&[other], &[]), &console).unwrap_err().problem.contains("another unit"));

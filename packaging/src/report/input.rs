@@ -2,7 +2,7 @@
 
 use tiprub_core::{Scene, VariableTable};
 use tiprub_model::Reduction;
-use tiprub_shell::{native::NativeRun, recording::Agreement, schedule::Schedule};
+use tiprub_shell::{native::NativeRun, recording::RecordingDifference, schedule::Schedule};
 use tiprub_study::estimate::Estimate;
 
 use crate::rom_facts::RomFacts;
@@ -15,7 +15,7 @@ pub struct ImportedSummary {
     /// Time spent in doStep (s).
     pub stepping: f64,
     /// Comparison with the native run.
-    pub agreement: Agreement,
+    pub agreement: RecordingDifference,
 }
 
 /// A file beside the report.

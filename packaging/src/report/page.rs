@@ -10,7 +10,7 @@ use tiprub_study::estimate;
 
 use super::input::{ReportFile, ReportInput};
 use super::sections::{Results, figures};
-use crate::rom_facts::{CheckRow, ROWS_SHOWN, RomFacts, Worst, not_negative_zero, order_text, sectors_text};
+use crate::rom_facts::{CheckRow, OmittedRows, ROWS_SHOWN, RomFacts, not_negative_zero, order_text, sectors_text};
 
 /// The whole page.
 ///
@@ -139,7 +139,7 @@ fn checks_table(checks: &[CheckRow]) -> String {
         );
     }
     html.push_str("</tbody></table>");
-    if let Some(rest) = Worst::of(checks, ROWS_SHOWN) {
+    if let Some(rest) = OmittedRows::of(checks, ROWS_SHOWN) {
         let _ = write!(
             html,
             "<p>{} more modes up to {:.1} Hz: deviation at most {:.5} %, residual at most {:.5} %.</p>",

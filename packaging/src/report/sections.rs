@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use tiprub_core::{VariableTable, settings::Shape, variables::Quantity};
 use tiprub_figure::{
     escape,
-    picture::{self, Frame, Surface, View, surface_of},
+    picture::{self, MeshSurface, ProjectionFrame, ViewPoint, surface_of},
     plots::{Plot, Series},
     time_map::{Shows, TimeMap},
 };
@@ -69,7 +69,7 @@ impl<'a> Results<'a> {
     }
 
     /// What the contact nodes do over time: a line for each of a few, a map of more. Empty where the scene has no such output.
-    fn per_node(&self, quantity: Quantity, nodes: &[String], (label, factor, shows): Unit) -> Result<String> {
+    fn per_node(&self, quantity: Quantity, nodes: &[String], (label, factor, shows): LabelledUnit) -> Result<String> {
         let columns = self.columns(quantity);
         if columns.is_empty() {
             return Ok(String::new());
@@ -92,14 +92,14 @@ impl<'a> Results<'a> {
 }
 
 /// Label with unit, factor to that unit, and what a map shows.
-type Unit = (&'static str, f64, Shows);
+type LabelledUnit = (&'static str, f64, Shows);
 
 /// More contact nodes than this are a map and no lines.
 const MOST_LINES: usize = 4;
 
 /// A numbered figure.
 #[derive(Clone)]
-struct Figure {
+struct NumberedFigure {
     body: String,
     caption: String,
 }
@@ -108,7 +108,7 @@ struct Figure {
 pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, String)>> {
     let results = Results::new(input.table, &input.native.recording);
     let mut number = 0;
-    let mut section = |title: &'static str, figures: Vec<Figure>| {
+    let mut section = |title: &'static str, figures: Vec<NumberedFigure>| {
         let mut html = String::new();
         for figure in figures {
             number += 1;
@@ -130,14 +130,14 @@ pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, Stri
 }
 
 /// What the laboratory measured, with the command that measures it on this machine.
-fn error_study() -> Figure {
+fn error_study() -> NumberedFigure {
     // The picture has its own paper and its own legend.
     let body = format!("<div class=\"scroll adapts\">{ERROR_PICTURE}</div>");
     let caption = "Error against run time of adaptive steps, fixed steps and the paper's method on a light rub of rotor 37 as it ships, measured \
                    once (docs/error-study.md of the sources). The demo does not measure it again. On this machine and for this scene \
                    <code>tiprub study error builtin:rotor37</code> does, with <code>--quick</code> in minutes."
         .to_owned();
-    Figure { body, caption }
+    NumberedFigure { body, caption }
 }
 
 fn watched(input: &ReportInput<'_>) -> usize {
@@ -161,13 +161,13 @@ fn readable(name: &str) -> String {
 }
 
 /// Clearance of an undeformed blade around the circumference, for the first contact.
-fn casing(input: &ReportInput<'_>) -> Result<Vec<Figure>> {
+fn casing(input: &ReportInput<'_>) -> Result<Vec<NumberedFigure>> {
     let settings = &input.scene.settings;
     let Some(contact) = settings.contacts.first() else { return Ok(Vec::new()) };
     let Some(surface) = settings.surfaces.iter().find(|surface| surface.name == contact.slave) else {
         return Ok(Vec::new());
     };
-    let shape = tiprub_core::gaps::shape::Surface::new(&surface.shape, contact.nominal_gap())
+    let shape = tiprub_core::gaps::shape::CompiledShape::new(&surface.shape, contact.nominal_gap())
         .map_err(|error| Failure::from_core("casing shape", error))?;
     let clearance = |degrees: f64| contact.nominal_gap() + shape.evaluate(degrees.to_radians()).0;
     let points = (0..=720_u32).map(|half| f64::from(half) / 2.0).map(|degrees| (degrees, 1e6 * clearance(degrees)));
@@ -185,10 +185,10 @@ fn casing(input: &ReportInput<'_>) -> Result<Vec<Figure>> {
         "Casing shape: radial clearance of an undeformed blade around the circumference{ramp}. The clearances below are normal \
          to the casing, which runs parallel to the tip contour, and a little smaller."
     );
-    Ok(vec![Figure { body, caption }])
+    Ok(vec![NumberedFigure { body, caption }])
 }
 
-fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>> {
+fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<NumberedFigure>> {
     let (sector, nodes) = (watched(input), node_names(input));
     let mut figures = Vec::new();
     let body = results.per_node(Quantity::Clearance(sector), &nodes, ("clearance (µm)", 1e6, Shows::Smallest))?;
@@ -198,7 +198,7 @@ fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figu
             sector + 1,
             passing(input)
         );
-        figures.push(Figure { body, caption });
+        figures.push(NumberedFigure { body, caption });
     }
     Ok(figures)
 }
@@ -213,7 +213,7 @@ fn passing(input: &ReportInput<'_>) -> &'static str {
     }
 }
 
-fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>> {
+fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<NumberedFigure>> {
     let (sector, nodes) = (watched(input), node_names(input));
     let mut figures = Vec::new();
     for (quantity, label, caption) in [
@@ -230,14 +230,14 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>>
     ] {
         let body = results.per_node(quantity, &nodes, (label, 1.0, Shows::Largest))?;
         if !body.is_empty() {
-            figures.push(Figure { body, caption: caption.replace("{}", &(sector + 1).to_string()) });
+            figures.push(NumberedFigure { body, caption: caption.replace("{}", &(sector + 1).to_string()) });
         }
     }
     if let Some(series) = results.series("nodes in contact", Quantity::ContactCount, 1.0) {
         let mut plot = Plot::new("time (ms)", "nodes in contact (-)", vec![series]);
         plot.height = 190;
         let all = input.scene.roms.iter().map(|rom| rom.sectors * rom.contact_nodes.len()).sum::<usize>();
-        figures.push(Figure {
+        figures.push(NumberedFigure {
             body: plot.to_html()?,
             caption: format!("Number of nodes in contact at the communication points, of {all} on the whole disk."),
         });
@@ -245,7 +245,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>>
     if let Some(series) = results.series("torque", Quantity::Moment(2), 1.0) {
         let mut plot = Plot::new("time (ms)", "torque on the rotor (N·m)", vec![series]);
         plot.height = 220;
-        figures.push(Figure {
+        figures.push(NumberedFigure {
             body: plot.to_html()?,
             caption:
                 "Reaction torque of the casing on the shaft, mean over the communication step; negative values brake."
@@ -255,7 +255,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Figure>>
     Ok(figures)
 }
 
-fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
+fn energies(results: &Results<'_>) -> Result<Vec<NumberedFigure>> {
     let mut figures = Vec::new();
     let vibration = [
         ("kinetic", Quantity::KineticEnergy),
@@ -281,7 +281,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
             list.iter().filter_map(|(label, quantity)| results.series(label, *quantity, 1.0)).collect();
         if !series.is_empty() {
             let plot = Plot { height, ..Plot::new("time (ms)", "energy (J)", series) };
-            figures.push(Figure { body: plot.to_html()?, caption: caption.into() });
+            figures.push(NumberedFigure { body: plot.to_html()?, caption: caption.into() });
         }
     }
     if let Some(column) = results.column(Quantity::EnergyResidualRelative) {
@@ -292,7 +292,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
             vec![Series::line("residual", results.points(&magnitude, 1.0))],
         );
         (plot.height, plot.logarithmic) = (200, true);
-        figures.push(Figure {
+        figures.push(NumberedFigure {
             body: plot.to_html()?,
             caption:
                 "Closure of the energy ledger: kinetic + strain + losses − initial − work put in, relative to initial \
@@ -304,10 +304,10 @@ fn energies(results: &Results<'_>) -> Result<Vec<Figure>> {
 }
 
 /// The blade at rest with its contact nodes, and its first mode shapes.
-fn mode_shapes(reduction: &Reduction) -> Figure {
-    let surface = reduction.mesh.as_ref().map_or_else(Surface::default, surface_of);
-    let view = View::of_blade(&surface, AZIMUTH, ELEVATION);
-    let frame = Frame::around(&surface, &view, 0.1);
+fn mode_shapes(reduction: &Reduction) -> NumberedFigure {
+    let surface = reduction.mesh.as_ref().map_or_else(MeshSurface::default, surface_of);
+    let view = ViewPoint::of_blade(&surface, AZIMUTH, ELEVATION);
+    let frame = ProjectionFrame::around(&surface, &view, 0.1);
     let marks: Vec<[f64; 3]> = reduction.rom.contact_nodes.iter().map(|node| cartesian(node.position)).collect();
     let mut body = String::from("<div class=\"shapes\">");
     let _ = write!(
@@ -331,7 +331,7 @@ fn mode_shapes(reduction: &Reduction) -> Figure {
         escape(&reduction.rom.name),
         reduction.modes.len().min(MODES_SHOWN)
     );
-    Figure { body, caption }
+    NumberedFigure { body, caption }
 }
 
 fn cartesian([radius, angle, z]: [f64; 3]) -> [f64; 3] {

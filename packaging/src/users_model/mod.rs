@@ -13,7 +13,7 @@ use std::{
 };
 
 use choose::Chosen;
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 use tiprub_gallery::reduction::{self, with_progress};
 use tiprub_model::{
     CasingOptions, FeModel, Material, Mesh, Reduction,
@@ -23,7 +23,7 @@ use tiprub_model::{
     read::{Imported, MatrixFiles, MeshOptions, bounding_box, read_matrices, read_mesh},
     reduce::ReductionOptions,
     reduce_casing, reduce_model,
-    rotor37::Tip,
+    rotor37::TipContact,
     thermal::equal_patches,
 };
 use tiprub_shell::{Failure, Result, console::Console};
@@ -32,9 +32,9 @@ use tiprub_study::convergence::refine::{self, Meshed};
 use crate::shared_arguments::KindChoice;
 use crate::{
     own_arguments::{
-        BladeOptions, CasingMeshArguments, FromMesh, KeptOptions, ModelOptions, SectorArguments, Source, TipOptions,
+        BladeOptions, CasingMeshArguments, FromMesh, KeptOptions, MeshSource, ModelOptions, SectorArguments, TipOptions,
     },
-    reduced::Reduced,
+    reduced::ReducedModel,
 };
 
 /// Modes, of patches as many as fine meshes bear, modes compared with the full model, and damping ratio where none are given.
@@ -58,14 +58,14 @@ pub fn blade(
     asked: &BladeOptions,
     (tips, kept): (&TipOptions, KeptOptions),
     console: &Console,
-) -> Result<Reduced> {
+) -> Result<ReducedModel> {
     let source = asked.source(file, kept);
     let imported = import(&source, console)?;
     let choose = |imported: &Imported| {
         Ok(Chosen { stress: choose::stress(imported, asked)?, ..choose::tips(imported, source.model, tips, None)? })
     };
     told(&source, imported, choose, |model, chosen, clamped| {
-        Ok(Reduced::general(general(&source, asked, model, chosen, console)?, clamped))
+        Ok(ReducedModel::general(general(&source, asked, model, chosen, console)?, clamped))
     })
 }
 
@@ -86,12 +86,12 @@ impl<'a> BladeSource<'a> {
     }
 }
 
-impl refine::Source for BladeSource<'_> {
-    fn reduce(&self, other: Option<usize>, modes: usize, tip: Tip, console: &Console) -> Result<Meshed> {
+impl refine::RomSource for BladeSource<'_> {
+    fn reduce(&self, other: Option<usize>, modes: usize, tip: TipContact, console: &Console) -> Result<Meshed> {
         let [count, rows] = tip.counts();
         let tips = match tip {
-            Tip::Nodes(_) => TipOptions { contact_nodes: Some(count), ..TipOptions::default() },
-            Tip::Patches(_) | Tip::Rows(_) => {
+            TipContact::Nodes(_) => TipOptions { contact_nodes: Some(count), ..TipOptions::default() },
+            TipContact::Patches(_) | TipContact::Rows(_) => {
                 TipOptions { contact_patches: Some(count), contact_rows: Some(rows), ..TipOptions::default() }
             }
         };
@@ -110,7 +110,7 @@ impl refine::Source for BladeSource<'_> {
 ///
 /// # Errors
 /// As [`blade`].
-pub fn sector(asked: &SectorArguments, console: &Console) -> Result<Reduced> {
+pub fn sector(asked: &SectorArguments, console: &Console) -> Result<ReducedModel> {
     let source = asked.source();
     let imported = import(&source, console)?;
     let choose = |imported: &Imported| choose::tips(imported, source.model, &asked.tips, Some(asked));
@@ -121,7 +121,7 @@ pub fn sector(asked: &SectorArguments, console: &Console) -> Result<Reduced> {
 ///
 /// # Errors
 /// As [`blade`]; a mesh of several materials.
-pub fn casing(asked: &CasingMeshArguments, console: &Console) -> Result<Reduced> {
+pub fn casing(asked: &CasingMeshArguments, console: &Console) -> Result<ReducedModel> {
     let source = asked.source();
     let imported = import(&source, console)?;
     let materials = imported.materials.len();
@@ -130,7 +130,7 @@ pub fn casing(asked: &CasingMeshArguments, console: &Console) -> Result<Reduced>
         if materials != 1 {
             return Err(no_mesh());
         }
-        Ok(Reduced::general(ring(&source, asked, model, chosen, console)?, clamped))
+        Ok(ReducedModel::general(ring(&source, asked, model, chosen, console)?, clamped))
     })
 }
 
@@ -139,7 +139,7 @@ pub fn casing(asked: &CasingMeshArguments, console: &Console) -> Result<Reduced>
 /// # Errors
 /// As [`blade`]; a mesh of several materials.
 pub fn conducting(file: &Path, asked: &ModelOptions, console: &Console) -> Result<ConductingMesh> {
-    let imported = import(&Source::mesh(file, asked), console)?;
+    let imported = import(&MeshSource::mesh(file, asked), console)?;
     let mut warnings = imported.warnings.clone();
     warnings.extend(judge::judge(&imported, asked)?);
     let set =
@@ -167,11 +167,11 @@ fn no_mesh() -> Failure {
 
 /// Judge and choose, reduce with the set of clamped nodes, and tell of all.
 fn told(
-    source: &Source,
+    source: &MeshSource,
     imported: Imported,
     choose: impl FnOnce(&Imported) -> Result<Chosen>,
-    reduce: impl FnOnce(FeModel, &Chosen, Option<&str>) -> Result<Reduced>,
-) -> Result<Reduced> {
+    reduce: impl FnOnce(FeModel, &Chosen, Option<&str>) -> Result<ReducedModel>,
+) -> Result<ReducedModel> {
     let mut warnings = imported.warnings.clone();
     warnings.extend(judge::judge(&imported, source.model)?);
     let chosen = choose(&imported)?;
@@ -195,7 +195,7 @@ fn told(
 }
 
 fn general(
-    source: &Source,
+    source: &MeshSource,
     asked: &BladeOptions,
     model: FeModel,
     chosen: &Chosen,
@@ -209,7 +209,7 @@ fn general(
         modes: source.kept.modes.unwrap_or_else(|| default_modes(&model, has_patches(chosen))),
         checked_modes: CHECKED_MODES,
         sectors: asked.sectors.unwrap_or(1) as usize,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         watched: choose::watched(&model, &chosen.contact)?,
         stress: chosen.stress.clone(),
         damping_ratio: source.kept.damping.unwrap_or(DAMPING),
@@ -227,7 +227,7 @@ fn default_modes(model: &FeModel, patches: bool) -> usize {
 }
 
 fn ring(
-    source: &Source,
+    source: &MeshSource,
     asked: &CasingMeshArguments,
     model: FeModel,
     chosen: &Chosen,
@@ -261,12 +261,12 @@ fn has_patches(chosen: &Chosen) -> bool {
 }
 
 fn cyclic(
-    (source, asked): (&Source, &SectorArguments),
+    (source, asked): (&MeshSource, &SectorArguments),
     model: FeModel,
     chosen: &Chosen,
     clamped: Option<&str>,
     console: &Console,
-) -> Result<Reduced> {
+) -> Result<ReducedModel> {
     let Some((boundary, _)) = &chosen.faces else {
         return Err(Failure::new("sector", "its faces were not paired", "Report this to the developers"));
     };
@@ -291,10 +291,10 @@ fn cyclic(
             mesh.sets.insert((*face).to_owned(), face_nodes);
         }
     }
-    Ok(Reduced::cyclic(reduction, mesh, nodes, clamped, FACES))
+    Ok(ReducedModel::cyclic(reduction, mesh, nodes, clamped, FACES))
 }
 
-fn import(source: &Source, console: &Console) -> Result<Imported> {
+fn import(source: &MeshSource, console: &Console) -> Result<Imported> {
     let (asked, material) = (source.model, source.material());
     let matrices = source.matrices.and_then(|own| Some((own, own.stiffness.as_ref()?, own.mass.as_ref()?)));
     let Some((matrices, stiffness, mass)) = matrices else {

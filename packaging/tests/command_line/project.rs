@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 use tempfile::TempDir;
 use tiprub_core::{
     Rom,
-    rom::{ContactNode, Frame, RomChecks},
+    rom::{ContactNode, DisplacementFrame, RomChecks},
 };
 
 pub const SCENE: &str = r#"
@@ -47,7 +47,7 @@ impl Project {
             name: "small".into(),
             origin: "One mass on three springs".into(),
             sectors: 4,
-            frame: Frame::Cylindrical,
+            frame: DisplacementFrame::Cylindrical,
             mass: DMatrix::identity(3, 3) * 0.1,
             stiffness: DMatrix::identity(3, 3) * 1e5,
             damping_ratio: 0.01,

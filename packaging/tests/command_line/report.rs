@@ -12,7 +12,7 @@ use tiprub_packaging::{
 };
 use tiprub_shell::{
     console::Console,
-    native::{self, Given},
+    native::{self, RunInputs},
     schedule::Schedule,
 };
 use tiprub_study::estimate::Estimate;
@@ -23,7 +23,7 @@ fn a_report_is_complete_offline_and_small() {
     let reduction = reduction::rotor37(&options, &Console::new(true, false)).unwrap();
     let scene = rotor37_scene_with(reduction.rom.clone()).unwrap();
     let schedule = Schedule::new(&scene.settings.experiment, Some(0.004), Some(2e-6)).unwrap();
-    let run = native::run(&scene, &schedule, Given::default(), &|_| {}).unwrap();
+    let run = native::run(&scene, &schedule, RunInputs::default(), &|_| {}).unwrap();
     let agreement = run.recording.compare(&run.recording).unwrap();
     let html = render(&ReportInput {
         scene: &scene,

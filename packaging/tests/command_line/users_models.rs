@@ -19,11 +19,11 @@ fn data(name: &str) -> PathBuf {
 }
 
 /// A directory with the models of the tests.
-struct Project {
+struct ModelProject {
     root: TempDir,
 }
 
-impl Project {
+impl ModelProject {
     fn new(files: &[&str]) -> Self {
         let root = tempfile::tempdir().unwrap();
         for name in files {
@@ -90,7 +90,7 @@ fn command() -> String {
 
 #[test]
 fn a_mesh_of_gmsh_becomes_a_running_scene_as_the_guide_tells() {
-    let project = Project::new(&["blade_hex20.inp"]);
+    let project = ModelProject::new(&["blade_hex20.inp"]);
     let told = project.succeed(&command());
     assert_eq!(told["rom"]["sectors"], 36);
     assert_eq!(told["model"]["sets"]["TIP"], 53);
@@ -118,8 +118,15 @@ fn a_mesh_of_gmsh_becomes_a_running_scene_as_the_guide_tells() {
 
 #[test]
 fn matrices_of_calculix_give_the_rom_of_the_mesh() {
-    let project =
-        Project::new(&["bar.inp", "bar.sti", "bar.mas", "bar.dof", "bar_held.sti", "bar_held.mas", "bar_held.dof"]);
+    let project = ModelProject::new(&[
+        "bar.inp",
+        "bar.sti",
+        "bar.mas",
+        "bar.dof",
+        "bar_held.sti",
+        "bar_held.mas",
+        "bar_held.dof",
+    ]);
     let common = "--contact-set TIP --contact-nodes 3 --modes 8 --units mm-t-s";
     let mesh = format!(
         "reduce blade bar.inp --clamp-set ROOT --young 210e9 --poisson 0.3 --density 7850 {common} -o mesh.rom.safetensors"
@@ -147,7 +154,7 @@ fn matrices_of_calculix_give_the_rom_of_the_mesh() {
 
 #[test]
 fn a_sector_of_gmsh_becomes_a_disk_with_the_frequencies_of_calculix() {
-    let project = Project::new(&["sector.msh"]);
+    let project = ModelProject::new(&["sector.msh"]);
     let line = "reduce sector sector.msh --contact-set TIP --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --young 210e9 --poisson 0.3 --density 7850 --contact-nodes 3 --modes 12 \
                 --inp sector_out.inp --vtk sector.vtu";
@@ -190,7 +197,7 @@ fn a_sector_of_gmsh_becomes_a_disk_with_the_frequencies_of_calculix() {
 
 #[test]
 fn an_exported_mesh_is_read_back_to_the_same_frequencies() {
-    let project = Project::new(&[]);
+    let project = ModelProject::new(&[]);
     let first = project.succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp");
     let again =
         project.succeed("reduce blade blade.inp --contact-set TIP --clamp-set HUB --contact-nodes 3 --modes 20");
@@ -203,7 +210,7 @@ fn an_exported_mesh_is_read_back_to_the_same_frequencies() {
 fn patches_of_other_elements_are_as_soft() {
     let kinds = ["hex20", "penta15", "tet10"];
     let files = kinds.map(|kind| format!("blade_{kind}.inp"));
-    let project = Project::new(&files.each_ref().map(String::as_str));
+    let project = ModelProject::new(&files.each_ref().map(String::as_str));
     let radial = |file: &String, contact: &str| -> f64 {
         let line = "--clamp-set ROOT --units mm-t-s --material titanium --modes 8 --kind free-interface --force -o r.rom.safetensors";
         project.succeed(&format!("reduce blade {file} {contact} {line}"));
@@ -223,7 +230,7 @@ fn patches_of_other_elements_are_as_soft() {
 
 #[test]
 fn effects_of_spin_are_computed_for_a_mesh_of_ones_own() {
-    let project = Project::new(&["blade_tet10.msh"]);
+    let project = ModelProject::new(&["blade_tet10.msh"]);
     let line = "reduce blade blade_tet10.msh --contact-set TIP --clamp-set ROOT --units mm-t-s --material titanium --spin 1500";
     let told = project.succeed(line);
     assert_eq!(told["rom"]["spin"]["largest_speed"], 1500.0);
@@ -234,7 +241,7 @@ fn effects_of_spin_are_computed_for_a_mesh_of_ones_own() {
 
 #[test]
 fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
-    let project = Project::new(&["bar.inp", "bar.sti", "bar.mas", "bar.dof", "sector.msh", "blade_hex8.inp"]);
+    let project = ModelProject::new(&["bar.inp", "bar.sti", "bar.mas", "bar.dof", "sector.msh", "blade_hex8.inp"]);
     project.write("empty.inp", "");
     project.write("picture.png", b"\x89PNG");
     project.write("old.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n");
@@ -286,7 +293,7 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
 
 #[test]
 fn rigid_body_modes_of_a_free_disk_are_no_reason_to_warn() {
-    let project = Project::new(&["sector.msh"]);
+    let project = ModelProject::new(&["sector.msh"]);
     let line = "reduce sector sector.msh --contact-set TIP --clamp-set none --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --material steel --contact-nodes 2 --modes 25";
     let output = project.run(line);
@@ -297,7 +304,7 @@ fn rigid_body_modes_of_a_free_disk_are_no_reason_to_warn() {
 
 #[test]
 fn a_casing_of_ones_own_is_the_casing_that_ships() {
-    let project = Project::new(&[]);
+    let project = ModelProject::new(&[]);
     let common = "--contact-grid 12x2 --modes 20 --fixed-interface-modes 40";
     project.succeed(&format!(
         "reduce casing --mesh 24x1x6 --patches 0x0 {common} -o ships.rom.safetensors --inp ring.inp"
@@ -349,7 +356,7 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
 
 #[test]
 fn conducts_heat_in_a_casing_mesh_of_the_user() {
-    let project = Project::new(&[]);
+    let project = ModelProject::new(&[]);
     // What packaging looks at in a library of heat conduction for Linux on x86-64.
     let mut library = vec![0_u8; 4096];
     library[..20].copy_from_slice(b"\x7fELF\x02\x01\x01\0\0\0\0\0\0\0\0\0\x03\0\x3e\0");
@@ -388,7 +395,7 @@ fn conducts_heat_in_a_casing_mesh_of_the_user() {
 
 #[test]
 fn accepts_contact_node_numbers_and_rejects_wrong_tips_and_axes() {
-    let project = Project::new(&["blade_hex8.inp"]);
+    let project = ModelProject::new(&["blade_hex8.inp"]);
     let line =
         "reduce blade blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";
     let told = project.succeed(&format!("{line} --contact-set TIP --contact-nodes 3 -o set.rom.safetensors"));

@@ -1,7 +1,7 @@
 //! What one structure's contact nodes remember: values now, one step before, and the oldest that a step still needs.
 
 use crate::gaps::Geometry;
-use crate::persist::{Persist, Reader, Writer, persist_fields};
+use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 
 /// A value of the step just done, and of the step before. Only the former is part of a saved state.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -49,27 +49,27 @@ impl Three {
 }
 
 impl<T: Persist> Persist for Two<T> {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         self.now.save(writer);
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         self.now.restore(reader);
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         self.now.check(reader);
     }
 }
 
 impl Persist for Three {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         self.now.save(writer);
         self.before.save(writer);
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         self.now.restore(reader);
         self.before.restore(reader);
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         self.now.check(reader);
         self.before.check(reader);
     }
@@ -78,7 +78,7 @@ impl Persist for Three {
 /// The past of the contact nodes of one structure, arrays `[node · lanes + lane]` and `[row · lanes + lane]` with three rows per
 /// node. Displacements now and before are those of the modes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct History {
+pub struct ContactHistory {
     /// Gaps (m); infinite in padding lanes and where there is nothing to touch.
     pub gap: Three,
     /// Normals and closest points.
@@ -108,14 +108,14 @@ pub struct Passing {
 
 /// Written at every step before it is read.
 impl Persist for Passing {
-    fn save(&self, _: &mut Writer) {}
-    fn restore(&mut self, _: &mut Reader) {}
-    fn check(&self, _: &mut Reader) {}
+    fn save(&self, _: &mut StateWriter) {}
+    fn restore(&mut self, _: &mut StateReader) {}
+    fn check(&self, _: &mut StateReader) {}
 }
 
-persist_fields!(History { gap, geometry, multiplier, coating_force, force, points, predicted, passing });
+persist_fields!(ContactHistory { gap, geometry, multiplier, coating_force, force, points, predicted, passing });
 
-impl History {
+impl ContactHistory {
     /// Nothing has touched yet: `contacts` nodes in all lanes, `rows` values of displacements.
     pub fn new(geometry: Geometry, contacts: usize, rows: usize) -> Self {
         Self {

@@ -2,12 +2,12 @@
 
 /// Appends little-endian values to a buffer of sufficient size.
 #[derive(Debug)]
-pub struct Writer<'a> {
+pub struct StateWriter<'a> {
     buffer: &'a mut [u8],
     at: usize,
 }
 
-impl<'a> Writer<'a> {
+impl<'a> StateWriter<'a> {
     /// Start at the beginning of `buffer`.
     pub fn new(buffer: &'a mut [u8]) -> Self {
         Self { buffer, at: 0 }
@@ -28,7 +28,7 @@ impl<'a> Writer<'a> {
 
 /// Takes little-endian values from a buffer; past its end it yields zeros (the length is checked beforehand).
 #[derive(Debug, Clone)]
-pub struct Reader<'a> {
+pub struct StateReader<'a> {
     buffer: &'a [u8],
     at: usize,
     fault: Option<&'static str>,
@@ -36,7 +36,7 @@ pub struct Reader<'a> {
     infinite: usize,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> StateReader<'a> {
     /// Start at the beginning of `buffer`.
     pub fn new(buffer: &'a [u8]) -> Self {
         Self { buffer, at: 0, fault: None, largest: f64::MAX, infinite: 0 }
@@ -76,25 +76,25 @@ impl<'a> Reader<'a> {
 /// A value that belongs to the state.
 pub trait Persist {
     /// Append it.
-    fn save(&self, writer: &mut Writer);
+    fn save(&self, writer: &mut StateWriter);
     /// Read it back, in the same order.
-    fn restore(&mut self, reader: &mut Reader);
-    /// Pass over its bytes and [`Reader::refuse`] what [`Persist::save`] never writes, so that nothing is changed before
+    fn restore(&mut self, reader: &mut StateReader);
+    /// Pass over its bytes and [`StateReader::refuse`] what [`Persist::save`] never writes, so that nothing is changed before
     /// all of a state is known to be one.
-    fn check(&self, reader: &mut Reader);
+    fn check(&self, reader: &mut StateReader);
 }
 
 /// Counts of steps are far below; what is above is no count.
 const MOST_COUNTED: u64 = 1 << 53;
 
 impl Persist for f64 {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         writer.put(&self.to_bits().to_le_bytes());
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         *self = Self::from_bits(u64::from_le_bytes(reader.take()));
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         let value = Self::from_bits(u64::from_le_bytes(reader.take()));
         if value.is_infinite() {
             reader.infinite += 1;
@@ -105,13 +105,13 @@ impl Persist for f64 {
 }
 
 impl Persist for u64 {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         writer.put(&self.to_le_bytes());
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         *self = Self::from_le_bytes(reader.take());
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         if Self::from_le_bytes(reader.take()) > MOST_COUNTED {
             reader.refuse("it holds a count beyond all counting");
         }
@@ -119,26 +119,26 @@ impl Persist for u64 {
 }
 
 impl Persist for i32 {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         writer.put(&self.to_le_bytes());
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         *self = Self::from_le_bytes(reader.take());
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         let _ = reader.take::<4>();
     }
 }
 
 impl Persist for bool {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         writer.put(&[u8::from(*self)]);
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         let [byte] = reader.take();
         *self = byte != 0;
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         let [byte] = reader.take();
         if byte > 1 {
             reader.refuse("it holds a flag that is neither set nor cleared");
@@ -147,17 +147,17 @@ impl Persist for bool {
 }
 
 impl<T: Persist> Persist for [T] {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         for value in self {
             value.save(writer);
         }
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         for value in self {
             value.restore(reader);
         }
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         for value in self {
             value.check(reader);
         }
@@ -165,25 +165,25 @@ impl<T: Persist> Persist for [T] {
 }
 
 impl<T: Persist> Persist for Vec<T> {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         self.as_slice().save(writer);
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         self.as_mut_slice().restore(reader);
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         self.as_slice().check(reader);
     }
 }
 
 impl<T: Persist, const N: usize> Persist for [T; N] {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         self.as_slice().save(writer);
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         self.as_mut_slice().restore(reader);
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         self.as_slice().check(reader);
     }
 }
@@ -193,15 +193,15 @@ impl<T: Persist, const N: usize> Persist for [T; N] {
 macro_rules! persist_fields {
     ($name:ident { $($field:ident),+ $(,)? }) => {
         impl $crate::persist::Persist for $name {
-            fn save(&self, writer: &mut $crate::persist::Writer) {
+            fn save(&self, writer: &mut $crate::persist::StateWriter) {
                 let Self { $($field),+ } = self;
                 $($crate::persist::Persist::save($field, writer);)+
             }
-            fn restore(&mut self, reader: &mut $crate::persist::Reader) {
+            fn restore(&mut self, reader: &mut $crate::persist::StateReader) {
                 let Self { $($field),+ } = self;
                 $($crate::persist::Persist::restore($field, reader);)+
             }
-            fn check(&self, reader: &mut $crate::persist::Reader) {
+            fn check(&self, reader: &mut $crate::persist::StateReader) {
                 let Self { $($field),+ } = self;
                 $($crate::persist::Persist::check($field, reader);)+
             }

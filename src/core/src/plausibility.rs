@@ -1,7 +1,7 @@
 //! Values within their range that are rarely meant: slips of units, axes and sets. They are errors unless the scene says that they
 //! are meant (`accept_implausible`), and warnings then.
 
-use crate::rom::Frame;
+use crate::rom::DisplacementFrame;
 use crate::warning::{Topic, Warning};
 use crate::{Error, Rom, shown};
 
@@ -57,7 +57,7 @@ const CROSSING_UP_TO: usize = 200;
 /// Tips that are too fast at `speed` (rad/s), the value of the input `name`. Allocates only to say so.
 pub fn of_speed(rom: &Rom, speed: f64, name: impl FnOnce() -> String) -> Option<Slip> {
     let fastest = speed.abs() * radii(rom)[1];
-    (rom.frame == Frame::Cylindrical && fastest > TIP_SPEED).then(|| {
+    (rom.frame == DisplacementFrame::Cylindrical && fastest > TIP_SPEED).then(|| {
         let speed_shown = shown(speed);
         let problem = format!(
             "at speed {speed_shown} rad/s the tips move at {fastest:.0} m/s; above {TIP_SPEED} m/s every rotor bursts"
@@ -69,7 +69,7 @@ pub fn of_speed(rom: &Rom, speed: f64, name: impl FnOnce() -> String) -> Option<
 
 /// Speed up to which tips are not asked about (rad/s).
 pub fn fastest(rom: &Rom) -> f64 {
-    if rom.frame == Frame::Cylindrical { TIP_SPEED / radii(rom)[1] } else { f64::INFINITY }
+    if rom.frame == DisplacementFrame::Cylindrical { TIP_SPEED / radii(rom)[1] } else { f64::INFINITY }
 }
 
 /// A free body that is too fast at `velocity` (m/s).
@@ -93,7 +93,7 @@ fn radii(rom: &Rom) -> [f64; 2] {
         let values = rom.contact_nodes.iter().map(|node| node.position[axis]);
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
     };
-    if rom.frame == Frame::Cylindrical {
+    if rom.frame == DisplacementFrame::Cylindrical {
         return along(0);
     }
     let sides = [0, 1, 2].map(|axis| along(axis)[1] - along(axis)[0]);
@@ -106,7 +106,7 @@ fn named(rom: &Rom) -> String {
 
 fn of_size(rom: &Rom) -> Option<Slip> {
     let [low, high] = radii(rom);
-    let what = if rom.frame == Frame::Cylindrical { "are at a radius of" } else { "are spread over" };
+    let what = if rom.frame == DisplacementFrame::Cylindrical { "are at a radius of" } else { "are spread over" };
     if high > RADII[1] {
         let problem = format!("its contact nodes {what} {} m", shown(high));
         return Some(Slip::new(named(rom), problem, "Are its lengths in millimetres? A ROM is in m, kg and s."));
@@ -129,7 +129,7 @@ fn of_frequencies(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> 
 
 /// Neighbouring sectors that lie within each other.
 fn of_sectors(rom: &Rom) -> Option<Slip> {
-    if rom.frame != Frame::Cylindrical {
+    if rom.frame != DisplacementFrame::Cylindrical {
         return None;
     }
     #[expect(clippy::cast_precision_loss, reason = "at most 10 000 sectors")]

@@ -15,8 +15,8 @@ use nalgebra::DMatrix;
 use crate::{Error, Result, ranges, shown};
 pub use cyclic::Harmonic;
 pub(crate) use cyclic::cholesky;
-pub use support::{SUPPORT_ROWS, Support};
-pub use watched::{STRESSES, Watched, von_mises};
+pub use support::{SUPPORT_ROWS, SupportRows};
+pub use watched::{STRESSES, WatchedPoints, von_mises};
 
 /// Most sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or hostile file must not ask for all memory,
 /// which ends the process of the importer.
@@ -24,7 +24,7 @@ pub const MAX_SECTORS: usize = 10_000;
 
 /// Which directions the three displacement components of a contact node have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frame {
+pub enum DisplacementFrame {
     /// (radial, tangential, axial) of the node's own position, turning with the structure.
     Cylindrical,
     /// (x, y, z), fixed to the structure.
@@ -36,7 +36,7 @@ pub enum Frame {
 pub struct ContactNode {
     /// Name used in variable names and plots, for example `leading_edge`.
     pub name: String,
-    /// Undeformed position: (r, θ, z) in m, rad, m for [`Frame::Cylindrical`], else (x, y, z) in m.
+    /// Undeformed position: (r, θ, z) in m, rad, m for [`DisplacementFrame::Cylindrical`], else (x, y, z) in m.
     pub position: [f64; 3],
     /// Slope dr/dz of the tip contour in the meridional plane at this node (the casing runs parallel to it).
     pub meridional_slope: f64,
@@ -48,7 +48,7 @@ pub struct ContactNode {
 
 /// What the coordinates of a ROM stand for beside static responses to contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Basis {
+pub enum ReductionBasis {
     /// Modes with the contact nodes held (Craig-Bampton), or not known.
     #[default]
     FixedInterface,
@@ -126,7 +126,7 @@ pub struct Spin {
 
 /// Part of a structure whose temperature is one number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Patch {
+pub struct ThermalPatch {
     /// Angles from and to (rad), from < to ≤ from + 2π.
     pub angle: [f64; 2],
     /// Axial positions from and to (m).
@@ -139,7 +139,7 @@ pub struct Thermal {
     /// Force on the reduced coordinates per kelvin of each patch above the reference, n × patches (N/K).
     pub loads: DMatrix<f64>,
     /// Where the patches are.
-    pub patches: Vec<Patch>,
+    pub patches: Vec<ThermalPatch>,
 }
 
 /// Contact nodes that form a grid: node `along · around + i` is the i-th of row `along`.
@@ -171,18 +171,18 @@ pub struct RomExtras {
     /// uncoupled sectors and single structures.
     pub harmonics: Vec<Harmonic>,
     /// Points beside the contact nodes.
-    pub watched: Option<Watched>,
+    pub watched: Option<WatchedPoints>,
     /// Places whose stress is recovered.
-    pub stress: Option<Watched>,
+    pub stress: Option<WatchedPoints>,
     /// Static stress of the full model at these places per kelvin of each patch, 6·places × patches (Pa/K), held where the structure is
     /// held and free of contact.
     pub stress_thermal: Option<DMatrix<f64>>,
     /// The same per Ω² of the centrifugal load on the structure at rest, 6·places × 1 (Pa s²).
     pub stress_centrifugal: Option<DMatrix<f64>>,
     /// What its held nodes feel.
-    pub support: Option<Support>,
+    pub support: Option<SupportRows>,
     /// What the coordinates stand for.
-    pub basis: Basis,
+    pub basis: ReductionBasis,
     /// The contact patches are in so many rows across the thickness of the tip, one row after the other, each as the others along the chord;
     /// `None` for one row, or nodes.
     pub rows: Option<usize>,
@@ -198,7 +198,7 @@ pub struct Rom {
     /// Number of identical copies around the axis (1 to [`MAX_SECTORS`]); uncoupled unless there are harmonics.
     pub sectors: usize,
     /// Directions of the displacement components.
-    pub frame: Frame,
+    pub frame: DisplacementFrame,
     /// Reduced mass matrix, n × n (kg for physical coordinates), symmetric positive definite.
     pub mass: DMatrix<f64>,
     /// Reduced stiffness matrix, n × n, symmetric positive semidefinite.
@@ -311,13 +311,13 @@ impl Rom {
     /// Lengths in metres, of a machine.
     fn validate_place(&self, what: &str, node: &ContactNode, remedy: &str) -> Result<()> {
         let finite = node.position.iter().all(|value| value.is_finite());
-        let radius_positive = self.frame == Frame::Cartesian || node.position[0] > 0.0;
+        let radius_positive = self.frame == DisplacementFrame::Cartesian || node.position[0] > 0.0;
         if !finite || !radius_positive {
             let problem = format!("{:?} is not finite, or its radius is not positive", node.position);
             return Err(Error::invalid(what, problem, remedy));
         }
         let mut lengths = &node.position[..];
-        if self.frame == Frame::Cylindrical {
+        if self.frame == DisplacementFrame::Cylindrical {
             ranges::within(what, node.position[0], ranges::SMALLEST_RADIUS, ranges::POSITION)?;
             ranges::at_most(what, node.position[1], ranges::ANGLE)?;
             lengths = &node.position[2..];

@@ -13,7 +13,7 @@ use crate::Rom;
 pub use crate::laws::Solver;
 pub use crate::schemes::Scheme;
 use crate::warning::Topic;
-pub use blades::{Direction, ExcitationSettings, InitialSettings};
+pub use blades::{ExcitationSettings, ForceDirection, InitialSettings};
 pub use coating::{CoatingSettings, CuttingSettings};
 
 /// Shape of a rigid surface of revolution: radial clearance change around the circumference.
@@ -89,7 +89,7 @@ pub const ADAPTIVE_STEP: f64 = 8e-5;
 /// How a structure moves as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Motion {
+pub enum BodyMotion {
     /// Turns about the z axis with the input `speed`.
     #[default]
     Rotating,
@@ -145,7 +145,7 @@ pub struct StructureSettings {
     pub rom: String,
     /// Rigid motion.
     #[serde(default)]
-    pub motion: Motion,
+    pub motion: BodyMotion,
     /// Start value of the speed input (rad/s).
     #[serde(default)]
     pub speed: f64,

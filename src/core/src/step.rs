@@ -1,8 +1,8 @@
 //! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the ledger kept on the way.
 
-use crate::gaps::Drive;
+use crate::gaps::PrescribedMotion;
 use crate::settings::Scheme;
-use crate::system::{Bodies, Found, StepFailure, System};
+use crate::system::{Bodies, GroupSolution, StepFailure, System};
 
 /// Denormals are flushed every this many steps.
 const FLUSH_EVERY: u64 = 512;
@@ -12,7 +12,7 @@ impl System {
     ///
     /// # Errors
     /// [`StepFailure`]; the state is then not meaningful any more.
-    pub fn step(&mut self, drives: &[Drive]) -> Result<(), StepFailure> {
+    pub fn step(&mut self, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
         if self.settings.scheme == Scheme::Galerkin {
             return self.march(drives);
         }
@@ -34,7 +34,10 @@ impl System {
         let mut bodies = Bodies { structures: &mut self.structures, pairs: &self.pairs, acts_later, ledger };
         for (group, ledger) in self.groups.iter_mut().zip(&mut self.counted.ledgers) {
             let (events, factorisations) = (&mut self.events.now, &mut self.counted.factorisations);
-            group.solve(&mut bodies, &mut Found { events, factorisations, wear_energy: &mut ledger.wear_energy })?;
+            group.solve(
+                &mut bodies,
+                &mut GroupSolution { events, factorisations, wear_energy: &mut ledger.wear_energy },
+            )?;
         }
         self.enter_work()?;
         self.remove_cut();

@@ -44,7 +44,7 @@ pub enum Variability {
 
 /// Data type of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum DataType {
     /// f64.
     Real,
     /// i32.
@@ -70,7 +70,7 @@ pub struct Enumeration {
 
 /// A unit with its SI exponents (kg, m, s, rad, K) and the display units an importer may offer.
 #[derive(Debug, PartialEq)]
-pub struct Unit {
+pub struct VariableUnit {
     /// Unit name.
     pub name: &'static str,
     /// What it measures, in the words of Modelica's SI units.
@@ -96,7 +96,7 @@ pub enum Span {
 
 /// A start value.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Start {
+pub enum StartValue {
     /// Reals, one per element.
     Real(Vec<f64>),
     /// An integer or an enumeration item.
@@ -117,7 +117,7 @@ pub struct Variable {
     /// `None` for a scalar, number of elements for an array.
     pub dimension: Option<usize>,
     /// Data type.
-    pub kind: Kind,
+    pub kind: DataType,
     /// Role.
     pub causality: Causality,
     /// When it may change.
@@ -125,7 +125,7 @@ pub struct Variable {
     /// Relation to the communication step.
     pub span: Span,
     /// Unit of reals, `None` if dimensionless.
-    pub unit: Option<&'static Unit>,
+    pub unit: Option<&'static VariableUnit>,
     /// Index into `unit.display` of the display unit, if one is better than SI.
     pub display: Option<usize>,
     /// Smallest legal value, for reals.
@@ -135,7 +135,7 @@ pub struct Variable {
     /// Typical magnitude, for reals.
     pub nominal: Option<f64>,
     /// Start value; present exactly for inputs, parameters and constants.
-    pub start: Option<Start>,
+    pub start: Option<StartValue>,
     /// One sentence.
     pub description: String,
     /// What the value stands for inside the simulation.

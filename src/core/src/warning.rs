@@ -7,14 +7,14 @@ use crate::{Error, Result};
 
 /// How much a warning matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
+pub enum Severity {
     /// Results are as good as without it; it explains the physics of the scene.
     Note,
     /// Results may be worse than they look.
     Warning,
 }
 
-impl Level {
+impl Severity {
     /// The word that stands before its text.
     pub fn word(self) -> &'static str {
         match self {
@@ -159,7 +159,7 @@ impl Topic {
 #[derive(Debug, Clone)]
 pub struct Warning {
     topic: Topic,
-    level: Level,
+    level: Severity,
     lines: [String; 2],
     text: String,
 }
@@ -169,7 +169,7 @@ impl Warning {
     pub fn new(topic: Topic, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         let lines = [problem.into(), remedy.into()];
         let text = format!("{}. {}", lines[0], lines[1]);
-        Self { topic, level: Level::Warning, lines, text }
+        Self { topic, level: Severity::Warning, lines, text }
     }
 
     /// With a longer text than its two lines, for logs and for people who want all of it.
@@ -185,7 +185,7 @@ impl Warning {
     }
 
     /// At another level.
-    pub fn at_level(self, level: Level) -> Self {
+    pub fn at_level(self, level: Severity) -> Self {
         Self { level, ..self }
     }
 
@@ -201,7 +201,7 @@ impl Warning {
     }
 
     /// How much it matters.
-    pub fn level(&self) -> Level {
+    pub fn level(&self) -> Severity {
         self.level
     }
 

@@ -6,9 +6,9 @@ mod guide;
 mod rods;
 
 use guide::told;
-use rods::{NEARLY_NONE, Rod, SCHEMES, SOLVERS, ascending, quiet_step};
+use rods::{NEARLY_NONE, SCHEMES, SOLVERS, StraightRod, ascending, quiet_step};
 use tiprub_core::dynamics::modal::{ModalModel, NodePair};
-use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
+use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::carpenter::{self, AREA, DENSITY, GAP, LENGTH, SPEED, YOUNG};
@@ -16,7 +16,7 @@ use tiprub_reference::carpenter::{self, AREA, DENSITY, GAP, LENGTH, SPEED, YOUNG
 const COURANT: f64 = 0.9;
 
 #[derive(Debug)]
-struct Outcome {
+struct BarRun {
     force: f64,
     touch: f64,
     release: f64,
@@ -27,12 +27,20 @@ struct Outcome {
     momentum: f64,
 }
 
-fn bars(elements: usize, scheme: Scheme) -> [Rod; 2] {
+fn bars(elements: usize, scheme: Scheme) -> [StraightRod; 2] {
     let kept = if scheme == Scheme::MasslessBoundary { NEARLY_NONE } else { 1.0 };
-    [elements, 0].map(|end| Rod { young: YOUNG, density: DENSITY, area: AREA, length: LENGTH, elements, end, kept })
+    [elements, 0].map(|end| StraightRod {
+        young: YOUNG,
+        density: DENSITY,
+        area: AREA,
+        length: LENGTH,
+        elements,
+        end,
+        kept,
+    })
 }
 
-fn collide(elements: usize, scheme: Scheme, solver: Solver) -> Outcome {
+fn collide(elements: usize, scheme: Scheme, solver: Solver) -> BarRun {
     let bars = bars(elements, scheme);
     let roms = bars.map(|bar| bar.rom());
     let models = [&roms[0], &roms[1]].map(|rom| ModalModel::from_rom(rom, 0.0).unwrap());
@@ -54,14 +62,14 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> Outcome {
     let momentum = |system: &System| -> f64 {
         (0..model.len()).map(|mode| rigid(mode, 0) * system.bank().modal_state(mode, 0).1 / step).sum()
     };
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     let (before, moving) = (system.ledger().initial, momentum(&system));
     let (mut touch, mut release, mut impulse, mut mean, mut count) = (f64::NAN, 0.0, 0.0, 0.0, 0);
     let exact = carpenter::exact();
     while system.steps() as f64 * step < 220e-6 {
         // λ enforces the gap at t_{n+1} and acts as the force at t_n.
         let time = system.steps() as f64 * step;
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
         let force = system.multiplier(0, 0);
         if force > 0.0 {
             touch = if touch.is_nan() { time } else { touch };
@@ -76,7 +84,7 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> Outcome {
     system.close_ledger();
     let (kinetic, strain) = system.energies();
     let energy = kinetic + strain;
-    Outcome {
+    BarRun {
         force: mean / f64::from(count),
         touch,
         release,
@@ -101,7 +109,7 @@ fn two_bars_meet_and_part_as_plane_waves_say() {
         for (solver, meshes) in SOLVERS.map(|solver| (solver, if solver == Solver::Lcp { 4 } else { 1 })) {
             for elements in [20, 40, 80, 200].into_iter().take(meshes) {
                 let found = collide(elements, scheme, solver);
-                let Outcome { force, touch, release, impulse, energy_loss, residual, momentum } = found;
+                let BarRun { force, touch, release, impulse, energy_loss, residual, momentum } = found;
                 told!(
                     "| {scheme:?} | {solver:?} | {elements} | {force:.1} | {:.2} | {:.2} | {impulse:.4} | {:.4} | {:.2} | {residual:.1e} |",
                     touch * 1e6,

@@ -12,10 +12,10 @@ use nalgebra::DMatrix;
 use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::dynamics::sectors::SectorModel;
-use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
+use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
-use tiprub_reference::closed::belt::{Belt, ThrownBlock};
+use tiprub_reference::closed::belt::{StickSlipBelt, ThrownBlock};
 
 const MASS: f64 = 2.0;
 const OMEGA: f64 = 50.0;
@@ -42,11 +42,11 @@ fn block(scheme: Scheme, step: f64) -> System {
     let mut system = System::alone(SectorModel::Uncoupled(&model, 1), bank, law, FRICTION, settings);
     system.set_step(step);
     system.bank_mut().set_modal_state(1, 0, 0.0, BELT * MASS.sqrt());
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     system
 }
 
-struct Record {
+struct BeltRecord {
     /// Position of the block (m) and whether it stuck, step by step.
     position: Vec<f64>,
     stuck: Vec<bool>,
@@ -54,14 +54,14 @@ struct Record {
 }
 
 /// The normal force is `sticking` (N) while the block sticks and `sliding` (N) while it slides.
-fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> Record {
+fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> BeltRecord {
     let mut system = block(scheme, step);
-    let mut record = Record { position: Vec::new(), stuck: Vec::new(), residual: 0.0 };
+    let mut record = BeltRecord { position: Vec::new(), stuck: Vec::new(), residual: 0.0 };
     let mut stuck = true;
     for _ in 0..steps {
         system.bank_mut().loads_mut()[0] = -(if stuck { sticking } else { sliding }) / MASS.sqrt();
         let before = system.bank().row(0, 0);
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
         let now = system.bank().row(0, 0);
         let slip = now - before - BELT * step;
         stuck = slip.abs() < 1e-9 * BELT * step;
@@ -78,7 +78,7 @@ fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> 
 fn stick_slip_has_the_amplitude_and_the_times_of_the_closed_form() {
     let (static_force, kinetic_force) = (FRICTION * 300.0, FRICTION * 200.0);
     let stiffness = MASS * OMEGA * OMEGA;
-    let closed = Belt { mass: MASS, stiffness, speed: BELT, sticking: static_force, sliding: kinetic_force };
+    let closed = StickSlipBelt { mass: MASS, stiffness, speed: BELT, sticking: static_force, sliding: kinetic_force };
     let (amplitude, slide_time, stick_time) = (closed.amplitude(), closed.slide_time(), closed.stick_time());
     let first_slip = static_force / stiffness / BELT;
     for scheme in [Scheme::ModalExact, Scheme::CentralDifference] {
@@ -157,7 +157,7 @@ fn by_tolerance(tolerance: f64, longest: f64) -> System {
     system.prepare_spans(longest, tolerance);
     system.set_step(longest);
     system.bank_mut().set_modal_state(0, 0, 0.0, THROWN * MASS.sqrt());
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     system
 }
 
@@ -171,7 +171,7 @@ fn by_a_tolerance_a_flexible_contact_sticks_and_slips_as_its_closed_form() {
         let mut system = by_tolerance(tolerance, longest);
         let mut worst = 0.0_f64;
         for exact in &exact.positions {
-            system.step(&[Drive::default()]).unwrap();
+            system.step(&[PrescribedMotion::default()]).unwrap();
             worst = worst.max((system.bank().row(0, 0) - exact).abs());
         }
         let (error, effort) = (worst / 1e-3, *system.effort());

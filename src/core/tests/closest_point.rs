@@ -35,8 +35,8 @@ fn found(projection: Projection) -> (ClosestPoint, [f64; 3], [f64; 3], f64) {
 
 #[test]
 fn the_closest_point_is_found_from_anywhere_around() {
-    let mut random = Random(6);
-    for (name, casing) in [("round", round as Casing), ("conical", conical), ("lobed", lobed)] {
+    let mut random = SeededRandom(6);
+    for (name, casing) in [("round", round as CasingShape), ("conical", conical), ("lobed", lobed)] {
         for (around, along) in [(36, 5), (72, 3), (7, 4), (12, 2)] {
             let surface = spline(&data(around, along, casing), around, along);
             let (mut offset, mut gradient, mut away): (f64, f64, f64) = (0.0, 0.0, 0.0);
@@ -83,7 +83,7 @@ fn brute_force(surface: &SurfaceSpline, x: [f64; 3], per_patch: usize) -> f64 {
 
 #[test]
 fn no_sampled_point_is_closer() {
-    let mut random = Random(8);
+    let mut random = SeededRandom(8);
     for (around, along) in [(36, 3), (12, 4), (5, 2)] {
         for (closure, interpolation) in KINDS {
             let points = data(around, along, lobed);
@@ -136,7 +136,7 @@ fn the_seam_of_a_smooth_surface_is_no_special_place() {
 
 #[test]
 fn starts_on_the_opposite_side_lead_back() {
-    let grids = [4, 36, 500].map(|around| [(around, round as Casing), (around, conical)]);
+    let grids = [4, 36, 500].map(|around| [(around, round as CasingShape), (around, conical)]);
     for ((around, casing), (closure, interpolation)) in
         grids.into_iter().flatten().flat_map(|grid| KINDS.map(|kind| (grid, kind)))
     {
@@ -189,7 +189,7 @@ fn a_node_finds_the_surface_beyond_its_edge_and_not_beyond_its_reach() {
     for (closure, interpolation) in KINDS {
         let points = data(36, 3, conical);
         let surface = SurfaceSpline::new(&points, 36, 3, closure, interpolation).unwrap();
-        let mut random = Random(9);
+        let mut random = SeededRandom(9);
         for _ in 0..200 {
             let (p, s, gap) = (random.below(36), random.within(0.1, 0.9), random.within(0.0, 1e-3));
             for (q, t, outwards) in [(0, 0.0, -1.0), (1, 1.0, 1.0)] {
@@ -227,7 +227,7 @@ fn a_node_finds_the_surface_beyond_its_edge_and_not_beyond_its_reach() {
 #[test]
 fn facets_meet_a_node_on_the_flat_and_at_corners() {
     let around = 12;
-    let facets = |radius: Casing| {
+    let facets = |radius: CasingShape| {
         let points = data(around, 3, radius);
         SurfaceSpline::new(&points, around, 3, Closure::Smooth, Interpolation::Facets).unwrap()
     };
@@ -269,7 +269,7 @@ fn facets_meet_a_node_on_the_flat_and_at_corners() {
 #[test]
 fn places_from_angle_and_axial_position_are_near() {
     for (surface, _) in every_surface() {
-        let mut random = Random(10);
+        let mut random = SeededRandom(10);
         for _ in 0..100 {
             let at = anywhere(&mut random, &surface);
             let (guess, far) = (surface.locate(surface.evaluate(at).point), surface.around());
@@ -316,7 +316,7 @@ fn hopeless_nodes_are_lost_without_panic() {
 
 #[test]
 fn a_start_from_the_last_step_ends_where_a_start_from_elsewhere_does() {
-    let mut random = Random(11);
+    let mut random = SeededRandom(11);
     for (closure, interpolation) in KINDS {
         let (around, along, turn) = (36, 5, 1e-3);
         let surface = SurfaceSpline::new(&data(around, along, lobed), around, along, closure, interpolation).unwrap();
@@ -346,7 +346,7 @@ fn a_start_from_the_last_step_ends_where_a_start_from_elsewhere_does() {
 #[test]
 fn a_sliding_node_is_kicked_at_every_border_of_facets_and_nowhere_on_the_spline() {
     use sliding::{AROUND, INTERFERENCE, MASS, SPEED, STEP, STIFFNESS, casing, slide};
-    let largest = |history: &sliding::History| history.changes().into_iter().fold(0.0, f64::max);
+    let largest = |history: &sliding::SlidingHistory| history.changes().into_iter().fold(0.0, f64::max);
     let facets = slide(&casing(Closure::Smooth, Interpolation::Facets));
     let free = slide(&casing(Closure::FreeEnds, Interpolation::Spline));
     let smooth = slide(&casing(Closure::Smooth, Interpolation::Spline));
@@ -366,7 +366,7 @@ fn a_sliding_node_is_kicked_at_every_border_of_facets_and_nowhere_on_the_spline(
     println!("largest changes: {:.3e} {:.3e} {:.3e} N", largest(&facets), largest(&free), largest(&smooth));
     assert!(largest(&smooth) < 1e-2 && largest(&facets) > 6e4 && largest(&free) > 3e4);
     // Far from the seam both closures are the same.
-    let far = |history: &sliding::History| history.changes()[100..5000].iter().copied().fold(0.0, f64::max);
+    let far = |history: &sliding::SlidingHistory| history.changes()[100..5000].iter().copied().fold(0.0, f64::max);
     assert!(far(&free) < 2e-2, "{:e}", far(&free));
 }
 
@@ -374,7 +374,7 @@ fn a_sliding_node_is_kicked_at_every_border_of_facets_and_nowhere_on_the_spline(
 fn nothing_but_construction_allocates() {
     for (mut surface, points) in every_surface() {
         let mut values = points.clone();
-        let mut random = Random(12);
+        let mut random = SeededRandom(12);
         let starts: Vec<ClosestPoint> = (0..50).map(|_| anywhere(&mut random, &surface)).collect();
         let allocations = counting::allocations_of(|| {
             surface.interpolate(&mut values);

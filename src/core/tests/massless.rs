@@ -7,9 +7,9 @@ mod rods;
 
 use guide::told;
 use nalgebra::DMatrix;
-use rods::{NEARLY_NONE, Rod};
+use rods::{NEARLY_NONE, StraightRod};
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
+use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::stability::massless::MasslessCheck;
 use tiprub_core::system::{System, SystemSettings};
@@ -26,8 +26,8 @@ const SPEED: f64 = 5.13588;
 const GAP: f64 = 0.508e-3 / 2.0;
 
 /// Half of the problem, its contact node at the wall keeping this share of its lumped mass.
-fn bar(elements: usize, kept: f64) -> Rod {
-    Rod { young: YOUNG, density: DENSITY, area: AREA, length: LENGTH, elements, end: elements, kept }
+fn bar(elements: usize, kept: f64) -> StraightRod {
+    StraightRod { young: YOUNG, density: DENSITY, area: AREA, length: LENGTH, elements, end: elements, kept }
 }
 
 fn system(model: &ModalModel, scheme: Scheme, step: f64) -> System {
@@ -51,11 +51,11 @@ fn a_bar_bounces_off_without_impact_loss() {
         let mut system = system(&model, scheme, step);
         // Rigid translation at SPEED: mode 0.
         system.bank_mut().set_modal_state(0, 0, 0.0, SPEED * (DENSITY * AREA * LENGTH).sqrt());
-        system.start(&[Drive::default()]);
+        system.start(&[PrescribedMotion::default()]);
         let before = system.energies();
         let (mut impulse, mut touched, mut released) = (0.0, f64::NAN, 0.0);
         for index in 1..=3000 {
-            system.step(&[Drive::default()]).unwrap();
+            system.step(&[PrescribedMotion::default()]).unwrap();
             let force: f64 = system.events().iter().map(|event| event.normal).sum();
             impulse += force * step;
             if force > 0.0 {
@@ -95,10 +95,10 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, ledger: true };
     let mut pressed = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);
     pressed.set_step(share * limit);
-    pressed.start(&[Drive::default()]);
+    pressed.start(&[PrescribedMotion::default()]);
     let (mut most, mut last) = (0.0_f64, [f64::INFINITY, f64::NEG_INFINITY]);
     for step in 0..4000 {
-        if pressed.step(&[Drive::default()]).is_err() {
+        if pressed.step(&[PrescribedMotion::default()]).is_err() {
             return (f64::INFINITY, f64::INFINITY);
         }
         // Fixed obstacles have no axis: the force is the one on the node, as it is.
@@ -219,7 +219,7 @@ fn dragged(step: f64, solver: Solver) -> (System, f64) {
     let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver, ledger: true };
     let mut system = System::new(&model, 1, GapLaw::Fixed(law), 0.3, settings);
     system.set_step(step);
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     (system, step)
 }
 
@@ -231,7 +231,7 @@ fn friction_opposes_sliding_however_short_the_step_is() {
             let (mut system, step) = dragged(step, solver);
             let mut time = 0.0;
             while time < 1e-4 {
-                system.step(&[Drive::default()]).unwrap();
+                system.step(&[PrescribedMotion::default()]).unwrap();
                 time += step;
                 let event = system.events()[0];
                 assert!((event.force[1] + 0.3 * event.normal).abs() < 1e-12 * event.normal, "h = {step:e}: {event:?}");

@@ -14,7 +14,7 @@ const LEGEND: f64 = 34.0;
 
 /// A kind of answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Kind {
+pub struct CellKind {
     /// In the legend.
     pub label: String,
     /// Colour of the cell.
@@ -34,7 +34,7 @@ pub struct Cell {
 
 /// One panel: rows from top to bottom.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Panel {
+pub struct CellPanel {
     /// Above it.
     pub title: String,
     /// Rows of cells, each as long as the columns.
@@ -55,9 +55,9 @@ pub struct Cells {
     /// Rows, top to bottom.
     pub rows: Vec<String>,
     /// Kinds of answers.
-    pub kinds: Vec<Kind>,
+    pub kinds: Vec<CellKind>,
     /// The panels.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<CellPanel>,
 }
 
 impl Cells {
@@ -87,7 +87,7 @@ impl Cells {
         svg
     }
 
-    fn draw_panel(&self, panel: &Panel, [x, y]: [f64; 2], svg: &mut String) {
+    fn draw_panel(&self, panel: &CellPanel, [x, y]: [f64; 2], svg: &mut String) {
         let (left, top) = (x + LEFT, y + ABOVE);
         let [wide, high] = [CELL[0] * self.columns.len() as f64, CELL[1] * self.rows.len() as f64];
         text(svg, [left, y + 20.0], "start", &panel.title);
@@ -116,7 +116,7 @@ impl Cells {
     }
 
     fn draw_cell(&self, cell: &Cell, [x, y]: [f64; 2], svg: &mut String) {
-        let Kind { color, sign, .. } = &self.kinds[cell.kind];
+        let CellKind { color, sign, .. } = &self.kinds[cell.kind];
         let _ = write!(
             svg,
             r##"<g><title>{}</title><rect x="{x}" y="{y}" width="{}" height="{}" fill="{color}" stroke="#fff"/>"##,
@@ -130,7 +130,7 @@ impl Cells {
 
     fn draw_legend(&self, y: f64, svg: &mut String) {
         let mut x = 14.0;
-        for Kind { label, color, sign } in &self.kinds {
+        for CellKind { label, color, sign } in &self.kinds {
             let _ = write!(svg, r#"<rect x="{x}" y="{}" width="22" height="16" fill="{color}"/>"#, y - 4.0);
             text(svg, [x + 11.0, y + 9.0], "middle", sign);
             text(svg, [x + 28.0, y + 9.0], "start", label);
@@ -149,9 +149,9 @@ mod tests {
 
     #[test]
     fn every_cell_shows_its_kind_and_its_words() {
-        let kind = |label: &str, color, sign| Kind { label: label.into(), color, sign };
+        let kind = |label: &str, color, sign| CellKind { label: label.into(), color, sign };
         let cell = |kind, words: &str| Cell { kind, words: words.into() };
-        let panel = |title: &str| Panel {
+        let panel = |title: &str| CellPanel {
             title: title.into(),
             cells: vec![vec![cell(0, "fine"), cell(1, "µ < 0.5")]],
             framed: Some((0, 1)),

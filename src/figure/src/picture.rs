@@ -6,7 +6,7 @@ use tiprub_model::{Mesh, surface_quads};
 
 /// Surface of a mesh: four-cornered faces over points (m).
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Surface {
+pub struct MeshSurface {
     /// Points (x, y, z) in m, z the engine axis.
     pub points: Vec<[f64; 3]>,
     /// Faces by the indices of their corners, in order around the face.
@@ -15,7 +15,7 @@ pub struct Surface {
 
 /// Where the observer stands.
 #[derive(Debug, Clone, Copy)]
-pub struct View {
+pub struct ViewPoint {
     /// Unit vector to the right in the picture.
     right: [f64; 3],
     /// Unit vector up in the picture.
@@ -43,10 +43,10 @@ const PATCHES: usize = 2;
 /// A mark is hidden by what lies in front of it by more than this share of the size of the surface.
 const HIDING: f64 = 1e-6;
 
-impl View {
+impl ViewPoint {
     /// A view of a blade standing on the z axis: radial direction of its centre upwards, seen from `azimuth` (rad)
     /// around that direction (0: along the tangential direction, π/2: along the axis) and from `elevation` (rad) above.
-    pub fn of_blade(surface: &Surface, azimuth: f64, elevation: f64) -> Self {
+    pub fn of_blade(surface: &MeshSurface, azimuth: f64, elevation: f64) -> Self {
         let count = surface.points.len().max(1) as f64;
         let centre = surface.points.iter().fold([0.0, 0.0], |sum, point| [sum[0] + point[0], sum[1] + point[1]]);
         let (x, y) = (centre[0] / count, centre[1] / count);
@@ -69,11 +69,11 @@ impl View {
 /// element. Without displacement it is plain grey with the lines of the mesh. `marks` are drawn as dots (the contact nodes),
 /// those hidden by the surface as circles.
 pub fn draw(
-    surface: &Surface,
+    surface: &MeshSurface,
     displacement: Option<(&[[f64; 3]], f64)>,
     marks: &[[f64; 3]],
-    frame: &Frame,
-    view: &View,
+    frame: &ProjectionFrame,
+    view: &ViewPoint,
 ) -> String {
     let magnitudes: Vec<f64> = match displacement {
         Some((vectors, _)) => vectors.iter().map(|vector| dot(*vector, *vector).sqrt()).collect(),
@@ -120,7 +120,7 @@ pub fn draw(
 /// Colour of the lines of a mesh.
 const MESH_LINE: &str = "#6c7784";
 
-fn draw_marks(svg: &mut String, places: &[[f64; 3]], patches: &[Patch], frame: &Frame) {
+fn draw_marks(svg: &mut String, places: &[[f64; 3]], patches: &[FacePatch], frame: &ProjectionFrame) {
     let margin = HIDING * EDGE / frame.magnification;
     for place in places {
         let (x, y) = frame.place(*place);
@@ -132,7 +132,7 @@ fn draw_marks(svg: &mut String, places: &[[f64; 3]], patches: &[Patch], frame: &
 
 /// Where projected points come to lie in a picture: the same for all pictures of one surface.
 #[derive(Debug, Clone, Copy)]
-pub struct Frame {
+pub struct ProjectionFrame {
     left: f64,
     top: f64,
     /// SVG units per metre.
@@ -141,9 +141,9 @@ pub struct Frame {
     height: f64,
 }
 
-impl Frame {
+impl ProjectionFrame {
     /// A frame that holds the surface with `margin` (fraction of its size) on every side, for displaced shapes.
-    pub fn around(surface: &Surface, view: &View, margin: f64) -> Self {
+    pub fn around(surface: &MeshSurface, view: &ViewPoint, margin: f64) -> Self {
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
         for point in &surface.points {
@@ -197,7 +197,7 @@ pub fn color_scale(low: &str, high: &str) -> String {
 }
 
 /// A piece of a face, ready to be drawn.
-struct Patch {
+struct FacePatch {
     /// Projected corners.
     corners: [[f64; 3]; 4],
     /// Distance towards the observer.
@@ -208,7 +208,7 @@ struct Patch {
     shade: f64,
 }
 
-impl Patch {
+impl FacePatch {
     /// Distance towards the observer where a projected point lies on the patch, seen as two triangles.
     fn depth_at(&self, point: [f64; 3]) -> Option<f64> {
         let [a, b, c, d] = self.corners;
@@ -228,9 +228,9 @@ fn subdivide(
     corners: &[[f64; 3]; 4],
     shares: [f64; 4],
     shade: f64,
-    view: &View,
+    view: &ViewPoint,
     pieces: usize,
-    patches: &mut Vec<Patch>,
+    patches: &mut Vec<FacePatch>,
 ) {
     let weights = |u: f64, v: f64| [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v];
     let point = |u: f64, v: f64| {
@@ -241,7 +241,7 @@ fn subdivide(
     for (row, column) in (0..pieces).flat_map(|row| (0..pieces).map(move |column| (row, column))) {
         let (u, v) = (row as f64 * step, column as f64 * step);
         let middle = weights(u + 0.5 * step, v + 0.5 * step);
-        patches.push(Patch {
+        patches.push(FacePatch {
             corners: [point(u, v), point(u + step, v), point(u + step, v + step), point(u, v + step)],
             depth: point(u + 0.5 * step, v + 0.5 * step)[2],
             share: (0..4).map(|corner| middle[corner] * shares[corner]).sum(),
@@ -257,7 +257,7 @@ fn normal([a, b, c, d]: &[[f64; 3]; 4]) -> [f64; 3] {
     normal.map(|component| component / length)
 }
 
-fn brightness(normal: [f64; 3], view: &View) -> f64 {
+fn brightness(normal: [f64; 3], view: &ViewPoint) -> f64 {
     // A light behind the observer's left shoulder.
     let light = combine(0.82, view.towards, 1.0, combine(-0.42, view.right, 0.38, view.up));
     0.62 + 0.38 * dot(normal, light).clamp(0.0, 1.0)
@@ -296,10 +296,10 @@ fn combine(alpha: f64, a: [f64; 3], beta: f64, b: [f64; 3]) -> [f64; 3] {
 }
 
 /// The outer surface of a mesh.
-pub fn surface_of(mesh: &Mesh) -> Surface {
+pub fn surface_of(mesh: &Mesh) -> MeshSurface {
     let corner = |face: &[usize], index: usize| face[index.min(face.len() - 1)];
     let faces = surface_quads(mesh);
-    Surface {
+    MeshSurface {
         points: mesh.nodes.clone(),
         faces: faces.iter().map(|face| std::array::from_fn(|index| corner(face, index))).collect(),
     }
@@ -310,14 +310,14 @@ mod tests {
     use super::*;
 
     /// Two unit squares at x = 1 and x = 2, seen along x from far away: the nearer one is drawn last.
-    fn two_squares() -> Surface {
+    fn two_squares() -> MeshSurface {
         let square = |x: f64| [[x, -0.5, 0.0], [x, 0.5, 0.0], [x, 0.5, 1.0], [x, -0.5, 1.0]];
-        Surface { points: [square(2.0), square(1.0)].concat(), faces: vec![[0, 1, 2, 3], [4, 5, 6, 7]] }
+        MeshSurface { points: [square(2.0), square(1.0)].concat(), faces: vec![[0, 1, 2, 3], [4, 5, 6, 7]] }
     }
 
     #[test]
     fn the_view_is_an_orthonormal_right_handed_triad() {
-        let view = View::of_blade(&two_squares(), 0.7, 0.3);
+        let view = ViewPoint::of_blade(&two_squares(), 0.7, 0.3);
         let triad = [view.right, view.up, view.towards];
         for (i, a) in triad.iter().enumerate() {
             for (j, b) in triad.iter().enumerate() {
@@ -331,9 +331,9 @@ mod tests {
     fn nearer_faces_are_drawn_later_and_stay_inside_the_frame() {
         let surface = two_squares();
         // From above: the radial direction (x) points towards the observer.
-        let view = View::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
+        let view = ViewPoint::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
         let displacement: Vec<[f64; 3]> = (0..8).map(|index| [0.0, 0.0, f64::from(u8::from(index >= 4))]).collect();
-        let frame = Frame::around(&surface, &view, 0.1);
+        let frame = ProjectionFrame::around(&surface, &view, 0.1);
         let svg = draw(&surface, Some((&displacement, 0.0)), &[[1.0, 0.0, 0.5]], &frame, &view);
         let shade = brightness([1.0, 0.0, 0.0], &view);
         let color = |share: f64| hex(scale_color(share).map(|channel| channel * shade));
@@ -349,8 +349,8 @@ mod tests {
     fn faces_turned_away_are_not_drawn() {
         let mut surface = two_squares();
         surface.faces[1].reverse();
-        let view = View::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
-        let svg = draw(&surface, None, &[], &Frame::around(&surface, &view, 0.1), &view);
+        let view = ViewPoint::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
+        let svg = draw(&surface, None, &[], &ProjectionFrame::around(&surface, &view, 0.1), &view);
         assert_eq!(svg.matches("<path").count(), 1, "one face");
     }
 
@@ -358,8 +358,8 @@ mod tests {
     #[test]
     fn lines_and_marks_behind_a_face_are_hidden() {
         let surface = two_squares();
-        let view = View::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
-        let frame = Frame::around(&surface, &view, 0.1);
+        let view = ViewPoint::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
+        let frame = ProjectionFrame::around(&surface, &view, 0.1);
         let (far, near, beside) = ([1.0, 0.1, 0.5], [2.0, 0.1, 0.5], [1.0, 0.7, 0.5]);
         let svg = draw(&surface, None, &[far, near, beside], &frame, &view);
         let paths: Vec<&str> = svg.split("<path ").skip(1).collect();

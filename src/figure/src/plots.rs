@@ -20,16 +20,16 @@ const SCALE: u32 = 2;
 const WIDTH: u32 = 920 * SCALE;
 /// Sizes of a plot, in CSS pixels.
 #[derive(Debug, Clone, Copy)]
-struct Size {
+struct PlotSize {
     width: u32,
     highest: u32,
     left: u32,
     x_labels: usize,
     buckets: usize,
 }
-const WIDE: Size = Size { width: WIDTH / SCALE, highest: u32::MAX, left: 78, x_labels: 10, buckets: 700 };
+const WIDE: PlotSize = PlotSize { width: WIDTH / SCALE, highest: u32::MAX, left: 78, x_labels: 10, buckets: 700 };
 /// For the card of a page on a telephone.
-const NARROW: Size = Size { width: 340, highest: 240, left: 62, x_labels: 5, buckets: 260 };
+const NARROW: PlotSize = PlotSize { width: 340, highest: 240, left: 62, x_labels: 5, buckets: 260 };
 /// Height of a line of a legend above the plot, and of the room around it, in CSS pixels.
 const LEGEND_LINE: u32 = 22;
 const LEGEND_ROOM: u32 = 6;
@@ -65,12 +65,12 @@ pub struct Series {
     /// Index into [`COLORS`], instead of one after the other.
     pub color: Option<usize>,
     /// How it is drawn.
-    pub form: Form,
+    pub form: SeriesForm,
 }
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
+pub enum SeriesForm {
     /// A line, peaks kept where there are too many points.
     Line,
     /// A thin line through few points.
@@ -82,11 +82,11 @@ pub enum Form {
 impl Series {
     /// A line.
     pub fn line(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
-        Self { label: label.into(), points, color: None, form: Form::Line }
+        Self { label: label.into(), points, color: None, form: SeriesForm::Line }
     }
 
     /// The same in another form and colour.
-    pub fn drawn(self, form: Form, color: usize) -> Self {
+    pub fn drawn(self, form: SeriesForm, color: usize) -> Self {
         Self { form, color: Some(color), ..self }
     }
 
@@ -190,7 +190,7 @@ impl Plot {
     }
 
     /// With so much room for a legend above the plot.
-    fn svg(&self, legend: u32, size: Size) -> Result<String> {
+    fn svg(&self, legend: u32, size: PlotSize) -> Result<String> {
         let mut svg = String::new();
         {
             let height = (self.height.min(size.highest) + legend) * SCALE;
@@ -218,7 +218,7 @@ impl Plot {
         Ok(())
     }
 
-    fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>, size: Size) -> Result<(), String> {
+    fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>, size: PlotSize) -> Result<(), String> {
         let x_range = self.x_range();
         let levels = self.levels.iter().map(|level| level.0);
         let y_range = padded(self.finite_points().map(|point| point.1).chain(levels), 0.06);
@@ -232,7 +232,7 @@ impl Plot {
         self.draw_series(&mut chart, size)
     }
 
-    fn draw_axes(&self, chart: &mut Chart<'_, '_>, size: Size) -> Result<(), String> {
+    fn draw_axes(&self, chart: &mut Chart<'_, '_>, size: PlotSize) -> Result<(), String> {
         let y_label = |value: &f64| match self.logarithmic {
             false => tick(*value),
             true if value.fract().abs() < 1e-9 => format!("1e{}", value.round()),
@@ -275,16 +275,16 @@ impl Plot {
         Ok(())
     }
 
-    fn draw_series(&self, chart: &mut Chart<'_, '_>, size: Size) -> Result<(), String> {
+    fn draw_series(&self, chart: &mut Chart<'_, '_>, size: PlotSize) -> Result<(), String> {
         for (index, series) in self.series.iter().enumerate() {
             let finite: Vec<_> = self.finite_points_of(series).collect();
             let color = COLORS[series.color_number(index)];
-            let width = if series.form == Form::Line { SCALE + SCALE / 2 } else { SCALE / 2 };
-            if series.form != Form::Dots {
+            let width = if series.form == SeriesForm::Line { SCALE + SCALE / 2 } else { SCALE / 2 };
+            if series.form != SeriesForm::Dots {
                 let line = LineSeries::new(decimate(&finite, size.buckets), color.stroke_width(width));
                 chart.draw_series(line).map_err(|error| error.to_string())?;
             }
-            if self.marked || series.form == Form::Dots {
+            if self.marked || series.form == SeriesForm::Dots {
                 let circle = |point: &(f64, f64)| Circle::new(*point, 4 * SCALE, color.filled());
                 chart.draw_series(finite.iter().map(circle)).map_err(|error| error.to_string())?;
             }
@@ -351,7 +351,7 @@ mod tests {
     #[test]
     fn a_file_of_its_own_holds_the_legend_and_unlabelled_lines_stay_out_of_it() {
         let line = |label: &str| Series::line(label, vec![(0.0, 1.0), (1.0, 2.0)]);
-        let series = vec![line("first"), line("").drawn(Form::Thin, 4), line("third").drawn(Form::Dots, 7)];
+        let series = vec![line("first"), line("").drawn(SeriesForm::Thin, 4), line("third").drawn(SeriesForm::Dots, 7)];
         let plot = Plot::new("x", "y", series);
         let svg = plot.to_whole_svg().unwrap();
         assert!(svg.contains("first") && svg.contains("third"));

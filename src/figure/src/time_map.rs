@@ -40,7 +40,7 @@ pub struct TimeMap {
 }
 
 /// Sizes of a picture.
-struct Size {
+struct MapSize {
     class: &'static str,
     width: f64,
     left: f64,
@@ -49,9 +49,9 @@ struct Size {
     ticks: f64,
 }
 
-const SIZES: [Size; 2] = [
-    Size { class: "wide", width: 920.0, left: 150.0, bins: 300, font: 13.0, ticks: 8.0 },
-    Size { class: "narrow", width: 340.0, left: 96.0, bins: 120, font: 12.0, ticks: 4.0 },
+const SIZES: [MapSize; 2] = [
+    MapSize { class: "wide", width: 920.0, left: 150.0, bins: 300, font: 13.0, ticks: 8.0 },
+    MapSize { class: "narrow", width: 340.0, left: 96.0, bins: 120, font: 12.0, ticks: 4.0 },
 ];
 
 impl TimeMap {
@@ -96,8 +96,8 @@ impl TimeMap {
         )
     }
 
-    fn picture(&self, range: [f64; 2], size: &Size) -> String {
-        let Size { width, left, font, .. } = size;
+    fn picture(&self, range: [f64; 2], size: &MapSize) -> String {
+        let MapSize { width, left, font, .. } = size;
         let high = ROW * self.rows.len() as f64;
         let height = ABOVE + high + BELOW;
         let mut svg = format!(
@@ -114,7 +114,7 @@ impl TimeMap {
     }
 
     /// One path per colour; neighbouring cells of one colour are one.
-    fn cells(&self, svg: &mut String, range: [f64; 2], size: &Size) {
+    fn cells(&self, svg: &mut String, range: [f64; 2], size: &MapSize) {
         let bins = size.bins.min(self.times.len()).max(1);
         let cell = (size.width - size.left - RIGHT) / bins as f64;
         let mut paths = vec![String::new(); LEVELS];
@@ -144,7 +144,7 @@ impl TimeMap {
         }
     }
 
-    fn axis(&self, svg: &mut String, y: f64, size: &Size) {
+    fn axis(&self, svg: &mut String, y: f64, size: &MapSize) {
         let (Some(first), Some(last)) = (self.times.first(), self.times.last()) else { return };
         let wide = size.width - size.left - RIGHT;
         let step = round_step((last - first).max(f64::MIN_POSITIVE) / size.ticks);

@@ -19,7 +19,7 @@ const MOST_POINTS: usize = 500;
 
 /// One axis.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Axis {
+pub struct WaterfallAxis {
     /// Text with unit.
     pub label: String,
     /// Range shown.
@@ -28,7 +28,7 @@ pub struct Axis {
     pub reversed: bool,
 }
 
-impl Axis {
+impl WaterfallAxis {
     /// An axis over the finite ones of these values, never empty.
     pub fn over(label: impl Into<String>, values: impl Iterator<Item = f64>) -> Self {
         let extend = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
@@ -69,11 +69,11 @@ impl Axis {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Waterfall {
     /// To the right.
-    pub x: Axis,
+    pub x: WaterfallAxis,
     /// Into the picture.
-    pub depth: Axis,
+    pub depth: WaterfallAxis,
     /// Upwards; values beyond are cut off at the ends of the range.
-    pub value: Axis,
+    pub value: WaterfallAxis,
     /// Curves: place in depth, and points (x, value) with x ascending.
     pub curves: Vec<(f64, Vec<(f64, f64)>)>,
 }
@@ -183,9 +183,9 @@ mod tests {
     fn sample() -> Waterfall {
         let curve = |place: f64| (place, (0..2000).map(|i| (f64::from(i), if i == 777 { 5.0 } else { 0.1 })).collect());
         Waterfall {
-            x: Axis::over("mode (-)", [1.0, 60.0].into_iter()),
-            depth: Axis::over("modes kept (-)", [0.0, 25.0].into_iter()),
-            value: Axis::over("deviation (%)", [0.0, 3.0].into_iter()),
+            x: WaterfallAxis::over("mode (-)", [1.0, 60.0].into_iter()),
+            depth: WaterfallAxis::over("modes kept (-)", [0.0, 25.0].into_iter()),
+            value: WaterfallAxis::over("deviation (%)", [0.0, 3.0].into_iter()),
             curves: vec![curve(0.0), curve(10.0), (25.0, Vec::new()), (20.0, vec![(1.0, f64::NAN)])],
         }
     }
@@ -210,13 +210,13 @@ mod tests {
 
     #[test]
     fn ticks_are_round_numbers_within_the_axis() {
-        let axis = |low, high| Axis { label: String::new(), range: [low, high], reversed: false };
+        let axis = |low, high| WaterfallAxis { label: String::new(), range: [low, high], reversed: false };
         assert_eq!(axis(0.0, 3.0).ticks(4.0), [0.0, 1.0, 2.0, 3.0]);
         assert_eq!(axis(0.0, 1456.0).ticks(5.0), [0.0, 500.0, 1000.0]);
         assert_eq!(axis(-1e-6, 4e-6).ticks(5.0).len(), 6);
-        let range = |axis: Axis| axis.range.map(f64::to_bits);
-        assert_eq!(range(Axis::over("", [7.0].into_iter())), [3.5_f64, 10.5].map(f64::to_bits));
-        assert_eq!(range(Axis::over("", std::iter::empty())), [0.0_f64, 1.0].map(f64::to_bits));
+        let range = |axis: WaterfallAxis| axis.range.map(f64::to_bits);
+        assert_eq!(range(WaterfallAxis::over("", [7.0].into_iter())), [3.5_f64, 10.5].map(f64::to_bits));
+        assert_eq!(range(WaterfallAxis::over("", std::iter::empty())), [0.0_f64, 1.0].map(f64::to_bits));
         let places = [axis(0.0, 4.0), axis(0.0, 4.0).reversed()].map(|axis| axis.share(1.0).to_bits());
         assert_eq!(places, [0.25_f64, 0.75].map(f64::to_bits));
     }

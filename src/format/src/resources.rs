@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use tiprub_core::rom::{RomExtras, SUPPORT_ROWS, Support};
+use tiprub_core::rom::{RomExtras, SUPPORT_ROWS, SupportRows};
 use tiprub_core::settings::{SceneSettings, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 
@@ -50,7 +50,7 @@ pub fn largest_resource(name: &str) -> Option<u64> {
 /// The content of `package.toml`.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Package {
+struct PackageFile {
     format_version: u32,
     fmi3_arrays: bool,
 }
@@ -72,7 +72,7 @@ pub fn resource_files(scene: &Scene, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)
 
 /// The packaging choices as a file.
 pub(crate) fn package_file(fmi3_arrays: bool) -> (String, Vec<u8>) {
-    let package = Package { format_version: RESOURCES_FORMAT_VERSION, fmi3_arrays };
+    let package = PackageFile { format_version: RESOURCES_FORMAT_VERSION, fmi3_arrays };
     let package = toml::to_string(&package).expect("a number and a flag can be written");
     (PACKAGE_FILE.to_owned(), package.into_bytes())
 }
@@ -114,7 +114,7 @@ fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) ->
         stress_centrifugal: (rom.extras.stress_centrifugal.clone())
             .filter(|_| settings.outputs.stress && structure.spin.growth),
         support: rom.extras.support.clone().filter(|_| carries && settings.outputs.support_reaction).map(|support| {
-            Support {
+            SupportRows {
                 // Its columns are the patches.
                 thermal: if structure.thermal { support.thermal } else { DMatrix::zeros(SUPPORT_ROWS, 0) },
                 ..support
@@ -199,7 +199,7 @@ fn read_into(directory: &Path, name: &str, files: &mut Vec<(String, Vec<u8>)>) -
     String::from_utf8(bytes).map_err(|error| text_error(&path, &error))
 }
 
-fn parse_package(path: &Path, text: &str) -> Result<Package> {
+fn parse_package(path: &Path, text: &str) -> Result<PackageFile> {
     let table: toml::Table = toml::from_str(text).map_err(|error| Error::file(path, error.message(), INTACT))?;
     let version = table.get("format_version").and_then(toml::Value::as_integer);
     if version != Some(i64::from(RESOURCES_FORMAT_VERSION)) {

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensorError, SafeTensors};
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
+use tiprub_core::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
 
 mod extras;
 mod harmonics;
@@ -32,7 +32,7 @@ pub(crate) type Metadata = BTreeMap<String, String>;
 /// [`Error::Rom`] naming `origin`, the array or metadata entry, expected and found, and the remedy. The ROM returned
 /// has passed [`Rom::validate`].
 pub fn read_rom(bytes: &[u8], origin: &str) -> Result<Rom> {
-    Reader { origin }.read(bytes)
+    RomReader { origin }.read(bytes)
 }
 
 /// Largest header (bytes): names of ten thousand contact nodes, or the arrays of a thousand nodal diameters.
@@ -47,11 +47,11 @@ pub(crate) fn header(bytes: &[u8]) -> std::result::Result<(usize, safetensors::t
     SafeTensors::read_metadata(bytes)
 }
 
-struct Reader<'a> {
+struct RomReader<'a> {
     origin: &'a str,
 }
 
-impl Reader<'_> {
+impl RomReader<'_> {
     fn read(&self, bytes: &[u8]) -> Result<Rom> {
         let (arrays, metadata) = self.content(bytes)?;
         let rom = self.rom(&arrays, &metadata)?;
@@ -281,10 +281,10 @@ impl Reader<'_> {
         })
     }
 
-    fn frame(&self, metadata: &Metadata) -> Result<Frame> {
+    fn frame(&self, metadata: &Metadata) -> Result<DisplacementFrame> {
         match self.entry(metadata, "frame")? {
-            "cylindrical" => Ok(Frame::Cylindrical),
-            "cartesian" => Ok(Frame::Cartesian),
+            "cylindrical" => Ok(DisplacementFrame::Cylindrical),
+            "cartesian" => Ok(DisplacementFrame::Cartesian),
             other => Err(self.error(
                 "metadata `frame`",
                 format!("{other:?} is not a frame"),
@@ -347,8 +347,8 @@ pub fn write_rom(rom: &Rom) -> Vec<u8> {
 
 fn rom_metadata(rom: &Rom, arrays: &Arrays) -> Metadata {
     let frame = match rom.frame {
-        Frame::Cylindrical => "cylindrical",
-        Frame::Cartesian => "cartesian",
+        DisplacementFrame::Cylindrical => "cylindrical",
+        DisplacementFrame::Cartesian => "cartesian",
     };
     let names = names(&rom.contact_nodes);
     let mut extras = extras::metadata(&rom.extras);

@@ -95,12 +95,7 @@ fn collect_table<'a>(table: &'a DeTable<'a>, path: &str, fields: &str, places: &
         let name: &str = key.get_ref();
         let join = |head: &str| if head.is_empty() { name.to_owned() } else { format!("{head}.{name}") };
         let (path, fields) = (join(path), join(fields));
-        places.push(TomlNode {
-            path: path.clone(),
-            fields: fields.clone(),
-            span: key.span(),
-            value: value.get_ref(),
-        });
+        places.push(TomlNode { path: path.clone(), fields: fields.clone(), span: key.span(), value: value.get_ref() });
         collect_value(value, &path, &fields, places);
     }
 }

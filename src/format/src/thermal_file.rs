@@ -4,8 +4,8 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensors};
-use tiprub_core::rom::Patch;
-use tiprub_thermal::Model;
+use tiprub_core::rom::ThermalPatch;
+use tiprub_thermal::ConductionModel;
 
 use crate::load::{LARGEST_ROM, read_bytes};
 use crate::resources::{INTACT, check_directory, instantiation_token, package_file, read_package};
@@ -22,7 +22,7 @@ const WRITE_AGAIN: &str = "Write the model again with `tiprub thermal`";
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalResources {
     /// The model.
-    pub model: Model,
+    pub model: ConductionModel,
     /// Instantiation token that belongs to these resources.
     pub token: String,
     /// Whether the FMI 3.0 description has arrays.
@@ -30,7 +30,7 @@ pub struct ThermalResources {
 }
 
 /// The files of `resources/` of a thermal FMU, in fixed order with fixed content for a given model.
-pub fn thermal_resource_files(model: &Model, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)> {
+pub fn thermal_resource_files(model: &ConductionModel, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)> {
     vec![(THERMAL_FILE.to_owned(), write_thermal(model)), package_file(fmi3_arrays)]
 }
 
@@ -49,7 +49,7 @@ pub fn load_thermal_resources(directory: &Path) -> Result<ThermalResources> {
 }
 
 /// The matrices of a model by their names in the file.
-fn matrices(model: &Model) -> [(&'static str, &DMatrix<f64>); 7] {
+fn matrices(model: &ConductionModel) -> [(&'static str, &DMatrix<f64>); 7] {
     [
         ("conduction", &model.conduction),
         ("gas_convection", &model.gas_convection),
@@ -62,7 +62,7 @@ fn matrices(model: &Model) -> [(&'static str, &DMatrix<f64>); 7] {
 }
 
 /// The bytes of a thermal model; equal models give equal bytes.
-pub fn write_thermal(model: &Model) -> Vec<u8> {
+pub fn write_thermal(model: &ConductionModel) -> Vec<u8> {
     let mut arrays: Arrays =
         matrices(model).into_iter().map(|(name, values)| (name.to_owned(), matrix(values))).collect();
     let edges = model.patches.iter().flat_map(|patch| [patch.angle, patch.axial].concat()).collect();
@@ -85,8 +85,8 @@ pub fn write_thermal(model: &Model) -> Vec<u8> {
 /// Read a thermal model; `origin` names the file in messages.
 ///
 /// # Errors
-/// [`Error::Rom`] naming `origin`, the array or metadata entry, and the remedy. The model has passed [`Model::validate`].
-pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<Model> {
+/// [`Error::Rom`] naming `origin`, the array or metadata entry, and the remedy. The model has passed [`ConductionModel::validate`].
+pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<ConductionModel> {
     let refuse = |what: String, problem: String| Error::Rom {
         origin: origin.to_owned(),
         what,
@@ -135,9 +135,9 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<Model> {
     }
     let patch = |row: usize| {
         let [first, last, low, high] = [0, 1, 2, 3].map(|column| edges[(row, column)]);
-        Patch { angle: [first, last], axial: [low, high] }
+        ThermalPatch { angle: [first, last], axial: [low, high] }
     };
-    let model = Model {
+    let model = ConductionModel {
         name: entry("name")?,
         origin: entry("origin")?,
         heat_capacity: number("heat_capacity")?,

@@ -10,7 +10,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use nalgebra::{Complex, DMatrix};
-use tiprub_core::rom::{ContactNode, Frame};
+use tiprub_core::rom::{ContactNode, DisplacementFrame};
 use tiprub_core::settings::{CuttingSettings, Preset, SceneSettings, Shape, TimeSettings, rules};
 use tiprub_format::{ARRAYS, FIELDS, METADATA, SceneField, parse_scene, read_rom, write_scene};
 
@@ -255,7 +255,7 @@ fn the_chapter_on_roms_lists_arrays_and_metadata() {
 fn the_file_that_the_python_example_writes_is_a_rom() {
     let bytes = include_bytes!("data/written_by_python.rom.safetensors");
     let rom = read_rom(bytes, "written_by_python").unwrap();
-    assert_eq!((rom.name.as_str(), rom.sectors, rom.frame), ("blade", 12, Frame::Cylindrical));
+    assert_eq!((rom.name.as_str(), rom.sectors, rom.frame), ("blade", 12, DisplacementFrame::Cylindrical));
     assert_eq!(rom.mass, DMatrix::from_diagonal_element(3, 3, 1e-3));
     let stiffness = [9e5, 1e5, 0.0, 1e5, 4e4, 0.0, 0.0, 0.0, 2e5];
     assert_eq!(rom.stiffness, DMatrix::from_row_slice(3, 3, &stiffness));

@@ -4,10 +4,10 @@ use tiprub_core::Rom;
 use tiprub_model::{
     CasingOptions, Mesh, Rotor37Options,
     casing::CASING37,
-    cube::{CubeOptions, RingOptions, Side},
+    cube::{CubeOptions, RingOptions, RingSide},
     cyclic::{CyclicReduction, ModeSelection, reduce_cyclic},
     reduce::ReductionKind,
-    rotor37::{DESIGN_SPEED, MeshCounts, Tip, blade_mesh},
+    rotor37::{DESIGN_SPEED, MeshCounts, TipContact, blade_mesh},
     stage::{
         SectorCounts, SectorOptions, StageOptions,
         casing::{StageCasingOptions, reduce_stage_casing},
@@ -45,7 +45,7 @@ pub(crate) const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
 /// The cube of the cube between two rings.
 pub const CUBE: &str = "cube";
 /// Its rings.
-pub const RINGS: [(&str, Side); 2] = [("ring-left", Side::Left), ("ring-right", Side::Right)];
+pub const RINGS: [(&str, RingSide); 2] = [("ring-left", RingSide::Left), ("ring-right", RingSide::Right)];
 
 /// Every name that [`rom`] knows.
 #[cfg(test)]
@@ -121,22 +121,22 @@ pub const MESHES: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, core::f64::
 
 /// In what a model differs from the one that ships.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Other {
+pub struct ModelVariant {
     /// Number of modes, as a factor on its own.
     pub modes: f64,
     /// What touches, where it [has a chord](has_chord).
-    pub tip: Tip,
+    pub tip: TipContact,
     /// Elements along the edges, as a factor on its own, where it has a chord: the number through the thickness stays.
     pub mesh: f64,
 }
 
-impl Other {
+impl ModelVariant {
     /// For the name of what is kept.
     fn told(&self, name: &str) -> String {
         let tip = match self.tip {
-            Tip::Nodes(count) => format!("nodes-{count}"),
-            Tip::Patches(count) => format!("patches-{count}"),
-            Tip::Rows([count, rows]) => format!("patches-{count}x{rows}"),
+            TipContact::Nodes(count) => format!("nodes-{count}"),
+            TipContact::Patches(count) => format!("patches-{count}"),
+            TipContact::Rows([count, rows]) => format!("patches-{count}x{rows}"),
         };
         format!("{name}-modes-{:.3}-{tip}-mesh-{:.3}", self.modes, self.mesh)
     }
@@ -144,7 +144,7 @@ impl Other {
 
 /// The model of this name in another form, as kept or made anew. `None` where there is no such model, or none with more modes: the
 /// cube has all.
-pub fn refined(name: &str, other: Other, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
+pub fn refined(name: &str, other: ModelVariant, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
     let times = |modes: usize| scaled(modes, other.modes);
     let families = |selection: ModeSelection| match selection {
         ModeSelection::Families(modes) => ModeSelection::Families(times(modes)),
@@ -162,8 +162,8 @@ pub fn refined(name: &str, other: Other, cache: &RomCache, console: &Console) ->
         STAGE | STAGE_NODES | STAGE_NODES_COARSE => {
             let DiskModel { name, options } = DiskModel::named(name);
             let kind = match other.tip {
-                Tip::Nodes(_) => StageOptions::default().kind,
-                Tip::Patches(_) | Tip::Rows(_) => ReductionKind::FreeInterface,
+                TipContact::Nodes(_) => StageOptions::default().kind,
+                TipContact::Patches(_) | TipContact::Rows(_) => ReductionKind::FreeInterface,
             };
             let sector = SectorOptions { counts: stage_mesh(options.sector.counts, other.mesh), ..options.sector };
             let options = StageOptions { modes: families(options.modes), tip: other.tip, kind, sector, ..options };
@@ -250,7 +250,7 @@ pub fn stage_nodes(coarse: bool) -> (&'static str, StageOptions) {
 /// Name and options of the bladed disk of the stage, full size, with nine patches along the chord in two rows at the sides of the tips.
 pub fn stage() -> (&'static str, StageOptions) {
     let options =
-        StageOptions { tip: Tip::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..StageOptions::default() };
+        StageOptions { tip: TipContact::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..StageOptions::default() };
     (STAGE, options)
 }
 
@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn models_are_refined_by_name() {
         let console = Console::new(true, false);
-        let with = |modes: f64| Other { modes, tip: Tip::Nodes(0), mesh: 1.0 };
+        let with = |modes: f64| ModelVariant { modes, tip: TipContact::Nodes(0), mesh: 1.0 };
         let off = RomCache::off();
         let order = |modes: f64| refined("ring-left", with(modes), &off, &console).unwrap().unwrap().order();
         assert_eq!(order(0.5), 50);

@@ -12,12 +12,12 @@ use tiprub_model::{
     Rotor37Options,
     cyclic::ModeSelection,
     reduce::ReductionKind,
-    rotor37::{MeshCounts, Tip},
+    rotor37::{MeshCounts, TipContact},
     stage::{SectorCounts, SectorOptions, StageOptions},
 };
 
 /// One model that ships with what was found of it.
-struct Row {
+struct KnownModel {
     /// Its options as they were, in debug form.
     options: String,
     /// The rub, in words.
@@ -27,17 +27,17 @@ struct Row {
 }
 
 /// All rows.
-fn rows() -> [Row; 5] {
+fn rows() -> [KnownModel; 5] {
     let one_row = Rotor37Options {
         mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
-        tip: Tip::Patches(9),
+        tip: TipContact::Patches(9),
         kind: ReductionKind::FreeInterface,
         modes: 80,
         ..Rotor37Options::paper()
     };
     let paper = Rotor37Options {
         mesh: MeshCounts { chord: 16, thickness: 2, span: 20 },
-        tip: Tip::Nodes(3),
+        tip: TipContact::Nodes(3),
         kind: ReductionKind::FixedInterface,
         modes: 20,
         ..Rotor37Options::paper()
@@ -46,37 +46,37 @@ fn rows() -> [Row; 5] {
         SectorCounts { chord: 12, span: 18, thickness: 1, side: 2, overhang: 2, rim: 3, web: [6, 12], bore: [2, 2] };
     let stage = StageOptions {
         sector: SectorOptions { counts, ..SectorOptions::default() },
-        tip: Tip::Nodes(3),
+        tip: TipContact::Nodes(3),
         kind: ReductionKind::FixedInterface,
         modes: ModeSelection::Families(25),
         ..StageOptions::default()
     };
     [
-        Row {
+        KnownModel {
             options: format!("{stage:?}"),
             found_on: "first 9.5 ms of the rub of the stage with friction 0.15: nodes on a mesh with 0.7 times the elements, the mesh with \
                        five patches; later nodes leave far more",
             errors: [None, Some(0.102), None, Some(0.0068)],
         },
-        Row {
+        KnownModel {
             options: format!(
                 "{:?}",
-                StageOptions { tip: Tip::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..stage }
+                StageOptions { tip: TipContact::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..stage }
             ),
             found_on: "first 9.4 ms of the rub of the stage with friction 0.05, modes on a mesh with 0.7 times the elements",
             errors: [Some(0.0014), None, None, Some(0.0084)],
         },
-        Row {
+        KnownModel {
             options: format!("{one_row:?}"),
             found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms",
             errors: [Some(0.0176), Some(0.0311), Some(0.274), Some(0.0557)],
         },
-        Row {
-            options: format!("{:?}", Rotor37Options { tip: Tip::Rows([9, 2]), ..one_row.clone() }),
+        KnownModel {
+            options: format!("{:?}", Rotor37Options { tip: TipContact::Rows([9, 2]), ..one_row.clone() }),
             found_on: "light rub of rotor 37 with friction 0.15, 4.73 ms",
             errors: [Some(0.0191), Some(0.0204), Some(0.0046), Some(0.0485)],
         },
-        Row {
+        KnownModel {
             options: format!("{paper:?}"),
             found_on: "light rub of rotor 37 with friction 0.15, one revolution, three nodes against nine patches",
             errors: [Some(0.047), Some(0.34), None, None],
@@ -109,7 +109,7 @@ mod tests {
         let console = Console::new(true, false);
         let small = Rotor37Options {
             mesh: MeshCounts { chord: 2, thickness: 1, span: 2 },
-            tip: Tip::Nodes(2),
+            tip: TipContact::Nodes(2),
             modes: 2,
             ..Rotor37Options::paper()
         };
@@ -133,14 +133,14 @@ mod tests {
         assert!(stage.is_some_and(|errors| errors.patches == Some(0.102) && errors.rows.is_none()));
         let stage = told(&builtin::stage().1, rom.clone()).checks.rub_errors;
         assert!(stage.is_some_and(|errors| errors.modes == Some(0.0014) && errors.mesh == Some(0.0084)));
-        let wider = StageOptions { tip: Tip::Rows([5, 2]), ..builtin::stage().1 };
+        let wider = StageOptions { tip: TipContact::Rows([5, 2]), ..builtin::stage().1 };
         for other in [StageOptions::coarse(), wider] {
             assert_eq!(told(&other, rom.clone()).checks.rub_errors, None, "{other:?}");
         }
         let mesh = MeshCounts { span: own.mesh.span + 2, ..own.mesh };
         for other in [
             Rotor37Options { modes: 81, ..own.clone() },
-            Rotor37Options { tip: Tip::Patches(17), ..own.clone() },
+            Rotor37Options { tip: TipContact::Patches(17), ..own.clone() },
             Rotor37Options { mesh, ..own.clone() },
             Rotor37Options { kind: ReductionKind::FixedInterface, ..own },
         ] {

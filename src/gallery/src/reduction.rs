@@ -4,7 +4,7 @@ use tiprub_model::{
     CasingOptions, Reduction, Rotor37Options,
     cube::{CubeOptions, RingOptions, reduce_cube, reduce_cube_ring},
     cyclic::CyclicReduction,
-    progress::{Listener, Progress, Stage},
+    progress::{Listener, ReductionProgress, ReductionStage},
     reduce_ring, reduce_rotor37,
     stage::{
         StageOptions,
@@ -16,14 +16,14 @@ use tiprub_shell::{Failure, Result, console::Console};
 
 use crate::known;
 
-const STAGES: [Stage; 7] = [
-    Stage::Mesh,
-    Stage::Assembly,
-    Stage::FullModes,
-    Stage::FixedInterfaceModes,
-    Stage::ConstraintModes,
-    Stage::Checks,
-    Stage::Spin,
+const STAGES: [ReductionStage; 7] = [
+    ReductionStage::Mesh,
+    ReductionStage::Assembly,
+    ReductionStage::FullModes,
+    ReductionStage::FixedInterfaceModes,
+    ReductionStage::ConstraintModes,
+    ReductionStage::Checks,
+    ReductionStage::Spin,
 ];
 
 /// Reduce rotor 37, showing stage and share done.
@@ -86,7 +86,7 @@ pub fn with_progress<T>(
     work: &dyn Fn(Listener<'_>) -> tiprub_model::Result<T>,
 ) -> Result<T> {
     let task = console.task(title, Some(100 * STAGES.len() as u64));
-    let listener = |progress: Progress| {
+    let listener = |progress: ReductionProgress| {
         let stage = STAGES.iter().position(|stage| *stage == progress.stage).unwrap_or(0);
         task.now(&format!("{title}: {}", progress.stage));
         task.at(percent(stage as f64 + progress.fraction));

@@ -166,7 +166,7 @@ mod tests {
     use std::cell::Cell;
 
     use nalgebra::DMatrix;
-    use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
+    use tiprub_core::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
 
     use super::*;
     use tiprub_shell::Failure;
@@ -176,7 +176,7 @@ mod tests {
             name: "spring".into(),
             origin: String::new(),
             sectors: 3,
-            frame: Frame::Cylindrical,
+            frame: DisplacementFrame::Cylindrical,
             mass: DMatrix::identity(3, 3),
             stiffness: DMatrix::identity(3, 3) * stiffness,
             damping_ratio: 0.0,

@@ -49,8 +49,8 @@ pub const BUILTIN: &str = "builtin:";
 pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) -> Result<Scene> {
     let reduce = |name: &str| Some(builtin::rom(name, cache, console)?.map_err(|failure| failure.to_string()));
     match source(argument.as_ref())? {
-        Source::Embedded(name, text) => builtin_scene(name, text, &reduce),
-        Source::File(path) => tiprub_format::load_scene(path, &reduce).map_err(Failure::from),
+        SceneSource::Embedded(name, text) => builtin_scene(name, text, &reduce),
+        SceneSource::File(path) => tiprub_format::load_scene(path, &reduce).map_err(Failure::from),
     }
 }
 
@@ -60,14 +60,14 @@ pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) ->
 /// As [`load`], but for the models.
 pub fn settings(argument: impl AsRef<OsStr>) -> Result<SceneSettings> {
     Ok(match source(argument.as_ref())? {
-        Source::Embedded(name, text) => tiprub_format::parse_scene(text, name)?,
-        Source::File(path) => tiprub_format::load_settings(path)?,
+        SceneSource::Embedded(name, text) => tiprub_format::parse_scene(text, name)?,
+        SceneSource::File(path) => tiprub_format::load_settings(path)?,
     })
 }
 
 /// The files that [`load`] would read: the scene and its ROMs; none of a scene that ships, or of one that is wrong.
 pub fn files(argument: &str) -> Vec<PathBuf> {
-    let Ok(Source::File(path)) = source(argument.as_ref()) else { return Vec::new() };
+    let Ok(SceneSource::File(path)) = source(argument.as_ref()) else { return Vec::new() };
     let structures = tiprub_format::load_settings(path).map(|settings| settings.structures).unwrap_or_default();
     let roms = structures.iter().filter(|structure| !structure.rom.starts_with(BUILTIN));
     let beside = |rom: &str| path.parent().unwrap_or(Path::new("")).join(rom);
@@ -79,8 +79,8 @@ pub fn located(argument: impl AsRef<OsStr>, failure: Failure) -> Failure {
     const KEY: &str = "time.step";
     let place = || {
         let (name, text) = match source(argument.as_ref()).ok()? {
-            Source::Embedded(name, text) => (name.to_owned(), text.to_owned()),
-            Source::File(path) => (path.display().to_string(), std::fs::read_to_string(path).ok()?),
+            SceneSource::Embedded(name, text) => (name.to_owned(), text.to_owned()),
+            SceneSource::File(path) => (path.display().to_string(), std::fs::read_to_string(path).ok()?),
         };
         let (line, column) = tiprub_format::position_of(&text, KEY)?;
         Some(format!("{name}:{line}:{column}: {KEY}"))
@@ -92,13 +92,13 @@ pub fn located(argument: impl AsRef<OsStr>, failure: Failure) -> Failure {
 }
 
 /// Where a scene is.
-enum Source<'a> {
+enum SceneSource<'a> {
     /// One of [`BUILTIN_SCENES`].
     Embedded(&'a str, &'static str),
     File(&'a Path),
 }
 
-fn source(argument: &OsStr) -> Result<Source<'_>> {
+fn source(argument: &OsStr) -> Result<SceneSource<'_>> {
     if let Some(argument) = argument.to_str().filter(|argument| argument.starts_with(BUILTIN)) {
         let name = &argument[BUILTIN.len()..];
         let Some((_, text)) = BUILTIN_SCENES.iter().find(|(known, _)| *known == name) else {
@@ -106,7 +106,7 @@ fn source(argument: &OsStr) -> Result<Source<'_>> {
             let problem = format!("there is no built-in scene `{name}`");
             return Err(Failure::usage("SCENE", problem, format!("Give a scene file, or one of {}", names.join(", "))));
         };
-        return Ok(Source::Embedded(argument, text));
+        return Ok(SceneSource::Embedded(argument, text));
     }
     let path = Path::new(argument);
     if path.is_dir() {
@@ -123,7 +123,7 @@ fn source(argument: &OsStr) -> Result<Source<'_>> {
             let remedy = "Give a scene file (TOML); `tiprub inspect` shows what is in this one";
             Err(Failure::usage(path.display(), problem, remedy))
         }
-        None => Ok(Source::File(path)),
+        None => Ok(SceneSource::File(path)),
     }
 }
 

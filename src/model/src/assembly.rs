@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::element::{ElementKind, Formulation, consistent_mass, incompatible_stiffness, lumped_mass, stiffness};
 use crate::material::Material;
 use crate::mesh::Mesh;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, Result};
 
@@ -93,7 +93,7 @@ pub fn assemble_with(
     let mut stiffness_values = vec![0.0; pattern.rows.len()];
     let mut mass_values = vec![0.0; pattern.rows.len()];
     for (chunk_index, chunk) in mesh.elements.chunks(CHUNK).enumerate() {
-        report(listener, Stage::Assembly, chunk_index * CHUNK, mesh.elements.len());
+        report(listener, ReductionStage::Assembly, chunk_index * CHUNK, mesh.elements.len());
         let matrices: Vec<Result<(DMatrix<f64>, DMatrix<f64>)>> = chunk
             .par_iter()
             .enumerate()
@@ -120,7 +120,7 @@ pub fn assemble_with(
             });
         }
     }
-    report(listener, Stage::Assembly, 1, 1);
+    report(listener, ReductionStage::Assembly, 1, 1);
     Ok(Assembled {
         stiffness: SparseMatrix { pattern: Arc::clone(&pattern), values: stiffness_values },
         mass: SparseMatrix { pattern, values: mass_values },

@@ -11,8 +11,8 @@
 use faer::{Mat, MatRef, Side};
 use nalgebra::DMatrix;
 
-use crate::eigen::{Modes, lowest_modes, positive_factor};
-use crate::progress::{Listener, Stage, report};
+use crate::eigen::{EigenModes, lowest_modes, positive_factor};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::sparse::{Factor, SparseMatrix, add_tall, principal_pair, tall_product};
 use crate::{Error, Result};
 
@@ -84,7 +84,7 @@ pub fn craig_bampton_with(
         "Clamp the structure, or choose at least three contact nodes that are not on one line",
     )?;
     let searched = if inner.whole_pairs { (modes + 1).min(interior.len()) } else { modes };
-    let fixed = lowest_modes(&inner_mass, &factor, 0.0, searched, Stage::FixedInterfaceModes, listener)?;
+    let fixed = lowest_modes(&inner_mass, &factor, 0.0, searched, ReductionStage::FixedInterfaceModes, listener)?;
     let fixed = lowest_of(fixed, modes);
     let fixed_interface_frequencies = fixed.frequencies();
     let inner = match inner.loads {
@@ -104,7 +104,7 @@ pub fn craig_bampton_with(
     let static_stiffness = constraint_modes(stiffness, &factor, &interior, interface, &mut transformation, listener);
     drop(factor);
     let reduced_mass = projected(mass, &transformation);
-    report(listener, Stage::ConstraintModes, 1, 1);
+    report(listener, ReductionStage::ConstraintModes, 1, 1);
     Ok(CraigBampton {
         mass: symmetrised(reduced_mass.nrows(), |i, j| reduced_mass[(i, j)]),
         stiffness: reduced_stiffness(&static_stiffness, &eigenvalues),
@@ -129,7 +129,7 @@ fn constraint_modes(
     let mut static_stiffness = Mat::zeros(interface.len(), interface.len());
     for (chunk, part) in interface.chunks(COLUMNS).enumerate() {
         let first = chunk * COLUMNS;
-        report(listener, Stage::ConstraintModes, first, interface.len());
+        report(listener, ReductionStage::ConstraintModes, first, interface.len());
         let constraint = factor.solve(stiffness.block(interior, part));
         let mut columns = transformation.get_mut(.., first..first + part.len());
         for (j, &dof) in part.iter().enumerate() {
@@ -162,14 +162,14 @@ pub(crate) fn projected(matrix: &SparseMatrix, transformation: &Mat<f64>) -> Mat
 const DOUBLE: f64 = 1e-6;
 
 /// The lowest `count` modes, or one fewer where more are there and the next one belongs to the last.
-fn lowest_of(modes: Modes, count: usize) -> Modes {
+fn lowest_of(modes: EigenModes, count: usize) -> EigenModes {
     let squares = &modes.eigenvalues;
     if squares.len() <= count {
         return modes;
     }
     let kept =
         if count > 0 && squares[count] - squares[count - 1] < DOUBLE * squares[count] { count - 1 } else { count };
-    Modes {
+    EigenModes {
         eigenvalues: squares[..kept].to_vec(),
         shapes: modes.shapes.get(.., ..kept).to_owned(),
         residuals: modes.residuals[..kept].to_vec(),
@@ -181,11 +181,11 @@ const DEPENDENT: f64 = 1e-10;
 
 /// The space of modes and static responses, described by its own modes.
 pub(crate) fn with_static_responses(
-    fixed: Modes,
+    fixed: EigenModes,
     stiffness: &SparseMatrix,
     mass: &SparseMatrix,
     responses: &Mat<f64>,
-) -> Result<Modes> {
+) -> Result<EigenModes> {
     let mut basis = fixed.shapes.clone();
     for j in 0..responses.ncols() {
         if let Some(column) = independent_part(&basis, mass, responses.get(.., j..j + 1).to_owned()) {
@@ -207,7 +207,7 @@ pub(crate) fn with_static_responses(
     let eigenvalues = (0..size).map(|k| scale * eigen.S()[k]).collect();
     let mut shapes = Mat::zeros(basis.nrows(), size);
     add_tall(shapes.as_mut(), 1.0, basis.as_ref(), eigen.U());
-    Ok(Modes { eigenvalues, shapes, residuals: fixed.residuals })
+    Ok(EigenModes { eigenvalues, shapes, residuals: fixed.residuals })
 }
 
 /// `column` without its part in the M-orthonormal `basis`, scaled to unit mass; `None` where nothing is left.

@@ -7,7 +7,7 @@
 
 use faer::{Mat, MatRef, Side};
 
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::sparse::{Factor, SparseMatrix, add_tall, tall_product};
 use crate::{Error, Result};
 
@@ -31,7 +31,7 @@ const MECHANISM: f64 = 1e-14;
 
 /// Modes of a pencil.
 #[derive(Debug, Clone)]
-pub struct Modes {
+pub struct EigenModes {
     /// ω² (rad²/s²), ascending.
     pub eigenvalues: Vec<f64>,
     /// M-orthonormal shapes, n × modes (1/√kg).
@@ -40,7 +40,7 @@ pub struct Modes {
     pub residuals: Vec<f64>,
 }
 
-impl Modes {
+impl EigenModes {
     /// The first `count`, or all where they are fewer.
     pub(crate) fn lowest(&self, count: usize) -> Self {
         let count = count.min(self.eigenvalues.len());
@@ -60,7 +60,7 @@ impl Modes {
 /// A growing M-orthonormal basis Q.
 ///
 /// It is kept in parts, so that it grows without being copied. M Q is not kept: M times a block costs less than the memory.
-struct Basis<'a> {
+struct KrylovBasis<'a> {
     mass: &'a SparseMatrix,
     parts: Vec<Mat<f64>>,
     size: usize,
@@ -68,7 +68,7 @@ struct Basis<'a> {
     capacity: usize,
 }
 
-impl<'a> Basis<'a> {
+impl<'a> KrylovBasis<'a> {
     fn new(mass: &'a SparseMatrix, capacity: usize) -> Self {
         Self { mass, parts: Vec::new(), size: 0, capacity }
     }
@@ -209,9 +209,9 @@ pub fn lowest_modes(
     factor: &Factor,
     shift: f64,
     count: usize,
-    stage: Stage,
+    stage: ReductionStage,
     listener: Listener<'_>,
-) -> Result<Modes> {
+) -> Result<EigenModes> {
     let order = mass.order();
     if count > order {
         return Err(Error::invalid(
@@ -221,10 +221,10 @@ pub fn lowest_modes(
         ));
     }
     if count == 0 {
-        return Ok(Modes { eigenvalues: Vec::new(), shapes: Mat::zeros(order, 0), residuals: Vec::new() });
+        return Ok(EigenModes { eigenvalues: Vec::new(), shapes: Mat::zeros(order, 0), residuals: Vec::new() });
     }
     let capacity = (6 * count + 20 * BLOCK).min(order);
-    let mut basis = Basis::new(mass, capacity);
+    let mut basis = KrylovBasis::new(mass, capacity);
     let mut projected = Mat::<f64>::zeros(0, 0);
     let mut seed = 0;
     // A first application of the operator makes the random start rich in low modes.
@@ -263,14 +263,19 @@ pub fn lowest_modes(
     }
 }
 
-struct Ritz {
+struct RitzValues {
     values: Vec<f64>,
     vectors: Mat<f64>,
     bounds: Vec<f64>,
 }
 
 /// Largest eigenpairs of the projected operator, with residual bounds ‖R s_last‖ / θ.
-fn ritz_pairs(projected: MatRef<'_, f64>, coupling: MatRef<'_, f64>, count: usize, complete: bool) -> Result<Ritz> {
+fn ritz_pairs(
+    projected: MatRef<'_, f64>,
+    coupling: MatRef<'_, f64>,
+    count: usize,
+    complete: bool,
+) -> Result<RitzValues> {
     let size = projected.nrows();
     // The eigenvalue solver deflates against 1, not against the matrix' norm, so the matrix is scaled to it. The block
     // columns are filled from the left, so of a pair of entries the later column's is the complete one.
@@ -286,7 +291,7 @@ fn ritz_pairs(projected: MatRef<'_, f64>, coupling: MatRef<'_, f64>, count: usiz
     let residuals = coupling * last;
     let bounds =
         (0..count).map(|k| if complete { 0.0 } else { residuals.col(k).norm_l2() / values[k].abs() }).collect();
-    Ok(Ritz { values, vectors, bounds })
+    Ok(RitzValues { values, vectors, bounds })
 }
 
 /// Form the residual of every pair explicitly and refuse what does not hold: of a basis that has reached its capacity the bounds know
@@ -297,7 +302,7 @@ fn checked(
     thetas: &[f64],
     shapes: Mat<f64>,
     basis: usize,
-) -> Result<Modes> {
+) -> Result<EigenModes> {
     let mut residuals = Vec::with_capacity(thetas.len());
     for (part, some) in thetas.chunks(CHECKED_TOGETHER).enumerate() {
         let some_shapes = shapes.get(.., part * CHECKED_TOGETHER..part * CHECKED_TOGETHER + some.len());
@@ -317,7 +322,7 @@ fn checked(
         return Err(Error::NotConverged { wanted, converged, basis, tolerance: CHECKED_TOLERANCE });
     }
     let eigenvalues = thetas.iter().map(|theta| shift + 1.0 / theta).collect();
-    Ok(Modes { eigenvalues, shapes, residuals })
+    Ok(EigenModes { eigenvalues, shapes, residuals })
 }
 
 /// Entries in [-1, 1) of a fixed sequence (splitmix64), so that results repeat from run to run.

@@ -6,15 +6,16 @@
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, RomExtras};
+use tiprub_core::rom::{ContactNode, DisplacementFrame, RomExtras};
 
 use crate::Result;
 use crate::assembly::free_dofs;
 use crate::casing::{modal_form, rigid_motions, without_rigid_motions};
 use crate::fe_model::FeModel;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{
-    ContactPoint, Held, Reduction, ReductionKind, check_nodes, compare, description, full_modes, interface, responses,
+    ContactPoint, HeldContact, Reduction, ReductionKind, check_nodes, compare, description, full_modes, interface,
+    responses,
 };
 
 /// Rigid-body motions.
@@ -48,9 +49,9 @@ pub(crate) fn reduce_free_body(
     listener: Listener<'_>,
 ) -> Result<Reduction> {
     faer::set_global_parallelism(faer::Par::Seq);
-    check_nodes(&model.nodes, &[], contact, Frame::Cartesian)?;
+    check_nodes(&model.nodes, &[], contact, DisplacementFrame::Cartesian)?;
     let free = free_dofs(model.nodes.len(), &[]);
-    let held = Held::new(&free, &model.nodes, contact, Frame::Cartesian)?;
+    let held = HeldContact::new(&free, &model.nodes, contact, DisplacementFrame::Cartesian)?;
     let inner = free.len().saturating_sub(held.interface.len());
     // All modes are all of them with the contact held.
     let kind = if options.modes.is_none() { ReductionKind::FixedInterface } else { options.kind };
@@ -67,9 +68,9 @@ pub(crate) fn reduce_free_body(
     let full = full.truncated(options.checked_modes);
     let rigid = rigid_motions(&points, reduced.mass.nrows());
     let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
-    report(listener, Stage::Checks, 0, 1);
+    report(listener, ReductionStage::Checks, 0, 1);
     let checks = without_rigid_motions(compare(&full, &model.mass, &reduced, &modes.squares, &modes.shapes));
-    report(listener, Stage::Checks, 1, 1);
+    report(listener, ReductionStage::Checks, 1, 1);
     let order = modes.squares.len();
     let exact = if count == inner { ", all of them" } else { "" };
     let kept = match kind {
@@ -84,7 +85,7 @@ pub(crate) fn reduce_free_body(
         name: options.name.clone(),
         origin: format!("{}, free to fly; {kept}", description(&model, 0)),
         sectors: 1,
-        frame: Frame::Cartesian,
+        frame: DisplacementFrame::Cartesian,
         mass: DMatrix::identity(order, order),
         stiffness: DMatrix::from_diagonal(&DVector::from_column_slice(&modes.squares)),
         damping_ratio: options.damping_ratio,

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 
 use crate::craig_bampton::{CraigBampton, dense_modes, projected, reduced_stiffness, symmetrised};
 use crate::eigen::{lowest_modes, positive_factor};
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::sparse::{SparseMatrix, add_tall, tall_product};
 use crate::{Error, Result};
 
@@ -58,8 +58,8 @@ pub fn free_interface(
         "K (stiffness of the supported structure)",
         "The structure can move as a rigid body: clamp at least three nodes that are not on one line",
     )?;
-    let found = lowest_modes(mass, &factor, 0.0, modes, Stage::FullModes, listener)?;
-    report(listener, Stage::ConstraintModes, 0, 1);
+    let found = lowest_modes(mass, &factor, 0.0, modes, ReductionStage::FullModes, listener)?;
+    report(listener, ReductionStage::ConstraintModes, 0, 1);
     let responses = factor.solve(contact.to_owned());
     drop(factor);
     let flexibility = dense(&tall_product(contact, responses.as_ref()));
@@ -83,7 +83,7 @@ pub fn free_interface(
     };
     add_tall(transformation.get_mut(.., boundary..), 1.0, left.as_ref(), faer_form(&turn).as_ref());
     let reduced_mass = projected(mass, &transformation);
-    report(listener, Stage::ConstraintModes, 1, 1);
+    report(listener, ReductionStage::ConstraintModes, 1, 1);
     Ok(CraigBampton {
         mass: symmetrised(reduced_mass.nrows(), |i, j| reduced_mass[(i, j)]),
         stiffness: reduced_stiffness(&faer_form(&stiff), &squares),

@@ -8,7 +8,7 @@
 use core::f64::consts::{PI, TAU};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use tiprub_core::rom::Patch;
+use tiprub_core::rom::ThermalPatch;
 
 use crate::mesh::{Element, Mesh};
 use crate::patches::{face_points, on_face, points_between};
@@ -36,7 +36,7 @@ const WHAT: &str = "inner surface of the casing";
 
 /// A face of an element: number of the element, its own numbers of the corners.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Face {
+pub(crate) struct InnerFace {
     pub(crate) element: usize,
     pub(crate) corners: &'static [usize],
 }
@@ -51,7 +51,7 @@ pub struct SurfacePoint {
 }
 
 /// How much of a face lies in a patch.
-enum Part {
+enum CoveredFace {
     Nothing,
     Whole,
     /// Triangles, by the natural coordinates of their corners.
@@ -59,7 +59,7 @@ enum Part {
 }
 
 /// Faces that belong to one element, in the order of elements.
-pub(crate) fn outer_faces(mesh: &Mesh) -> Vec<Face> {
+pub(crate) fn outer_faces(mesh: &Mesh) -> Vec<InnerFace> {
     let key = |element: &Element, corners: &[usize]| {
         let mut nodes: Vec<usize> = corners.iter().map(|&corner| element.nodes[corner]).collect();
         nodes.sort_unstable();
@@ -68,14 +68,14 @@ pub(crate) fn outer_faces(mesh: &Mesh) -> Vec<Face> {
     let mut count: HashMap<Vec<usize>, usize> = HashMap::new();
     let all = || {
         mesh.elements.iter().enumerate().flat_map(|(number, element)| {
-            element.kind.faces().iter().map(move |&corners| (Face { element: number, corners }, element))
+            element.kind.faces().iter().map(move |&corners| (InnerFace { element: number, corners }, element))
         })
     };
     all().for_each(|(face, element)| *count.entry(key(element, face.corners)).or_default() += 1);
     all().filter(|(face, element)| count[&key(element, face.corners)] == 1).map(|(face, _)| face).collect()
 }
 
-impl Face {
+impl InnerFace {
     pub(crate) fn corner_nodes(&self, mesh: &Mesh) -> Vec<usize> {
         self.corners.iter().map(|&corner| mesh.elements[self.element].nodes[corner]).collect()
     }
@@ -106,11 +106,11 @@ impl Face {
     }
 
     /// The same over the part of the face within a patch. The parts in patches that fill the surface fill the face.
-    pub(crate) fn integrate_within(&self, mesh: &Mesh, patch: &Patch, mut visit: impl FnMut(&[f64], f64)) {
+    pub(crate) fn integrate_within(&self, mesh: &Mesh, patch: &ThermalPatch, mut visit: impl FnMut(&[f64], f64)) {
         let triangles = match self.part(mesh, patch) {
-            Part::Nothing => return,
-            Part::Whole => return self.integrate(mesh, visit),
-            Part::Triangles(triangles) => triangles,
+            CoveredFace::Nothing => return,
+            CoveredFace::Whole => return self.integrate(mesh, visit),
+            CoveredFace::Triangles(triangles) => triangles,
         };
         let element = &mesh.elements[self.element];
         let coordinates = mesh.coordinates(element);
@@ -124,11 +124,11 @@ impl Face {
     }
 
     /// Whether some of the face lies in a patch.
-    pub(crate) fn meets(&self, mesh: &Mesh, patch: &Patch) -> bool {
-        !matches!(self.part(mesh, patch), Part::Nothing)
+    pub(crate) fn meets(&self, mesh: &Mesh, patch: &ThermalPatch) -> bool {
+        !matches!(self.part(mesh, patch), CoveredFace::Nothing)
     }
 
-    fn part(&self, mesh: &Mesh, patch: &Patch) -> Part {
+    fn part(&self, mesh: &Mesh, patch: &ThermalPatch) -> CoveredFace {
         let element = &mesh.elements[self.element];
         let coordinates = mesh.coordinates(element);
         let corners = self.corner_positions(mesh);
@@ -159,7 +159,7 @@ impl Face {
                 spans[axis][1] <= window[axis][0] + slacks[axis] || spans[axis][0] >= window[axis][1] - slacks[axis]
             };
             if inside(0) && inside(1) {
-                return Part::Whole;
+                return CoveredFace::Whole;
             }
             if beside(0) || beside(1) {
                 continue;
@@ -176,7 +176,7 @@ impl Face {
             }
             triangles.extend((2..polygon.len()).map(|i| [polygon[0], polygon[i - 1], polygon[i]]));
         }
-        if triangles.is_empty() { Part::Nothing } else { Part::Triangles(triangles) }
+        if triangles.is_empty() { CoveredFace::Nothing } else { CoveredFace::Triangles(triangles) }
     }
 
     /// The place on the face at an angle and an axial position, or the nearest to it: shape functions of the element, position, distance (m).
@@ -268,7 +268,7 @@ fn clipped(polygon: &[[f64; 3]], side: impl Fn([f64; 3]) -> f64) -> Vec<[f64; 3]
 #[derive(Debug, Clone)]
 pub struct InnerSurface<'a> {
     mesh: &'a Mesh,
-    faces: Vec<Face>,
+    faces: Vec<InnerFace>,
 }
 
 /// A border of a surface.
@@ -292,9 +292,9 @@ impl<'a> InnerSurface<'a> {
     pub fn find(mesh: &'a Mesh, set: Option<&[usize]>, axial: Option<[f64; 2]>) -> Result<Self> {
         let mut chosen = vec![set.is_none(); mesh.nodes.len()];
         set.into_iter().flatten().for_each(|&node| chosen[node] = true);
-        let within = |face: &Face| face.corner_nodes(mesh).iter().all(|&node| chosen[node]);
-        let named: Vec<Face> = outer_faces(mesh).into_iter().filter(within).collect();
-        let inner: Vec<Face> = named.iter().copied().filter(|face| face.looks_inward(mesh)).collect();
+        let within = |face: &InnerFace| face.corner_nodes(mesh).iter().all(|&node| chosen[node]);
+        let named: Vec<InnerFace> = outer_faces(mesh).into_iter().filter(within).collect();
+        let inner: Vec<InnerFace> = named.iter().copied().filter(|face| face.looks_inward(mesh)).collect();
         let [from, to] = axial.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let pieces: Vec<Self> = pieces(mesh, &inner).into_iter().map(|faces| Self { mesh, faces }).collect();
         let mut there: Vec<Self> =
@@ -515,9 +515,9 @@ fn edges(corners: &[usize]) -> Vec<[usize; 2]> {
 }
 
 /// Faces by what is connected over edges.
-fn pieces(mesh: &Mesh, faces: &[Face]) -> Vec<Vec<Face>> {
+fn pieces(mesh: &Mesh, faces: &[InnerFace]) -> Vec<Vec<InnerFace>> {
     let mut numbers: HashMap<[usize; 2], usize> = HashMap::new();
-    let of_face = |face: &Face| {
+    let of_face = |face: &InnerFace| {
         let own = edges(&face.corner_nodes(mesh)).into_iter().map(|[a, b]| {
             let next = numbers.len();
             *numbers.entry([a.min(b), a.max(b)]).or_insert(next)

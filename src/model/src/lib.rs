@@ -47,6 +47,6 @@ pub use error::{Error, Result};
 pub use fe_model::FeModel;
 pub use material::Material;
 pub use mesh::{Mesh, surface_quads};
-pub use progress::{Progress, Stage};
+pub use progress::{ReductionProgress, ReductionStage};
 pub use reduce::{Reduction, reduce, reduce_model};
 pub use rotor37::{Rotor37Options, reduce_rotor37};

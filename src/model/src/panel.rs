@@ -9,13 +9,13 @@
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, RomExtras};
+use tiprub_core::rom::{ContactGrid, ContactNode, DisplacementFrame, RomExtras};
 
 use crate::assembly::free_dofs;
 use crate::craig_bampton::{CraigBampton, with_static_responses};
-use crate::eigen::Modes;
+use crate::eigen::EigenModes;
 use crate::fe_model::FeModel;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{FullModes, Reduction, compare, description, full_modes};
 use crate::sparse::{SparseMatrix, principal_pair};
 use crate::{Error, Result};
@@ -102,10 +102,10 @@ pub(crate) fn reduce_panel(
         transformation: basis.shapes,
         fixed_interface_frequencies: Vec::new(),
     };
-    report(listener, Stage::Checks, 0, 1);
+    report(listener, ReductionStage::Checks, 0, 1);
     let judged = full.clone().truncated(options.checked_modes);
     let checks = compare(&judged, &mass, &reduced, &basis.eigenvalues, &DMatrix::identity(order, order));
-    report(listener, Stage::Checks, 1, 1);
+    report(listener, ReductionStage::Checks, 1, 1);
     let rom = Rom {
         name: options.name.clone(),
         origin: format!(
@@ -118,7 +118,7 @@ pub(crate) fn reduce_panel(
             grid.along(),
         ),
         sectors: 1,
-        frame: Frame::Cartesian,
+        frame: DisplacementFrame::Cartesian,
         contact_map: contact_map(&free, grid, &reduced.transformation),
         mass: reduced.mass,
         stiffness: reduced.stiffness,
@@ -143,13 +143,13 @@ fn grid_dofs(free: &[usize], grid: &PanelGrid) -> Vec<Option<usize>> {
 }
 
 fn with_grid_responses(
-    kept: Modes,
+    kept: EigenModes,
     full: &FullModes,
     (stiffness, mass): (&SparseMatrix, &SparseMatrix),
     dofs: &[Option<usize>],
     options: &PanelOptions,
     listener: Listener<'_>,
-) -> Result<Modes> {
+) -> Result<EigenModes> {
     let dofs: Vec<usize> = dofs.iter().copied().flatten().collect();
     let count = options.static_responses;
     if count > dofs.len() {
@@ -177,7 +177,7 @@ fn with_grid_responses(
 
 /// Force patterns on the grid, dofs × `count`, along which the modes lack most flexibility.
 fn principal_forces(
-    kept: &Modes,
+    kept: &EigenModes,
     full: &FullModes,
     dofs: &[usize],
     count: usize,
@@ -185,7 +185,7 @@ fn principal_forces(
 ) -> Result<Mat<f64>> {
     let mut lacking = Mat::zeros(dofs.len(), dofs.len());
     for (chunk, part) in dofs.chunks(COLUMNS).enumerate() {
-        report(listener, Stage::ConstraintModes, chunk * COLUMNS, dofs.len());
+        report(listener, ReductionStage::ConstraintModes, chunk * COLUMNS, dofs.len());
         let mut unit = Mat::zeros(kept.shapes.nrows(), part.len());
         part.iter().enumerate().for_each(|(j, &dof)| unit[(dof, j)] = 1.0);
         let response = full.responses(unit);

@@ -200,12 +200,12 @@ pub fn face_patches(
 const SAME_PLACE: f64 = 1e-3;
 
 /// Faces of elements with the element's own numbers of their corners.
-type Faces<'a> = Vec<(&'a Element, &'static [usize])>;
+type ElementFaces<'a> = Vec<(&'a Element, &'static [usize])>;
 
 /// ∫ h_k N_p dA over the faces, patch by patch over the nodes of the set.
 fn weights(
     mesh: &Mesh,
-    (set, faces): (&[usize], Faces<'_>),
+    (set, faces): (&[usize], ElementFaces<'_>),
     count: usize,
     hats: impl Fn([f64; 3]) -> Vec<(usize, f64)>,
 ) -> Result<Vec<Vec<f64>>> {
@@ -332,7 +332,7 @@ pub(crate) fn on_face(
 }
 
 /// Outer faces whose nodes, mid-side ones too, are all in the set.
-fn faces_within<'a>(mesh: &'a Mesh, set: &[usize]) -> Result<Faces<'a>> {
+fn faces_within<'a>(mesh: &'a Mesh, set: &[usize]) -> Result<ElementFaces<'a>> {
     let mut chosen = vec![false; mesh.nodes.len()];
     set.iter().for_each(|&node| chosen[node] = true);
     let mut found: HashMap<Vec<usize>, (usize, &Element, &'static [usize])> = HashMap::new();

@@ -4,7 +4,7 @@ use std::fmt;
 
 /// The stages of a reduction, in the order in which they run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Stage {
+pub enum ReductionStage {
     /// Building the mesh from the geometry.
     Mesh,
     /// Element matrices and their sum.
@@ -21,7 +21,7 @@ pub enum Stage {
     Spin,
 }
 
-impl fmt::Display for Stage {
+impl fmt::Display for ReductionStage {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
             Self::Mesh => "mesh",
@@ -37,20 +37,20 @@ impl fmt::Display for Stage {
 
 /// One report: how much of a stage is done.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
+pub struct ReductionProgress {
     /// The stage that runs.
-    pub stage: Stage,
+    pub stage: ReductionStage,
     /// Share of the stage that is done, 0 to 1.
     pub fraction: f64,
 }
 
 /// Who listens. Called from the calling thread only.
-pub type Listener<'a> = &'a dyn Fn(Progress);
+pub type Listener<'a> = &'a dyn Fn(ReductionProgress);
 
 /// A listener that ignores everything.
-pub fn silent(_: Progress) {}
+pub fn silent(_: ReductionProgress) {}
 
-pub(crate) fn report(listener: Listener<'_>, stage: Stage, done: usize, total: usize) {
+pub(crate) fn report(listener: Listener<'_>, stage: ReductionStage, done: usize, total: usize) {
     let fraction = if total == 0 { 1.0 } else { done.min(total) as f64 / total as f64 };
-    listener(Progress { stage, fraction });
+    listener(ReductionProgress { stage, fraction });
 }

@@ -5,7 +5,7 @@ use crate::mesh::Mesh;
 
 /// How well an element, or the worst of a mesh, is shaped.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quality {
+pub struct ElementQuality {
     /// Scaled Jacobian: over the corners, the least triple product of the unit tangents of the three edges that meet there,
     /// over its value for the regular element (1 for cubes, √3/2 for prisms, √2/2 for tetrahedra). 1 is ideal, 0 flat.
     /// P. M. Knupp, Int. J. Numer. Meth. Engng 48, 2000.
@@ -15,7 +15,7 @@ pub struct Quality {
 }
 
 /// Quality of one element from the coordinates of its nodes (m).
-pub fn quality(kind: ElementKind, coordinates: &[[f64; 3]]) -> Quality {
+pub fn quality(kind: ElementKind, coordinates: &[[f64; 3]]) -> ElementQuality {
     let nodes = kind.natural_nodes();
     let corners = &nodes[..kind.corner_count()];
     let scaled = corners.iter().enumerate().map(|(corner, point)| {
@@ -36,13 +36,13 @@ pub fn quality(kind: ElementKind, coordinates: &[[f64; 3]]) -> Quality {
     let points = nodes.iter().copied().chain(rules.iter().map(|point| point.point));
     let determinants = points.map(|point| determinant(jacobian(kind, coordinates, point)));
     let [least, most] = determinants.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
-    Quality { scaled_jacobian, jacobian_ratio: least / most.abs() }
+    ElementQuality { scaled_jacobian, jacobian_ratio: least / most.abs() }
 }
 
 /// The worst of both figures over all elements.
-pub fn worst_quality(mesh: &Mesh) -> Quality {
+pub fn worst_quality(mesh: &Mesh) -> ElementQuality {
     let all = mesh.elements.iter().map(|element| quality(element.kind, &mesh.coordinates(element)));
-    all.fold(Quality { scaled_jacobian: 1.0, jacobian_ratio: 1.0 }, |worst, one| Quality {
+    all.fold(ElementQuality { scaled_jacobian: 1.0, jacobian_ratio: 1.0 }, |worst, one| ElementQuality {
         scaled_jacobian: worst.scaled_jacobian.min(one.scaled_jacobian),
         jacobian_ratio: worst.jacobian_ratio.min(one.jacobian_ratio),
     })

@@ -7,18 +7,18 @@ mod response;
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{Basis, Frame, RomChecks, Watched};
+use tiprub_core::rom::{DisplacementFrame, ReductionBasis, RomChecks, WatchedPoints};
 use tiprub_core::shown;
 
 use crate::assembly::{Assembled, free_dofs};
 use crate::contact_point::clamped_point;
 use crate::craig_bampton::{CraigBampton, dense_modes};
-use crate::eigen::{Modes, lowest_modes, positive_factor};
+use crate::eigen::{EigenModes, lowest_modes, positive_factor};
 use crate::fe_model::FeModel;
 use crate::free_interface::free_interface;
 use crate::material::Material;
 use crate::mesh::Mesh;
-use crate::progress::{Listener, Stage, report, silent};
+use crate::progress::{Listener, ReductionStage, report, silent};
 use crate::sparse::{Factor, SparseMatrix, principal_pair, tall_product};
 use crate::spin::{
     ReducedSpin, Resting, Rotating, SPARE_MODES, SpinCheck, SpinningStates, centrifugal_load, reduced_spin,
@@ -28,10 +28,10 @@ use crate::thermal::uniform_heat;
 use crate::{Error, Result};
 
 pub use crate::contact_point::ContactPoint;
-pub(crate) use held::Held;
+pub(crate) use held::HeldContact;
 use outcome::build_rom;
 pub(crate) use outcome::{contact_node, description, direction, element_names, interface, responses};
-use response::{Seen, with_responses};
+use response::{ContactResponse, with_responses};
 
 /// How the motion of a structure is described beside its static responses to contact forces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -45,10 +45,10 @@ pub enum ReductionKind {
 
 impl ReductionKind {
     /// As the ROM tells it.
-    pub(crate) fn basis(self) -> Basis {
+    pub(crate) fn basis(self) -> ReductionBasis {
         match self {
-            Self::FixedInterface => Basis::FixedInterface,
-            Self::FreeInterface => Basis::FreeInterface,
+            Self::FixedInterface => ReductionBasis::FixedInterface,
+            Self::FreeInterface => ReductionBasis::FreeInterface,
         }
     }
 }
@@ -67,7 +67,7 @@ pub struct ReductionOptions {
     /// Number of identical uncoupled copies around the axis.
     pub sectors: usize,
     /// Directions of the contact displacements.
-    pub frame: Frame,
+    pub frame: DisplacementFrame,
     /// Points whose displacements the ROM tells beside those of the contact nodes.
     pub watched: Vec<ContactPoint>,
     /// Places whose stress the ROM recovers; from a mesh of one material.
@@ -98,7 +98,7 @@ pub struct Reduction {
     pub nodes: usize,
     /// Modes of the full model, ascending.
     pub modes: Vec<Mode>,
-    /// Largest relative residual of those modes, see [`Modes::residuals`].
+    /// Largest relative residual of those modes, see [`EigenModes::residuals`].
     pub largest_residual: f64,
     /// Degrees of freedom that are not clamped.
     pub free_dofs: usize,
@@ -164,32 +164,32 @@ pub fn reduce_model(
     let loads = contact_loads(&free, &model.nodes, contact, options.frame)?;
     let component_modes = |stiffness: &SparseMatrix, modes: usize, listener: Listener<'_>| match options.kind {
         ReductionKind::FixedInterface => {
-            let held = Held::new(&free, &model.nodes, contact, options.frame)?;
+            let held = HeldContact::new(&free, &model.nodes, contact, options.frame)?;
             held.craig_bampton(stiffness, &mass, modes, listener)
         }
         ReductionKind::FreeInterface if relieved => {
-            let held = Held::new(&free, &model.nodes, contact, options.frame)?;
+            let held = HeldContact::new(&free, &model.nodes, contact, options.frame)?;
             held.free_interface(stiffness, &mass, &own, listener)
         }
         ReductionKind::FreeInterface => free_interface(stiffness, &mass, loads.as_ref(), modes, listener),
     };
     let craig_bampton = component_modes(&stiffness, options.modes, listener)?;
-    report(listener, Stage::Checks, 0, 1);
+    report(listener, ReductionStage::Checks, 0, 1);
     let (squares, vectors) = dense_modes(&craig_bampton.stiffness, &craig_bampton.mass)?;
     let checks = compare(&full, &mass, &craig_bampton, &squares, &vectors);
-    let seen = Seen { squares: &squares, shapes: vectors.rows(0, loads.ncols()).into_owned() };
+    let seen = ContactResponse { squares: &squares, shapes: vectors.rows(0, loads.ncols()).into_owned() };
     let checks = with_responses(checks, &full, &mass, &loads, &seen, options.frame);
-    report(listener, Stage::Checks, 1, 1);
+    report(listener, ReductionStage::Checks, 1, 1);
     let spin = |speed| -> Result<ReducedSpin> {
         let resting = Resting { model: &craig_bampton, mass: &mass, free: &free, contact: loads.as_ref() };
         let states = spinning_states(&model, &free, &stiffness, speed, listener)?;
         let modes = (options.modes + SPARE_MODES).min(free.len() - loads.ncols());
         let middle = component_modes(&states.middle.stiffness, modes, &silent)?;
-        report(listener, Stage::Spin, 4, 6);
+        report(listener, ReductionStage::Spin, 4, 6);
         let largest = component_modes(&states.largest.stiffness, modes, &silent)?;
-        report(listener, Stage::Spin, 5, 6);
+        report(listener, ReductionStage::Spin, 5, 6);
         let spin = reduced_spin(&states, resting, &middle, &largest, options.checked_modes)?;
-        report(listener, Stage::Spin, 6, 6);
+        report(listener, ReductionStage::Spin, 6, 6);
         Ok(spin)
     };
     let spin = largest_speed.map(spin).transpose()?;
@@ -234,14 +234,14 @@ fn spinning_states(
     };
     let assembled = Assembled { stiffness: model.stiffness.clone(), mass: model.mass.clone() };
     let body = Rotating::new(mesh, material, &assembled, free, stiffness)?;
-    SpinningStates::find(&body, speed, &|done| report(listener, Stage::Spin, done, 6))
+    SpinningStates::find(&body, speed, &|done| report(listener, ReductionStage::Spin, done, 6))
 }
 
 /// Modes of the full model, and the factor and shift they were found with.
 #[derive(Debug, Clone)]
 pub struct FullModes {
     /// The modes.
-    pub modes: Modes,
+    pub modes: EigenModes,
     /// K - σM.
     shifted: SparseMatrix,
     /// Its factor.
@@ -282,7 +282,7 @@ pub fn full_modes(
         "K (stiffness of the supported structure)",
         "The structure can move as a rigid body: clamp at least three nodes that are not on one line",
     )?;
-    let modes = lowest_modes(mass, &factor, shift, count.min(mass.order()), Stage::FullModes, listener)?;
+    let modes = lowest_modes(mass, &factor, shift, count.min(mass.order()), ReductionStage::FullModes, listener)?;
     Ok(FullModes { modes, shifted, factor, shift })
 }
 
@@ -321,7 +321,12 @@ pub(crate) fn compare(
     RomChecks { full_frequencies, reduced_frequencies, frequency_deviation, residual_criterion, ..RomChecks::default() }
 }
 
-pub(crate) fn check_nodes(nodes: &[[f64; 3]], clamped: &[usize], contact: &[ContactPoint], frame: Frame) -> Result<()> {
+pub(crate) fn check_nodes(
+    nodes: &[[f64; 3]],
+    clamped: &[usize],
+    contact: &[ContactPoint],
+    frame: DisplacementFrame,
+) -> Result<()> {
     let touching = contact.iter().flat_map(ContactPoint::weights).map(|(node, _)| node);
     for node in clamped.iter().copied().chain(touching) {
         if node >= nodes.len() {
@@ -335,7 +340,7 @@ pub(crate) fn check_nodes(nodes: &[[f64; 3]], clamped: &[usize], contact: &[Cont
             return Err(clamped_point(point));
         }
         let on_axis = |(node, _): (usize, f64)| nodes[node][0].hypot(nodes[node][1]) <= 0.0;
-        if frame == Frame::Cylindrical && point.weights().any(on_axis) {
+        if frame == DisplacementFrame::Cylindrical && point.weights().any(on_axis) {
             let problem = "it lies on the z axis, where the radial direction is undefined";
             return Err(Error::invalid(what(), problem, "Choose another node or the Cartesian frame"));
         }
@@ -349,11 +354,16 @@ pub(crate) fn check_nodes(nodes: &[[f64; 3]], clamped: &[usize], contact: &[Cont
 
 /// Unit forces on the contact coordinates, free dofs × 3·points: node by node its three directions in `frame`, spread over the nodes of a
 /// patch with each node's own directions.
-fn contact_loads(free: &[usize], nodes: &[[f64; 3]], contact: &[ContactPoint], frame: Frame) -> Result<Mat<f64>> {
+fn contact_loads(
+    free: &[usize],
+    nodes: &[[f64; 3]],
+    contact: &[ContactPoint],
+    frame: DisplacementFrame,
+) -> Result<Mat<f64>> {
     let mut loads = Mat::zeros(free.len(), 3 * contact.len());
     for (index, point) in contact.iter().enumerate() {
         for (node, weight) in point.weights() {
-            let (cos, sin) = if frame == Frame::Cylindrical { direction(nodes[node]) } else { (1.0, 0.0) };
+            let (cos, sin) = if frame == DisplacementFrame::Cylindrical { direction(nodes[node]) } else { (1.0, 0.0) };
             for (component, unit) in [[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]].into_iter().enumerate() {
                 for (axis, share) in unit.into_iter().enumerate() {
                     let row = free.binary_search(&(3 * node + axis)).map_err(|_| clamped_point(point))?;
@@ -371,12 +381,15 @@ fn watched(
     free: &[usize],
     transformation: &Mat<f64>,
     options: &ReductionOptions,
-) -> Result<Option<Watched>> {
+) -> Result<Option<WatchedPoints>> {
     if options.watched.is_empty() {
         return Ok(None);
     }
     let rows = contact_loads(free, &model.nodes, &options.watched, options.frame)?;
     let map = tall_product(rows.as_ref(), transformation.as_ref());
     let points = options.watched.iter().map(|point| contact_node(&model.nodes, point, options.frame));
-    Ok(Some(Watched { map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]), points: points.collect() }))
+    Ok(Some(WatchedPoints {
+        map: DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]),
+        points: points.collect(),
+    }))
 }

@@ -4,7 +4,7 @@
 
 use faer::Mat;
 use nalgebra::{DMatrix, Matrix3};
-use tiprub_core::rom::{ContactNode, Frame, STRESSES, Watched, von_mises};
+use tiprub_core::rom::{ContactNode, DisplacementFrame, STRESSES, WatchedPoints, von_mises};
 
 use crate::element::nodal_stress;
 use crate::fe_model::FeModel;
@@ -31,11 +31,11 @@ impl StressPlaces {
 }
 
 /// Stress at a node per displacement of the nodes around it: (node, component, of each of the six stresses).
-type Rows = Vec<(usize, usize, [f64; STRESSES])>;
+type StressRows = Vec<(usize, usize, [f64; STRESSES])>;
 
 /// Means of the elements around each of these nodes.
-fn rows(mesh: &Mesh, material: &Material, nodes: &[usize]) -> Result<Vec<Rows>> {
-    let mut all = vec![(Rows::new(), 0.0); nodes.len()];
+fn rows(mesh: &Mesh, material: &Material, nodes: &[usize]) -> Result<Vec<StressRows>> {
+    let mut all = vec![(StressRows::new(), 0.0); nodes.len()];
     for (number, element) in mesh.elements.iter().enumerate() {
         for (local, node) in element.nodes.iter().enumerate() {
             for (place, _) in nodes.iter().enumerate().filter(|(_, own)| *own == node) {
@@ -50,7 +50,7 @@ fn rows(mesh: &Mesh, material: &Material, nodes: &[usize]) -> Result<Vec<Rows>> 
             }
         }
     }
-    let mean = |(rows, around): (Rows, f64)| {
+    let mean = |(rows, around): (StressRows, f64)| {
         let share =
             |(node, axis, values): (usize, usize, [f64; STRESSES])| (node, axis, values.map(|one| one / around));
         rows.into_iter().map(share).collect()
@@ -66,11 +66,12 @@ fn stress_rows(
     (mesh, material): (&Mesh, &Material),
     free: &[usize],
     nodes: &[usize],
-    frame: Frame,
+    frame: DisplacementFrame,
 ) -> Result<Mat<f64>> {
     let mut loads = Mat::zeros(free.len(), STRESSES * nodes.len());
     for (place, rows) in rows(mesh, material, nodes)?.into_iter().enumerate() {
-        let (cos, sin) = if frame == Frame::Cylindrical { direction(mesh.nodes[nodes[place]]) } else { (1.0, 0.0) };
+        let (cos, sin) =
+            if frame == DisplacementFrame::Cylindrical { direction(mesh.nodes[nodes[place]]) } else { (1.0, 0.0) };
         for (node, axis, values) in rows {
             // What is clamped does not move.
             let Ok(row) = free.binary_search(&(3 * node + axis)) else { continue };
@@ -210,10 +211,10 @@ pub(crate) fn recovered_stress(
 
 impl RecoveredStress {
     /// Per reduced coordinate.
-    pub(crate) fn reduced(&self, transformation: &Mat<f64>) -> Watched {
+    pub(crate) fn reduced(&self, transformation: &Mat<f64>) -> WatchedPoints {
         let map = tall_product(self.rows.as_ref(), transformation.as_ref());
         let map = DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)]);
-        Watched { map, points: self.points.clone() }
+        WatchedPoints { map, points: self.points.clone() }
     }
 
     /// Of displacements (free dofs × 1), 6·places × 1.

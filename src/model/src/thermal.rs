@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::rom::{Patch, Thermal};
+use tiprub_core::rom::{Thermal, ThermalPatch};
 
 use crate::element::{ElementKind, QuadraturePoint, thermal_load_of};
 use crate::fe_model::FeModel;
@@ -25,28 +25,29 @@ const EDGE: f64 = 1e-9;
 
 /// Equal patches, `around` × `along`, over a whole turn from θ = 0 and the axial positions `axial` (m); those of one
 /// ring follow each other.
-pub fn equal_patches(around: usize, along: usize, axial: [f64; 2]) -> Vec<Patch> {
+pub fn equal_patches(around: usize, along: usize, axial: [f64; 2]) -> Vec<ThermalPatch> {
     let part = |[from, to]: [f64; 2], index: usize, count: usize| {
         [index, index + 1].map(|edge| if edge == count { to } else { from + (to - from) * edge as f64 / count as f64 })
     };
-    let ring = |k| (0..around).map(move |i| Patch { angle: part([0.0, TAU], i, around), axial: part(axial, k, along) });
+    let ring =
+        |k| (0..around).map(move |i| ThermalPatch { angle: part([0.0, TAU], i, around), axial: part(axial, k, along) });
     (0..along).flat_map(ring).collect()
 }
 
 /// The patch that holds all of a mesh.
-pub fn whole_mesh(mesh: &Mesh) -> Patch {
+pub fn whole_mesh(mesh: &Mesh) -> ThermalPatch {
     let axial = mesh.nodes.iter().map(|node| node[2]);
     let (low, high) = axial.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
     // Beyond the last centroid.
     let margin = 0.01 * (high - low);
-    Patch { angle: [0.0, TAU], axial: [low - margin, high + margin] }
+    ThermalPatch { angle: [0.0, TAU], axial: [low - margin, high + margin] }
 }
 
 /// The patch of every element: the one that its centroid (mean of its corners) lies in.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a patch without elements and for patches that overlap.
-pub fn patch_of_elements(mesh: &Mesh, patches: &[Patch]) -> Result<Vec<Option<usize>>> {
+pub fn patch_of_elements(mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Vec<Option<usize>>> {
     let (low, high) = mesh
         .nodes
         .iter()
@@ -72,7 +73,7 @@ pub fn patch_of_elements(mesh: &Mesh, patches: &[Patch]) -> Result<Vec<Option<us
         found.push(first);
     }
     if let Some(empty) = filled.iter().position(|&filled| !filled) {
-        let Patch { angle, axial } = patches[empty];
+        let ThermalPatch { angle, axial } = patches[empty];
         return Err(Error::invalid(
             format!("thermal patch {}", empty + 1),
             format!("no element has its centroid at angles {angle:?} rad and axial positions {axial:?} m"),
@@ -97,7 +98,7 @@ pub(crate) enum ElementShare {
 ///
 /// # Errors
 /// Those of [`patch_of_elements`].
-pub(crate) fn shares_of_elements(mesh: &Mesh, patches: &[Patch]) -> Result<Vec<ElementShare>> {
+pub(crate) fn shares_of_elements(mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Vec<ElementShare>> {
     let share = |(element, found): (&Element, Option<usize>)| {
         let corners = || element.nodes[..element.kind.corner_count()].iter().map(|&node| mesh.nodes[node]);
         let ends = |axis: usize| {
@@ -108,7 +109,7 @@ pub(crate) fn shares_of_elements(mesh: &Mesh, patches: &[Patch]) -> Result<Vec<E
         let slack = EDGE * (high - low);
         let [x, y, _] = centroid(mesh, element);
         // Angles of the corners from the middle of a patch.
-        let within = |patch: &Patch| {
+        let within = |patch: &ThermalPatch| {
             let (middle, half) = (0.5 * (patch.angle[0] + patch.angle[1]), 0.5 * (patch.angle[1] - patch.angle[0]));
             let turned = (y.atan2(x) - middle + PI).rem_euclid(TAU) - PI;
             let around = corners().all(|[cx, cy, _]| {
@@ -131,7 +132,7 @@ pub(crate) fn shares_of_elements(mesh: &Mesh, patches: &[Patch]) -> Result<Vec<E
 pub(crate) fn patches_of_points(
     coordinates: &[[f64; 3]],
     (kind, rule): (ElementKind, &[QuadraturePoint]),
-    patches: &[Patch],
+    patches: &[ThermalPatch],
 ) -> Vec<(usize, Vec<QuadraturePoint>)> {
     let mut found: BTreeMap<usize, Vec<QuadraturePoint>> = BTreeMap::new();
     for point in rule {
@@ -150,7 +151,7 @@ pub(crate) fn patches_of_points(
 ///
 /// # Errors
 /// Those of [`patch_of_elements`]; [`Error::NegativeJacobian`].
-pub fn patch_loads(mesh: &Mesh, material: &Material, patches: &[Patch]) -> Result<Mat<f64>> {
+pub fn patch_loads(mesh: &Mesh, material: &Material, patches: &[ThermalPatch]) -> Result<Mat<f64>> {
     let mut loads = Mat::zeros(3 * mesh.nodes.len(), patches.len());
     for (number, (element, share)) in mesh.elements.iter().zip(shares_of_elements(mesh, patches)?).enumerate() {
         let coordinates = mesh.coordinates(element);
@@ -176,7 +177,7 @@ pub fn patch_loads(mesh: &Mesh, material: &Material, patches: &[Patch]) -> Resul
 pub(crate) struct UniformHeat {
     /// Nodal forces per kelvin, free dofs × 1 (N/K).
     pub(crate) forces: Mat<f64>,
-    patches: Vec<Patch>,
+    patches: Vec<ThermalPatch>,
 }
 
 /// Load per kelvin of the whole structure, of a mesh of one material that expands.
@@ -204,7 +205,7 @@ fn centroid(mesh: &Mesh, element: &Element) -> [f64; 3] {
 }
 
 /// Whether a point lies in a patch, its lower edges included.
-fn contains(patch: &Patch, angle: f64, axial: f64, slack: f64) -> bool {
+fn contains(patch: &ThermalPatch, angle: f64, axial: f64, slack: f64) -> bool {
     let beyond = (angle - patch.angle[0]).rem_euclid(TAU);
     // Just below the edge counts as on it.
     let beyond = if beyond > TAU * (1.0 - EDGE) { 0.0 } else { beyond };

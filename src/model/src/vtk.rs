@@ -16,14 +16,14 @@ use crate::{Error, Result};
 
 /// One quantity at every node.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Field {
+pub struct NodalField {
     /// Name under which ParaView shows it.
     pub name: String,
     /// Its values.
     pub values: Values,
 }
 
-/// Values of a [`Field`], one per node.
+/// Values of a [`NodalField`], one per node.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
     /// Scalars.
@@ -32,7 +32,7 @@ pub enum Values {
     Vectors(Vec<[f64; 3]>),
 }
 
-impl Field {
+impl NodalField {
     /// A vector at every node.
     pub fn vectors(name: impl Into<String>, values: Vec<[f64; 3]>) -> Self {
         Self { name: name.into(), values: Values::Vectors(values) }
@@ -61,7 +61,7 @@ impl Field {
 /// # Errors
 /// [`Error::Invalid`] for an unsound mesh, a field with another number of values than the mesh has nodes, and names that
 /// appear twice.
-pub fn write(mesh: &Mesh, fields: &[Field]) -> Result<Vec<u8>> {
+pub fn write(mesh: &Mesh, fields: &[NodalField]) -> Result<Vec<u8>> {
     mesh.validate()?;
     check_fields(mesh, fields)?;
     let (points, cells) = (mesh.nodes.len(), mesh.elements.len());
@@ -138,7 +138,7 @@ fn set_name(name: &str) -> String {
     format!("set_{name}")
 }
 
-fn check_fields(mesh: &Mesh, fields: &[Field]) -> Result<()> {
+fn check_fields(mesh: &Mesh, fields: &[NodalField]) -> Result<()> {
     let mut names: Vec<String> = mesh.sets.keys().map(|name| set_name(name)).collect();
     for field in fields {
         let what = || format!("field `{}`", field.name);

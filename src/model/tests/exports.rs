@@ -8,11 +8,11 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use common::straight_box;
 use nalgebra::Complex;
-use tiprub_model::casing::{ContactRings, Contour, Flange, RingCounts, RingGeometry, ring_mesh};
+use tiprub_model::casing::{ContactRings, Flange, InnerContour, RingCounts, RingGeometry, ring_mesh};
 use tiprub_model::element::ElementKind;
 use tiprub_model::inp::{CyclicSymmetry, calculix_cyclic_input, calculix_input};
 use tiprub_model::stage::{SectorOptions, sector_mesh};
-use tiprub_model::vtk::{self, Field, Values};
+use tiprub_model::vtk::{self, NodalField, Values};
 use tiprub_model::{Material, Mesh};
 
 fn coarse() -> Mesh {
@@ -44,7 +44,7 @@ fn numbers(line: &str) -> Vec<usize> {
 fn a_calculix_file_holds_the_mesh_again() {
     let ring = ring_mesh(
         &RingGeometry {
-            contour: Contour::new(&[[-0.02, 0.3], [0.02, 0.29]]).unwrap(),
+            contour: InnerContour::new(&[[-0.02, 0.3], [0.02, 0.29]]).unwrap(),
             thickness: 0.004,
             flanges: [Some(Flange { thickness: 0.004, height: 0.01 }), None],
         },
@@ -134,8 +134,8 @@ fn a_vtk_file_holds_mesh_sets_and_fields() {
     let mesh = coarse();
     let heights: Vec<f64> = mesh.nodes.iter().map(|node| node[2]).collect();
     let shape: Vec<[Complex<f64>; 3]> = mesh.nodes.iter().map(|node| node.map(|x| Complex::new(x, 2.0 * x))).collect();
-    let mut fields = vec![Field::scalars("height & \"more\"", heights.clone())];
-    fields.extend(Field::mode("mode", &shape));
+    let mut fields = vec![NodalField::scalars("height & \"more\"", heights.clone())];
+    fields.extend(NodalField::mode("mode", &shape));
     let text = String::from_utf8(vtk::write(&mesh, &fields).unwrap()).unwrap();
     assert!(text.contains("NumberOfPoints=\"294\" NumberOfCells=\"60\""));
     assert_eq!(reals(&text, "Points"), mesh.nodes.concat());
@@ -165,11 +165,11 @@ fn a_vtk_file_holds_mesh_sets_and_fields() {
 fn fields_that_do_not_fit_are_refused() {
     let mesh = coarse();
     let count = mesh.nodes.len();
-    let short = Field { name: "short".into(), values: Values::Vectors(vec![[0.0; 3]; count - 1]) };
+    let short = NodalField { name: "short".into(), values: Values::Vectors(vec![[0.0; 3]; count - 1]) };
     assert!(vtk::write(&mesh, &[short]).unwrap_err().to_string().contains("`short`: 293 values for 294 nodes"));
-    let twice = [Field::scalars("a", vec![0.0; count]), Field::scalars("a", vec![0.0; count])];
+    let twice = [NodalField::scalars("a", vec![0.0; count]), NodalField::scalars("a", vec![0.0; count])];
     assert!(vtk::write(&mesh, &twice).unwrap_err().to_string().contains("`a`: its name appears twice"));
-    let set = [Field::scalars("set_TIP", vec![0.0; count])];
+    let set = [NodalField::scalars("set_TIP", vec![0.0; count])];
     assert!(vtk::write(&mesh, &set).is_err());
 }
 

@@ -6,10 +6,10 @@
 use std::f64::consts::TAU;
 
 use guide::told;
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 use tiprub_core::settings::StructureSettings;
 use tiprub_core::{Rom, Scene, Simulation};
-use tiprub_model::casing::{ContactRings, Contour, RingCounts, RingGeometry, Support};
+use tiprub_model::casing::{ContactRings, InnerContour, RingCounts, RingGeometry, RingSupport};
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
 use tiprub_model::progress::silent;
@@ -54,7 +54,7 @@ fn bar(elements: usize, kind: ReductionKind) -> Rom {
         modes: 6,
         checked_modes: 6,
         sectors: 8,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         watched: Vec::new(),
         stress: StressPlaces { nodes: places, modes: 0 },
         damping_ratio: 0.01,
@@ -69,7 +69,7 @@ fn ring() -> (Rom, f64) {
     let options = CasingOptions {
         name: "ring".into(),
         geometry: RingGeometry {
-            contour: Contour::new(&[[-0.02, radius], [0.02, radius]]).unwrap(),
+            contour: InnerContour::new(&[[-0.02, radius], [0.02, radius]]).unwrap(),
             thickness: 4e-3,
             flanges: [None, None],
         },
@@ -79,7 +79,7 @@ fn ring() -> (Rom, f64) {
         fixed_interface_modes: 12,
         modes: 30,
         checked_modes: 10,
-        support: Support::Free,
+        support: RingSupport::Free,
         ..CasingOptions::default()
     };
     (reduce_ring(&options, &silent).unwrap().rom, options.material.expansion)

@@ -6,7 +6,7 @@ use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::element::consistent_mass;
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::full_modes;
-use tiprub_model::rotor37::{FIT_ALONG_THETA, FIT_DISTANCE, MeshCounts, Section, blade_mesh, sections};
+use tiprub_model::rotor37::{AerofoilSection, FIT_ALONG_THETA, FIT_DISTANCE, MeshCounts, blade_mesh, sections};
 use tiprub_model::sparse::principal_pair;
 use tiprub_model::{Reduction, Rotor37Options, inp, reduce_rotor37, surface_quads};
 
@@ -55,7 +55,7 @@ fn distance_to_segment(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
 }
 
 /// θ at which the fitted side runs over the plane abscissa `x`; `None` on the edge arcs.
-fn side_theta(section: &Section, side: f64, x: f64) -> Option<f64> {
+fn side_theta(section: &AerofoilSection, side: f64, x: f64) -> Option<f64> {
     let at = |u: f64| {
         let [camber, half] = section.sides(u);
         section.plane(u, camber + side * half)

@@ -6,7 +6,7 @@ use tiprub_core::settings::{Meridian, SpinSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::ReductionKind;
-use tiprub_model::rotor37::{DESIGN_SPEED, Tip};
+use tiprub_model::rotor37::{DESIGN_SPEED, TipContact};
 use tiprub_model::{Rotor37Options, reduce_rotor37};
 use tiprub_test_models as models;
 
@@ -48,7 +48,7 @@ fn clearance_of(node: &ContactNode, [x, y, z]: [f64; 3]) -> f64 {
 
 fn reduced() -> Rom {
     let options = Rotor37Options {
-        tip: Tip::Nodes(NODES),
+        tip: TipContact::Nodes(NODES),
         kind: ReductionKind::FreeInterface,
         modes: MODES,
         spin: Some(DESIGN_SPEED),

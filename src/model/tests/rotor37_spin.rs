@@ -8,7 +8,7 @@ use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::ReductionKind;
 use tiprub_model::reduce::full_modes;
-use tiprub_model::rotor37::{DESIGN_SPEED, MeshCounts, Tip, blade_mesh};
+use tiprub_model::rotor37::{DESIGN_SPEED, MeshCounts, TipContact, blade_mesh};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::spin::{
     Rotating, SpinningState, frequencies_at, gyroscopic_frequencies, static_growth, stiffness_at, turned_about_axis,
@@ -25,7 +25,7 @@ fn reference(kind: &str, speed: f64) -> Vec<(usize, Vec<f64>)> {
         .collect()
 }
 
-struct Blade {
+struct SpinBlade {
     mesh: Mesh,
     assembled: Assembled,
     free: Vec<usize>,
@@ -33,7 +33,7 @@ struct Blade {
     mass: SparseMatrix,
 }
 
-impl Blade {
+impl SpinBlade {
     fn new(counts: MeshCounts) -> Self {
         let mesh = blade_mesh(counts).unwrap().mesh;
         let assembled = assemble(&mesh, &Material::maraging_steel(), &silent).unwrap();
@@ -50,9 +50,9 @@ impl Blade {
 }
 
 /// The full blade, made once.
-fn full() -> &'static Blade {
-    static BLADE: OnceLock<Blade> = OnceLock::new();
-    BLADE.get_or_init(|| Blade::new(MeshCounts::default()))
+fn full() -> &'static SpinBlade {
+    static BLADE: OnceLock<SpinBlade> = OnceLock::new();
+    BLADE.get_or_init(|| SpinBlade::new(MeshCounts::default()))
 }
 
 /// The reduced blade, made once for all tests of this file.
@@ -185,7 +185,7 @@ fn contact_nodes_yield_under_spin_as_in_the_full_model() {
 fn coriolis_couples_the_modes_as_in_the_full_model() {
     let mesh = COARSE;
     let options = Rotor37Options { mesh, modes: 80, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
-    let (blade, rom) = (Blade::new(mesh), reduce_rotor37(&options, &silent).unwrap().rom);
+    let (blade, rom) = (SpinBlade::new(mesh), reduce_rotor37(&options, &silent).unwrap().rom);
     let spin = rom.extras.spin.as_ref().unwrap();
     let modes = full_modes(&blade.at(DESIGN_SPEED).stiffness, &blade.mass, false, 6, &silent).unwrap().modes;
     let full = modes.shapes.transpose() * blade.mass.times(turned_about_axis(&blade.free, &modes.shapes).as_ref());
@@ -269,10 +269,10 @@ const COARSE: MeshCounts = MeshCounts { chord: 8, thickness: 1, span: 10 };
 fn other_reductions_hold_as_well() {
     use ReductionKind::{FixedInterface, FreeInterface};
     for (tip, kind, modes) in [
-        (Tip::Patches(5), FixedInterface, 20),
-        (Tip::Nodes(3), FixedInterface, 40),
-        (Tip::Patches(5), FreeInterface, 20),
-        (Tip::Nodes(3), FreeInterface, 20),
+        (TipContact::Patches(5), FixedInterface, 20),
+        (TipContact::Nodes(3), FixedInterface, 40),
+        (TipContact::Patches(5), FreeInterface, 20),
+        (TipContact::Nodes(3), FreeInterface, 20),
     ] {
         let (mesh, spin) = (MeshCounts { chord: 14, thickness: 1, span: 18 }, Some(DESIGN_SPEED));
         let options = Rotor37Options { mesh, tip, kind, modes, checked_modes: 6, spin, ..Rotor37Options::paper() };

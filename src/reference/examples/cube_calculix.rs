@@ -10,7 +10,7 @@ fn main() {
     };
     let says = |word: &str| arguments.iter().any(|argument| argument == word);
     let file = arguments.get(1).expect("the name of the file to write");
-    let run = calculix::Run {
+    let run = calculix::CalculixRun {
         speed: 100.0,
         friction: number(4, FRICTION),
         increment: number(2, 2e-6),

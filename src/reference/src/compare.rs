@@ -1,6 +1,6 @@
 //! Agreement of two histories, as numbers.
 
-use crate::cube::history::History;
+use crate::cube::history::CubeHistory;
 
 /// Value at a time between samples, by straight lines; the nearest end outside.
 pub fn sample(times: &[f64], values: &[f64], time: f64) -> f64 {
@@ -41,7 +41,7 @@ pub fn windowed(times: &[f64], force: &[f64], length: f64, end: f64) -> Vec<f64>
 
 /// How far a history is from another.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Agreement {
+pub struct HistoryDifference {
     /// Relative L2 difference of u1x, u1y + vt (the slowing down) and u1z while node 1 touches.
     pub touching: [f64; 3],
     /// The same while any node of the cube touches.
@@ -64,8 +64,8 @@ pub struct Agreement {
 pub const WINDOW: f64 = 20e-6;
 
 /// Compare `a` with `b`, both run at `speed` (m/s); `touching` and `contact` are the ends of the two windows (s).
-pub fn agreement(a: &History, b: &History, speed: f64, touching: f64, contact: f64) -> Agreement {
-    let series = |history: &History, component: usize| -> Vec<f64> {
+pub fn agreement(a: &CubeHistory, b: &CubeHistory, speed: f64, touching: f64, contact: f64) -> HistoryDifference {
+    let series = |history: &CubeHistory, component: usize| -> Vec<f64> {
         let lag = if component == 1 { speed } else { 0.0 };
         history.first(component).iter().zip(&history.times).map(|(u, t)| u + lag * t).collect()
     };
@@ -73,16 +73,17 @@ pub fn agreement(a: &History, b: &History, speed: f64, touching: f64, contact: f
     let l2 = |component: usize, end: f64| {
         relative_l2((&a.times, &series(a, component)), (&b.times, &series(b, component)), &until(end))
     };
-    let window = |history: &History| windowed(&history.times, &history.first_force(), WINDOW, touching + 2.0 * WINDOW);
+    let window =
+        |history: &CubeHistory| windowed(&history.times, &history.first_force(), WINDOW, touching + 2.0 * WINDOW);
     let (first, second) = (window(a), window(b));
     let norm = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>().sqrt();
     let differences: Vec<f64> = first.iter().zip(&second).map(|(x, y)| x - y).collect();
     let peak = |values: &[f64]| values.iter().fold(0.0, |largest: f64, x| largest.max(*x));
-    let left = |history: &History| {
+    let left = |history: &CubeHistory| {
         let forces: Vec<f64> = history.forces.iter().map(|sides| sides[0]).collect();
         windowed(&history.times, &forces, contact, contact)[0]
     };
-    Agreement {
+    HistoryDifference {
         touching: [l2(0, touching), l2(1, touching), l2(2, touching)],
         contact: [l2(0, contact), l2(1, contact), l2(2, contact)],
         path: relative_l2((&a.times, &a.first(1)), (&b.times, &b.first(1)), &until(contact)),
@@ -95,13 +96,13 @@ pub fn agreement(a: &History, b: &History, speed: f64, touching: f64, contact: f
 }
 
 /// Speed of the cube's centre along −y at the end (m/s).
-pub fn exit_speed(history: &History) -> f64 {
+pub fn exit_speed(history: &CubeHistory) -> f64 {
     history.velocity.last().map_or(f64::NAN, |velocity| -velocity[1])
 }
 
 /// Largest difference between left and right: displacements ux of the corner pairs (1, 31), (6, 36), (85, 91), (90, 96)
 /// relative to the largest, and their forces relative to the largest.
-pub fn asymmetry(history: &History, until: f64) -> [f64; 2] {
+pub fn asymmetry(history: &CubeHistory, until: f64) -> [f64; 2] {
     let mut largest = [0.0_f64; 2];
     let mut difference = [0.0_f64; 2];
     for (i, _) in history.times.iter().enumerate().filter(|(_, time)| **time <= until) {

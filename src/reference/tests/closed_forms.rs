@@ -6,7 +6,7 @@ use tiprub_model::mesh::Element;
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::full_modes;
 use tiprub_model::{FeModel, Material, Mesh};
-use tiprub_reference::closed::belt::Belt;
+use tiprub_reference::closed::belt::StickSlipBelt;
 use tiprub_reference::closed::bouncing_bar::{self as bar, displacement, pressure};
 use tiprub_reference::closed::frequencies::{cantilever, cantilever_root, cyclic_chain, free_ring};
 use tiprub_reference::closed::impact::{Hertz, rigid_bounce};
@@ -138,7 +138,7 @@ fn bounces_of_rigid_bodies_follow_their_force_laws() {
 
 #[test]
 fn the_block_on_the_belt_follows_its_equation_of_motion() {
-    let belt = Belt { mass: 2.0, stiffness: 5000.0, speed: 0.1, sticking: 120.0, sliding: 80.0 };
+    let belt = StickSlipBelt { mass: 2.0, stiffness: 5000.0, speed: 0.1, sticking: 120.0, sliding: 80.0 };
     // Starts to slide when the spring pulls with F_s; velocity Verlet under F_k until it has the speed of the belt again.
     let (step, mut x, mut v, mut time) = (1e-7, belt.sticking / belt.stiffness, belt.speed, 0.0);
     let force = |x: f64| (belt.sliding - belt.stiffness * x) / belt.mass;

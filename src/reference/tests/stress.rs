@@ -3,9 +3,9 @@
 use tiprub_reference::blade::{PushedBlade, equivalent};
 
 /// Node (from 0), and displacements, stress of the same displacements, CalculiX's own stress.
-type Row = (usize, [f64; 3], [f64; 6], [f64; 6]);
+type StressRow = (usize, [f64; 3], [f64; 6], [f64; 6]);
 
-fn recorded() -> Vec<Row> {
+fn recorded() -> Vec<StressRow> {
     let lines = include_str!("data/blade_stress_calculix.csv").lines();
     let rows = lines.filter(|line| line.starts_with("mode_")).map(|line| {
         let values: Vec<f64> = line.split(',').skip(1).map(|value| value.parse().unwrap()).collect();

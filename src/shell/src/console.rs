@@ -48,7 +48,7 @@ const READER_LEFT: u8 = 128 + 13;
 
 /// Result of a command, in both forms the user can ask for.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Outcome {
+pub struct CommandOutcome {
     /// For people: the answer.
     pub text: String,
     /// What the answer is to be read with, on stderr behind it.
@@ -148,7 +148,7 @@ impl Console {
     }
 
     /// Print what came of the command: the result on stdout, or the failure. Returns the exit code of the program.
-    pub fn finish(&self, result: Result<Outcome>) -> ExitCode {
+    pub fn finish(&self, result: Result<CommandOutcome>) -> ExitCode {
         match result.and_then(|outcome| self.deliver(&outcome)) {
             Ok(code) => code,
             Err(failure) => {
@@ -162,7 +162,7 @@ impl Console {
     ///
     /// # Errors
     /// Stdout takes it not or in part, such as a file on a full disk.
-    fn deliver(&self, outcome: &Outcome) -> Result<ExitCode> {
+    fn deliver(&self, outcome: &CommandOutcome) -> Result<ExitCode> {
         let json = self.json.then(|| format!("{:#}", outcome.json));
         let text = json.as_deref().map_or_else(|| printable(outcome.text.trim_end()), printable_json);
         let code = print(&text)?;
@@ -238,9 +238,9 @@ mod tests {
 
     #[test]
     fn prints_two_lines_per_topic_for_any_number_of_warnings() {
-        use tiprub_core::warning::{Level, Topic};
+        use tiprub_core::warning::{Severity, Topic};
         let slow = |name: &str| Warning::new(Topic::Sticking, "too slow", "Turn faster").named(name);
-        let flutter = Warning::new(Topic::Flutter, "contact grows", "Nothing to do").at_level(Level::Note);
+        let flutter = Warning::new(Topic::Flutter, "contact grows", "Nothing to do").at_level(Severity::Note);
         let all = [slow("front"), flutter, slow("rear")];
         let lines = warning_lines(&all);
         assert_eq!(lines[0], "warning [sticking] front: too slow\n    Turn faster (1 more of this kind: --all)");

@@ -23,7 +23,7 @@ const LONG: f64 = 20.0;
 
 /// Work of one kind.
 #[derive(Debug, Clone, Copy, Default)]
-struct Kind {
+struct WorkKind {
     planned: f64,
     done: f64,
     seconds: f64,
@@ -31,15 +31,15 @@ struct Kind {
 
 /// What is planned and done.
 #[derive(Debug, Clone)]
-pub struct Ledger {
-    kinds: Vec<Kind>,
+pub struct WorkPlan {
+    kinds: Vec<WorkKind>,
     /// Seconds per unit before anything is measured.
     rate: f64,
     /// Largest share given so far.
     shown: f64,
 }
 
-impl Ledger {
+impl WorkPlan {
     /// Nothing planned; `rate` is in seconds per unit.
     pub fn new(rate: f64) -> Self {
         Self { kinds: Vec::new(), rate, shown: 0.0 }
@@ -58,9 +58,9 @@ impl Ledger {
         own.planned = own.planned.max(own.done);
     }
 
-    fn kind(&mut self, kind: usize) -> &mut Kind {
+    fn kind(&mut self, kind: usize) -> &mut WorkKind {
         if self.kinds.len() <= kind {
-            self.kinds.resize(kind + 1, Kind::default());
+            self.kinds.resize(kind + 1, WorkKind::default());
         }
         &mut self.kinds[kind]
     }
@@ -70,7 +70,7 @@ impl Ledger {
         let measured = self.kinds.iter().filter(|kind| kind.done > 0.0);
         let (units, seconds) = measured.fold((0.0, 0.0), |(units, all), kind| (units + kind.done, all + kind.seconds));
         let usual = if units > 0.0 { seconds / units } else { self.rate };
-        let left = |kind: &Kind| {
+        let left = |kind: &WorkKind| {
             let rate = if kind.done > 0.0 { kind.seconds / kind.done } else { usual };
             (kind.planned - kind.done) * rate
         };
@@ -92,12 +92,12 @@ impl Ledger {
 pub struct Forecast {
     task: Task,
     title: String,
-    state: RefCell<State>,
+    state: RefCell<ForecastState>,
 }
 
 #[derive(Debug)]
-struct State {
-    ledger: Ledger,
+struct ForecastState {
+    ledger: WorkPlan,
     /// When the last work was done.
     last: Instant,
     /// Share and time of the last line.
@@ -106,14 +106,14 @@ struct State {
 
 impl Forecast {
     /// Show planned work, and say how long it takes where that is long.
-    pub fn new(console: &Console, title: &str, ledger: Ledger) -> Self {
+    pub fn new(console: &Console, title: &str, ledger: WorkPlan) -> Self {
         let seconds = ledger.left();
         if seconds >= LONG {
             console.say(format_args!("{title}: about {}, a first estimate", duration(seconds)));
         }
         let (last, line) = (Instant::now(), (0.0, Instant::now()));
         let task = console.task(title, Some(PARTS));
-        Self { task, title: title.to_owned(), state: RefCell::new(State { ledger, last, line }) }
+        Self { task, title: title.to_owned(), state: RefCell::new(ForecastState { ledger, last, line }) }
     }
 
     /// Plan more work of a kind.
@@ -164,7 +164,7 @@ mod tests {
     fn progress_never_falls_and_ends_at_one_for_any_first_estimate() {
         let truth = |kind: usize, index: usize| [0.01, 1.0, 0.1][kind] * (1.0 + 0.5 * (index % 3) as f64);
         for rate in [1e-4, 1.0, 1e4] {
-            let mut ledger = Ledger::new(rate);
+            let mut ledger = WorkPlan::new(rate);
             let work: Vec<(usize, f64)> =
                 (0..60).map(|index| ([0, 2, 1][index / 20], 1.0 + (index % 4) as f64)).collect();
             work.iter().for_each(|(kind, units)| ledger.plan(*kind, *units));
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn the_rest_follows_what_was_measured() {
-        let mut ledger = Ledger::new(1.0);
+        let mut ledger = WorkPlan::new(1.0);
         ledger.plan(0, 10.0);
         ledger.plan(1, 10.0);
         assert!((ledger.left() - 20.0).abs() < 1e-12);

@@ -7,7 +7,7 @@ use std::{
 
 use tiprub_core::{
     Simulation, Warning,
-    variables::{Causality, Kind, Quantity, Variability, Variable},
+    variables::{Causality, DataType, Quantity, Variability, Variable},
     warning::Topic,
 };
 
@@ -20,7 +20,7 @@ const MOST_SHOWN: usize = 60;
 
 /// Inputs over time: a column each, linear between the rows, and as in the first and the last row before and after them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct History {
+pub struct InputHistory {
     /// Where it is from, for messages.
     name: String,
     /// Names of the columns after the time.
@@ -31,7 +31,7 @@ pub struct History {
     values: Vec<f64>,
 }
 
-impl History {
+impl InputHistory {
     /// Read a CSV file whose first column is `time` (s), the others inputs and tunable parameters by their names of FMI 2.0.
     ///
     /// # Errors
@@ -122,9 +122,9 @@ impl History {
                 return Err(Failure::new(format!("{}, `{name}`", self.name), problem, remedy));
             };
             elements.push(match (row.causality, row.quantity) {
-                (Causality::Input, _) => Element::Line(reference),
-                (_, Quantity::GapOffset) => Element::Reached(reference),
-                _ => Element::Held(reference),
+                (Causality::Input, _) => ColumnTarget::Line(reference),
+                (_, Quantity::GapOffset) => ColumnTarget::Reached(reference),
+                _ => ColumnTarget::Held(reference),
             });
         }
         Ok(Driver { history: self, elements })
@@ -160,12 +160,12 @@ fn beginning(line: &str) -> String {
 /// Real inputs and tunable parameters.
 fn is_drivable(row: &Variable) -> bool {
     let tunable = row.causality == Causality::Parameter && row.variability == Variability::Tunable;
-    row.kind == Kind::Real && (row.causality == Causality::Input || tunable)
+    row.kind == DataType::Real && (row.causality == Causality::Input || tunable)
 }
 
 /// How a variable follows its column.
 #[derive(Debug, Clone, Copy)]
-enum Element {
+enum ColumnTarget {
     /// Value at the start of a communication step and its derivative over it.
     Line(u32),
     /// Ramped, without derivative: the value of the end, which is reached there.
@@ -177,8 +177,8 @@ enum Element {
 /// Columns of a history with the variables that follow them.
 #[derive(Debug)]
 pub struct Driver<'a> {
-    history: &'a History,
-    elements: Vec<Element>,
+    history: &'a InputHistory,
+    elements: Vec<ColumnTarget>,
 }
 
 impl Driver<'_> {
@@ -188,7 +188,8 @@ impl Driver<'_> {
     /// Values that the variables do not take.
     pub fn start(&self, simulation: &mut Simulation, time: f64) -> Result<()> {
         for (column, element) in self.elements.iter().enumerate() {
-            let (Element::Line(reference) | Element::Reached(reference) | Element::Held(reference)) = *element;
+            let (ColumnTarget::Line(reference) | ColumnTarget::Reached(reference) | ColumnTarget::Held(reference)) =
+                *element;
             self.set(simulation, (column, reference), time)?;
         }
         Ok(())
@@ -201,16 +202,16 @@ impl Driver<'_> {
     pub fn step(&self, simulation: &mut Simulation, [from, to]: [f64; 2]) -> Result<()> {
         for (column, element) in self.elements.iter().enumerate() {
             match *element {
-                Element::Line(reference) => {
+                ColumnTarget::Line(reference) => {
                     self.set(simulation, (column, reference), from)?;
                     let slope = (self.history.at(column, to) - self.history.at(column, from)) / (to - from);
                     let set = simulation.set_input_derivative(reference, 1, slope);
                     set.map_err(|error| self.refused(column, from, error))?;
                 }
-                Element::Reached(reference) => self.set(simulation, (column, reference), to)?,
+                ColumnTarget::Reached(reference) => self.set(simulation, (column, reference), to)?,
                 // What rests is not judged anew.
-                Element::Held(reference) if self.rests(simulation, (column, reference), from) => {}
-                Element::Held(reference) => self.set(simulation, (column, reference), from)?,
+                ColumnTarget::Held(reference) if self.rests(simulation, (column, reference), from) => {}
+                ColumnTarget::Held(reference) => self.set(simulation, (column, reference), from)?,
             }
         }
         Ok(())
@@ -227,17 +228,17 @@ impl Driver<'_> {
     }
 
     fn refused(&self, column: usize, time: f64, error: tiprub_core::Error) -> Failure {
-        let History { name, names, .. } = self.history;
+        let InputHistory { name, names, .. } = self.history;
         Failure::from_core(format!("{name}, `{}` at {time} s", names[column]), error)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::History;
+    use super::InputHistory;
 
-    fn parsed(text: &str) -> crate::Result<History> {
-        History::parse(text.as_bytes(), "inputs.csv")
+    fn parsed(text: &str) -> crate::Result<InputHistory> {
+        InputHistory::parse(text.as_bytes(), "inputs.csv")
     }
 
     #[test]

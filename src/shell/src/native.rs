@@ -6,10 +6,10 @@ use tiprub_core::{
     Scene, Simulation, VariableTable, Warning,
     settings::Scheme,
     system::Effort,
-    variables::{Causality, Kind, Variable},
+    variables::{Causality, DataType, Variable},
 };
 
-use crate::{Failure, Result, history::History, recording::Recording, schedule::Schedule};
+use crate::{Failure, Result, history::InputHistory, recording::Recording, schedule::Schedule};
 
 /// Results of a native run.
 #[derive(Debug, Clone)]
@@ -30,18 +30,18 @@ pub struct NativeRun {
 
 /// What a run is given beside its scene.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Given<'a> {
+pub struct RunInputs<'a> {
     /// Start values (name, value as text).
     pub settings: &'a [(String, String)],
     /// Inputs over time.
-    pub history: Option<&'a History>,
+    pub history: Option<&'a InputHistory>,
 }
 
 /// Run `scene` over the schedule with other start values and inputs over time.
 ///
 /// # Errors
 /// Unknown or wrong settings, refused scenes, a step that failed: its failure carries the warnings up to then.
-pub fn run(scene: &Scene, schedule: &Schedule, given: Given<'_>, progress: &dyn Fn(usize)) -> Result<NativeRun> {
+pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &dyn Fn(usize)) -> Result<NativeRun> {
     let name = scene.settings.name.clone();
     let in_scene = |error: tiprub_core::Error| Failure::from_core(format!("scene `{name}`"), error);
     // Checks and warnings are for the step that is taken.
@@ -103,13 +103,13 @@ pub fn numeric_outputs(simulation: &Simulation) -> Vec<f64> {
 /// The numeric outputs of a table, element by element.
 struct Outputs {
     names: Vec<String>,
-    elements: Vec<(Kind, u32)>,
+    elements: Vec<(DataType, u32)>,
 }
 
 impl Outputs {
     fn of(table: &VariableTable) -> Self {
         let is_numeric_output =
-            |variable: &&Variable| variable.causality == Causality::Output && variable.kind != Kind::String;
+            |variable: &&Variable| variable.causality == Causality::Output && variable.kind != DataType::String;
         let mut outputs = Self { names: Vec::new(), elements: Vec::new() };
         for variable in table.variables().iter().filter(is_numeric_output) {
             for (index, reference) in (0..variable.len()).zip(variable.reference..) {
@@ -123,8 +123,8 @@ impl Outputs {
     fn read(&self, simulation: &Simulation, values: &mut Vec<f64>) -> tiprub_core::Result<()> {
         for &(kind, reference) in &self.elements {
             values.push(match kind {
-                Kind::Real => simulation.real(reference)?,
-                Kind::Boolean => f64::from(u8::from(simulation.boolean(reference)?)),
+                DataType::Real => simulation.real(reference)?,
+                DataType::Boolean => f64::from(u8::from(simulation.boolean(reference)?)),
                 _ => f64::from(simulation.integer(reference)?),
             });
         }
@@ -139,11 +139,11 @@ pub fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
     for (reference, text) in (first..).zip(texts(name, text, dimension)?) {
         let option = format!("--set {name}={text}");
         let outcome = match kind {
-            Kind::Real => simulation.set_real(reference, number(&option, text)?),
-            Kind::Integer => simulation.set_integer(reference, number(&option, text)?),
-            Kind::Boolean => simulation.set_boolean(reference, number(&option, text)?),
-            Kind::String => simulation.set_string(reference, text),
-            Kind::Enumeration(enumeration) => {
+            DataType::Real => simulation.set_real(reference, number(&option, text)?),
+            DataType::Integer => simulation.set_integer(reference, number(&option, text)?),
+            DataType::Boolean => simulation.set_boolean(reference, number(&option, text)?),
+            DataType::String => simulation.set_string(reference, text),
+            DataType::Enumeration(enumeration) => {
                 let items = enumeration.items.iter().map(|(item, _)| *item).collect::<Vec<_>>();
                 let item = items.iter().zip(1..).find(|(item, _)| **item == text).map(|(_, value)| value);
                 let unknown =
@@ -188,7 +188,7 @@ fn example(kind: &str) -> &'static str {
 }
 
 /// Kind, dimension and first value reference of a variable or of one of its elements.
-fn locate(table: &VariableTable, name: &str) -> Result<(Kind, Option<usize>, u32)> {
+fn locate(table: &VariableTable, name: &str) -> Result<(DataType, Option<usize>, u32)> {
     if let Some(variable) = table.find(name) {
         return Ok((variable.kind, variable.dimension, variable.reference));
     }

@@ -33,8 +33,9 @@ pub fn create_directory(path: &Path) -> Result<()> {
 pub fn try_directory(path: &Path) -> Result<()> {
     let named = path.ancestors().filter(|ancestor| !ancestor.as_os_str().is_empty());
     let missing: Vec<&Path> = named.take_while(|ancestor| !ancestor.exists()).collect();
-    let trial = create_directory(path)
-        .and_then(|()| Draft::new(path).map(drop).map_err(|error| Failure::file(path, "cannot write there", &error)));
+    let trial = create_directory(path).and_then(|()| {
+        PendingFile::new(path).map(drop).map_err(|error| Failure::file(path, "cannot write there", &error))
+    });
     for made in missing {
         // Those that were not made are not there.
         let _ = fs::remove_dir(made);
@@ -107,13 +108,13 @@ pub fn destination(target: &Path) -> io::Result<PathBuf> {
 
 /// A file in the making.
 #[derive(Debug)]
-pub struct Draft {
+pub struct PendingFile {
     file: File,
     /// Where it has a name already.
     named: Option<NamedTempFile>,
 }
 
-impl Draft {
+impl PendingFile {
     /// In this directory.
     fn new(directory: &Path) -> io::Result<Self> {
         if let Some(file) = unnamed(directory) {
@@ -132,7 +133,7 @@ impl Draft {
     }
 }
 
-impl Write for Draft {
+impl Write for PendingFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.file.write(bytes)
     }
@@ -186,14 +187,14 @@ fn link(_file: &File, _path: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// The directory cannot be written to, or `target` is itself a directory or no possible name.
-pub fn begin(target: &Path) -> Result<Draft> {
+pub fn begin(target: &Path) -> Result<PendingFile> {
     let place = place(target)?;
     let directory = match &place {
         OutputTarget::File(path) => parent(path),
         OutputTarget::Stream => std::env::temp_dir(),
     };
     create_directory(&directory)?;
-    let draft = Draft::new(&directory).and_then(|draft| match &place {
+    let draft = PendingFile::new(&directory).and_then(|draft| match &place {
         OutputTarget::File(path) => keep_permissions(&draft.file, path).map(|()| draft),
         OutputTarget::Stream => Ok(draft),
     });
@@ -212,14 +213,14 @@ fn keep_permissions(file: &File, target: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// The rename failed, and the temporary file is gone and an older target untouched; or a device or pipe took only a part.
-pub fn persist(draft: Draft, target: &Path) -> Result<()> {
+pub fn persist(draft: PendingFile, target: &Path) -> Result<()> {
     let OutputTarget::File(path) = place(target)? else { return copy_into_stream(draft, target) };
     let named = draft.name(&parent(&path));
     let renamed = named.and_then(|named| named.persist(path).map_err(|error| error.error));
     renamed.map_err(|error| Failure::file(target, "cannot be put in place", &error))
 }
 
-fn copy_into_stream(draft: Draft, target: &Path) -> Result<()> {
+fn copy_into_stream(draft: PendingFile, target: &Path) -> Result<()> {
     let mut finished = draft.file;
     let copied = io::Seek::rewind(&mut finished)
         .and_then(|()| open_stream(target))

@@ -10,14 +10,14 @@ use crate::{Failure, Result, output_file};
 
 /// A file, with the words of the command line for it.
 #[derive(Debug, Clone)]
-pub struct Named {
+pub struct NamedFile {
     /// Words of the command line.
     pub role: String,
     /// The file.
     pub path: PathBuf,
 }
 
-impl Named {
+impl NamedFile {
     /// What `role` says is at `path`.
     pub fn new(role: impl Into<String>, path: impl Into<PathBuf>) -> Self {
         Self { role: role.into(), path: path.into() }
@@ -33,7 +33,7 @@ impl Named {
 ///
 /// # Errors
 /// As said there.
-pub fn outputs(inputs: &[Named], outputs: &[Named]) -> Result<()> {
+pub fn outputs(inputs: &[NamedFile], outputs: &[NamedFile]) -> Result<()> {
     apart(inputs, outputs)?;
     outputs.iter().try_for_each(|output| output_file::try_target(&output.path))
 }
@@ -42,7 +42,7 @@ pub fn outputs(inputs: &[Named], outputs: &[Named]) -> Result<()> {
 ///
 /// # Errors
 /// Two names for one file, whatever they look like: links of both kinds, open files, directories that do not exist yet.
-pub fn apart(inputs: &[Named], outputs: &[Named]) -> Result<()> {
+pub fn apart(inputs: &[NamedFile], outputs: &[NamedFile]) -> Result<()> {
     let mut known: Vec<(&str, String, Identity)> = Vec::new();
     let streams = [("stdout", stream(io::stdout())), ("stderr", stream(io::stderr()))];
     known.extend(streams.into_iter().filter_map(|(name, place)| Some((name, String::new(), place?))));
@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     fn same(root: &Path, one: &str, two: &str) -> bool {
-        let named = |name: &str| Named::new("x", root.join(name));
+        let named = |name: &str| NamedFile::new("x", root.join(name));
         let [input, both] = [apart(&[named(one)], &[named(two)]), apart(&[], &[named(one), named(two)])];
         assert_eq!(input.is_err(), both.is_err(), "{one} {two}");
         assert!(input.err().is_none_or(|failure| failure.exit_code() == 2 && failure.problem.contains("same file")));

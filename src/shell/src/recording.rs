@@ -23,7 +23,7 @@ pub struct Recording {
 
 /// Where two recordings first differ, and by how much at most.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Agreement {
+pub struct RecordingDifference {
     /// Communication points compared.
     pub points: usize,
     /// Variables compared.
@@ -36,7 +36,7 @@ pub struct Agreement {
     pub first: Option<(String, f64)>,
 }
 
-impl Agreement {
+impl RecordingDifference {
     /// Every bit of every value is the same.
     pub fn is_exact(&self) -> bool {
         self.different == 0
@@ -94,7 +94,7 @@ impl Recording {
     ///
     /// # Errors
     /// Different columns or numbers of rows.
-    pub fn compare(&self, other: &Self) -> Result<Agreement> {
+    pub fn compare(&self, other: &Self) -> Result<RecordingDifference> {
         if self.names != other.names || self.rows() != other.rows() {
             return Err(Failure::new(
                 "comparison of two runs",
@@ -108,8 +108,13 @@ impl Recording {
                 "Both runs must come from the same scene and the same communication points",
             ));
         }
-        let mut agreement =
-            Agreement { points: self.rows(), variables: self.names.len(), different: 0, largest: 0.0, first: None };
+        let mut agreement = RecordingDifference {
+            points: self.rows(),
+            variables: self.names.len(),
+            different: 0,
+            largest: 0.0,
+            first: None,
+        };
         for row in 0..self.rows() {
             let times = (self.times[row], other.times[row]);
             agreement.note(times, "time", times.0);
@@ -157,7 +162,7 @@ impl Recording {
     }
 }
 
-impl Agreement {
+impl RecordingDifference {
     fn note(&mut self, (mine, theirs): (f64, f64), name: &str, time: f64) {
         if mine.to_bits() == theirs.to_bits() {
             return;

@@ -78,13 +78,13 @@ pub struct StabilityArguments {
     pub scene: String,
     /// Friction coefficients: first, last and count [default: 11 from 0 to 1, or to twice the scene's].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = frictions, allow_hyphen_values = true)]
-    pub friction: Option<Range>,
+    pub friction: Option<NumberRange>,
     /// Speeds (rad/s): first, last and count; negative ones turn backwards [default: -1, 0.5, 1 and 1.5 times the scene's].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = range, allow_hyphen_values = true)]
-    pub speeds: Option<Range>,
+    pub speeds: Option<NumberRange>,
     /// Internal steps (s): first, last and count, evenly on a logarithmic scale [default: 9 from 1/16 to 16 times the scene's].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = steps, allow_hyphen_values = true)]
-    pub steps: Option<Range>,
+    pub steps: Option<NumberRange>,
     /// Checks at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
@@ -125,7 +125,7 @@ pub struct ConvergenceArguments {
 
 /// A range of numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
+pub struct NumberRange {
     /// First.
     pub from: f64,
     /// Last.
@@ -134,7 +134,7 @@ pub struct Range {
     pub count: usize,
 }
 
-impl Range {
+impl NumberRange {
     /// All of them, ascending and evenly spaced.
     pub fn values(&self) -> Vec<f64> {
         self.shares().map(|share| self.from + (self.to - self.from) * share).collect()
@@ -152,10 +152,10 @@ impl Range {
 }
 
 /// Two growing numbers and a count of at most `most`.
-fn counted(text: &str, most: usize) -> Option<Range> {
+fn counted(text: &str, most: usize) -> Option<NumberRange> {
     let parts: Vec<&str> = text.split(':').collect();
     let [from, to, count] = parts.as_slice() else { return None };
-    let range = Range { from: from.parse().ok()?, to: to.parse().ok()?, count: count.parse().ok()? };
+    let range = NumberRange { from: from.parse().ok()?, to: to.parse().ok()?, count: count.parse().ok()? };
     let growing = range.from.is_finite() && range.from < range.to && range.to.is_finite();
     (growing && (2..=most).contains(&range.count)).then_some(range)
 }
@@ -163,26 +163,26 @@ fn counted(text: &str, most: usize) -> Option<Range> {
 /// Most values of one range of a map of answers: more cannot be looked at.
 const MOST_ANSWERS: usize = 200;
 
-fn range(text: &str) -> Result<Range, String> {
+fn range(text: &str) -> Result<NumberRange, String> {
     counted(text, MOST_ANSWERS).ok_or_else(|| {
         "give two growing numbers and a count from 2 to 200 as FROM:TO:COUNT, for example -1700:1700:5".into()
     })
 }
 
-fn frictions(text: &str) -> Result<Range, String> {
+fn frictions(text: &str) -> Result<NumberRange, String> {
     counted(text, MOST_ANSWERS).filter(|range| range.from >= 0.0).ok_or_else(|| {
         "give growing friction coefficients from 0 on and a count from 2 to 200 as FROM:TO:COUNT, for example 0:0.5:11".into()
     })
 }
 
-fn steps(text: &str) -> Result<Range, String> {
+fn steps(text: &str) -> Result<NumberRange, String> {
     counted(text, MOST_ANSWERS).filter(|range| range.from > 0.0).ok_or_else(|| {
         "give growing positive steps in s and a count from 2 to 200 as FROM:TO:COUNT, for example 1e-7:1e-5:9".into()
     })
 }
 
 /// A range of angular velocities (rad/s).
-pub type Speeds = Range;
+pub type Speeds = NumberRange;
 
 /// What a command line adds to a scene.
 #[derive(Debug, Clone, Default, Args)]

@@ -13,8 +13,8 @@ use tiprub_shell::{Result, console::Console};
 use crate::convergence::{
     Refined, Runner,
     coarsen::{coarsened, fewer_rows},
-    refine::{Direction, Level, OF_CLEARANCE, SECONDS, goes_by_tolerance, with_division},
-    truncate::{Form, truncated},
+    refine::{OF_CLEARANCE, RefinementDirection, RefinementLevel, SECONDS, goes_by_tolerance, with_division},
+    truncate::{Truncation, truncated},
 };
 use crate::error::own::own_division;
 
@@ -154,17 +154,17 @@ pub fn of_rom(rom: &Rom) -> Vec<Estimate> {
     [steps].into_iter().chain(others).collect()
 }
 
-fn direction(title: &str, unit: &'static str, levels: Vec<Level>) -> Direction {
-    Direction { name: "estimate", title: title.into(), unit, levels, missing: String::new(), shorter: None }
+fn direction(title: &str, unit: &'static str, levels: Vec<RefinementLevel>) -> RefinementDirection {
+    RefinementDirection { name: "estimate", title: title.into(), unit, levels, missing: String::new(), shorter: None }
 }
 
-fn steps(scene: &Scene, own: u32, divisions: [u32; 3]) -> Direction {
+fn steps(scene: &Scene, own: u32, divisions: [u32; 3]) -> RefinementDirection {
     let interval = scene.settings.experiment.communication_step;
     let tolerant = goes_by_tolerance(scene);
     let level = |division: u32| {
         let changed = if division == own { scene.clone() } else { with_division(scene, division) };
         let whole = if tolerant { 1.0 } else { interval };
-        Level { value: whole / f64::from(division), own: division == own, scene: changed, division }
+        RefinementLevel { value: whole / f64::from(division), own: division == own, scene: changed, division }
     };
     let (title, unit) = if tolerant { ("tolerance", OF_CLEARANCE) } else { ("internal step", SECONDS) };
     direction(title, unit, divisions.map(level).into())
@@ -187,10 +187,10 @@ fn of_steps(scene: &Scene, own: u32, runner: &Runner) -> Result<Estimate> {
 }
 
 /// Half and a quarter of the modes of the master.
-fn modes(scene: &Scene, division: u32) -> std::result::Result<Direction, String> {
+fn modes(scene: &Scene, division: u32) -> std::result::Result<RefinementDirection, String> {
     let master = crate::master(scene);
     let rom = &scene.roms[master];
-    let own = Form::of(rom).modes(rom);
+    let own = Truncation::of(rom).modes(rom);
     if own < 8 {
         return Err(format!("{own} modes have no half and no quarter"));
     }
@@ -198,11 +198,11 @@ fn modes(scene: &Scene, division: u32) -> std::result::Result<Direction, String>
     for modes in [own / 4, own / 2] {
         levels.push(with_rom(scene, master, modes, truncated(rom, modes)?, division));
     }
-    levels.push(Level { value: own as f64, own: true, scene: scene.clone(), division });
+    levels.push(RefinementLevel { value: own as f64, own: true, scene: scene.clone(), division });
     Ok(direction("modes", "modes", levels))
 }
 
-fn patches(scene: &Scene, division: u32) -> std::result::Result<Direction, String> {
+fn patches(scene: &Scene, division: u32) -> std::result::Result<RefinementDirection, String> {
     let master = crate::master(scene);
     let along = |rom: &Rom| rom.contact_nodes.len() / rom.rows();
     let own = along(&scene.roms[master]);
@@ -210,12 +210,12 @@ fn patches(scene: &Scene, division: u32) -> std::result::Result<Direction, Strin
     let quarter = coarsened(&half)?;
     let levels = [quarter, half].map(|rom| with_rom(scene, master, along(&rom), rom, division));
     let mut levels = Vec::from(levels);
-    levels.push(Level { value: own as f64, own: true, scene: scene.clone(), division });
+    levels.push(RefinementLevel { value: own as f64, own: true, scene: scene.clone(), division });
     Ok(direction("contact patches", "patches", levels))
 }
 
 /// One and two of three rows across the thickness; fewer rows do not tell what more would change.
-pub(crate) fn rows(scene: &Scene, division: u32) -> std::result::Result<Direction, String> {
+pub(crate) fn rows(scene: &Scene, division: u32) -> std::result::Result<RefinementDirection, String> {
     let master = crate::master(scene);
     let rom = &scene.roms[master];
     if rom.contact_nodes.iter().any(|patch| patch.area <= 0.0) {
@@ -234,14 +234,14 @@ pub(crate) fn rows(scene: &Scene, division: u32) -> std::result::Result<Directio
     for fewer in [1, 2] {
         levels.push(with_rom(scene, master, fewer, fewer_rows(rom, fewer)?, division));
     }
-    levels.push(Level { value: own as f64, own: true, scene: scene.clone(), division });
+    levels.push(RefinementLevel { value: own as f64, own: true, scene: scene.clone(), division });
     Ok(direction("rows of contact patches", "rows", levels))
 }
 
-fn with_rom(scene: &Scene, index: usize, value: usize, rom: Rom, division: u32) -> Level {
+fn with_rom(scene: &Scene, index: usize, value: usize, rom: Rom, division: u32) -> RefinementLevel {
     let mut scene = scene.clone();
     scene.roms[index] = rom;
-    Level { value: value as f64, own: false, scene, division }
+    RefinementLevel { value: value as f64, own: false, scene, division }
 }
 
 /// Estimates of a scene over a window of `samples` communication steps, with start values replaced (name, value as text); the mesh is
@@ -284,7 +284,7 @@ pub fn estimates(
 mod tests {
     use tiprub_model::{
         Rotor37Options, reduce_rotor37,
-        rotor37::{MeshCounts, Tip},
+        rotor37::{MeshCounts, TipContact},
     };
 
     use super::*;
@@ -315,7 +315,7 @@ mod tests {
     #[test]
     fn what_is_not_known_here_is_what_the_rom_says() {
         let mesh = MeshCounts { chord: 2, thickness: 1, span: 2 };
-        let options = Rotor37Options { mesh, tip: Tip::Nodes(2), modes: 2, ..Rotor37Options::paper() };
+        let options = Rotor37Options { mesh, tip: TipContact::Nodes(2), modes: 2, ..Rotor37Options::paper() };
         let mut rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;
         assert!(of_rom(&rom).is_empty());
         let found_on = "a light rub".to_owned();

@@ -78,7 +78,7 @@ pub struct Study {
     /// What the figures should show and whether they do.
     pub statements: Vec<Statement>,
     /// The figures.
-    pub figures: Vec<Figure>,
+    pub figures: Vec<StudyFigure>,
     /// Numbers for programs, beside those of the figures.
     pub results: Value,
     /// Further files to write: name, meaning, bytes.
@@ -119,7 +119,7 @@ impl Statement {
 
 /// A picture, its numbers and its caption.
 #[derive(Debug, Clone)]
-pub struct Figure {
+pub struct StudyFigure {
     /// For file names: `clearances`.
     pub name: &'static str,
     /// Caption, plain text.
@@ -219,7 +219,7 @@ impl Study {
     ///
     /// # Errors
     /// There is none.
-    pub fn figure(&self, name: &str) -> Result<&Figure> {
+    pub fn figure(&self, name: &str) -> Result<&StudyFigure> {
         let missing = || Failure::new(format!("study {}", self.name), format!("no figure {name}"), "");
         self.figures.iter().find(|figure| figure.name == name).ok_or_else(missing)
     }

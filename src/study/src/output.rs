@@ -3,7 +3,7 @@
 use std::{fmt::Write as _, path::Path};
 
 use tiprub_figure::{STYLE, escape};
-use tiprub_shell::{Result, console::Outcome, output_file};
+use tiprub_shell::{Result, console::CommandOutcome, output_file};
 
 use super::Study;
 
@@ -16,7 +16,7 @@ pub const RESULTS: &str = "results.json";
 ///
 /// # Errors
 /// Files cannot be written.
-pub fn write(study: &Study, directory: &Path) -> Result<Outcome> {
+pub fn write(study: &Study, directory: &Path) -> Result<CommandOutcome> {
     output_file::create_directory(directory)?;
     for figure in &study.figures {
         output_file::write(&directory.join(format!("{}.svg", figure.name)), &figure.picture.svg)?;
@@ -30,7 +30,7 @@ pub fn write(study: &Study, directory: &Path) -> Result<Outcome> {
     output_file::write(&directory.join(PAGE), page(study))?;
     json["page"] = directory.join(PAGE).display().to_string().into();
     let text = format!("{}\nopen {}", study.to_text(), directory.join(PAGE).display());
-    Ok(Outcome { text, json, ..Outcome::default() })
+    Ok(CommandOutcome { text, json, ..CommandOutcome::default() })
 }
 
 fn page(study: &Study) -> String {

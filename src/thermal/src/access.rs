@@ -1,19 +1,19 @@
 //! Reading and setting variables.
 
-use tiprub_core::variables::{Causality, Kind, Start, Variability, Variable};
+use tiprub_core::variables::{Causality, DataType, StartValue, Variability, Variable};
 use tiprub_core::{Error, Result, shown};
 
-use crate::simulation::Simulation;
+use crate::simulation::ThermalSimulation;
 use crate::state::CREATED;
 use crate::table::Item;
 
-impl Simulation {
+impl ThermalSimulation {
     /// Read one element of a real variable; inputs and parameters give back what was set.
     ///
     /// # Errors
     /// Unknown reference, or not a real.
     pub fn real(&self, reference: u32) -> Result<f64> {
-        self.of_kind(reference, "real", |kind| kind == Kind::Real)?;
+        self.of_kind(reference, "real", |kind| kind == DataType::Real)?;
         Ok(self.values[reference as usize])
     }
 
@@ -22,7 +22,7 @@ impl Simulation {
     /// # Errors
     /// Unknown reference, or not an enumeration.
     pub fn integer(&self, reference: u32) -> Result<i32> {
-        self.of_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
+        self.of_kind(reference, "integer", |kind| matches!(kind, DataType::Integer | DataType::Enumeration(_)))?;
         #[expect(clippy::cast_possible_truncation, reason = "stored as the i32 it was set from")]
         Ok(self.values[reference as usize] as i32)
     }
@@ -32,7 +32,7 @@ impl Simulation {
     /// # Errors
     /// Always.
     pub fn boolean(&self, reference: u32) -> Result<bool> {
-        self.of_kind(reference, "boolean", |kind| kind == Kind::Boolean).map(|_| false)
+        self.of_kind(reference, "boolean", |kind| kind == DataType::Boolean).map(|_| false)
     }
 
     /// Read a text.
@@ -40,14 +40,14 @@ impl Simulation {
     /// # Errors
     /// Unknown reference, or not a text.
     pub fn string(&self, reference: u32) -> Result<&str> {
-        let (variable, _) = self.of_kind(reference, "string", |kind| kind == Kind::String)?;
+        let (variable, _) = self.of_kind(reference, "string", |kind| kind == DataType::String)?;
         match &variable.start {
-            Some(Start::String(text)) => Ok(text),
+            Some(StartValue::String(text)) => Ok(text),
             _ => Ok(""),
         }
     }
 
-    fn of_kind(&self, reference: u32, wanted: &str, fits: impl Fn(Kind) -> bool) -> Result<(&Variable, usize)> {
+    fn of_kind(&self, reference: u32, wanted: &str, fits: impl Fn(DataType) -> bool) -> Result<(&Variable, usize)> {
         let (variable, element) = self.table.locate(reference)?;
         if fits(variable.kind) {
             return Ok((variable, element));
@@ -81,7 +81,7 @@ impl Simulation {
     /// # Errors
     /// Unknown reference, wrong kind, not settable, out of range; nothing is changed then.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
-        self.of_kind(reference, "real", |kind| kind == Kind::Real)?;
+        self.of_kind(reference, "real", |kind| kind == DataType::Real)?;
         let (item, element, variable) = self.settable(reference)?;
         let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
         if !(low..=high).contains(&value) {
@@ -104,11 +104,11 @@ impl Simulation {
     /// Set an item of an enumeration.
     ///
     /// # Errors
-    /// As [`Simulation::set_real`].
+    /// As [`ThermalSimulation::set_real`].
     pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
-        self.of_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
+        self.of_kind(reference, "integer", |kind| matches!(kind, DataType::Integer | DataType::Enumeration(_)))?;
         let (item, _, variable) = self.settable(reference)?;
-        if let Kind::Enumeration(choices) = variable.kind
+        if let DataType::Enumeration(choices) = variable.kind
             && !usize::try_from(value).is_ok_and(|item| (1..=choices.items.len()).contains(&item))
         {
             let items = choices.items.iter().enumerate().map(|(index, (name, _))| format!("{} = {name}", index + 1));
@@ -130,7 +130,7 @@ impl Simulation {
     /// # Errors
     /// Always.
     pub fn set_boolean(&mut self, reference: u32, _value: bool) -> Result<()> {
-        self.of_kind(reference, "boolean", |kind| kind == Kind::Boolean).map(drop)
+        self.of_kind(reference, "boolean", |kind| kind == DataType::Boolean).map(drop)
     }
 
     /// Set a text: none can be.
@@ -138,7 +138,7 @@ impl Simulation {
     /// # Errors
     /// Always.
     pub fn set_string(&mut self, reference: u32, _value: &str) -> Result<()> {
-        self.of_kind(reference, "string", |kind| kind == Kind::String)?;
+        self.of_kind(reference, "string", |kind| kind == DataType::String)?;
         self.settable(reference).map(drop)
     }
 
@@ -176,7 +176,7 @@ impl Simulation {
     pub fn output_derivative(&self, reference: u32, order: i32) -> Result<f64> {
         let (variable, element) = self.table.locate(reference)?;
         let what = format!("derivative of `{}`", variable.name);
-        if variable.causality != Causality::Output || variable.kind != Kind::Real {
+        if variable.causality != Causality::Output || variable.kind != DataType::Real {
             let remedy = "Ask for derivatives of continuous real outputs only";
             return Err(Error::invalid(what, "the variable is not a continuous real output", remedy));
         }

@@ -4,7 +4,7 @@ use tiprub_core::persist_fields;
 
 /// An input between communication points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Course {
+pub(crate) struct InputCourse {
     /// As set.
     pub(crate) value: f64,
     /// Its time derivative, 0 unless given.
@@ -15,9 +15,9 @@ pub(crate) struct Course {
     pub(crate) reached: f64,
 }
 
-persist_fields!(Course { value, slope, since, reached });
+persist_fields!(InputCourse { value, slope, since, reached });
 
-impl Course {
+impl InputCourse {
     /// Take a value; a derivative given before is over.
     pub(crate) fn set(&mut self, value: f64) {
         (self.value, self.slope, self.since) = (value, 0.0, 0.0);

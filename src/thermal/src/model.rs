@@ -1,7 +1,7 @@
 //! A reduced-order model of heat conduction, as plain data.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::Patch;
+use tiprub_core::rom::ThermalPatch;
 use tiprub_core::{Error, Result, ranges, shown};
 
 /// Most coordinates: their eigenvalue problem is dense, and solved anew when a convection factor changes.
@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-9;
 /// The first coordinate is the uniform temperature, x₁ = √C T with the heat capacity C of the whole, so that heat is conserved
 /// whatever the other coordinates leave out: the heat stored is √C x₁.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Model {
+pub struct ConductionModel {
     /// Name.
     pub name: String,
     /// Where it comes from, in words.
@@ -37,13 +37,13 @@ pub struct Model {
     /// Temperatures of places on the heated surface, places × coordinates.
     pub places: DMatrix<f64>,
     /// The patches, as those of the mechanical model.
-    pub patches: Vec<Patch>,
+    pub patches: Vec<ThermalPatch>,
     /// Diffusion time of the elements under the heated surface (s): their largest depth squared over the diffusivity. What heat does within
     /// a shorter time happens inside one element, which does not resolve it.
     pub element_time: f64,
 }
 
-impl Model {
+impl ConductionModel {
     /// Number of coordinates.
     pub fn order(&self) -> usize {
         self.conduction.nrows()

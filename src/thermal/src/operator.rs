@@ -3,11 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::exponential::Phi;
-use crate::model::Model;
+use crate::model::ConductionModel;
 
 /// ż = −λ z + loads, z = Eᵀ x.
 #[derive(Debug, Clone)]
-pub(crate) struct Operator {
+pub(crate) struct DiagonalOperator {
     /// Factors of the gas and of the air that it was made for.
     pub(crate) factors: [f64; 2],
     /// λ (1/s), ascending.
@@ -26,9 +26,9 @@ pub(crate) struct Operator {
     pub(crate) stored: DVector<f64>,
 }
 
-impl Operator {
+impl DiagonalOperator {
     /// Of a model with `rows` of outputs.
-    pub(crate) fn new(model: &Model, rows: &DMatrix<f64>, factors: [f64; 2]) -> Self {
+    pub(crate) fn new(model: &ConductionModel, rows: &DMatrix<f64>, factors: [f64; 2]) -> Self {
         let films = [&model.gas_convection, &model.ambient_convection];
         let matrix = &model.conduction + films[0] * factors[0] + films[1] * factors[1];
         let eigen = matrix.symmetric_eigen();

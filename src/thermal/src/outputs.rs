@@ -2,15 +2,15 @@
 
 use nalgebra::DMatrix;
 
-use crate::model::Model;
-use crate::operator::Operator;
-use crate::simulation::Simulation;
-use crate::state::State;
+use crate::model::ConductionModel;
+use crate::operator::DiagonalOperator;
+use crate::simulation::ThermalSimulation;
+use crate::state::ThermalState;
 use crate::table::Item;
 
 /// Rows of temperatures by coordinates x: of patches, of their heated surfaces, of the whole, of the surfaces in gas and air, of
 /// places.
-pub(crate) fn rows(model: &Model) -> DMatrix<f64> {
+pub(crate) fn rows(model: &ConductionModel) -> DMatrix<f64> {
     let parts = [&model.patch_means, &model.heat_loads.transpose(), &mean(model), &model.wetted_means, &model.places];
     let count = parts.iter().map(|part| part.nrows()).sum();
     let mut rows = DMatrix::zeros(count, model.order());
@@ -23,23 +23,23 @@ pub(crate) fn rows(model: &Model) -> DMatrix<f64> {
 }
 
 /// Of the whole: the first coordinate alone.
-fn mean(model: &Model) -> DMatrix<f64> {
+fn mean(model: &ConductionModel) -> DMatrix<f64> {
     let mut row = DMatrix::zeros(1, model.order());
     row[(0, 0)] = 1.0 / model.heat_capacity.sqrt();
     row
 }
 
 /// A row of the operator times coordinates.
-pub(crate) fn row_times(operator: &Operator, row: usize, coordinates: &[f64]) -> f64 {
+pub(crate) fn row_times(operator: &DiagonalOperator, row: usize, coordinates: &[f64]) -> f64 {
     operator.rows.row(row).iter().zip(coordinates).map(|(a, b)| a * b).sum()
 }
 
 /// Heat stored (J).
-pub(crate) fn stored(operator: &Operator, coordinates: &[f64]) -> f64 {
+pub(crate) fn stored(operator: &DiagonalOperator, coordinates: &[f64]) -> f64 {
     operator.stored.iter().zip(coordinates).map(|(a, b)| a * b).sum()
 }
 
-impl Simulation {
+impl ThermalSimulation {
     /// First row of the places.
     pub(crate) fn first_place(&self) -> usize {
         2 * self.model.patches.len() + 3
@@ -69,7 +69,7 @@ impl Simulation {
     /// One output; `None` of what is none.
     fn output(&self, item: Item, element: usize) -> Option<f64> {
         let (state, operator) = (&self.state, &self.operator);
-        let State { coordinates, totals, powers, .. } = state;
+        let ThermalState { coordinates, totals, powers, .. } = state;
         Some(match item {
             Item::Time => state.time,
             Item::Rows(first) => row_times(operator, first + element, coordinates),

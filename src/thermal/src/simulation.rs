@@ -1,16 +1,16 @@
 //! A model with its state: what an FMU instance and the tests drive.
 
-use tiprub_core::simulation::Progress;
-use tiprub_core::variables::{Start, VariableTable};
+use tiprub_core::simulation::StepProgress;
+use tiprub_core::variables::{StartValue, VariableTable};
 use tiprub_core::warning::Topic;
 use tiprub_core::{Error, Result, Sum, Warning, ranges, shown};
 
-use crate::course::Course;
+use crate::course::InputCourse;
 use crate::exponential::Phi;
-use crate::model::Model;
-use crate::operator::Operator;
+use crate::model::ConductionModel;
+use crate::operator::DiagonalOperator;
 use crate::outputs::{rows, stored};
-use crate::state::{CREATED, FAILED, READY, State, fingerprint_of};
+use crate::state::{CREATED, FAILED, READY, ThermalState, fingerprint_of};
 use crate::table::{self, HEAT, Item, TEMPERATURES};
 
 /// Communication points may differ from the simulation's own time by this fraction of H, as in the contact unit.
@@ -20,18 +20,18 @@ const UNCOOLED: f64 = 1e-13;
 
 /// A reduced model of conduction and its state.
 ///
-/// Life: [`Simulation::new`] → set parameters and inputs → [`Simulation::initialise`] → any number of steps → ([`Simulation::reset`]
+/// Life: [`ThermalSimulation::new`] → set parameters and inputs → [`ThermalSimulation::initialise`] → any number of steps → ([`ThermalSimulation::reset`]
 /// and again). A communication step is one internal step, and exact.
 #[derive(Debug, Clone)]
-pub struct Simulation {
-    pub(crate) model: Model,
+pub struct ThermalSimulation {
+    pub(crate) model: ConductionModel,
     pub(crate) table: VariableTable,
     pub(crate) items: Vec<Item>,
     pub(crate) fingerprint: u64,
     /// Of the model's outputs, in its own coordinates.
     pub(crate) model_rows: nalgebra::DMatrix<f64>,
-    pub(crate) operator: Operator,
-    pub(crate) state: State,
+    pub(crate) operator: DiagonalOperator,
+    pub(crate) state: ThermalState,
     /// Values of all references; of inputs and parameters as set.
     pub(crate) values: Vec<f64>,
     /// Step that was begun: time at its end and length (s).
@@ -41,21 +41,21 @@ pub struct Simulation {
     heat: [Vec<f64>; 2],
     /// Whether steps shorter than elements resolve were warned of, once for all steps of the instance.
     warned: bool,
-    /// Warnings since the last [`Simulation::take_notes`].
+    /// Warnings since the last [`ThermalSimulation::take_notes`].
     notes: Vec<Warning>,
 }
 
-impl Simulation {
+impl ThermalSimulation {
     /// Start values are in place, nothing is computed yet.
     ///
     /// # Errors
-    /// Those of [`Model::validate`].
-    pub fn new(model: Model) -> Result<Self> {
+    /// Those of [`ConductionModel::validate`].
+    pub fn new(model: ConductionModel) -> Result<Self> {
         model.validate()?;
         let (table, items) = table::build(&model)?;
         let (order, patches) = (model.order(), model.patches.len());
         let model_rows = rows(&model);
-        let operator = Operator::new(&model, &model_rows, [1.0; 2]);
+        let operator = DiagonalOperator::new(&model, &model_rows, [1.0; 2]);
         let arrays =
             [&model.conduction, &model.gas_convection, &model.ambient_convection, &model.heat_loads, &model_rows];
         let fingerprint = fingerprint_of(arrays.iter().map(|array| array.as_slice()));
@@ -66,7 +66,7 @@ impl Simulation {
             fingerprint,
             model_rows,
             operator,
-            state: State::new(patches, order),
+            state: ThermalState::new(patches, order),
             under_way: None,
             phi: vec![Phi::default(); order],
             heat: [vec![0.0; patches], vec![0.0; patches]],
@@ -84,7 +84,7 @@ impl Simulation {
     }
 
     /// The model.
-    pub fn model(&self) -> &Model {
+    pub fn model(&self) -> &ConductionModel {
         &self.model
     }
 
@@ -100,14 +100,14 @@ impl Simulation {
 
     /// Back to the start values.
     pub fn reset(&mut self) {
-        self.state = State::new(self.model.patches.len(), self.model.order());
+        self.state = ThermalState::new(self.model.patches.len(), self.model.order());
         self.under_way = None;
         self.values.fill(0.0);
         for variable in self.table.variables() {
             let first = variable.reference as usize;
             match &variable.start {
-                Some(Start::Real(values)) => self.values[first..first + values.len()].copy_from_slice(values),
-                Some(Start::Integer(value)) => self.values[first] = f64::from(*value),
+                Some(StartValue::Real(values)) => self.values[first..first + values.len()].copy_from_slice(values),
+                Some(StartValue::Integer(value)) => self.values[first] = f64::from(*value),
                 _ => {}
             }
         }
@@ -123,7 +123,7 @@ impl Simulation {
         let state = &mut self.state;
         state.phase = CREATED;
         state.factors_used = state.factors;
-        state.heat.iter_mut().chain(&mut state.films).for_each(Course::start);
+        state.heat.iter_mut().chain(&mut state.films).for_each(InputCourse::start);
         self.follow_factors();
         if self.state.initial_state == 2 {
             self.start_steady()?;
@@ -165,7 +165,7 @@ impl Simulation {
     fn follow_factors(&mut self) {
         let used = self.state.factors_used;
         if used.map(f64::to_bits) != self.operator.factors.map(f64::to_bits) {
-            self.operator = Operator::new(&self.model, &self.model_rows, used);
+            self.operator = DiagonalOperator::new(&self.model, &self.model_rows, used);
         }
     }
 
@@ -181,7 +181,7 @@ impl Simulation {
     }
 
     /// Take over a state whose content has been checked.
-    pub(crate) fn adopt(&mut self, state: State) {
+    pub(crate) fn adopt(&mut self, state: ThermalState) {
         self.state = state;
         self.under_way = None;
         self.follow_factors();
@@ -270,7 +270,7 @@ impl Simulation {
     ///
     /// # Errors
     /// None was begun; the state is not finite any more.
-    pub fn advance(&mut self) -> Result<Progress> {
+    pub fn advance(&mut self) -> Result<StepProgress> {
         let Some([end, length]) = self.under_way.take() else {
             return Err(Error::invalid("step", "none was begun", "Begin a step first"));
         };
@@ -298,7 +298,7 @@ impl Simulation {
             let remedy = format!("Value reference {wrong} was the first: look at heat and convection factors");
             return Err(Error::NonFinite { last_good_time: end - length, time: end, remedy });
         }
-        Ok(Progress { time: end, finished: true })
+        Ok(StepProgress { time: end, finished: true })
     }
 
     /// All coordinates over a step; heat from gas and air (J).
@@ -321,7 +321,7 @@ impl Simulation {
     /// A whole communication step.
     ///
     /// # Errors
-    /// As [`Simulation::begin_step`] and [`Simulation::advance`].
+    /// As [`ThermalSimulation::begin_step`] and [`ThermalSimulation::advance`].
     pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size)?;
         self.advance().map(drop)
@@ -333,7 +333,7 @@ impl Simulation {
     }
 }
 
-impl State {
+impl ThermalState {
     fn new(patches: usize, order: usize) -> Self {
         Self {
             phase: CREATED,
@@ -341,8 +341,8 @@ impl State {
             initial_temperature: 0.0,
             initial_state: 1,
             interpolation: 1,
-            heat: vec![Course::default(); patches],
-            films: [Course::default(); 2],
+            heat: vec![InputCourse::default(); patches],
+            films: [InputCourse::default(); 2],
             factors: [1.0; 2],
             factors_used: [1.0; 2],
             coordinates: vec![0.0; order],

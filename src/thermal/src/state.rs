@@ -1,10 +1,10 @@
 //! Everything that determines the future of a simulation, and its bytes.
 
-use tiprub_core::persist::{Persist, Reader, Writer, fingerprint};
+use tiprub_core::persist::{Persist, StateReader, StateWriter, fingerprint};
 use tiprub_core::{Error, Result, Sum, persist_fields};
 
-use crate::course::Course;
-use crate::simulation::Simulation;
+use crate::course::InputCourse;
+use crate::simulation::ThermalSimulation;
 
 /// Bytes of the fingerprint of the model, before the state.
 const FINGERPRINT_BYTES: usize = 8;
@@ -20,7 +20,7 @@ pub(crate) const FAILED: u64 = 2;
 
 /// The state.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct State {
+pub(crate) struct ThermalState {
     pub(crate) phase: u64,
     /// s.
     pub(crate) time: f64,
@@ -29,9 +29,9 @@ pub(crate) struct State {
     pub(crate) initial_state: i32,
     pub(crate) interpolation: i32,
     /// Heat of the patches (W).
-    pub(crate) heat: Vec<Course>,
+    pub(crate) heat: Vec<InputCourse>,
     /// Temperatures of gas and air (K).
-    pub(crate) films: [Course; 2],
+    pub(crate) films: [InputCourse; 2],
     /// Convection factors as set.
     pub(crate) factors: [f64; 2],
     /// Those of the last step, in whose eigenvectors the coordinates are.
@@ -51,7 +51,7 @@ pub(crate) struct State {
     pub(crate) initial_heat: f64,
 }
 
-persist_fields!(State {
+persist_fields!(ThermalState {
     phase,
     time,
     initial_temperature,
@@ -72,30 +72,30 @@ persist_fields!(State {
 
 /// All inputs over time at one instant.
 #[derive(Debug, Clone)]
-pub struct Courses {
-    heat: Vec<Course>,
-    films: [Course; 2],
+pub struct ThermalInputs {
+    heat: Vec<InputCourse>,
+    films: [InputCourse; 2],
 }
 
-impl Simulation {
+impl ThermalSimulation {
     /// What the inputs do, derivatives included.
-    pub fn courses(&self) -> Courses {
-        Courses { heat: self.state.heat.clone(), films: self.state.films }
+    pub fn courses(&self) -> ThermalInputs {
+        ThermalInputs { heat: self.state.heat.clone(), films: self.state.films }
     }
 
     /// Back to what the inputs did at the same instant.
-    pub fn restore_courses(&mut self, courses: Courses) {
+    pub fn restore_courses(&mut self, courses: ThermalInputs) {
         (self.state.heat, self.state.films) = (courses.heat, courses.films);
     }
 
     /// Size of a saved state (bytes).
     pub fn state_size(&self) -> usize {
-        let mut writer = Writer::new(&mut []);
+        let mut writer = StateWriter::new(&mut []);
         self.state.save(&mut writer);
         FINGERPRINT_BYTES + writer.written()
     }
 
-    /// Save the state into exactly [`Simulation::state_size`] bytes.
+    /// Save the state into exactly [`ThermalSimulation::state_size`] bytes.
     ///
     /// # Errors
     /// Another length.
@@ -103,7 +103,7 @@ impl Simulation {
         self.check_size(buffer.len())?;
         let (head, body) = buffer.split_at_mut(FINGERPRINT_BYTES);
         head.copy_from_slice(&self.fingerprint.to_le_bytes());
-        self.state.save(&mut Writer::new(body));
+        self.state.save(&mut StateWriter::new(body));
         Ok(())
     }
 
@@ -117,14 +117,14 @@ impl Simulation {
         if head != self.fingerprint.to_le_bytes() {
             return damaged("it belongs to another model");
         }
-        let mut reader = Reader::new(body);
+        let mut reader = StateReader::new(body);
         reader.up_to(LARGEST);
         self.state.check(&mut reader);
         if let Some(fault) = reader.fault() {
             return damaged(fault);
         }
         let mut state = self.state.clone();
-        state.restore(&mut Reader::new(body));
+        state.restore(&mut StateReader::new(body));
         let items = [state.initial_state, state.interpolation].iter().all(|item| (1..=2).contains(item));
         let factors =
             state.factors.iter().chain(&state.factors_used).all(|factor| crate::table::FACTORS.contains(factor));

@@ -4,10 +4,10 @@ use std::ops::RangeInclusive;
 
 use tiprub_core::Result;
 use tiprub_core::variables::{
-    Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
+    Causality, DataType, Enumeration, Quantity, Span, StartValue, Variability, Variable, VariableTable, VariableUnit,
 };
 
-use crate::model::Model;
+use crate::model::ConductionModel;
 
 /// Temperatures above the reference (K), as those of the contact unit.
 pub(crate) const TEMPERATURES: RangeInclusive<f64> = -3000.0..=3000.0;
@@ -16,13 +16,18 @@ pub(crate) const HEAT: RangeInclusive<f64> = -1e9..=1e9;
 /// Factors on film coefficients.
 pub(crate) const FACTORS: RangeInclusive<f64> = 0.0..=1e3;
 
-static KELVIN: Unit = Unit { name: "K", quantity: "TemperatureDifference", exponents: [0, 0, 0, 0, 1], display: &[] };
-static WATT: Unit = Unit { name: "W", quantity: "Power", exponents: [1, 2, -3, 0, 0], display: &[("kW", 1e-3)] };
-static JOULE: Unit = Unit { name: "J", quantity: "Energy", exponents: [1, 2, -2, 0, 0], display: &[("kJ", 1e-3)] };
-static CAPACITY: Unit = Unit { name: "J/K", quantity: "HeatCapacity", exponents: [1, 2, -2, 0, -1], display: &[] };
-static CONDUCTANCE: Unit =
-    Unit { name: "W/K", quantity: "ThermalConductance", exponents: [1, 2, -3, 0, -1], display: &[] };
-static SECOND: Unit = Unit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[("min", 1.0 / 60.0)] };
+static KELVIN: VariableUnit =
+    VariableUnit { name: "K", quantity: "TemperatureDifference", exponents: [0, 0, 0, 0, 1], display: &[] };
+static WATT: VariableUnit =
+    VariableUnit { name: "W", quantity: "Power", exponents: [1, 2, -3, 0, 0], display: &[("kW", 1e-3)] };
+static JOULE: VariableUnit =
+    VariableUnit { name: "J", quantity: "Energy", exponents: [1, 2, -2, 0, 0], display: &[("kJ", 1e-3)] };
+static CAPACITY: VariableUnit =
+    VariableUnit { name: "J/K", quantity: "HeatCapacity", exponents: [1, 2, -2, 0, -1], display: &[] };
+static CONDUCTANCE: VariableUnit =
+    VariableUnit { name: "W/K", quantity: "ThermalConductance", exponents: [1, 2, -3, 0, -1], display: &[] };
+static SECOND: VariableUnit =
+    VariableUnit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[("min", 1.0 / 60.0)] };
 
 static INITIAL_STATES: Enumeration = Enumeration {
     name: "InitialState",
@@ -67,21 +72,21 @@ pub(crate) enum Item {
 
 /// The table with its items.
 #[derive(Default)]
-struct Builder {
+struct ThermalTableBuilder {
     variables: Vec<Variable>,
     items: Vec<Item>,
     next: u32,
 }
 
-impl Builder {
-    fn push(&mut self, item: Item, name: &str, unit: Option<&'static Unit>, text: &str) -> &mut Variable {
+impl ThermalTableBuilder {
+    fn push(&mut self, item: Item, name: &str, unit: Option<&'static VariableUnit>, text: &str) -> &mut Variable {
         self.close();
         self.items.push(item);
         self.variables.push(Variable {
             name: name.into(),
             reference: self.next,
             dimension: None,
-            kind: Kind::Real,
+            kind: DataType::Real,
             causality: Causality::Output,
             variability: Variability::Continuous,
             span: Span::Point,
@@ -105,26 +110,33 @@ impl Builder {
         }
     }
 
-    fn input(&mut self, item: Item, name: &str, unit: Option<&'static Unit>, value: f64, text: &str) -> &mut Variable {
+    fn input(
+        &mut self,
+        item: Item,
+        name: &str,
+        unit: Option<&'static VariableUnit>,
+        value: f64,
+        text: &str,
+    ) -> &mut Variable {
         let variable = self.push(item, name, unit, text);
         variable.causality = Causality::Input;
-        variable.start = Some(Start::Real(vec![value]));
+        variable.start = Some(StartValue::Real(vec![value]));
         variable
     }
 
     fn choice(&mut self, item: Item, name: &str, kind: &'static Enumeration, text: &str) {
         let variable = self.push(item, name, None, text);
-        (variable.kind, variable.start) = (Kind::Enumeration(kind), Some(Start::Integer(1)));
+        (variable.kind, variable.start) = (DataType::Enumeration(kind), Some(StartValue::Integer(1)));
         (variable.causality, variable.variability) = (Causality::Parameter, Variability::Fixed);
     }
 
-    fn constant(&mut self, name: &str, unit: &'static Unit, value: f64, text: &str) {
+    fn constant(&mut self, name: &str, unit: &'static VariableUnit, value: f64, text: &str) {
         let variable = self.push(Item::Constant, name, Some(unit), text);
-        variable.start = Some(Start::Real(vec![value]));
+        variable.start = Some(StartValue::Real(vec![value]));
         (variable.causality, variable.variability) = (Causality::Local, Variability::Constant);
     }
 
-    fn output(&mut self, item: Item, name: &str, unit: &'static Unit, span: Span, text: &str) -> &mut Variable {
+    fn output(&mut self, item: Item, name: &str, unit: &'static VariableUnit, span: Span, text: &str) -> &mut Variable {
         let variable = self.push(item, name, Some(unit), text);
         variable.span = span;
         variable
@@ -136,8 +148,8 @@ fn limit(variable: &mut Variable, range: &RangeInclusive<f64>) {
 }
 
 /// The table of a model, with what its rows stand for.
-pub(crate) fn build(model: &Model) -> Result<(VariableTable, Vec<Item>)> {
-    let (mut table, patches) = (Builder::default(), model.patches.len());
+pub(crate) fn build(model: &ConductionModel) -> Result<(VariableTable, Vec<Item>)> {
+    let (mut table, patches) = (ThermalTableBuilder::default(), model.patches.len());
     let time = table.push(Item::Time, "time", Some(&SECOND), "Simulated time");
     (time.causality, time.quantity) = (Causality::Independent, Quantity::Time);
     inputs(&mut table, patches);
@@ -147,10 +159,11 @@ pub(crate) fn build(model: &Model) -> Result<(VariableTable, Vec<Item>)> {
     Ok((VariableTable::new(table.variables)?, table.items))
 }
 
-fn inputs(table: &mut Builder, patches: usize) {
+fn inputs(table: &mut ThermalTableBuilder, patches: usize) {
     let text = "Heat into each patch, spread over its heated surface; held over the step, or linear with a derivative";
     let heat = table.input(Item::Heat, "casing_heat", Some(&WATT), 0.0, text);
-    (heat.dimension, heat.start, heat.nominal) = (Some(patches), Some(Start::Real(vec![0.0; patches])), Some(100.0));
+    (heat.dimension, heat.start, heat.nominal) =
+        (Some(patches), Some(StartValue::Real(vec![0.0; patches])), Some(100.0));
     limit(heat, &HEAT);
     for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
         let text = format!(
@@ -167,7 +180,7 @@ fn inputs(table: &mut Builder, patches: usize) {
     }
 }
 
-fn parameters(table: &mut Builder, model: &Model) {
+fn parameters(table: &mut ThermalTableBuilder, model: &ConductionModel) {
     let text = "Temperature at the start above the reference, where the start is uniform";
     let initial = table.input(Item::InitialTemperature, "initial_temperature", Some(&KELVIN), 0.0, text);
     (initial.causality, initial.variability) = (Causality::Parameter, Variability::Fixed);
@@ -176,7 +189,7 @@ fn parameters(table: &mut Builder, model: &Model) {
     let text = "Temperatures of gas and air between communication points";
     table.choice(Item::Interpolation, "input_interpolation", &INTERPOLATIONS, text);
     let name = table.push(Item::Constant, "model_name", None, "Name of the model");
-    (name.kind, name.start) = (Kind::String, Some(Start::String(model.name.clone())));
+    (name.kind, name.start) = (DataType::String, Some(StartValue::String(model.name.clone())));
     (name.causality, name.variability) = (Causality::Local, Variability::Constant);
     table.constant("heat_capacity", &CAPACITY, model.heat_capacity, "Heat capacity of the whole");
     let text = "Film coefficient times area of the gas inside, at a factor of 1";
@@ -185,8 +198,8 @@ fn parameters(table: &mut Builder, model: &Model) {
     table.constant("ambient_conductance", &CONDUCTANCE, model.ambient_conductance(), text);
 }
 
-fn temperatures(table: &mut Builder, patches: usize) {
-    let kelvin = |table: &mut Builder, item, name: &str, text: &str| {
+fn temperatures(table: &mut ThermalTableBuilder, patches: usize) {
+    let kelvin = |table: &mut ThermalTableBuilder, item, name: &str, text: &str| {
         table.output(item, name, &KELVIN, Span::Point, text).nominal = Some(100.0);
     };
     let mut row = 0;
@@ -207,7 +220,7 @@ fn temperatures(table: &mut Builder, patches: usize) {
     }
 }
 
-fn heat(table: &mut Builder) {
+fn heat(table: &mut ThermalTableBuilder) {
     for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
         let text = format!("Heat flow from the {what} into the casing, mean over the communication step");
         table.output(Item::Power(index), &format!("{name}_power"), &WATT, Span::Mean, &text);

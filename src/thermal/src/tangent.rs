@@ -4,19 +4,19 @@ use tiprub_core::variables::Variable;
 use tiprub_core::{Error, Result};
 
 use crate::exponential::Phi;
-use crate::operator::Operator;
+use crate::operator::DiagonalOperator;
 use crate::outputs::{row_times, stored};
-use crate::simulation::Simulation;
+use crate::simulation::ThermalSimulation;
 use crate::table::Item;
 
 /// How coordinates, their integrals over the step and heats change.
-struct Change {
+struct ThermalChange {
     coordinates: Vec<f64>,
     /// Supplied, from the gas, from the air (J).
     heats: [f64; 3],
 }
 
-impl Simulation {
+impl ThermalSimulation {
     /// Rate of an output at the communication point.
     pub(crate) fn rate(&self, item: Item, element: usize) -> f64 {
         let (state, operator) = (&self.state, &self.operator);
@@ -94,15 +94,15 @@ impl Simulation {
         Ok(())
     }
 
-    fn change(&self, length: f64, heat: &[f64], films: [f64; 2]) -> Change {
-        let operator: &Operator = &self.operator;
+    fn change(&self, length: f64, heat: &[f64], films: [f64; 2]) -> ThermalChange {
+        let operator: &DiagonalOperator = &self.operator;
         // A ramp begins where the step before ended, whatever is set.
         let ramped = self.state.last_ramped;
         let begin = if ramped { [0.0; 2] } else { films };
         let share = if ramped { 0.5 } else { 1.0 };
         let flows = [0, 1].map(|film| operator.conductances[film] * films[film] * share * length);
         let mut change =
-            Change { coordinates: Vec::new(), heats: [heat.iter().sum::<f64>() * length, flows[0], flows[1]] };
+            ThermalChange { coordinates: Vec::new(), heats: [heat.iter().sum::<f64>() * length, flows[0], flows[1]] };
         for (coordinate, rate) in operator.rates.iter().enumerate() {
             let start = operator.load(coordinate, heat, begin);
             let end = operator.load(coordinate, heat, films);

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::rom::Patch;
-use tiprub_thermal::{Model, Simulation};
+use tiprub_core::rom::ThermalPatch;
+use tiprub_thermal::{ConductionModel, ThermalSimulation};
 
 const ORDER: usize = 7;
 const PATCHES: usize = 3;
@@ -22,7 +22,7 @@ fn positive(seed: usize, scale: f64) -> DMatrix<f64> {
 }
 
 /// A model that no mesh made.
-fn model() -> Model {
+fn model() -> ConductionModel {
     let capacity = 50.0_f64;
     let share = 1.0 / capacity.sqrt();
     let mut conduction = positive(3, 1e-5);
@@ -32,7 +32,7 @@ fn model() -> Model {
         DMatrix::from_fn(count, ORDER, |i, j| if j == 0 { share } else { 0.1 * number(seed + 3 * i + 11 * j) })
     };
     let angle = |k: usize| 2.0 * PI * k as f64 / PATCHES as f64;
-    Model {
+    ConductionModel {
         name: "toy".into(),
         origin: "numbers".into(),
         heat_capacity: capacity,
@@ -43,37 +43,37 @@ fn model() -> Model {
         patch_means: rows(PATCHES, 19),
         wetted_means: rows(2, 31),
         places: rows(4, 41),
-        patches: (0..PATCHES).map(|k| Patch { angle: [angle(k), angle(k + 1)], axial: [0.0, 0.1] }).collect(),
+        patches: (0..PATCHES).map(|k| ThermalPatch { angle: [angle(k), angle(k + 1)], axial: [0.0, 0.1] }).collect(),
         element_time: 1e-6,
     }
 }
 
 #[track_caller]
-fn reference(simulation: &Simulation, name: &str) -> u32 {
+fn reference(simulation: &ThermalSimulation, name: &str) -> u32 {
     simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference
 }
 
-fn set(simulation: &mut Simulation, name: &str, value: f64) {
+fn set(simulation: &mut ThermalSimulation, name: &str, value: f64) {
     let reference = reference(simulation, name);
     simulation.set_real(reference, value).unwrap();
 }
 
-fn get(simulation: &Simulation, name: &str) -> f64 {
+fn get(simulation: &ThermalSimulation, name: &str) -> f64 {
     simulation.real(reference(simulation, name)).unwrap()
 }
 
 /// All real outputs.
-fn outputs(simulation: &Simulation) -> Vec<f64> {
+fn outputs(simulation: &ThermalSimulation) -> Vec<f64> {
     let count = u32::try_from(simulation.table().references()).unwrap();
     (0..count).filter_map(|reference| simulation.real(reference).ok()).collect()
 }
 
-fn bits(simulation: &Simulation) -> Vec<u64> {
+fn bits(simulation: &ThermalSimulation) -> Vec<u64> {
     outputs(simulation).into_iter().map(f64::to_bits).collect()
 }
 
-fn warm() -> Simulation {
-    let mut simulation = Simulation::new(model()).unwrap();
+fn warm() -> ThermalSimulation {
+    let mut simulation = ThermalSimulation::new(model()).unwrap();
     set(&mut simulation, "initial_temperature", 30.0);
     set(&mut simulation, "gas_temperature", 200.0);
     set(&mut simulation, "ambient_temperature", 15.0);
@@ -83,7 +83,7 @@ fn warm() -> Simulation {
 
 /// Fourth-order Runge-Kutta in the model's own coordinates, inputs linear over the step; patch means at the end.
 fn runge_kutta(
-    model: &Model,
+    model: &ConductionModel,
     start: f64,
     heat: [f64; PATCHES],
     films: [[f64; 2]; 2],
@@ -173,7 +173,7 @@ fn steps_of_any_length_lead_to_the_same() {
 #[test]
 fn a_derivative_given_is_a_ramp_whatever_the_interpolation() {
     let run = |choice: i32| {
-        let mut simulation = Simulation::new(model()).unwrap();
+        let mut simulation = ThermalSimulation::new(model()).unwrap();
         let interpolation = reference(&simulation, "input_interpolation");
         simulation.set_integer(interpolation, choice).unwrap();
         simulation.initialise(0.0).unwrap();
@@ -199,7 +199,7 @@ fn a_derivative_given_is_a_ramp_whatever_the_interpolation() {
 #[test]
 fn heat_from_gas_and_air_is_what_their_films_let_through() {
     let (model, mut simulation) = (model(), warm());
-    let flow = |simulation: &Simulation| {
+    let flow = |simulation: &ThermalSimulation| {
         ["gas_heat", "ambient_heat"].map(|name| simulation.output_derivative(reference(simulation, name), 1).unwrap())
     };
     // At the start the temperature is uniform: h A (T_gas − T), by numbers of the model alone.
@@ -249,7 +249,7 @@ fn derivatives_over_a_step_are_differences_exactly() {
         "ambient_heat",
     ];
     let references = names.map(|name| reference(&simulation, name));
-    let run = |simulation: &mut Simulation, scale: f64| {
+    let run = |simulation: &mut ThermalSimulation, scale: f64| {
         simulation.restore_state(&state).unwrap();
         for (input, seed) in inputs.iter().zip(seed) {
             let value = simulation.real(*input).unwrap() + scale * seed;
@@ -302,7 +302,7 @@ fn saved_states_and_resets_give_the_same_bits() {
     let mut state = vec![0; simulation.state_size()];
     simulation.save_state(&mut state).unwrap();
     let here = bits(&simulation);
-    let onwards = |simulation: &mut Simulation| {
+    let onwards = |simulation: &mut ThermalSimulation| {
         set(simulation, "gas_convection_factor", 0.1);
         set(simulation, "casing_heat", 11.0);
         (0..20).for_each(|step| simulation.do_step(2.0 + 0.7 * f64::from(step), 0.7).unwrap());
@@ -312,7 +312,7 @@ fn saved_states_and_resets_give_the_same_bits() {
     simulation.restore_state(&state).unwrap();
     assert_eq!(bits(&simulation), here);
     assert_eq!(onwards(&mut simulation), first);
-    let mut other = Simulation::new(model()).unwrap();
+    let mut other = ThermalSimulation::new(model()).unwrap();
     other.restore_state(&state).unwrap();
     assert_eq!(onwards(&mut other), first);
     simulation.reset();
@@ -338,7 +338,7 @@ fn saved_states_and_resets_give_the_same_bits() {
 
 #[test]
 fn steady_starts_stay_and_need_cooling() {
-    let mut simulation = Simulation::new(model()).unwrap();
+    let mut simulation = ThermalSimulation::new(model()).unwrap();
     let choice = reference(&simulation, "initial_state");
     simulation.set_integer(choice, 2).unwrap();
     set(&mut simulation, "casing_heat", 9.0);
@@ -359,7 +359,7 @@ fn steady_starts_stay_and_need_cooling() {
 /// Without any film heat stays: what is supplied is stored.
 #[test]
 fn a_casing_that_nothing_cools_keeps_its_heat() {
-    let mut simulation = Simulation::new(model()).unwrap();
+    let mut simulation = ThermalSimulation::new(model()).unwrap();
     set(&mut simulation, "gas_convection_factor", 0.0);
     set(&mut simulation, "ambient_convection_factor", 0.0);
     set(&mut simulation, "casing_heat", 3.0);
@@ -389,10 +389,10 @@ fn what_means_nothing_is_refused() {
     simulation.set_input_derivative(heat, 1, 1e9).unwrap();
     let error = simulation.begin_step(0.0, 10.0).unwrap_err().to_string();
     assert!(error.contains("its derivative leads to"), "{error}");
-    let text = |change: &dyn Fn(&mut Model)| {
+    let text = |change: &dyn Fn(&mut ConductionModel)| {
         let mut model = model();
         change(&mut model);
-        Simulation::new(model).map(drop).unwrap_err().to_string()
+        ThermalSimulation::new(model).map(drop).unwrap_err().to_string()
     };
     assert!(text(&|model| model.heat_capacity = 0.0).contains("heat_capacity"));
     assert!(text(&|model| model.conduction[(0, 1)] = 1.0).contains("conduction"));

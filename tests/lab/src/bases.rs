@@ -11,18 +11,18 @@ use tiprub_gallery::{reduction, scene_source};
 use tiprub_model::{
     Rotor37Options,
     reduce::ReductionKind,
-    rotor37::{MeshCounts, Tip},
+    rotor37::{MeshCounts, TipContact},
 };
 use tiprub_shell::{Failure, Result, console::Console};
 use tiprub_study::{
-    Figure, Picture, Sheet, Statement, Study,
+    Picture, Sheet, Statement, Study, StudyFigure,
     arguments::StudyCommon,
-    convergence::march::{Marched, march},
+    convergence::march::{RunSummary, march},
     error::{
-        run::{self, Run},
+        run::{self, TimedRun},
         scene::SceneRun,
     },
-    stability::structure::Structure,
+    stability::structure::SingleStructure,
 };
 
 /// Time between samples (s).
@@ -34,7 +34,7 @@ const MODEL_DIVISION: u32 = 40;
 const EQUAL: [f64; 2] = [3e-2, 1e-2];
 
 /// How big it is.
-struct Size {
+struct BasisSize {
     mesh: MeshCounts,
     modes: &'static [usize],
     /// With fewer of them responses go beyond the frequencies that are kept.
@@ -51,7 +51,7 @@ struct Size {
 /// Of the time of a step.
 const TYPICAL: u32 = 20;
 
-const FULL: Size = Size {
+const FULL: BasisSize = BasisSize {
     mesh: MeshCounts { chord: 16, thickness: 2, span: 20 },
     modes: &[8, 12, 20, 40, 80],
     covered: 20,
@@ -61,7 +61,7 @@ const FULL: Size = Size {
     samples: 349,
     divisions: &[1, 2, 3, 5, 10, TYPICAL, 40, 80],
 };
-const QUICK: Size = Size {
+const QUICK: BasisSize = BasisSize {
     mesh: MeshCounts { chord: 4, thickness: 1, span: 5 },
     modes: &[6, 12],
     covered: 12,
@@ -74,13 +74,13 @@ const QUICK: Size = Size {
 
 /// What touches, and which modes stand beside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Basis {
+struct BasisChoice {
     /// Patches, or else three nodes.
     patches: Option<usize>,
     kind: ReductionKind,
 }
 
-impl Basis {
+impl BasisChoice {
     /// All, the paper's first and the default last.
     fn all(patches: usize) -> [Self; 4] {
         let of =
@@ -99,14 +99,14 @@ impl Basis {
     }
 
     /// Its model with so many modes.
-    fn rom(self, size: &Size, modes: usize, console: &Console) -> Result<Rom> {
-        let tip = self.patches.map_or(Tip::Nodes(3), Tip::Patches);
+    fn rom(self, size: &BasisSize, modes: usize, console: &Console) -> Result<Rom> {
+        let tip = self.patches.map_or(TipContact::Nodes(3), TipContact::Patches);
         let own = Rotor37Options { mesh: size.mesh, tip, kind: self.kind, modes, ..Rotor37Options::default() };
         Ok(reduction::rotor37(&Rotor37Options { checked_modes: size.checked, ..own }, console)?.rom)
     }
 
     /// The same contact with most modes.
-    fn truth(self, size: &Size, console: &Console) -> Result<Marched> {
+    fn truth(self, size: &BasisSize, console: &Console) -> Result<RunSummary> {
         let rom = Self { kind: ReductionKind::FreeInterface, ..self }.rom(size, size.true_modes, console)?;
         marched(&scene(rom)?, TRUE_DIVISION, size.samples)
     }
@@ -119,7 +119,7 @@ fn scene(rom: Rom) -> Result<Scene> {
     Ok(scene)
 }
 
-fn marched(scene: &Scene, division: u32, samples: usize) -> Result<Marched> {
+fn marched(scene: &Scene, division: u32, samples: usize) -> Result<RunSummary> {
     let scene = with(scene, Scheme::ModalExact, division);
     march(&scene, &[], division, samples).map_err(|why| Failure::new("the light rub", why, ""))
 }
@@ -139,8 +139,8 @@ struct Timed {
 }
 
 /// A model.
-struct Found {
-    basis: Basis,
+struct BasisModel {
+    basis: BasisChoice,
     modes: usize,
     /// Worst static flexibility at the contact, and worst forced response (shares).
     flexibility: f64,
@@ -158,15 +158,16 @@ struct Found {
 }
 
 /// Runs of a model by all schemes and steps.
-fn timed(scene: &Scene, modes: usize, truth: &Marched, size: &Size) -> Vec<Timed> {
+fn timed(scene: &Scene, modes: usize, truth: &RunSummary, size: &BasisSize) -> Vec<Timed> {
     let schemes = [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary];
     let samples = size.samples;
     let configurations = schemes.iter().flat_map(|scheme| size.divisions.iter().map(|division| (*scheme, *division)));
     let of = |(scheme, division): (Scheme, u32)| {
         let scene = with(scene, scheme, division);
         let found = march(&scene, &[], division, samples).ok()?;
-        let start =
-            || SceneRun::with_start_values(&scene, INTERVAL, division, &[]).map(|run| Box::new(run) as Box<dyn Run>);
+        let start = || {
+            SceneRun::with_start_values(&scene, INTERVAL, division, &[]).map(|run| Box::new(run) as Box<dyn TimedRun>)
+        };
         let seconds = run::time(&start, samples, 1, None).ok()?;
         Some(Timed {
             modes,
@@ -179,10 +180,16 @@ fn timed(scene: &Scene, modes: usize, truth: &Marched, size: &Size) -> Vec<Timed
     configurations.filter_map(of).collect()
 }
 
-fn model(basis: Basis, modes: usize, size: &Size, truths: [&Marched; 2], console: &Console) -> Result<Found> {
+fn model(
+    basis: BasisChoice,
+    modes: usize,
+    size: &BasisSize,
+    truths: [&RunSummary; 2],
+    console: &Console,
+) -> Result<BasisModel> {
     let rom = basis.rom(size, modes, console)?;
     let failed = |error: tiprub_core::Error| Failure::from_below("a reduced blade", error);
-    let limits = Structure::new(&rom, rom.damping_ratio, 0.0).map_err(failed)?.step_limits(None);
+    let limits = SingleStructure::new(&rom, rom.damping_ratio, 0.0).map_err(failed)?.step_limits(None);
     let worst = |values: &[f64]| values.iter().fold(0.0, |most: f64, value| most.max(value.abs())) / 100.0;
     let (flexibility, response) = (worst(&rom.checks.flexibility_deviation), worst(&rom.checks.response_deviation));
     let scene = scene(rom)?;
@@ -195,16 +202,16 @@ fn model(basis: Basis, modes: usize, size: &Size, truths: [&Marched; 2], console
     let judged = timed.iter().find(|one| one.scheme == Scheme::ModalExact && (one.step / typical - 1.0).abs() < 1e-9);
     let step_time = judged.map_or(f64::NAN, |one| one.seconds * one.step * 1e3);
     let limits = limits.iter().map(|limit| (limit.scheme, limit.below())).collect();
-    Ok(Found { basis, modes, flexibility, response, same, patches, massless, limits, step_time, timed })
+    Ok(BasisModel { basis, modes, flexibility, response, same, patches, massless, limits, step_time, timed })
 }
 
 /// The cheapest run of a basis within an error.
-fn cheapest(all: &[Found], basis: Basis, error: f64) -> Option<Timed> {
+fn cheapest(all: &[BasisModel], basis: BasisChoice, error: f64) -> Option<Timed> {
     let runs = all.iter().filter(|found| found.basis == basis).flat_map(|found| &found.timed);
     runs.filter(|one| one.error <= error).min_by(|a, b| a.seconds.total_cmp(&b.seconds)).copied()
 }
 
-fn table(all: &[Found], frequency: f64) -> String {
+fn table(all: &[BasisModel], frequency: f64) -> String {
     let mut text = format!(
         "| contact, basis | modes | flexibility | response to {:.1} kHz | rub | rub, massless | rub, against patches | largest step: central \
          differences | modal-exact | massless-boundary | µs per step |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
@@ -233,7 +240,7 @@ fn table(all: &[Found], frequency: f64) -> String {
     text
 }
 
-fn cost_table(all: &[Found], bases: &[Basis]) -> String {
+fn cost_table(all: &[BasisModel], bases: &[BasisChoice]) -> String {
     let mut text = String::from(
         "| contact, basis | error | cheapest: modes, scheme, step | ms per simulated ms | of the first row of this error |\n|---|---|---|---|---|\n",
     );
@@ -254,20 +261,20 @@ fn cost_table(all: &[Found], bases: &[Basis]) -> String {
     text
 }
 
-fn figure(all: &[Found], bases: &[Basis]) -> Result<Figure> {
-    let of = |basis: Basis| all.iter().filter(move |one| one.basis == basis);
-    let line = |basis: &Basis| of(*basis).map(|one| (one.modes as f64, one.same.log10())).collect();
+fn figure(all: &[BasisModel], bases: &[BasisChoice]) -> Result<StudyFigure> {
+    let of = |basis: BasisChoice| all.iter().filter(move |one| one.basis == basis);
+    let line = |basis: &BasisChoice| of(*basis).map(|one| (one.modes as f64, one.same.log10())).collect();
     let series = bases.iter().map(|basis| Series::line(basis.name(), line(basis))).collect();
     let plot = Plot { marked: true, ..Plot::new("modes", "log10 of the error of displacements", series) };
     let mut sheet =
         Sheet::new(["basis", "modes", "flexibility", "response", "rub", "rub, massless", "rub, against patches"]);
     for (index, basis) in bases.iter().enumerate() {
-        let row = |one: &Found| {
+        let row = |one: &BasisModel| {
             vec![index as f64, one.modes as f64, one.flexibility, one.response, one.same, one.massless, one.patches]
         };
         sheet.rows.extend(of(*basis).map(row));
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "modes",
         caption: "A light rub against the same contact with most modes.".into(),
         picture: Picture::plot(&plot)?,
@@ -275,24 +282,24 @@ fn figure(all: &[Found], bases: &[Basis]) -> Result<Figure> {
     })
 }
 
-fn statements(all: &[Found], bases: &[Basis], covered: usize) -> Vec<Statement> {
+fn statements(all: &[BasisModel], bases: &[BasisChoice], covered: usize) -> Vec<Statement> {
     let pairs = || {
         bases.chunks(2).flat_map(|pair| {
-            let of = |basis: Basis| all.iter().filter(move |one| one.basis == basis);
+            let of = |basis: BasisChoice| all.iter().filter(move |one| one.basis == basis);
             of(pair[0]).zip(of(pair[1]))
         })
     };
     let flexibility = all.iter().map(|one| one.flexibility).fold(0.0, f64::max);
-    let told = |value: &dyn Fn(&Found) -> f64| {
+    let told = |value: &dyn Fn(&BasisModel) -> f64| {
         let each = pairs().map(|(held, free)| format!("{:.1e} / {:.1e}", value(held), value(free)));
         each.collect::<Vec<_>>().join("; ")
     };
-    let last = |basis: Basis| all.iter().rfind(|one| one.basis == basis);
+    let last = |basis: BasisChoice| all.iter().rfind(|one| one.basis == basis);
     let smaller = bases.chunks(2).all(|pair| match (last(pair[0]), last(pair[1])) {
         (Some(held), Some(free)) => free.same < held.same,
         _ => false,
     });
-    let massless = |one: &Found| one.limits.iter().find(|limit| limit.0 == Scheme::MasslessBoundary.name())?.1;
+    let massless = |one: &BasisModel| one.limits.iter().find(|limit| limit.0 == Scheme::MasslessBoundary.name())?.1;
     let steps: Vec<String> = all
         .iter()
         .filter_map(|one| Some(format!("{}, {}: {:.1} µs", one.basis.name(), one.modes, 1e6 * massless(one)?)))
@@ -323,9 +330,9 @@ fn statements(all: &[Found], bases: &[Basis], covered: usize) -> Vec<Statement> 
     ]
 }
 
-fn results(all: &[Found]) -> Value {
+fn results(all: &[BasisModel]) -> Value {
     let run = |one: &Timed| json!({ "scheme": one.scheme.name(), "step": one.step, "error": one.error, "seconds_per_ms": one.seconds });
-    let row = |one: &Found| {
+    let row = |one: &BasisModel| {
         json!({
             "basis": one.basis.name(), "modes": one.modes, "flexibility": one.flexibility, "response": one.response,
             "rub": one.same, "rub_massless": one.massless, "rub_against_patches": one.patches, "limits": one.limits, "step_seconds": one.step_time,
@@ -342,7 +349,7 @@ fn results(all: &[Found]) -> Value {
 pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
     let size = if arguments.quick { &QUICK } else { &FULL };
     let quiet = Console::new(true, false);
-    let bases = Basis::all(size.patches);
+    let bases = BasisChoice::all(size.patches);
     let task = console.task("Reducing and rubbing", Some((bases.len() * size.modes.len() + 2) as u64));
     let truths = [bases[0].truth(size, &quiet)?, bases[3].truth(size, &quiet)?];
     let mut all = Vec::new();

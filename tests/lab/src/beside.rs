@@ -9,12 +9,12 @@ use tiprub_core::{
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::scene_source;
 use tiprub_reference::reduced::{
-    Method,
+    ReducedMethod,
     moreau::Moreau,
-    rub::{BladeScene, Blades, Obstacle, Tip},
+    rub::{BladeScene, Blades, BumpedCasing, RubTip},
 };
 use tiprub_shell::{Failure, Result, console::Console};
-use tiprub_study::{Figure, Picture, Sheet, Statement, Study};
+use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure};
 
 use crate::cli::BesideArguments;
 
@@ -29,7 +29,7 @@ const LONGEST: f64 = 5e-7;
 const MARGIN: f64 = 4.0;
 
 /// What one of the two found.
-struct Found {
+struct SideBySideRun {
     /// Displacements of all contact rows and blades at the communication points (m), sample by sample.
     displacements: Vec<f64>,
     /// Sum over all contacts of λ, per communication step (N·s).
@@ -75,7 +75,7 @@ pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
         _ => return Err(refused("surface.shape", "the witness knows round casings and two bumps")),
     };
     let meridional = f64::from(u8::from(contact.meridian == Meridian::Contour));
-    let tips = rom.contact_nodes.iter().map(|node| Tip {
+    let tips = rom.contact_nodes.iter().map(|node| RubTip {
         radius: node.position[0],
         angle: node.position[1] - phase,
         slope: meridional * node.meridional_slope,
@@ -89,13 +89,18 @@ pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
         damping: rotor.damping_ratio.unwrap_or(rom.damping_ratio),
         frequency_factors: rotor.frequency_factors.clone(),
         clearances: contact.sector_gaps.clone(),
-        obstacle: Obstacle { clearance: contact.nominal_gap(), speed: rotor.speed, friction: contact.friction, bumps },
+        obstacle: BumpedCasing {
+            clearance: contact.nominal_gap(),
+            speed: rotor.speed,
+            friction: contact.friction,
+            bumps,
+        },
     };
     BladeScene::new(blades).ok_or_else(|| refused("rom", "its mass is not positive definite"))
 }
 
 /// The product over `samples` communication steps, its internal step divided by `division`.
-fn product(scene: &Scene, division: u32, samples: u32) -> tiprub_core::Result<Found> {
+fn product(scene: &Scene, division: u32, samples: u32) -> tiprub_core::Result<SideBySideRun> {
     let mut scene = scene.clone();
     let (time, interval) = (&mut scene.settings.time, scene.settings.experiment.communication_step);
     if time.scheme == Scheme::Galerkin {
@@ -107,7 +112,7 @@ fn product(scene: &Scene, division: u32, samples: u32) -> tiprub_core::Result<Fo
     scene.settings.preset = Preset::None;
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
-    let mut found = Found { displacements: Vec::new(), impulses: Vec::new() };
+    let mut found = SideBySideRun { displacements: Vec::new(), impulses: Vec::new() };
     for sample in 0..samples {
         simulation.do_step(f64::from(sample) * interval, interval)?;
         let bank = simulation.system().bank();
@@ -126,11 +131,16 @@ fn impulse(simulation: &Simulation) -> f64 {
 }
 
 /// The witness over as many, in steps of at most `longest` (s).
-fn witness(scene: &BladeScene, interval: f64, longest: f64, samples: u32) -> std::result::Result<Found, String> {
+fn witness(
+    scene: &BladeScene,
+    interval: f64,
+    longest: f64,
+    samples: u32,
+) -> std::result::Result<SideBySideRun, String> {
     let division = (interval / longest * (1.0 - 1e-9)).ceil().max(1.0);
     let step = interval / division;
     let mut method = Moreau::new(scene, step);
-    let mut found = Found { displacements: Vec::new(), impulses: Vec::new() };
+    let mut found = SideBySideRun { displacements: Vec::new(), impulses: Vec::new() };
     for _ in 0..samples {
         let mut impulse = 0.0;
         let mut done = 0.0;
@@ -138,7 +148,7 @@ fn witness(scene: &BladeScene, interval: f64, longest: f64, samples: u32) -> std
             impulse += method.step()?.forces.iter().map(|(_, force)| force * step).sum::<f64>();
             done += 1.0;
         }
-        found.displacements.extend(tiprub_reference::reduced::Scene::observed(scene, method.state().0));
+        found.displacements.extend(tiprub_reference::reduced::ReducedScene::observed(scene, method.state().0));
         found.impulses.push(impulse);
     }
     Ok(found)
@@ -181,12 +191,17 @@ pub(crate) fn study(arguments: &BesideArguments, console: &Console) -> Result<St
 }
 
 /// Distances: of two runs in displacements, and of their whole impulses.
-fn distances(a: &Found, b: &Found) -> [f64; 2] {
+fn distances(a: &SideBySideRun, b: &SideBySideRun) -> [f64; 2] {
     let [own, other] = [a, b].map(|found| found.impulses.iter().sum::<f64>());
     [apart(&a.displacements, &b.displacements), if other == 0.0 { own.abs() } else { (own / other - 1.0).abs() }]
 }
 
-fn report(scene: &Scene, (own, half): (&Found, &Found), witnesses: &[(f64, Found)], interval: f64) -> Study {
+fn report(
+    scene: &Scene,
+    (own, half): (&SideBySideRun, &SideBySideRun),
+    witnesses: &[(f64, SideBySideRun)],
+    interval: f64,
+) -> Study {
     let (_, finest) = &witnesses[witnesses.len() - 1];
     let (_, before) = &witnesses[witnesses.len() - 2];
     let (between, halved, own_halved) = (distances(half, finest), distances(before, finest), distances(own, half));
@@ -232,8 +247,8 @@ fn report(scene: &Scene, (own, half): (&Found, &Found), witnesses: &[(f64, Found
     }
 }
 
-fn figure((product, witness): (&Found, &Found), interval: f64, sheet: Sheet) -> Option<Figure> {
-    let series = |found: &Found| -> Vec<(f64, f64)> {
+fn figure((product, witness): (&SideBySideRun, &SideBySideRun), interval: f64, sheet: Sheet) -> Option<StudyFigure> {
+    let series = |found: &SideBySideRun| -> Vec<(f64, f64)> {
         let mean = |(sample, impulse): (usize, &f64)| (1e3 * interval * (sample as f64 + 1.0), impulse / interval);
         found.impulses.iter().enumerate().map(mean).collect()
     };
@@ -243,5 +258,5 @@ fn figure((product, witness): (&Found, &Found), interval: f64, sheet: Sheet) -> 
         vec![Series::line("product", series(product)), Series::line("witness", series(witness))],
     );
     let caption = "All normal forces together, means over communication steps.".to_owned();
-    Some(Figure { name: "forces", caption, picture: Picture::plot(&plot).ok()?, sheet })
+    Some(StudyFigure { name: "forces", caption, picture: Picture::plot(&plot).ok()?, sheet })
 }

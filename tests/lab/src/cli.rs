@@ -7,7 +7,7 @@ use tiprub_gallery::builtin::DiskModel;
 use tiprub_packaging::commands;
 use tiprub_shell::{
     Result,
-    console::{Console, Outcome},
+    console::{CommandOutcome, Console},
     output_file,
 };
 use tiprub_study as study;
@@ -26,7 +26,7 @@ use crate::{
     after_help = "Examples:\n  lab stage --quick\n  lab error --scene carpenter\n  lab stability --case friction/\n\n\
                   In the sources: cargo run --release -p tiprub-lab -- stage --quick"
 )]
-pub struct Cli {
+pub struct LabCli {
     /// Print one JSON object with the result on stdout (errors too); progress stays on stderr.
     #[arg(long, global = true)]
     pub json: bool,
@@ -35,20 +35,20 @@ pub struct Cli {
     pub quiet: bool,
     /// What to do.
     #[command(subcommand)]
-    pub command: Command,
+    pub command: LabCommand,
 }
 
 /// Studies by name.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub enum LabCommand {
     /// Error against run time of every method on built-in scenes and standard problems, beside independent methods.
-    Error(ErrorArguments),
+    Error(LabErrorArguments),
     /// Stiff and extreme cases: each must end with a correct result or with an error that gives the reason.
     #[command(
         after_help = "Every case runs in a separate process with a time limit. DIR then holds index.html, stability.csv, \
                       stability.md and results.json."
     )]
-    Stability(StabilityArguments),
+    Stability(LabStabilityArguments),
     /// Small extreme random scenes: checks of energy, losses, penetration, saved states, and the bits of the FMU.
     #[command(after_help = "A seed determines its scene. Run a single one with `lab random --only SEED`.")]
     Random(RandomArguments),
@@ -57,9 +57,9 @@ pub enum Command {
     /// Natural frequencies against nodal diameter with engine orders, and mode shapes.
     Modes(ModesArguments),
     /// Blades against an oval casing, rigid and flexible, over a range of speeds.
-    Stage(StageArguments),
+    Stage(LabStageArguments),
     /// The cube between two rings: the product against independent methods on the full model.
-    Cube(CubeArguments),
+    Cube(LabCubeArguments),
     /// Forces and moments on both sides of contacts, torque against the work of the shaft, and the ledger, over all features.
     Conjugacy(StudyCommon),
     /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
@@ -97,7 +97,7 @@ pub struct EstimatesArguments {
 
 /// Arguments of `lab cube`.
 #[derive(Debug, Args)]
-pub struct CubeArguments {
+pub struct LabCubeArguments {
     /// Only the faces of the cube as patches: a minute.
     #[arg(long)]
     pub patches_only: bool,
@@ -136,7 +136,7 @@ pub struct RefinementArguments {
 
 /// Arguments of `lab error`.
 #[derive(Debug, Args)]
-pub struct ErrorArguments {
+pub struct LabErrorArguments {
     /// Only this scene; may be given several times.
     #[arg(long = "scene", value_name = "SCENE", value_enum)]
     pub scenes: Vec<ErrorScene>,
@@ -209,7 +209,7 @@ pub struct ModesArguments {
 
 /// Arguments of `lab stage`.
 #[derive(Debug, Args)]
-pub struct StageArguments {
+pub struct LabStageArguments {
     /// Angular velocities (rad/s), from, to and how many [default: 0.5 to 1.5 times the one where an oval casing meets the
     /// first mode of nodal diameter 2].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
@@ -224,7 +224,7 @@ pub struct StageArguments {
 
 /// Arguments of `lab stability`.
 #[derive(Debug, Args)]
-pub struct StabilityArguments {
+pub struct LabStabilityArguments {
     /// Directory for the table; made if missing.
     #[arg(long, value_name = "DIR", default_value = "stability")]
     pub out: PathBuf,
@@ -271,31 +271,31 @@ pub struct RandomArguments {
     pub library: Option<PathBuf>,
 }
 
-impl Cli {
+impl LabCli {
     /// Do what is asked for.
     ///
     /// # Errors
     /// A study that fails, or files that cannot be written.
-    pub fn run(&self, console: &Console) -> Result<Outcome> {
+    pub fn run(&self, console: &Console) -> Result<CommandOutcome> {
         let (name, common) = match &self.command {
-            Command::Stability(arguments) => return stability::command::run(arguments, console),
-            Command::Random(arguments) => return random::command::run(arguments, console),
-            Command::Error(arguments) => ("error", &arguments.common),
-            Command::Convergence(common) => ("convergence", common),
-            Command::Modes(arguments) => ("modes", &arguments.common),
-            Command::Stage(arguments) => ("stage", &arguments.common),
-            Command::Cube(arguments) => ("cube", &arguments.common),
-            Command::Conjugacy(common) => ("conjugacy", common),
-            Command::Inputs(common) => ("inputs", common),
-            Command::Coupling(common) => ("coupling", common),
-            Command::Estimates(arguments) => ("estimates", &arguments.common),
-            Command::Refinement(arguments) => ("refinement", &arguments.common),
-            Command::Bases(common) => ("bases", common),
-            Command::Beside(arguments) => ("beside", &arguments.common),
-            Command::Scatter(common) => ("scatter", common),
-            Command::Witness(common) => ("witness", common),
-            Command::Stress(common) => ("stress", common),
-            Command::Wear(common) => ("wear", common),
+            LabCommand::Stability(arguments) => return stability::command::run(arguments, console),
+            LabCommand::Random(arguments) => return random::command::run(arguments, console),
+            LabCommand::Error(arguments) => ("error", &arguments.common),
+            LabCommand::Convergence(common) => ("convergence", common),
+            LabCommand::Modes(arguments) => ("modes", &arguments.common),
+            LabCommand::Stage(arguments) => ("stage", &arguments.common),
+            LabCommand::Cube(arguments) => ("cube", &arguments.common),
+            LabCommand::Conjugacy(common) => ("conjugacy", common),
+            LabCommand::Inputs(common) => ("inputs", common),
+            LabCommand::Coupling(common) => ("coupling", common),
+            LabCommand::Estimates(arguments) => ("estimates", &arguments.common),
+            LabCommand::Refinement(arguments) => ("refinement", &arguments.common),
+            LabCommand::Bases(common) => ("bases", common),
+            LabCommand::Beside(arguments) => ("beside", &arguments.common),
+            LabCommand::Scatter(common) => ("scatter", common),
+            LabCommand::Witness(common) => ("witness", common),
+            LabCommand::Stress(common) => ("stress", common),
+            LabCommand::Wear(common) => ("wear", common),
         };
         let directory = commands::study::directory(name, common);
         output_file::try_directory(&directory)?;
@@ -304,30 +304,30 @@ impl Cli {
 
     fn study(&self, console: &Console) -> Result<study::Study> {
         match &self.command {
-            Command::Error(arguments) => error::study(arguments, console),
-            Command::Convergence(common) => {
+            LabCommand::Error(arguments) => error::study(arguments, console),
+            LabCommand::Convergence(common) => {
                 let start = std::time::Instant::now();
                 let (reduction, _) = DiskModel::with_nodes(common.quick).reduce(console)?;
                 convergence::study(&reduction, start.elapsed().as_secs_f64(), common.quick)
             }
-            Command::Modes(arguments) => {
+            LabCommand::Modes(arguments) => {
                 let (reduction, mesh) = DiskModel::with_nodes(arguments.common.quick).reduce(console)?;
                 modes::study(&reduction, &mesh, arguments.speed, arguments.common.quick)
             }
-            Command::Stage(arguments) => stage::study(arguments, console),
-            Command::Cube(arguments) => cube::study(arguments, console),
-            Command::Conjugacy(common) => conjugacy::study(common.quick),
-            Command::Inputs(common) => inputs::study(common, console),
-            Command::Coupling(common) => coupling::study(common, console),
-            Command::Estimates(arguments) => estimates::study(arguments, console),
-            Command::Refinement(arguments) => refinement::study(arguments, console),
-            Command::Bases(common) => bases::study(common, console),
-            Command::Beside(arguments) => beside::study(arguments, console),
-            Command::Scatter(common) => scatter::study(common, console),
-            Command::Witness(common) => witness::study(common, console),
-            Command::Stress(common) => witness::stress(common, console),
-            Command::Wear(common) => wear::study(common, console),
-            Command::Stability(_) | Command::Random(_) => unreachable!("`run` has answered it"),
+            LabCommand::Stage(arguments) => stage::study(arguments, console),
+            LabCommand::Cube(arguments) => cube::study(arguments, console),
+            LabCommand::Conjugacy(common) => conjugacy::study(common.quick),
+            LabCommand::Inputs(common) => inputs::study(common, console),
+            LabCommand::Coupling(common) => coupling::study(common, console),
+            LabCommand::Estimates(arguments) => estimates::study(arguments, console),
+            LabCommand::Refinement(arguments) => refinement::study(arguments, console),
+            LabCommand::Bases(common) => bases::study(common, console),
+            LabCommand::Beside(arguments) => beside::study(arguments, console),
+            LabCommand::Scatter(common) => scatter::study(common, console),
+            LabCommand::Witness(common) => witness::study(common, console),
+            LabCommand::Stress(common) => witness::stress(common, console),
+            LabCommand::Wear(common) => wear::study(common, console),
+            LabCommand::Stability(_) | LabCommand::Random(_) => unreachable!("`run` has answered it"),
         }
     }
 }
@@ -340,7 +340,7 @@ mod tests {
 
     #[test]
     fn the_definition_is_consistent() {
-        Cli::command().debug_assert();
+        LabCli::command().debug_assert();
     }
 
     #[test]
@@ -356,7 +356,7 @@ mod tests {
             ("stage scene.toml", false),
             ("beside scene.toml --quick", true),
         ] {
-            assert_eq!(Cli::try_parse_from(["lab"].into_iter().chain(line.split(' '))).is_ok(), right, "{line}");
+            assert_eq!(LabCli::try_parse_from(["lab"].into_iter().chain(line.split(' '))).is_ok(), right, "{line}");
         }
     }
 }

@@ -3,13 +3,13 @@
 
 use serde_json::json;
 use tiprub_figure::{
-    plots::{Form, Plot, Series},
-    waterfall::{Axis, Waterfall},
+    plots::{Plot, Series, SeriesForm},
+    waterfall::{Waterfall, WaterfallAxis},
 };
 use tiprub_model::cyclic::{ConvergenceRow, CyclicReduction, NodalDiameter};
 use tiprub_packaging::rom_facts::{DEVIATION_LIMIT, RESIDUAL_LIMIT};
 use tiprub_shell::Result;
-use tiprub_study::{Figure, Picture, Sheet, Statement, Study};
+use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure};
 
 /// Where the paper's figures end, in %.
 const DEVIATION_SHOWN: f64 = 3.0;
@@ -69,9 +69,9 @@ impl Criterion {
             (row.total_modes as f64, modes.map(|(value, mode)| (f64::from(mode), value.abs())).collect())
         };
         Waterfall {
-            x: Axis::over("mode of the disk (-)", [1.0, MODES as f64].into_iter()),
-            depth: Axis::over("component modes (-)", rows.iter().map(|row| row.total_modes as f64)).reversed(),
-            value: Axis::over(self.label, [0.0, self.shown].into_iter()),
+            x: WaterfallAxis::over("mode of the disk (-)", [1.0, MODES as f64].into_iter()),
+            depth: WaterfallAxis::over("component modes (-)", rows.iter().map(|row| row.total_modes as f64)).reversed(),
+            value: WaterfallAxis::over(self.label, [0.0, self.shown].into_iter()),
             curves: rows.iter().map(curve).collect(),
         }
     }
@@ -87,8 +87,8 @@ impl Criterion {
         sheet
     }
 
-    fn figure(&self, rows: &[ConvergenceRow]) -> Figure {
-        Figure {
+    fn figure(&self, rows: &[ConvergenceRow]) -> StudyFigure {
+        StudyFigure {
             name: self.name,
             caption: format!(
                 "{} of the {MODES} lowest modes of the disk against the number of component modes in the reduced model. \
@@ -115,14 +115,14 @@ impl Criterion {
 }
 
 /// Both criteria at once, the largest over the modes: what decides how many component modes to keep.
-fn worst_figure(rows: &[ConvergenceRow]) -> Result<Figure> {
+fn worst_figure(rows: &[ConvergenceRow]) -> Result<StudyFigure> {
     let series = CRITERIA.iter().map(|criterion| {
         let points = rows.iter().map(|row| (row.modes as f64, criterion.worst(row)));
         Series::line(criterion.title, points.collect())
     });
     let limit = |criterion: &Criterion, color| {
         let ends = [rows.first(), rows.last()].into_iter().flatten().map(|row| (row.modes as f64, criterion.limit));
-        Series::line(format!("limit {} %", criterion.limit), ends.collect()).drawn(Form::Thin, color)
+        Series::line(format!("limit {} %", criterion.limit), ends.collect()).drawn(SeriesForm::Thin, color)
     };
     let series = series.chain([limit(&CRITERIA[0], 0), limit(&CRITERIA[1], 1)]).collect();
     let plot = Plot {
@@ -139,7 +139,7 @@ fn worst_figure(rows: &[ConvergenceRow]) -> Result<Figure> {
     for row in rows {
         sheet.rows.push(vec![row.modes as f64, row.total_modes as f64, CRITERIA[0].worst(row), CRITERIA[1].worst(row)]);
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "worst",
         caption: format!("The largest value over the {MODES} lowest modes of the disk, with the limits."),
         picture: Picture::plot(&plot)?,
@@ -239,7 +239,7 @@ pub(crate) fn study(reduction: &CyclicReduction, seconds: f64, quick: bool) -> R
             None => "not reached here".into(),
         },
     ));
-    let mut figures: Vec<Figure> = CRITERIA.iter().map(|criterion| criterion.figure(rows)).collect();
+    let mut figures: Vec<StudyFigure> = CRITERIA.iter().map(|criterion| criterion.figure(rows)).collect();
     figures.push(worst_figure(rows)?);
     Ok(Study {
         name: "convergence",

@@ -10,7 +10,7 @@ use tiprub_core::{Scene, Simulation};
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{Failure, Result, console::Console};
-use tiprub_study::{Figure, Picture, Sheet, Statement, Study, arguments::StudyCommon};
+use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure, arguments::StudyCommon};
 
 use crate::stability::models;
 
@@ -49,14 +49,14 @@ const SHAFTS: [Shaft; 2] = [
 
 /// Displacement (m) and velocity (m/s) of the shaft's centre.
 #[derive(Debug, Clone, Copy, Default)]
-struct Motion {
+struct ShaftMotion {
     place: Vector2<f64>,
     velocity: Vector2<f64>,
 }
 
 impl Shaft {
     /// Where a mean force (N) puts it after `step` (s), by the midpoint rule: x₁ = free + compliance·F.
-    fn law(&self, at: Motion, step: f64, unbalance: Vector2<f64>) -> (Vector2<f64>, f64) {
+    fn law(&self, at: ShaftMotion, step: f64, unbalance: Vector2<f64>) -> (Vector2<f64>, f64) {
         let inertia = 2.0 * self.mass / (step * step) + self.damping / step;
         let compliance = 1.0 / (inertia + 0.5 * self.stiffness);
         let kept = at.place * (inertia - 0.5 * self.stiffness) + at.velocity * (2.0 * self.mass / step);
@@ -73,7 +73,7 @@ impl Shaft {
 
 /// How a step of both is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
+enum CouplingMethod {
     /// The shaft goes by the last force, then the rub by the shaft.
     Once,
     /// Again and again with the force found, from a saved state.
@@ -84,7 +84,7 @@ enum Way {
     Differences,
 }
 
-impl Way {
+impl CouplingMethod {
     const ALL: [Self; 4] = [Self::Once, Self::FixedPoint, Self::Newton, Self::Differences];
 
     fn name(self) -> &'static str {
@@ -99,7 +99,7 @@ impl Way {
 
 /// What came of a run.
 #[derive(Debug, Clone, Default)]
-struct Found {
+struct CouplingRun {
     /// At multiples of the longest step.
     orbit: Vec<Vector2<f64>>,
     /// Steps of the rub, those repeated and those of differences included, per communication step.
@@ -111,7 +111,7 @@ struct Found {
 }
 
 /// The rub as an importer sees it.
-struct Rub {
+struct CoupledRub {
     simulation: Simulation,
     inputs: [u32; 2],
     outputs: [u32; 2],
@@ -120,13 +120,13 @@ struct Rub {
     derivatives: usize,
 }
 
-impl Rub {
-    fn new(scene: &Scene, way: Way) -> tiprub_core::Result<Self> {
+impl CoupledRub {
+    fn new(scene: &Scene, way: CouplingMethod) -> tiprub_core::Result<Self> {
         let mut simulation = Simulation::new(scene)?;
         let reference = |name: &str| simulation.table().find(name).map_or(0, |row| row.reference);
         let (inputs, outputs) = (["whirl_x", "whirl_y"].map(reference), ["force_x", "force_y"].map(reference));
         let switch = reference("step_derivatives");
-        if way == Way::Newton {
+        if way == CouplingMethod::Newton {
             simulation.set_integer(switch, 2)?;
         }
         simulation.initialise(0.0)?;
@@ -164,12 +164,12 @@ impl Rub {
     }
 }
 
-fn march(scene: &Scene, shaft: Shaft, way: Way, step: f64) -> tiprub_core::Result<Found> {
+fn march(scene: &Scene, shaft: Shaft, way: CouplingMethod, step: f64) -> tiprub_core::Result<CouplingRun> {
     let start = Instant::now();
-    let mut rub = Rub::new(scene, way)?;
+    let mut rub = CoupledRub::new(scene, way)?;
     let speed = scene.settings.structures[0].speed;
     let precision = SOLVED * scene.settings.contacts[0].nominal_gap();
-    let (mut at, mut force, mut found) = (Motion::default(), Vector2::zeros(), Found::default());
+    let (mut at, mut force, mut found) = (ShaftMotion::default(), Vector2::zeros(), CouplingRun::default());
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "constants: at most 1120 steps")]
     let [count, every] = [LENGTH / step, STEPS[0] / step].map(|ratio| ratio.round() as usize);
     for index in 0..count {
@@ -180,12 +180,15 @@ fn march(scene: &Scene, shaft: Shaft, way: Way, step: f64) -> tiprub_core::Resul
         force = rub.force(place, step)?;
         let mut left = free + force * compliance - place;
         let mut tried = 1;
-        while way != Way::Once && left.norm() > precision && tried < MOST {
+        while way != CouplingMethod::Once && left.norm() > precision && tried < MOST {
             let change = match way {
-                Way::Once | Way::FixedPoint => left,
-                Way::Newton | Way::Differences => {
-                    let slope =
-                        if way == Way::Newton { rub.derivative()? } else { rub.difference(place, force, step)? };
+                CouplingMethod::Once | CouplingMethod::FixedPoint => left,
+                CouplingMethod::Newton | CouplingMethod::Differences => {
+                    let slope = if way == CouplingMethod::Newton {
+                        rub.derivative()?
+                    } else {
+                        rub.difference(place, force, step)?
+                    };
                     let matrix = Matrix2::identity() - slope * compliance;
                     matrix.lu().solve(&left).unwrap_or(left)
                 }
@@ -198,13 +201,13 @@ fn march(scene: &Scene, shaft: Shaft, way: Way, step: f64) -> tiprub_core::Resul
                 force = rub.force(place, step)?;
                 left = free + force * compliance - place;
                 (tried, share) = (tried + 1, 0.5 * share);
-                if way == Way::FixedPoint || left.norm() < before || tried >= MOST || share < SHORTEST {
+                if way == CouplingMethod::FixedPoint || left.norm() < before || tried >= MOST || share < SHORTEST {
                     break;
                 }
             }
         }
-        found.unsolved += usize::from(way != Way::Once && left.norm() > precision);
-        at = Motion { place, velocity: (place - at.place) * (2.0 / step) - at.velocity };
+        found.unsolved += usize::from(way != CouplingMethod::Once && left.norm() > precision);
+        at = ShaftMotion { place, velocity: (place - at.place) * (2.0 / step) - at.velocity };
         if (index + 1) % every == 0 {
             found.orbit.push(place);
         }
@@ -216,7 +219,7 @@ fn march(scene: &Scene, shaft: Shaft, way: Way, step: f64) -> tiprub_core::Resul
 }
 
 /// Largest distance of two orbits as a share of the clearance.
-fn distance(one: &Found, other: &Found, clearance: f64) -> f64 {
+fn distance(one: &CouplingRun, other: &CouplingRun, clearance: f64) -> f64 {
     one.orbit.iter().zip(&other.orbit).map(|(one, other)| (one - other).norm()).fold(0.0, f64::max) / clearance
 }
 
@@ -231,22 +234,24 @@ fn scene(arguments: &StudyCommon, console: &Console) -> Result<Scene> {
 }
 
 /// A way, a communication step (s), and what came of it with its error; nothing where the run failed.
-type Row = (Way, f64, Option<(Found, f64)>);
+type CouplingRow = (CouplingMethod, f64, Option<(CouplingRun, f64)>);
 
 /// All runs with one shaft.
-struct Runs {
+struct CouplingRuns {
     shaft: Shaft,
-    all: Vec<Row>,
+    all: Vec<CouplingRow>,
 }
 
-fn runs(scene: &Scene, shaft: Shaft, console: &Console) -> Result<Runs> {
+fn runs(scene: &Scene, shaft: Shaft, console: &Console) -> Result<CouplingRuns> {
     let clearance = scene.settings.contacts[0].nominal_gap();
-    let fine = march(scene, shaft, Way::Newton, FINE)
+    let fine = march(scene, shaft, CouplingMethod::Newton, FINE)
         .map_err(|error| Failure::from_core(format!("lab coupling, {}", shaft.name), error))?;
     let mut all = Vec::new();
-    let task = console
-        .task(&format!("Stepping a rub and a shaft ({})", shaft.name), Some((Way::ALL.len() * STEPS.len()) as u64));
-    for way in Way::ALL {
+    let task = console.task(
+        &format!("Stepping a rub and a shaft ({})", shaft.name),
+        Some((CouplingMethod::ALL.len() * STEPS.len()) as u64),
+    );
+    for way in CouplingMethod::ALL {
         for step in STEPS {
             task.at(all.len() as u64);
             // A shaft thrown through the casing is what a way that does not converge may end in.
@@ -254,11 +259,11 @@ fn runs(scene: &Scene, shaft: Shaft, console: &Console) -> Result<Runs> {
             all.push((way, step, found.map(|found| (found.clone(), distance(&found, &fine, clearance)))));
         }
     }
-    Ok(Runs { shaft, all })
+    Ok(CouplingRuns { shaft, all })
 }
 
-impl Runs {
-    fn found(&self, way: Way, step: f64) -> Option<&(Found, f64)> {
+impl CouplingRuns {
+    fn found(&self, way: CouplingMethod, step: f64) -> Option<&(CouplingRun, f64)> {
         self.all
             .iter()
             .find(|(one, at, _)| *one == way && at.to_bits() == step.to_bits())
@@ -266,7 +271,7 @@ impl Runs {
     }
 }
 
-fn table(runs: &[Runs]) -> String {
+fn table(runs: &[CouplingRuns]) -> String {
     let mut text = String::from(
         "| shaft | way | H (s) | error / clearance | steps of the rub per H | derivatives per H | not solved | time (s) |\n\
          |---|---|---|---|---|---|---|---|\n",
@@ -286,12 +291,12 @@ fn table(runs: &[Runs]) -> String {
     text
 }
 
-fn figure(runs: &Runs, name: &'static str) -> Result<Figure> {
-    let points = |way: Way| {
+fn figure(runs: &CouplingRuns, name: &'static str) -> Result<StudyFigure> {
+    let points = |way: CouplingMethod| {
         let found = |step: &f64| runs.found(way, *step).map(|(_, error)| (step.log10(), *error));
         STEPS.iter().filter_map(found).collect()
     };
-    let series = Way::ALL.map(|way| Series::line(way.name(), points(way)));
+    let series = CouplingMethod::ALL.map(|way| Series::line(way.name(), points(way)));
     let plot = Plot {
         logarithmic: true,
         marked: true,
@@ -301,12 +306,12 @@ fn figure(runs: &Runs, name: &'static str) -> Result<Figure> {
     let mut sheet =
         Sheet::new(["way", "H (s)", "error / clearance", "steps of the rub per H", "derivatives per H", "time (s)"]);
     for (way, step, found) in &runs.all {
-        let number = Way::ALL.iter().position(|one| one == way).unwrap_or(0);
+        let number = CouplingMethod::ALL.iter().position(|one| one == way).unwrap_or(0);
         if let Some((found, error)) = found {
             sheet.rows.push(vec![number as f64, *step, *error, found.steps, found.derivatives, found.seconds]);
         }
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name,
         caption: format!("Shaft {}: largest distance from the orbit of H = {FINE:e} s.", runs.shaft.name),
         picture: Picture::plot(&plot)?,
@@ -320,9 +325,9 @@ fn steps_of_all() -> usize {
     STEPS.iter().map(|step| (LENGTH / step).round() as usize).sum()
 }
 
-fn statements(runs: &Runs) -> Vec<Statement> {
+fn statements(runs: &CouplingRuns) -> Vec<Statement> {
     let name = runs.shaft.name;
-    let unsolved = |way: Way| {
+    let unsolved = |way: CouplingMethod| {
         let failed = STEPS.iter().filter(|step| runs.found(way, **step).is_none()).count();
         let unsolved: usize =
             STEPS.iter().filter_map(|step| runs.found(way, *step)).map(|(found, _)| found.unsolved).sum();
@@ -335,11 +340,12 @@ fn statements(runs: &Runs) -> Vec<Statement> {
             },
         )
     };
-    let steps = |way: Way| {
+    let steps = |way: CouplingMethod| {
         let all = STEPS.iter().filter_map(|step| runs.found(way, *step));
         all.map(|(found, _)| found.steps + found.derivatives).fold(0.0, f64::max)
     };
-    let [fixed, newton, differences] = [Way::FixedPoint, Way::Newton, Way::Differences].map(unsolved);
+    let [fixed, newton, differences] =
+        [CouplingMethod::FixedPoint, CouplingMethod::Newton, CouplingMethod::Differences].map(unsolved);
     vec![
         Statement::tested(
             format!("{name}: Newton's method with derivatives over the step solves 99 of 100 steps, and no run fails"),
@@ -350,8 +356,12 @@ fn statements(runs: &Runs) -> Vec<Statement> {
             format!(
                 "{name}: it takes at most a tenth more steps of the rub than differences do, derivatives counted as steps"
             ),
-            steps(Way::Newton) <= 1.1 * steps(Way::Differences),
-            format!("{:.2} against {:.2} per communication step", steps(Way::Newton), steps(Way::Differences)),
+            steps(CouplingMethod::Newton) <= 1.1 * steps(CouplingMethod::Differences),
+            format!(
+                "{:.2} against {:.2} per communication step",
+                steps(CouplingMethod::Newton),
+                steps(CouplingMethod::Differences)
+            ),
         ),
     ]
 }
@@ -386,14 +396,14 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     })
 }
 
-fn results(all: &[Runs]) -> Value {
-    let one = |(way, step, found): &Row| {
+fn results(all: &[CouplingRuns]) -> Value {
+    let one = |(way, step, found): &CouplingRow| {
         let figures = found.as_ref().map(|(found, error)| {
             json!({ "error": error, "steps": found.steps, "derivatives": found.derivatives, "unsolved": found.unsolved,
                     "seconds": found.seconds })
         });
         json!({ "way": way.name(), "step": step, "found": figures })
     };
-    let runs = |runs: &Runs| (runs.shaft.name.to_owned(), runs.all.iter().map(one).collect::<Value>());
+    let runs = |runs: &CouplingRuns| (runs.shaft.name.to_owned(), runs.all.iter().map(one).collect::<Value>());
     Value::Object(all.iter().map(runs).collect())
 }

@@ -7,14 +7,14 @@ use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::{reduction, scene_source};
 use tiprub_model::{
     Rotor37Options,
-    rotor37::{MeshCounts, Tip},
+    rotor37::{MeshCounts, TipContact},
 };
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 use tiprub_study::{
-    Figure, Picture, Sheet, Statement, Study,
+    Picture, Sheet, Statement, Study, StudyFigure,
     convergence::{
         limit,
-        march::{Marched, march},
+        march::{RunSummary, march},
     },
     estimate::{self, Estimate},
 };
@@ -22,7 +22,7 @@ use tiprub_study::{
 use crate::cli::EstimatesArguments;
 
 /// Rubs of one model: elements of its mesh, of two coarser ones (the coarsest first) and of the true one, modes, and depths of the bumps, friction coefficients and speeds (rad/s), each with each.
-struct Group {
+struct RubGroup {
     mesh: [usize; 3],
     coarser: [[usize; 3]; 2],
     finer: [usize; 3],
@@ -33,8 +33,8 @@ struct Group {
 }
 
 /// The first group is the one that the bounds of [`estimate`] were chosen with, the second is not.
-static GROUPS: [Group; 2] = [
-    Group {
+static GROUPS: [RubGroup; 2] = [
+    RubGroup {
         mesh: [16, 1, 16],
         coarser: [[8, 1, 8], [12, 1, 12]],
         finer: [32, 1, 32],
@@ -43,7 +43,7 @@ static GROUPS: [Group; 2] = [
         frictions: &[0.0, 0.15],
         speeds: &[1500.0, 1800.0, 2000.0],
     },
-    Group {
+    RubGroup {
         mesh: [12, 2, 20],
         coarser: [[6, 2, 10], [8, 2, 14]],
         finer: [24, 2, 40],
@@ -81,9 +81,9 @@ struct Compared {
 }
 
 /// One rub: its group, and with its own model and others.
-struct Rub {
+struct EstimatedRub {
     name: String,
-    group: &'static Group,
+    group: &'static RubGroup,
     own: Scene,
     modes: Scene,
     patches: Scene,
@@ -92,7 +92,7 @@ struct Rub {
     finer: Scene,
 }
 
-fn rubs(quick: bool, console: &Console) -> Result<Vec<Rub>> {
+fn rubs(quick: bool, console: &Console) -> Result<Vec<EstimatedRub>> {
     let mut found = Vec::new();
     let base = scene_source::settings("builtin:rotor37-one-row")?;
     for (group, number) in GROUPS.iter().zip(1..) {
@@ -108,19 +108,19 @@ fn rubs(quick: bool, console: &Console) -> Result<Vec<Rub>> {
             let name = format!("group {number}, depth {depth}, µ = {friction}, {speed} rad/s");
             let with = |rom: &Rom| Scene { settings: settings.clone(), roms: vec![rom.clone()] };
             let [own, modes, patches, coarsest, coarser, finer] = roms.each_ref().map(with);
-            found.push(Rub { name, group, own, modes, patches, coarser: [coarsest, coarser], finer });
+            found.push(EstimatedRub { name, group, own, modes, patches, coarser: [coarsest, coarser], finer });
         }
     }
     Ok(found)
 }
 
 /// The own model of a group, with more modes, with more patches, on the coarser meshes and on the true one.
-fn roms(group: &Group, console: &Console) -> Result<[Rom; 6]> {
+fn roms(group: &RubGroup, console: &Console) -> Result<[Rom; 6]> {
     let rom = |[chord, thickness, span]: [usize; 3], modes: usize, patches: usize| {
         let mesh = MeshCounts { chord, thickness, span };
         // Nobody reads the checks of these.
         let own = Rotor37Options::default();
-        let options = Rotor37Options { mesh, tip: Tip::Patches(patches), modes, checked_modes: 1, ..own };
+        let options = Rotor37Options { mesh, tip: TipContact::Patches(patches), modes, checked_modes: 1, ..own };
         reduction::rotor37(&options, console).map(|found| found.rom)
     };
     let (mesh, modes) = (group.mesh, group.modes);
@@ -134,7 +134,7 @@ fn roms(group: &Group, console: &Console) -> Result<[Rom; 6]> {
     ])
 }
 
-fn run(scene: &Scene, division: u32, samples: usize) -> Result<Marched> {
+fn run(scene: &Scene, division: u32, samples: usize) -> Result<RunSummary> {
     let mut scene = scene.clone();
     scene.settings.time.step = INTERVAL / f64::from(division);
     march(&scene, &[], division, samples).map_err(|why| Failure::new(&scene.settings.name, why, ""))
@@ -146,7 +146,7 @@ fn edge([chord, _, span]: [usize; 3]) -> f64 {
 }
 
 /// What the mesh leaves, from one coarser mesh and from two.
-fn of_mesh(rub: &Rub, own: &Marched, samples: usize) -> [Option<f64>; 2] {
+fn of_mesh(rub: &EstimatedRub, own: &RunSummary, samples: usize) -> [Option<f64>; 2] {
     let [coarsest, coarse] = rub.coarser.each_ref().map(|scene| run(scene, DIVISION, samples).ok());
     let [first, second] = rub.group.coarser.map(edge);
     let own_edge = edge(rub.group.mesh);
@@ -160,7 +160,7 @@ fn of_mesh(rub: &Rub, own: &Marched, samples: usize) -> [Option<f64>; 2] {
 }
 
 /// One rub over its mesh.
-fn compared_over_meshes(rubs: &[Rub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
+fn compared_over_meshes(rubs: &[EstimatedRub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
     let rub = &rubs[scene];
     let own = run(&rub.own, DIVISION, samples)?;
     let truth = run(&rub.finer, DIVISION, samples).ok().and_then(|truth| own.displacement_change(&truth));
@@ -169,7 +169,7 @@ fn compared_over_meshes(rubs: &[Rub], scene: usize, samples: usize) -> Result<Ve
 }
 
 /// The same in the directions that a scene tells of itself.
-fn compared_by_itself(rubs: &[Rub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
+fn compared_by_itself(rubs: &[EstimatedRub], scene: usize, samples: usize) -> Result<Vec<Compared>> {
     let quiet = Console::new(true, false);
     let rub = &rubs[scene];
     let estimates = estimate::estimates(&rub.own, &[], samples, &quiet)?;
@@ -202,8 +202,8 @@ fn statement(all: &[Compared], direction: usize) -> Statement {
 }
 
 /// The same of every group, with true errors and ratios.
-fn groups(rubs: &[Rub], all: &[Compared], direction: usize) -> Vec<Statement> {
-    let of = |(group, number): (&'static Group, usize)| {
+fn groups(rubs: &[EstimatedRub], all: &[Compared], direction: usize) -> Vec<Statement> {
+    let of = |(group, number): (&'static RubGroup, usize)| {
         let own = |one: &&Compared| one.direction == direction && core::ptr::eq(rubs[one.scene].group, group);
         let own: Vec<&Compared> = all.iter().filter(own).collect();
         let truths: Vec<f64> = own.iter().filter_map(|one| one.truth).collect();
@@ -226,7 +226,7 @@ fn groups(rubs: &[Rub], all: &[Compared], direction: usize) -> Vec<Statement> {
     GROUPS.iter().zip(1..).map(of).collect()
 }
 
-fn figure(all: &[Compared]) -> Result<Figure> {
+fn figure(all: &[Compared]) -> Result<StudyFigure> {
     let logarithm = |value: f64| value.max(NONE).log10();
     let series = DIRECTIONS.iter().enumerate().map(|(direction, name)| {
         let own = all.iter().filter(|one| one.direction == direction);
@@ -239,7 +239,7 @@ fn figure(all: &[Compared]) -> Result<Figure> {
         let [estimate, truth] = [one.estimate, one.truth].map(|value| value.unwrap_or(f64::NAN));
         sheet.rows.push(vec![one.scene as f64, one.direction as f64, estimate, truth]);
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "estimates",
         caption: "Estimated against true relative error of the displacements of watched points.".into(),
         picture: Picture::plot(&plot)?,

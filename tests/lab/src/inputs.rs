@@ -12,7 +12,7 @@ use tiprub_core::{
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{Failure, Result, console::Console, sweep};
-use tiprub_study::{Figure, Picture, Sheet, Statement, Study, arguments::StudyCommon};
+use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure, arguments::StudyCommon};
 
 use crate::stability::models;
 
@@ -34,7 +34,7 @@ const MILD: f64 = 1.5;
 
 /// How the importer gives an input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
+enum InputMethod {
     /// Values only, ramped by the FMU.
     Ramp,
     /// Values and derivatives.
@@ -43,7 +43,7 @@ enum Way {
     Hold,
 }
 
-impl Way {
+impl InputMethod {
     const ALL: [Self; 3] = [Self::Ramp, Self::Derivatives, Self::Hold];
 
     fn name(self) -> &'static str {
@@ -56,7 +56,7 @@ impl Way {
 }
 
 /// An input and its course.
-struct Course {
+struct InputCase {
     name: &'static str,
     title: &'static str,
     scene: Scene,
@@ -66,7 +66,7 @@ struct Course {
 
 /// What came of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Found {
+struct InputRun {
     /// Largest normal force of any node in any internal step (N).
     force: f64,
     /// Largest magnitude of the torque over [`PART`] (N.m).
@@ -109,7 +109,7 @@ fn temperature(_: &Scene, time: f64, length: f64) -> Vec<(&'static str, f64)> {
 }
 
 /// All courses; the quick ones on models of a few masses and springs, which need no reduction.
-fn courses(arguments: &StudyCommon, console: &Console) -> Result<Vec<Course>> {
+fn courses(arguments: &StudyCommon, console: &Console) -> Result<Vec<InputCase>> {
     let (rigid, elastic) = if arguments.quick {
         let mut elastic = models::bumps(models::blade(12));
         models::on_ring(&mut elastic, 0.03);
@@ -142,18 +142,28 @@ fn courses(arguments: &StudyCommon, console: &Console) -> Result<Vec<Course>> {
         scene.settings.structures[0].whirl = true;
     };
     Ok(vec![
-        Course { name: "whirl", title: "whirl_x, whirl_y", scene: with(&rigid, whirling), values: whirl },
-        Course { name: "gap-offset", title: "gap_offset", scene: with(&rigid, round), values: gap_offset },
-        Course { name: "shape-factor", title: "casing_shape_factor", scene: with(&rigid, bumps), values: shape_factor },
-        Course { name: "temperature", title: "casing_temperature", scene: with(&elastic, |_| ()), values: temperature },
+        InputCase { name: "whirl", title: "whirl_x, whirl_y", scene: with(&rigid, whirling), values: whirl },
+        InputCase { name: "gap-offset", title: "gap_offset", scene: with(&rigid, round), values: gap_offset },
+        InputCase {
+            name: "shape-factor",
+            title: "casing_shape_factor",
+            scene: with(&rigid, bumps),
+            values: shape_factor,
+        },
+        InputCase {
+            name: "temperature",
+            title: "casing_temperature",
+            scene: with(&elastic, |_| ()),
+            values: temperature,
+        },
     ])
 }
 
-impl Course {
+impl InputCase {
     /// One run by communication steps of `step` (s).
-    fn run(&self, way: Way, step: f64, length: f64) -> Result<Found> {
+    fn run(&self, way: InputMethod, step: f64, length: f64) -> Result<InputRun> {
         let mut scene = self.scene.clone();
-        if way == Way::Hold {
+        if way == InputMethod::Hold {
             scene.settings.time.input_interpolation = InputInterpolation::Hold;
         }
         let place = || format!("study inputs, {} by {step} s ({})", self.title, way.name());
@@ -161,7 +171,7 @@ impl Course {
     }
 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "constants: at most 8000 steps")]
-    fn march(&self, scene: &Scene, way: Way, step: f64, length: f64) -> tiprub_core::Result<Found> {
+    fn march(&self, scene: &Scene, way: InputMethod, step: f64, length: f64) -> tiprub_core::Result<InputRun> {
         let mut simulation = Simulation::new(scene)?;
         self.give(&mut simulation, way, [0.0, step], length)?;
         simulation.initialise(0.0)?;
@@ -169,7 +179,7 @@ impl Course {
         let (torque, force) = (output(Quantity::Moment(2)), output(Quantity::NormalForcePeak));
         let parts = (length / PART).round() as usize;
         let steps = (PART / step).round() as usize;
-        let mut found = Found { force: 0.0, torque: 0.0, mean: 0.0 };
+        let mut found = InputRun { force: 0.0, torque: 0.0, mean: 0.0 };
         for part in 0..parts {
             let mut sum = 0.0;
             for index in part * steps..(part + 1) * steps {
@@ -186,7 +196,13 @@ impl Course {
     }
 
     /// Set the inputs at the first of two communication points.
-    fn give(&self, simulation: &mut Simulation, way: Way, times: [f64; 2], length: f64) -> tiprub_core::Result<()> {
+    fn give(
+        &self,
+        simulation: &mut Simulation,
+        way: InputMethod,
+        times: [f64; 2],
+        length: f64,
+    ) -> tiprub_core::Result<()> {
         let [now, next] = times.map(|time| (self.values)(&self.scene, time, length));
         for ((name, value), (_, next)) in now.into_iter().zip(next) {
             let row = simulation.table().find(name).map(|row| (row.reference, row.len(), row.quantity));
@@ -194,9 +210,9 @@ impl Course {
             for reference in (first..).take(count) {
                 simulation.set_real(reference, value)?;
                 // A parameter has no derivative: of it that way sets where it is to be at the end.
-                if way == Way::Derivatives && quantity == Quantity::GapOffset {
+                if way == InputMethod::Derivatives && quantity == Quantity::GapOffset {
                     simulation.set_real(reference, next)?;
-                } else if way == Way::Derivatives {
+                } else if way == InputMethod::Derivatives {
                     simulation.set_input_derivative(reference, 1, (next - value) / (times[1] - times[0]))?;
                 }
             }
@@ -206,18 +222,18 @@ impl Course {
 }
 
 /// All runs of a course: the fine one, then by ways and steps.
-struct Runs {
-    fine: Found,
-    by_way: Vec<[Found; 3]>,
+struct InputRuns {
+    fine: InputRun,
+    by_way: Vec<[InputRun; 3]>,
 }
 
-fn table(courses: &[Course], runs: &[Runs]) -> String {
+fn table(courses: &[InputCase], runs: &[InputRuns]) -> String {
     let mut text = String::from(
         "| input | given | H (s) | peak node force (N) | of the fine run | peak torque (N m) | mean torque (N m) |\n\
          |---|---|---|---|---|---|---|\n",
     );
     for (course, runs) in courses.iter().zip(runs) {
-        let mut row = |way: &str, step: &str, found: &Found| {
+        let mut row = |way: &str, step: &str, found: &InputRun| {
             let ratio = found.force / runs.fine.force;
             text.push_str(&format!(
                 "| `{}` | {way} | {step} | {:.1} | {ratio:.2} | {:.2} | {:.3} |\n",
@@ -228,7 +244,7 @@ fn table(courses: &[Course], runs: &[Runs]) -> String {
             ));
         };
         row("fine run", "1e-6", &runs.fine);
-        for (way, found) in Way::ALL.iter().zip(&runs.by_way) {
+        for (way, found) in InputMethod::ALL.iter().zip(&runs.by_way) {
             for (step, found) in STEPS.iter().zip(found) {
                 row(way.name(), &format!("{step:e}"), found);
             }
@@ -237,9 +253,9 @@ fn table(courses: &[Course], runs: &[Runs]) -> String {
     text
 }
 
-fn figure(course: &Course, runs: &Runs) -> Result<Figure> {
-    let points = |found: &[Found; 3]| STEPS.iter().zip(found).map(|(step, one)| (step.log10(), one.force)).collect();
-    let series = Way::ALL.iter().zip(&runs.by_way).map(|(way, found)| Series::line(way.name(), points(found)));
+fn figure(course: &InputCase, runs: &InputRuns) -> Result<StudyFigure> {
+    let points = |found: &[InputRun; 3]| STEPS.iter().zip(found).map(|(step, one)| (step.log10(), one.force)).collect();
+    let series = InputMethod::ALL.iter().zip(&runs.by_way).map(|(way, found)| Series::line(way.name(), points(found)));
     let plot = Plot {
         logarithmic: true,
         marked: true,
@@ -253,7 +269,7 @@ fn figure(course: &Course, runs: &Runs) -> Result<Figure> {
             sheet.rows.push(vec![f64::from(way), *step, one.force, one.torque, one.mean]);
         }
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: course.name,
         caption: format!(
             "Largest normal force of a node while {} moves, against the communication step.",
@@ -264,7 +280,7 @@ fn figure(course: &Course, runs: &Runs) -> Result<Figure> {
     })
 }
 
-fn statements(course: &Course, runs: &Runs) -> [Statement; 2] {
+fn statements(course: &InputCase, runs: &InputRuns) -> [Statement; 2] {
     let worst = |way: usize| runs.by_way[way].iter().fold(0.0, |most: f64, one| most.max(one.force)) / runs.fine.force;
     let [ramp, derivatives, hold] = [0, 1, 2].map(worst);
     let title = course.title;
@@ -293,14 +309,14 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let courses = courses(arguments, console)?;
     let mut tasks = Vec::new();
     for course in &courses {
-        tasks.push((course, Way::Derivatives, STEPS[0]));
-        tasks.extend(Way::ALL.iter().flat_map(|way| STEPS.map(|step| (course, *way, step))));
+        tasks.push((course, InputMethod::Derivatives, STEPS[0]));
+        tasks.extend(InputMethod::ALL.iter().flat_map(|way| STEPS.map(|step| (course, *way, step))));
     }
-    let work = |(course, way, step): &(&Course, Way, f64)| course.run(*way, *step, length);
+    let work = |(course, way, step): &(&InputCase, InputMethod, f64)| course.run(*way, *step, length);
     let found = sweep::sweep(&tasks, sweep::processors(), work, |_| ())?;
-    let runs: Vec<Runs> = found
+    let runs: Vec<InputRuns> = found
         .chunks(1 + 3 * STEPS.len())
-        .map(|found| Runs {
+        .map(|found| InputRuns {
             fine: found[0],
             by_way: found[1..].chunks(STEPS.len()).map(|found| [found[0], found[1], found[2]]).collect(),
         })
@@ -328,10 +344,10 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     })
 }
 
-fn results(courses: &[Course], runs: &[Runs]) -> Value {
-    let one = |found: &Found| json!({ "force": found.force, "torque": found.torque, "mean_torque": found.mean });
-    let course = |(course, runs): (&Course, &Runs)| {
-        let ways = Way::ALL.iter().zip(&runs.by_way);
+fn results(courses: &[InputCase], runs: &[InputRuns]) -> Value {
+    let one = |found: &InputRun| json!({ "force": found.force, "torque": found.torque, "mean_torque": found.mean });
+    let course = |(course, runs): (&InputCase, &InputRuns)| {
+        let ways = InputMethod::ALL.iter().zip(&runs.by_way);
         let ways = ways.map(|(way, found)| (way.name().to_owned(), found.iter().map(one).collect()));
         let all: serde_json::Map<String, Value> =
             [("fine".to_owned(), one(&runs.fine))].into_iter().chain(ways).collect();

@@ -3,16 +3,16 @@
 
 use serde_json::json;
 use tiprub_figure::{
-    picture::{self, Frame, Surface, View, surface_of},
-    plots::{Form, Plot, Series},
+    picture::{self, MeshSurface, ProjectionFrame, ViewPoint, surface_of},
+    plots::{Plot, Series, SeriesForm},
 };
 use tiprub_model::{
     Mesh,
     cyclic::{CyclicReduction, NodalDiameter},
-    vtk::Field,
+    vtk::NodalField,
 };
 use tiprub_shell::{Failure, Result};
-use tiprub_study::{Figure, Picture, Sheet, Statement, Study, map::prediction::folded};
+use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure, map::prediction::folded};
 
 /// Azimuth and elevation of the pictures of a sector (rad).
 const AZIMUTH: f64 = 1.0;
@@ -39,7 +39,7 @@ fn nearest_order(number: usize, frequency: f64, turns: f64, sectors: usize) -> O
 }
 
 /// What is drawn: where modes and engine orders are.
-fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<Figure> {
+fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<StudyFigure> {
     let turns = speed / std::f64::consts::TAU;
     let kept = |diameter: &NodalDiameter| diameter.full_frequencies.iter().take(FAMILIES).copied().collect::<Vec<_>>();
     let top = diameters.iter().flat_map(kept).fold(0.0, f64::max) * 1.05;
@@ -51,14 +51,14 @@ fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<Fi
             .filter_map(|diameter| Some((diameter.number as f64, *diameter.full_frequencies.get(family)?)));
         let label = if family == 0 { "modes of the disk" } else { "" };
         let points: Vec<_> = points.collect();
-        series.push(Series::line("", points.clone()).drawn(Form::Thin, 0));
-        series.push(Series::line(label, points).drawn(Form::Dots, 0));
+        series.push(Series::line("", points.clone()).drawn(SeriesForm::Thin, 0));
+        series.push(Series::line(label, points).drawn(SeriesForm::Dots, 0));
     }
     let orders = (0..).map_while(|order: u32| (f64::from(order) * turns <= top).then_some(order as usize));
     let points: Vec<_> = orders.map(|order| (folded(order, sectors).0 as f64, order as f64 * turns)).collect();
-    series.push(Series::line("", points.clone()).drawn(Form::Thin, 1));
+    series.push(Series::line("", points.clone()).drawn(SeriesForm::Thin, 1));
     let label = format!("engine orders at {speed:.0} rad/s");
-    series.push(Series::line(label, points).drawn(Form::Dots, 1));
+    series.push(Series::line(label, points).drawn(SeriesForm::Dots, 1));
     let plot = Plot { height: 480, ..Plot::new("nodal diameter (-)", "frequency (Hz)", series) };
     let mut sheet = Sheet::new([
         "nodal diameter",
@@ -85,7 +85,7 @@ fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<Fi
             ]);
         }
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "interference",
         caption: format!(
             "Natural frequencies at rest against nodal diameter, first {drawn} at each, and the engine orders at {speed:.1} \
@@ -99,10 +99,10 @@ fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<Fi
 }
 
 /// Pictures of mode shapes of one sector, at the phase of largest displacement.
-fn shapes(mesh: &Mesh, diameters: &[NodalDiameter]) -> Figure {
-    let surface: Surface = surface_of(mesh);
-    let view = View::of_blade(&surface, AZIMUTH, ELEVATION);
-    let frame = Frame::around(&surface, &view, 0.1);
+fn shapes(mesh: &Mesh, diameters: &[NodalDiameter]) -> StudyFigure {
+    let surface: MeshSurface = surface_of(mesh);
+    let view = ViewPoint::of_blade(&surface, AZIMUTH, ELEVATION);
+    let frame = ProjectionFrame::around(&surface, &view, 0.1);
     let radii = surface.points.iter().map(|point| point[0].hypot(point[1]));
     let (low, high) = radii.fold((f64::INFINITY, 0.0_f64), |(low, high), radius| (low.min(radius), high.max(radius)));
     let last = diameters.len().saturating_sub(1);
@@ -123,7 +123,7 @@ fn shapes(mesh: &Mesh, diameters: &[NodalDiameter]) -> Figure {
         sheet.rows.push(vec![number as f64, mode as f64 + 1.0, frequency]);
     }
     html.push_str(&format!("</div><div class=\"scale\">{}</div>", picture::color_scale("0", "largest")));
-    Figure {
+    StudyFigure {
         name: "shapes",
         caption:
             "Mode shapes of one sector at the moment of its largest displacement; the next sector does the same with a \
@@ -212,7 +212,7 @@ fn vtk(mesh: &Mesh, diameters: &[NodalDiameter]) -> Result<Vec<u8>> {
     let mut fields = Vec::new();
     for (number, mode) in SHAPES {
         if let Some(shape) = diameters.get(number).and_then(|diameter| diameter.shapes.get(mode)) {
-            fields.extend(Field::mode(&format!("n{number}_mode{}", mode + 1), shape));
+            fields.extend(NodalField::mode(&format!("n{number}_mode{}", mode + 1), shape));
         }
     }
     tiprub_model::vtk::write(mesh, &fields).map_err(|error| Failure::from_below("VTK file", error))

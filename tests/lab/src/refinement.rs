@@ -11,19 +11,19 @@ use tiprub_figure::{
     table::Table,
 };
 use tiprub_gallery::{
-    builtin::{self, Other},
+    builtin::{self, ModelVariant},
     rom_cache::RomCache,
     scene_source,
 };
-use tiprub_model::rotor37::Tip;
+use tiprub_model::rotor37::TipContact;
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 use tiprub_study::{
-    Figure, Picture, Sheet, Statement, Study,
+    Picture, Sheet, Statement, Study, StudyFigure,
     convergence::{
-        self, Asked, Found, Refined,
-        limit::Limit,
+        self, ConvergenceRequest, ConvergenceResult, Refined,
+        limit::ConvergedLimit,
         page,
-        refine::{self, Direction},
+        refine::{self, RefinementDirection},
     },
 };
 
@@ -39,8 +39,8 @@ const FAMILIES: [&str; 2] = ["rotor37", "stage"];
 /// What is in no picture.
 const APART: &str = "apart";
 /// Tips of a blade of the stage: two rows of patches, and three nodes.
-const STAGE_TIPS: [(Tip, &str, &str); 2] =
-    [(Tip::Rows([9, 2]), "stage", "9 × 2 patches"), (Tip::Nodes(3), "stage-nodes", "3 contact nodes")];
+const STAGE_TIPS: [(TipContact, &str, &str); 2] =
+    [(TipContact::Rows([9, 2]), "stage", "9 × 2 patches"), (TipContact::Nodes(3), "stage-nodes", "3 contact nodes")];
 /// Friction coefficients of the stage: none, less than its tip digs in with, and more.
 const STAGE_FRICTIONS: [(f64, &str); 3] = [(0.0, "-smooth"), (0.05, ""), (FRICTION, "-digging")];
 /// The mesh of its sector, so that the one that ships is the finest of four: to reduce a finer one takes many minutes.
@@ -56,7 +56,7 @@ struct Standard {
     family: &'static str,
     settings: SceneSettings,
     /// Tip and mesh of the structure that touches, instead of what the scene names.
-    other: Option<(Tip, f64)>,
+    other: Option<(TipContact, f64)>,
     /// Spaces between contact points of the finest tip, times its own.
     finest_tip: usize,
 }
@@ -79,7 +79,7 @@ fn standards() -> Result<Vec<Standard>> {
     }
     for (tip, name, touching) in STAGE_TIPS {
         for (friction, ending) in STAGE_FRICTIONS {
-            let scene = if matches!(tip, Tip::Nodes(_)) { "builtin:stage-nodes" } else { "builtin:stage" };
+            let scene = if matches!(tip, TipContact::Nodes(_)) { "builtin:stage-nodes" } else { "builtin:stage" };
             let mut settings = scene_source::settings(scene)?;
             settings.contacts[0].friction = friction;
             all.push(Standard {
@@ -102,7 +102,7 @@ impl Standard {
             let name = tiprub_format::builtin_model(structure).ok_or_else(missing)?;
             let found = match self.other.filter(|_| index == 0) {
                 Some((tip, mesh)) => {
-                    let other = Other { modes: 1.0, tip, mesh };
+                    let other = ModelVariant { modes: 1.0, tip, mesh };
                     builtin::refined(name, other, cache, console)
                 }
                 None => builtin::rom(name, cache, console),
@@ -115,11 +115,11 @@ impl Standard {
 }
 
 /// What was found of a scene, or why it does not run.
-struct Case {
+struct RefinementCase {
     title: String,
     name: String,
     family: &'static str,
-    found: std::result::Result<Found, String>,
+    found: std::result::Result<ConvergenceResult, String>,
     seconds: f64,
 }
 
@@ -136,7 +136,7 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
         console.say(&standard.title);
         let clock = std::time::Instant::now();
         let scene = standard.scene(&cache, console)?;
-        let of = Asked {
+        let of = ConvergenceRequest {
             settings: &[],
             window: None,
             quick,
@@ -150,7 +150,7 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
         let found = convergence::found(&standard.name, &scene, &of, console).map_err(|failure| failure.to_string());
         let seconds = clock.elapsed().as_secs_f64();
         let (title, name) = (standard.title.clone(), standard.name.clone());
-        cases.push(Case { title, name, family: standard.family, found, seconds });
+        cases.push(RefinementCase { title, name, family: standard.family, found, seconds });
     }
     if cases.is_empty() {
         let names = standards()?.into_iter().map(|standard| standard.name).collect::<Vec<_>>().join(", ");
@@ -179,7 +179,7 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
     })
 }
 
-fn statements(case: &Case) -> Vec<Statement> {
+fn statements(case: &RefinementCase) -> Vec<Statement> {
     match &case.found {
         Err(why) => vec![Statement::remark(&case.title, format!("does not run, after {:.0} s: {why}", case.seconds))],
         Ok(found) => {
@@ -212,7 +212,7 @@ fn energy(refined: &Refined) -> usize {
 }
 
 /// What is refined, in a word or two.
-fn short(direction: &Direction) -> &str {
+fn short(direction: &RefinementDirection) -> &str {
     match direction.name {
         refine::STEP if direction.unit == refine::OF_CLEARANCE => "tolerance",
         refine::NODES => direction.unit,
@@ -256,9 +256,10 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
         Some((limit, finest)) => format!("{:.5e}", finest[index] + limit.rest),
         None => "not to be read".into(),
     };
-    let order =
-        |limit: Option<Limit>| limit.map_or("not to be read".into(), |limit| format!("order {:.1}", limit.order));
-    let short = |limit: Option<Limit>| limit.map_or("-".into(), |limit| format!("order {:.1}", limit.order));
+    let order = |limit: Option<ConvergedLimit>| {
+        limit.map_or("not to be read".into(), |limit| format!("order {:.1}", limit.order))
+    };
+    let short = |limit: Option<ConvergedLimit>| limit.map_or("-".into(), |limit| format!("order {:.1}", limit.order));
     let last = vec![
         title.clone(),
         "limit".into(),
@@ -277,7 +278,7 @@ fn first_words(why: &str) -> String {
     why.split_whitespace().take(18).collect::<Vec<_>>().join(" ")
 }
 
-fn tables(case: &Case) -> Vec<Table> {
+fn tables(case: &RefinementCase) -> Vec<Table> {
     let Ok(found) = &case.found else { return Vec::new() };
     let caption =
         format!("{}: {}, {:.2} ms, {:.0} s for all", case.title, found.method, 1e3 * found.window.0, case.seconds);
@@ -292,7 +293,7 @@ fn tables(case: &Case) -> Vec<Table> {
 }
 
 /// Error of the scene as it stands: a row per scene, a column per direction.
-fn summary(cases: &[Case]) -> Table {
+fn summary(cases: &[RefinementCase]) -> Table {
     let mut table = Table::new(
         "Error of the scene as it stands, of the displacements (relative L2)",
         ["scene", "steps", "modes", "patches", "rows", "mesh"],
@@ -309,7 +310,7 @@ fn summary(cases: &[Case]) -> Table {
     table
 }
 
-fn markdown(cases: &[Case]) -> String {
+fn markdown(cases: &[RefinementCase]) -> String {
     let all = std::iter::once(summary(cases)).chain(cases.iter().flat_map(tables));
     all.map(|table| table.to_markdown() + "\n").collect()
 }
@@ -376,10 +377,10 @@ const PICTURES: [(&str, &str, &str, [&str; 3]); 10] = [
 ];
 
 /// Pictures per family of scenes and direction, a curve per scene.
-fn pictures(cases: &[Case]) -> Result<Vec<Figure>> {
+fn pictures(cases: &[RefinementCase]) -> Result<Vec<StudyFigure>> {
     let mut figures = Vec::new();
     for (family, direction, label, names) in PICTURES {
-        let of_family: Vec<&Case> = cases.iter().filter(|case| case.family == family).collect();
+        let of_family: Vec<&RefinementCase> = cases.iter().filter(|case| case.family == family).collect();
         for (number, name) in names.into_iter().enumerate() {
             figures.extend(picture(&of_family, (direction, label), number, name)?);
         }
@@ -389,11 +390,11 @@ fn pictures(cases: &[Case]) -> Result<Vec<Figure>> {
 
 /// Errors of one quantity over the levels of a direction; `None` where no scene has them.
 fn picture(
-    cases: &[&Case],
+    cases: &[&RefinementCase],
     (direction, label): (&str, &str),
     number: usize,
     name: &'static str,
-) -> Result<Option<Figure>> {
+) -> Result<Option<StudyFigure>> {
     let (mut series, mut sheet) = (Vec::new(), Sheet::new(["scene", "value", "error"]));
     let quantity = DRAWN[number];
     for (case, scene) in cases.iter().zip(0_u32..) {
@@ -420,7 +421,7 @@ fn picture(
     };
     let caption =
         format!("Error of {quantity} against the limit, over {label}; scenes from 0 in the order of the legend.");
-    Ok(Some(Figure { name, caption, picture: Picture::plot(&plot)?, sheet }))
+    Ok(Some(StudyFigure { name, caption, picture: Picture::plot(&plot)?, sheet }))
 }
 
 #[cfg(test)]

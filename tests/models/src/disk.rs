@@ -2,13 +2,13 @@
 
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Scene;
-use tiprub_core::rom::{Frame, Harmonic, Rom};
+use tiprub_core::rom::{DisplacementFrame, Harmonic, Rom};
 
-use crate::{Random, node, rub, structure};
+use crate::{SeededRandom, node, rub, structure};
 
 /// Sectors that are coupled to their neighbours.
 #[derive(Debug, Clone)]
-pub struct Disk {
+pub struct TestDisk {
     pub sectors: usize,
     pub nodes: usize,
     /// Matrices of one sector, and of a sector with the one after it (row: this sector, column: the next).
@@ -17,10 +17,10 @@ pub struct Disk {
     pub contact_map: DMatrix<f64>,
 }
 
-impl Disk {
+impl TestDisk {
     /// Random matrices; `coupling` is the size of those between neighbours relative to those of a sector.
     pub fn random(sectors: usize, nodes: usize, order: usize, coupling: f64, seed: u64) -> Self {
-        let mut numbers = Random(seed);
+        let mut numbers = SeededRandom(seed);
         let square = numbers.matrix(order, order);
         let frequency = |i: usize| std::f64::consts::TAU * (900.0 + 1100.0 * i as f64);
         let squares = DMatrix::from_fn(order, order, |i, j| if i == j { frequency(i) * frequency(i) } else { 0.0 });
@@ -69,7 +69,7 @@ impl Disk {
         let all = (0..copies).flat_map(|copy| (0..self.nodes).map(move |n| (copy, n)));
         let nodes = all.map(|(copy, n)| node(format!("node_{copy}_{n}"), place(copy, n), -0.2)).collect();
         let rom = structure("disk", mass, stiffness, contact_map, nodes);
-        Rom { sectors, frame: Frame::Cylindrical, damping_ratio: 0.01, ..rom }
+        Rom { sectors, frame: DisplacementFrame::Cylindrical, damping_ratio: 0.01, ..rom }
     }
 
     /// As a ROM with one pencil per nodal diameter.

@@ -1,6 +1,6 @@
 //! A simulation driven by the names of its variables.
 
-use tiprub_core::variables::Kind;
+use tiprub_core::variables::DataType;
 use tiprub_core::{Result, Scene, Simulation};
 
 /// First reference of a variable.
@@ -86,7 +86,7 @@ pub fn saved(simulation: &Simulation) -> Vec<u8> {
 
 /// All real values as bits, in the order of their references.
 pub fn bits(simulation: &Simulation) -> Vec<u64> {
-    let rows = simulation.table().variables().iter().filter(|row| row.kind == Kind::Real);
+    let rows = simulation.table().variables().iter().filter(|row| row.kind == DataType::Real);
     let references = rows.flat_map(|row| (row.reference..).take(row.len()));
     references.map(|reference| simulation.real(reference).unwrap().to_bits()).collect()
 }

@@ -84,12 +84,12 @@ pub fn faces(centre: [f64; 3]) -> Rom {
 
 /// Which side of the block a plate is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub enum BlockSide {
     Left,
     Right,
 }
 
-impl Side {
+impl BlockSide {
     pub fn sign(self) -> f64 {
         if self == Self::Left { -1.0 } else { 1.0 }
     }
@@ -97,7 +97,7 @@ impl Side {
 
 /// Points of a plate over y and z, `rows` along y and `columns` along z, whose nearest line to the block is x = ±`distance`;
 /// flat, or a cylinder about z. Row after row along y; z runs so that the normal points to the block.
-pub fn plate_points(side: Side, distance: f64, curved: bool, [rows, columns]: [usize; 2]) -> Vec<[f64; 3]> {
+pub fn plate_points(side: BlockSide, distance: f64, curved: bool, [rows, columns]: [usize; 2]) -> Vec<[f64; 3]> {
     let centred = |index: usize, count: usize| (2.0 * index as f64 - (count - 1) as f64) / (count - 1) as f64;
     (0..rows)
         .flat_map(|row| (0..columns).map(move |column| (row, column)))
@@ -115,7 +115,7 @@ pub fn plate_points(side: Side, distance: f64, curved: bool, [rows, columns]: [u
 }
 
 /// A plate of masses on springs to the ground and to their neighbours.
-pub fn plate(side: Side, distance: f64, curved: bool, k: f64) -> Rom {
+pub fn plate(side: BlockSide, distance: f64, curved: bool, k: f64) -> Rom {
     let [rows, columns] = [9, 5];
     let points = plate_points(side, distance, curved, [rows, columns]);
     let order = 3 * points.len();
@@ -141,14 +141,18 @@ pub fn plate(side: Side, distance: f64, curved: bool, k: f64) -> Rom {
 }
 
 /// The block between plates: `left` and `right` each a distance (m) from x = 0.
-pub fn scene(block: Rom, plates: &[(Side, f64)], curved: bool, velocity: [f64; 3]) -> Scene {
-    let names = |side: Side| {
-        if side == Side::Left { ("left_plate", "left_face", "left") } else { ("right_plate", "right_face", "right") }
+pub fn scene(block: Rom, plates: &[(BlockSide, f64)], curved: bool, velocity: [f64; 3]) -> Scene {
+    let names = |side: BlockSide| {
+        if side == BlockSide::Left {
+            ("left_plate", "left_face", "left")
+        } else {
+            ("right_plate", "right_face", "right")
+        }
     };
     let mut structures = vec![StructureSettings {
         name: "block".into(),
         rom: "block".into(),
-        motion: Motion::Free,
+        motion: BodyMotion::Free,
         velocity,
         ..StructureSettings::default()
     }];
@@ -158,17 +162,17 @@ pub fn scene(block: Rom, plates: &[(Side, f64)], curved: bool, velocity: [f64; 3
         structures.push(StructureSettings {
             name: name.into(),
             rom: name.into(),
-            motion: Motion::Still,
+            motion: BodyMotion::Still,
             ..StructureSettings::default()
         });
         roms.push(plate(*side, *distance, curved, 2e8));
     }
-    let surface = |(side, _): &(Side, f64)| SurfaceSettings {
+    let surface = |(side, _): &(BlockSide, f64)| SurfaceSettings {
         name: names(*side).1.into(),
         structure: Some(names(*side).0.into()),
         ..SurfaceSettings::default()
     };
-    let contact = |(side, _): &(Side, f64)| ContactSettings {
+    let contact = |(side, _): &(BlockSide, f64)| ContactSettings {
         master: "block".into(),
         slave: names(*side).1.into(),
         nodes: Some(names(*side).2.into()),
@@ -207,7 +211,7 @@ pub fn squeezed() -> Scene {
 /// The same with this interference (m) and velocity (m/s).
 pub fn squeezed_by(interference: f64, velocity: [f64; 3]) -> Scene {
     let distance = 0.5 * SIDE - interference;
-    scene(block([0.0, 0.045, 0.0], 3e6), &[(Side::Left, distance), (Side::Right, distance)], true, velocity)
+    scene(block([0.0, 0.045, 0.0], 3e6), &[(BlockSide::Left, distance), (BlockSide::Right, distance)], true, velocity)
 }
 
 pub fn vector(simulation: &Simulation, name: &str) -> [f64; 3] {

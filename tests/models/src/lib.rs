@@ -13,12 +13,14 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomChecks, RomExtras, Spin, Thermal};
+use tiprub_core::rom::{
+    ContactGrid, ContactNode, DisplacementFrame, RomChecks, RomExtras, Spin, Thermal, ThermalPatch,
+};
 
 pub use drive::{
     bits, element, go, move_on, real, reference, saved, set, set_element, slope, started, started_at, try_started,
 };
-pub use random::Random;
+pub use random::SeededRandom;
 pub use scenes::{bumps, coating, coating_of, flexible, on_ring, round, rub};
 
 /// Radius of the contact nodes (m).
@@ -43,7 +45,7 @@ pub fn structure(
         name: name.into(),
         origin: "written down for a test".into(),
         sectors: 1,
-        frame: Frame::Cartesian,
+        frame: DisplacementFrame::Cartesian,
         mass,
         stiffness,
         damping_ratio: 0.0,
@@ -65,7 +67,7 @@ pub fn modal(
     let squares = DVector::from_iterator(order, frequencies.iter().map(|frequency| (TAU * frequency).powi(2)));
     let map = DMatrix::from_fn(3 * contact_nodes.len(), order, shape);
     let (mass, stiffness) = (DMatrix::identity(order, order), DMatrix::from_diagonal(&squares));
-    Rom { frame: Frame::Cylindrical, ..structure(name, mass, stiffness, map, contact_nodes) }
+    Rom { frame: DisplacementFrame::Cylindrical, ..structure(name, mass, stiffness, map, contact_nodes) }
 }
 
 /// Frequencies of the whole blade (Hz).
@@ -165,7 +167,7 @@ pub fn ring_of(around: usize, along: usize, diameters: usize) -> Rom {
 }
 
 /// Four thermal patches around.
-pub(crate) fn quarters(axial: [f64; 2]) -> Vec<Patch> {
+pub(crate) fn quarters(axial: [f64; 2]) -> Vec<ThermalPatch> {
     let quarter = |index: u32| [FRAC_PI_2 * f64::from(index), FRAC_PI_2 * f64::from(index + 1)];
-    (0..4).map(|index| Patch { angle: quarter(index), axial }).collect()
+    (0..4).map(|index| ThermalPatch { angle: quarter(index), axial }).collect()
 }

@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 /// A sequence, by its seed.
 #[derive(Debug, Clone)]
-pub struct Random(pub u64);
+pub struct SeededRandom(pub u64);
 
-impl Random {
+impl SeededRandom {
     fn bits(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64

@@ -1,7 +1,7 @@
 //! Rotors in casings, and what is added to them.
 
 use tiprub_core::settings::{
-    CoatingSettings, ContactSettings, ExperimentSettings, Meridian, Motion, OutputSettings, Preset, SceneSettings,
+    BodyMotion, CoatingSettings, ContactSettings, ExperimentSettings, Meridian, OutputSettings, Preset, SceneSettings,
     Scheme, Shape, StructureSettings, SurfaceSettings, TimeSettings,
 };
 use tiprub_core::{Rom, Scene};
@@ -19,7 +19,7 @@ pub fn round(rom: Rom) -> Scene {
         structures: vec![StructureSettings {
             name: "rotor".into(),
             rom: "rotor".into(),
-            motion: Motion::Rotating,
+            motion: BodyMotion::Rotating,
             speed: 1300.0,
             ..StructureSettings::default()
         }],
@@ -71,7 +71,7 @@ pub fn on_ring(scene: &mut Scene, ring: Rom, damping_ratio: f64) {
     scene.settings.structures.push(StructureSettings {
         name: "ring".into(),
         rom: "ring".into(),
-        motion: Motion::Still,
+        motion: BodyMotion::Still,
         damping_ratio: Some(damping_ratio),
         ..StructureSettings::default()
     });

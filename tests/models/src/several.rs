@@ -1,7 +1,7 @@
 //! Scenes of several structures and pairs.
 
 use tiprub_core::Scene;
-use tiprub_core::settings::{Motion, Shape, Solver, StructureSettings};
+use tiprub_core::settings::{BodyMotion, Shape, Solver, StructureSettings};
 
 /// The blades' three nodes each a pair of its own, all against the same casing.
 pub fn split(scene: &Scene) -> Scene {
@@ -66,7 +66,7 @@ pub fn in_one_casing(mut scene: Scene, solver: Solver, friction: f64) -> Scene {
     scene.settings.structures.push(StructureSettings {
         name: "ring".into(),
         rom: "ring".into(),
-        motion: Motion::Still,
+        motion: BodyMotion::Still,
         damping_ratio: Some(0.01),
         ..StructureSettings::default()
     });

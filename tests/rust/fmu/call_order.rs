@@ -13,7 +13,7 @@ use std::ptr::{null, null_mut};
 
 use tables::{FMI2, FMI2_APART, FMI3, FMI3_APART, rows};
 use tiprub_fmi_host::api::{Fmi2Api, Fmi3Api};
-use tiprub_tests::scene::Resources;
+use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{ERROR, fmi2, fmi3, shipped};
 
 #[track_caller]
@@ -45,13 +45,13 @@ fn judge(name: &str, allowed: &str, state: char, status: i32, log: &str) {
 /// What is called: the contact unit, or that of heat conduction.
 struct Subject {
     path: PathBuf,
-    resources: Resources,
-    known: References,
+    resources: UnpackedResources,
+    known: CallReferences,
 }
 
 /// References: input, what drives the step to failure, text, enumeration, output with derivative.
 #[derive(Clone, Copy)]
-struct References {
+struct CallReferences {
     input: u32,
     /// Uniform change of radius and gap offset: together they can close the casing far too deep. Conduction cannot fail.
     closing: Option<[u32; 2]>,
@@ -69,20 +69,20 @@ fn subject(thermal: bool) -> Subject {
     if thermal {
         return Subject {
             path: tiprub_tests::thermal(),
-            resources: Resources::of_thermal(&crate::thermal::model(), false),
+            resources: UnpackedResources::of_thermal(&crate::thermal::model(), false),
             known: references(true),
         };
     }
     let mut scene = tiprub_tests::scene::scene();
     scene.settings.surfaces[0].moving = true;
-    Subject { path: shipped(), resources: Resources::of(&scene, false), known: references(false) }
+    Subject { path: shipped(), resources: UnpackedResources::of(&scene, false), known: references(false) }
 }
 
-fn references(thermal: bool) -> References {
+fn references(thermal: bool) -> CallReferences {
     if thermal {
-        let simulation = tiprub_thermal::Simulation::new(crate::thermal::model()).expect("valid");
+        let simulation = tiprub_thermal::ThermalSimulation::new(crate::thermal::model()).expect("valid");
         let find = |name: &str| simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
-        return References {
+        return CallReferences {
             input: find("gas_temperature"),
             closing: None,
             text: find("model_name"),
@@ -94,7 +94,7 @@ fn references(thermal: bool) -> References {
     scene.settings.surfaces[0].moving = true;
     let simulation = tiprub_core::Simulation::new(&scene).expect("valid");
     let find = |name: &str| simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
-    References {
+    CallReferences {
         input: find("speed"),
         closing: Some(["casing_radius_change", "gap_offset"].map(find)),
         text: find("scene"),
@@ -104,7 +104,7 @@ fn references(thermal: bool) -> References {
 }
 
 /// Rows of a table that hold for the unit.
-fn rows_of(table: &'static str, known: References) -> Vec<(&'static str, &'static str)> {
+fn rows_of(table: &'static str, known: CallReferences) -> Vec<(&'static str, &'static str)> {
     let asked = |name: &str| known.closing.is_some() || !DERIVATIVES.contains(&name);
     rows(table).into_iter().filter(|(name, _)| asked(name)).collect()
 }
@@ -120,7 +120,7 @@ macro_rules! call {
 }
 
 /// Call one function with arguments that are proper where it is allowed.
-fn call2(api: &Fmi2Api, slave: &fmi2::Slave<'_>, name: &str, known: References) -> i32 {
+fn call2(api: &Fmi2Api, slave: &fmi2::Fmi2TestSlave<'_>, name: &str, known: CallReferences) -> i32 {
     let (h, value, mut real, mut integer) = (slave.handle, 300.0, 0.0, 0);
     let (mut text, mut flag, mut state, order) = (null(), 0, null_mut(), 1);
     let (mut size, mut saved, mut bytes) = (0, null_mut(), Vec::new());
@@ -185,7 +185,7 @@ fn fmi2_pair_by_pair() {
 
 fn fmi2_pairs(subject: &Subject) {
     let (api, known) = (fmi2::load(&subject.path), subject.known);
-    let slave = fmi2::Slave::new(&api, &subject.resources);
+    let slave = fmi2::Fmi2TestSlave::new(&api, &subject.resources);
     let mut states = vec![('I', slave.save())];
     slave.expect(slave.enter());
     states.push(('N', slave.save()));
@@ -214,7 +214,7 @@ fn fmi2_pairs(subject: &Subject) {
 
 /// Call one function with arguments that are proper where it is allowed. Works on the bare handle, so that it can be used
 /// from within an intermediate update.
-unsafe fn call3(api: &Fmi3Api, h: *mut c_void, saved: (*mut c_void, &[u8]), name: &str, known: References) -> i32 {
+unsafe fn call3(api: &Fmi3Api, h: *mut c_void, saved: (*mut c_void, &[u8]), name: &str, known: CallReferences) -> i32 {
     let (value, mut real, mut long, order) = (300.0, 0.0, 0_i64, 1);
     let (mut text, mut state, (saved, bytes)) = (null(), null_mut(), saved);
     let (input, output, string, choice) = (&known.input, &known.output, &known.text, &known.choice);
@@ -318,7 +318,7 @@ unsafe extern "C" fn call_inside<const THERMAL: bool>(
     _requested: *mut bool,
     _at: *mut f64,
 ) {
-    let context: *mut fmi3::Context = environment.cast();
+    let context: *mut fmi3::CallbackContext = environment.cast();
     // SAFETY: the context outlives the instance; the journal is written to during the call, hence no long borrows.
     unsafe {
         let (api, handle, wish) = (&*(*context).api, (*context).handle, (*context).wish);
@@ -344,8 +344,8 @@ fn fmi3_pairs<const THERMAL: bool>() {
     let subject = &subject(THERMAL);
     let (api, known) = (fmi3::load(&subject.path), subject.known);
     let arguments =
-        fmi3::Arguments { update: Some(call_inside::<THERMAL>), ..fmi3::Arguments::new(&subject.resources) };
-    let slave = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
+        fmi3::Fmi3Arguments { update: Some(call_inside::<THERMAL>), ..fmi3::Fmi3Arguments::new(&subject.resources) };
+    let slave = fmi3::Fmi3TestSlave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
     slave.wish(-1.0);
     let mut states = vec![('I', slave.save())];
     slave.expect(slave.enter(0.0, None));
@@ -391,7 +391,7 @@ fn after_calls_in_any_order_a_reset_instance_is_as_new() {
 
 fn random_calls(subject: &Subject) {
     let (api, resources, known) = (fmi2::load(&subject.path), &subject.resources, subject.known);
-    let run = |slave: &fmi2::Slave<'_>| -> Vec<u64> {
+    let run = |slave: &fmi2::Fmi2TestSlave<'_>| -> Vec<u64> {
         slave.expect(slave.setup(0.0, None));
         slave.initialise();
         for step in 0..40 {
@@ -399,7 +399,7 @@ fn random_calls(subject: &Subject) {
         }
         slave.reals(&[0, known.output, known.output + 1, known.output + 2]).into_iter().map(f64::to_bits).collect()
     };
-    let fresh = run(&fmi2::Slave::new(&api, resources));
+    let fresh = run(&fmi2::Fmi2TestSlave::new(&api, resources));
     let names: Vec<_> = rows(FMI2).into_iter().map(|(name, _)| name).collect();
     // A linear congruential generator (Knuth's MMIX constants): the same calls every time.
     let mut seed = 42_u64;
@@ -409,7 +409,7 @@ fn random_calls(subject: &Subject) {
     };
     let mut visited = [0_u32; 4];
     for _ in 0..20 {
-        let slave = fmi2::Slave::new(&api, resources);
+        let slave = fmi2::Fmi2TestSlave::new(&api, resources);
         for _ in 0..400 {
             // Some calls more often than others, so that every phase is reached.
             let name = match next(6) {

@@ -5,7 +5,7 @@
 
 use tiprub_core::rom::Spin;
 use tiprub_core::{Scene, Simulation};
-use tiprub_tests::scene::{PATCHES, Resources, ring, rom, scene, warm_scene};
+use tiprub_tests::scene::{PATCHES, UnpackedResources, ring, rom, scene, warm_scene};
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
 
 /// First reference of a variable of a scene.
@@ -26,8 +26,8 @@ const START: [f64; PATCHES] = [3.0, -2.0, 0.5, 7.0];
 fn an_array_input_is_set_whole_or_not_at_all() {
     let (path, scene) = (shipped(), warm_scene());
     let (array, speed) = (of(&scene, "casing_temperature"), of(&scene, "speed"));
-    let (api, resources) = (fmi3::load(&path), Resources::of(&scene, true));
-    let slave = fmi3::Slave::new(&api, &resources);
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::of(&scene, true));
+    let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
     assert_eq!(slave.reals(&[array], PATCHES), [0.0; PATCHES], "start values");
     slave.initialise();
     slave.expect(slave.set_reals(&[array], &START));
@@ -67,10 +67,10 @@ fn elements_are_scalars_in_fmi2_and_where_fmi3_is_packaged_so() {
     let (path, scene) = (shipped(), warm_scene());
     let array = of(&scene, "casing_temperature");
     let references: Vec<u32> = (array..array + 4).collect();
-    let resources = Resources::of(&scene, false);
+    let resources = UnpackedResources::of(&scene, false);
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
-    let two = fmi2::Slave::initialised(&api2, &resources);
-    let three = fmi3::Slave::new(&api3, &resources);
+    let two = fmi2::Fmi2TestSlave::initialised(&api2, &resources);
+    let three = fmi3::Fmi3TestSlave::new(&api3, &resources);
     three.initialise();
     two.expect(two.set_reals(&references, &START));
     three.expect(three.set_reals(&references, &START));
@@ -88,8 +88,8 @@ fn each_element_of_an_array_input_has_its_derivative() {
     let (path, mut scene) = (shipped(), warm_scene());
     scene.settings.outputs.slave_displacement = true;
     let (array, moved) = (of(&scene, "casing_temperature"), of(&scene, "casing_displacement"));
-    let (api, resources) = (fmi2::load(&path), Resources::of(&scene, true));
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let (api, resources) = (fmi2::load(&path), UnpackedResources::of(&scene, true));
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     for (order, value, reason) in [(2, 1.0, "order"), (0, 1.0, "order"), (1, f64::NAN, "not finite")] {
         refused(slave.set_derivatives(&[array + 3], order, &[value]), &slave.log(), reason);
     }
@@ -181,8 +181,8 @@ fn features_that_are_off_have_no_variables_and_no_data() {
 fn a_packaged_scene_of_features_runs_as_it_does_without_packaging() {
     let (path, scene) = (shipped(), warm_scene());
     let array = of(&scene, "casing_temperature");
-    let (api, resources) = (fmi3::load(&path), Resources::of(&scene, true));
-    let slave = fmi3::Slave::new(&api, &resources);
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::of(&scene, true));
+    let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
     let slightly = START.map(|value| 0.1 * value);
     slave.expect(slave.set_reals(&[array], &slightly));
     slave.initialise();
@@ -210,8 +210,8 @@ fn mean_torque_times_speed_is_the_work_of_the_shaft() {
     let (path, mut scene) = (shipped(), scene());
     scene.settings.outputs.energies = true;
     let [speed, torque, work] = ["speed", "torque", "shaft_work"].map(|name| of(&scene, name));
-    let (api, resources) = (fmi2::load(&path), Resources::of(&scene, true));
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let (api, resources) = (fmi2::load(&path), UnpackedResources::of(&scene, true));
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     let (mut supplied, mut step) = (0.0, 0.0);
     for index in 0..400 {
         let now = 300.0 - 0.2 * f64::from(index);

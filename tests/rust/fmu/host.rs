@@ -7,14 +7,14 @@ use std::ffi::{CString, c_void};
 
 use tiprub_fmi_host::api::Fmi3Api;
 use tiprub_tests::refusals::{count, refused, summary};
-use tiprub_tests::scene::{Resources, reference};
+use tiprub_tests::scene::{UnpackedResources, reference};
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
 
 #[test]
 fn loggers() {
     let path = shipped();
-    let (api, resources) = (fmi2::load(&path), Resources::new(false));
-    let slave = fmi2::Slave::new(&api, &resources);
+    let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
+    let slave = fmi2::Fmi2TestSlave::new(&api, &resources);
     let names = ["logStatusWarning", "nonsense"].map(|name| CString::new(name).expect("no NUL"));
     let list = [names[0].as_ptr(), names[1].as_ptr()];
     // SAFETY: arrays of the lengths given.
@@ -36,7 +36,7 @@ fn loggers() {
     // "#r3#" would stand for the variable of value reference 3; an importer shows "##" as the character it is.
     let named = CString::new("a#r3# of mine").expect("no NUL");
     let api3 = fmi3::load(&path);
-    let third = fmi3::Slave::new(&api3, &resources);
+    let third = fmi3::Fmi3TestSlave::new(&api3, &resources);
     // SAFETY: one text each.
     unsafe {
         let list = named.as_ptr();
@@ -48,7 +48,7 @@ fn loggers() {
         );
     }
     // No callbacks at all, and callbacks without a logger: everything works in silence.
-    let good = fmi2::Arguments::new(&resources);
+    let good = fmi2::Fmi2Arguments::new(&resources);
     let (name, token, place) = (good.name.expect("set"), good.token.expect("set"), good.location.expect("set"));
     let none = tiprub_fmi_host::api::Fmi2Callbacks {
         logger: std::ptr::null(),
@@ -85,7 +85,7 @@ unsafe extern "C" fn misbehave(
     requested: *mut bool,
     at: *mut f64,
 ) {
-    let context: *mut fmi3::Context = environment.cast();
+    let context: *mut fmi3::CallbackContext = environment.cast();
     // SAFETY: the context outlives the instance; logging writes to its journal during these calls, hence no long borrows.
     unsafe {
         let (api, handle): (&Fmi3Api, _) = (&*(*context).api, (*context).handle);
@@ -111,10 +111,11 @@ unsafe extern "C" fn misbehave(
 #[test]
 fn an_intermediate_update_cannot_pull_the_rug() {
     let path = shipped();
-    let (api, resources) = (fmi3::load(&path), Resources::new(false));
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::new(false));
     for early_return in [false, true] {
-        let arguments = fmi3::Arguments { update: Some(misbehave), early_return, ..fmi3::Arguments::new(&resources) };
-        let slave = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
+        let arguments =
+            fmi3::Fmi3Arguments { update: Some(misbehave), early_return, ..fmi3::Fmi3Arguments::new(&resources) };
+        let slave = fmi3::Fmi3TestSlave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
         slave.initialise();
         let answer = slave.step(0.0, 1e-5);
         let notes = slave.notes();
@@ -137,8 +138,8 @@ fn a_step_that_fails_ends_in_error_with_the_last_good_time() {
     let api = fmi2::load(&path);
     let mut moving = tiprub_tests::scene::scene();
     moving.settings.surfaces[0].moving = true;
-    let resources = Resources::of(&moving, false);
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let resources = UnpackedResources::of(&moving, false);
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     slave.expect(slave.step(0.0, 1e-4));
     let good = slave.save();
     let simulation = tiprub_core::Simulation::new(&moving).expect("valid");
@@ -171,11 +172,11 @@ unsafe impl Sync for Shared {}
 #[test]
 fn two_threads_with_an_instance_each_and_two_on_one() {
     let path = shipped();
-    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), Resources::new(false));
+    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), UnpackedResources::new(false));
     let references =
         ["time", "rotor_angle", "clearance_minimum", "force_x", "normal_impulse", "blade[1].clearance"].map(reference);
     let run2 = || {
-        let slave = fmi2::Slave::initialised(&api2, &resources);
+        let slave = fmi2::Fmi2TestSlave::initialised(&api2, &resources);
         for step in 0..300 {
             slave.expect(slave.step(f64::from(step) * 1e-4, 1e-4));
         }
@@ -183,7 +184,7 @@ fn two_threads_with_an_instance_each_and_two_on_one() {
         reals
     };
     let run3 = || {
-        let slave = fmi3::Slave::new(&api3, &resources);
+        let slave = fmi3::Fmi3TestSlave::new(&api3, &resources);
         slave.initialise();
         for step in 0..300 {
             assert_eq!(slave.step(f64::from(step) * 1e-4, 1e-4).status, OK);
@@ -199,7 +200,7 @@ fn two_threads_with_an_instance_each_and_two_on_one() {
         }
     });
     // Two threads on one instance is against the rules: some calls are refused, none is undefined.
-    let slave = fmi2::Slave::initialised(&api2, &resources);
+    let slave = fmi2::Fmi2TestSlave::initialised(&api2, &resources);
     let shared = Shared(slave.handle);
     let reset = || {
         let Shared(handle) = &shared;
@@ -262,13 +263,13 @@ mod control {
 fn the_floating_point_environment_of_the_host_neither_matters_nor_changes() {
     const MASKED: u32 = 0x1F80;
     let traps = MASKED & !(0x0080 | 0x0200 | 0x0400 | 0x0800); // invalid, division by zero, overflow, underflow
-    let (path, resources) = (shipped(), Resources::new(false));
+    let (path, resources) = (shipped(), UnpackedResources::new(false));
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
     let references =
         ["rotor_angle", "clearance_minimum", "force_x", "normal_impulse", "energy_residual"].map(reference);
     let run = |word: u32| {
-        let slave = control::under(word, || fmi2::Slave::new(&api2, &resources));
-        let third = control::under(word, || fmi3::Slave::new(&api3, &resources));
+        let slave = control::under(word, || fmi2::Fmi2TestSlave::new(&api2, &resources));
+        let third = control::under(word, || fmi3::Fmi3TestSlave::new(&api3, &resources));
         slave.expect(control::under(word, || slave.enter()));
         slave.expect(control::under(word, || slave.exit()));
         third.expect(control::under(word, || third.enter(0.0, None)));

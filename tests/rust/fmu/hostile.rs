@@ -7,7 +7,7 @@ use std::ffi::{CString, c_void};
 
 use tiprub_fmi_host::api::{Fmi3Api, LogMessage};
 use tiprub_tests::refusals::{count, refused, summary};
-use tiprub_tests::scene::{Resources, SCENE, reference, rom};
+use tiprub_tests::scene::{SCENE, UnpackedResources, reference, rom};
 use tiprub_tests::{DISCARD, ERROR, OK, fmi2, fmi3, shipped};
 
 fn text(text: &str) -> Option<CString> {
@@ -16,22 +16,22 @@ fn text(text: &str) -> Option<CString> {
 
 #[test]
 fn instantiation_of_fmi2_refuses_and_says_why() {
-    let (api2, resources) = (fmi2::load(&shipped()), Resources::new(true));
+    let (api2, resources) = (fmi2::load(&shipped()), UnpackedResources::new(true));
     let empty = tempfile::tempdir().expect("a temporary directory");
-    let good = fmi2::Arguments::new(&resources);
+    let good = fmi2::Fmi2Arguments::new(&resources);
     let uri = |path: &std::path::Path| text(&format!("file://{}", path.display()));
     let cases2 = [
-        (fmi2::Arguments { name: None, ..good.clone() }, "instanceName is NULL"),
-        (fmi2::Arguments { kind: 0, ..good.clone() }, "fmuType = 0"),
-        (fmi2::Arguments { kind: -7, ..good.clone() }, "fmuType = -7"),
-        (fmi2::Arguments { token: None, ..good.clone() }, "fmuGUID is NULL"),
-        (fmi2::Arguments { token: text("{wrong}"), ..good.clone() }, "\"{wrong}\" does not belong"),
-        (fmi2::Arguments { token: text(""), ..good.clone() }, "does not belong"),
-        (fmi2::Arguments { location: None, ..good.clone() }, "fmuResourceLocation is NULL"),
-        (fmi2::Arguments { location: text(""), ..good.clone() }, "fmuResourceLocation is empty"),
-        (fmi2::Arguments { location: text("http://example.org/r"), ..good.clone() }, "not a file: URI"),
-        (fmi2::Arguments { location: text("file:///no/such/place"), ..good.clone() }, "/no/such/place"),
-        (fmi2::Arguments { location: uri(empty.path()), ..good }, "scene.toml"),
+        (fmi2::Fmi2Arguments { name: None, ..good.clone() }, "instanceName is NULL"),
+        (fmi2::Fmi2Arguments { kind: 0, ..good.clone() }, "fmuType = 0"),
+        (fmi2::Fmi2Arguments { kind: -7, ..good.clone() }, "fmuType = -7"),
+        (fmi2::Fmi2Arguments { token: None, ..good.clone() }, "fmuGUID is NULL"),
+        (fmi2::Fmi2Arguments { token: text("{wrong}"), ..good.clone() }, "\"{wrong}\" does not belong"),
+        (fmi2::Fmi2Arguments { token: text(""), ..good.clone() }, "does not belong"),
+        (fmi2::Fmi2Arguments { location: None, ..good.clone() }, "fmuResourceLocation is NULL"),
+        (fmi2::Fmi2Arguments { location: text(""), ..good.clone() }, "fmuResourceLocation is empty"),
+        (fmi2::Fmi2Arguments { location: text("http://example.org/r"), ..good.clone() }, "not a file: URI"),
+        (fmi2::Fmi2Arguments { location: text("file:///no/such/place"), ..good.clone() }, "/no/such/place"),
+        (fmi2::Fmi2Arguments { location: uri(empty.path()), ..good }, "scene.toml"),
     ];
     for (arguments, reason) in cases2 {
         // The journal checks the instance name; NULL arrives as "".
@@ -45,38 +45,44 @@ fn instantiation_of_fmi2_refuses_and_says_why() {
             count(1);
             continue;
         }
-        let log = fmi2::Slave::try_new(&api2, &arguments).expect_err("must be refused");
+        let log = fmi2::Fmi2TestSlave::try_new(&api2, &arguments).expect_err("must be refused");
         refused(ERROR, &log, reason);
     }
     let token = &resources.token;
-    let log = fmi2::Slave::try_new(&api2, &fmi2::Arguments { token: text("{x}"), ..fmi2::Arguments::new(&resources) });
+    let log = fmi2::Fmi2TestSlave::try_new(
+        &api2,
+        &fmi2::Fmi2Arguments { token: text("{x}"), ..fmi2::Fmi2Arguments::new(&resources) },
+    );
     assert!(log.expect_err("refused").contains(token), "the message names both tokens");
     summary("instantiation, FMI 2.0");
 }
 
 #[test]
 fn instantiation_of_fmi3_refuses_and_says_why() {
-    let (api3, resources) = (fmi3::load(&shipped()), Resources::new(true));
-    let good = fmi3::Arguments::new(&resources);
+    let (api3, resources) = (fmi3::load(&shipped()), UnpackedResources::new(true));
+    let good = fmi3::Fmi3Arguments::new(&resources);
     let cases3 = [
-        (fmi3::Arguments { name: None, ..good.clone() }, "instanceName is NULL"),
-        (fmi3::Arguments { name: text(" \t"), ..good.clone() }, "instanceName is empty"),
-        (fmi3::Arguments { token: text("{wrong}"), ..good.clone() }, "does not belong"),
-        (fmi3::Arguments { path: None, ..good.clone() }, "resourcePath is NULL"),
-        (fmi3::Arguments { path: text(""), ..good.clone() }, "resourcePath is empty"),
-        (fmi3::Arguments { path: text("resources"), ..good.clone() }, "not absolute"),
-        (fmi3::Arguments { event_mode: true, ..good.clone() }, "Event Mode"),
-        (fmi3::Arguments { intermediate: vec![99_999], ..good.clone() }, "99999"),
-        (fmi3::Arguments { intermediate: vec![reference("gap_offset")], ..good.clone() }, "neither input nor output"),
+        (fmi3::Fmi3Arguments { name: None, ..good.clone() }, "instanceName is NULL"),
+        (fmi3::Fmi3Arguments { name: text(" \t"), ..good.clone() }, "instanceName is empty"),
+        (fmi3::Fmi3Arguments { token: text("{wrong}"), ..good.clone() }, "does not belong"),
+        (fmi3::Fmi3Arguments { path: None, ..good.clone() }, "resourcePath is NULL"),
+        (fmi3::Fmi3Arguments { path: text(""), ..good.clone() }, "resourcePath is empty"),
+        (fmi3::Fmi3Arguments { path: text("resources"), ..good.clone() }, "not absolute"),
+        (fmi3::Fmi3Arguments { event_mode: true, ..good.clone() }, "Event Mode"),
+        (fmi3::Fmi3Arguments { intermediate: vec![99_999], ..good.clone() }, "99999"),
+        (
+            fmi3::Fmi3Arguments { intermediate: vec![reference("gap_offset")], ..good.clone() },
+            "neither input nor output",
+        ),
     ];
     for (arguments, reason) in cases3 {
-        refused(ERROR, &fmi3::Slave::try_new(&api3, &arguments).expect_err("must be refused"), reason);
+        refused(ERROR, &fmi3::Fmi3TestSlave::try_new(&api3, &arguments).expect_err("must be refused"), reason);
     }
     // A trailing slash, none, and a URI are all understood.
     let path = resources.path().display().to_string();
     for form in [path.clone(), format!("{path}/"), format!("file://{path}")] {
-        let arguments = fmi3::Arguments { path: text(&form), ..good.clone() };
-        assert!(fmi3::Slave::try_new(&api3, &arguments).is_ok(), "{form}");
+        let arguments = fmi3::Fmi3Arguments { path: text(&form), ..good.clone() };
+        assert!(fmi3::Fmi3TestSlave::try_new(&api3, &arguments).is_ok(), "{form}");
     }
     other_interfaces(&api3);
     summary("instantiation, FMI 3.0");
@@ -107,24 +113,26 @@ fn damaged_resources_are_refused() {
         ("scene.toml", b"\xff\xfe".to_vec(), "UTF-8"),
         ("package.toml", Vec::new(), "package.toml"),
     ] {
-        let resources = Resources::new(false);
+        let resources = UnpackedResources::new(false);
         std::fs::write(resources.path().join(name), content).expect("writable");
-        let log = fmi2::Slave::try_new(&api, &fmi2::Arguments::new(&resources)).expect_err("must be refused");
+        let log =
+            fmi2::Fmi2TestSlave::try_new(&api, &fmi2::Fmi2Arguments::new(&resources)).expect_err("must be refused");
         refused(ERROR, &log, reason);
     }
-    let resources = Resources::new(false);
+    let resources = UnpackedResources::new(false);
     let rom_file = std::fs::read_dir(resources.path()).expect("readable").flatten().map(|entry| entry.path());
     let rom_file = rom_file.into_iter().find(|path| path.to_string_lossy().ends_with("safetensors")).expect("a ROM");
     let bytes = std::fs::read(&rom_file).expect("readable");
     for length in [0, 7, bytes.len() / 2, bytes.len() - 1] {
         std::fs::write(&rom_file, &bytes[..length]).expect("writable");
-        let log = fmi2::Slave::try_new(&api, &fmi2::Arguments::new(&resources)).expect_err("must be refused");
+        let log =
+            fmi2::Fmi2TestSlave::try_new(&api, &fmi2::Fmi2Arguments::new(&resources)).expect_err("must be refused");
         refused(ERROR, &log, "safetensors");
     }
     let mut broken = rom();
     broken.mass[(0, 0)] = f64::NAN;
     std::fs::write(&rom_file, tiprub_format::write_rom(&broken)).expect("writable");
-    let log = fmi2::Slave::try_new(&api, &fmi2::Arguments::new(&resources)).expect_err("must be refused");
+    let log = fmi2::Fmi2TestSlave::try_new(&api, &fmi2::Fmi2Arguments::new(&resources)).expect_err("must be refused");
     refused(ERROR, &log, "mass");
     summary("resources");
 }
@@ -161,8 +169,8 @@ fn a_null_instance_is_refused_everywhere() {
 #[test]
 fn arguments_of_get_and_set() {
     let path = shipped();
-    let (api, resources) = (fmi2::load(&path), Resources::new(false));
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     let handle = slave.handle;
     let (null_in, null_out) = (std::ptr::null(), std::ptr::null_mut());
     let (speed, friction, output) = ([reference("speed")], reference("friction_coefficient"), reference("rotor_angle"));
@@ -227,8 +235,8 @@ fn arguments_of_get_and_set() {
 #[test]
 fn arrays_of_fmi3() {
     let path = shipped();
-    let (api, resources) = (fmi3::load(&path), Resources::new(true));
-    let slave = fmi3::Slave::new(&api, &resources);
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::new(true));
+    let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
     slave.initialise();
     let simulation = tiprub_core::Simulation::new(&tiprub_tests::scene::scene()).expect("valid");
     let array = simulation.table().find("blade[1].clearance").expect("watched").reference;
@@ -252,8 +260,8 @@ fn arrays_of_fmi3() {
         refused(status, &log, if count == usize::MAX { "" } else { reason });
     }
     // Scalars when packaged so.
-    let scalars = Resources::new(false);
-    let scalar = fmi3::Slave::new(&api, &scalars);
+    let scalars = UnpackedResources::new(false);
+    let scalar = fmi3::Fmi3TestSlave::new(&api, &scalars);
     scalar.initialise();
     assert_eq!(scalar.reals(&[array + 1], 1).len(), 1);
     // Types that no variable has.
@@ -271,11 +279,11 @@ fn arrays_of_fmi3() {
 #[test]
 fn texts_enumerations_and_booleans() {
     let path = shipped();
-    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), Resources::new(false));
+    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), UnpackedResources::new(false));
     let simulation = tiprub_core::Simulation::new(&tiprub_tests::scene::scene()).expect("valid");
     let find = |name: &str| simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
     let (scheme, scene, touching) = (find("scheme"), find("scene"), find("in_contact"));
-    let (two, three) = (fmi2::Slave::new(&api2, &resources), fmi3::Slave::new(&api3, &resources));
+    let (two, three) = (fmi2::Fmi2TestSlave::new(&api2, &resources), fmi3::Fmi3TestSlave::new(&api3, &resources));
     let (mut name, mut number, mut long, mut flag) = (std::ptr::null(), 0_i32, 0_i64, 1_u8);
     // SAFETY: arrays of one element.
     unsafe {
@@ -312,8 +320,8 @@ fn texts_enumerations_and_booleans() {
 #[test]
 fn steps_at_wrong_times_and_of_wrong_sizes() {
     let path = shipped();
-    let (api, resources) = (fmi2::load(&path), Resources::new(false));
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     slave.expect(slave.step(0.0, 1e-4));
     let before = slave.serialise(slave.save());
     for (time, size, reason) in [
@@ -348,7 +356,7 @@ fn steps_at_wrong_times_and_of_wrong_sizes() {
         refused((api.fmi2GetRealStatus)(slave.handle, 2, std::ptr::null_mut()), &slave.log(), "argument value is NULL");
     }
     let three = fmi3::load(&path);
-    let third = fmi3::Slave::new(&three, &resources);
+    let third = fmi3::Fmi3TestSlave::new(&three, &resources);
     for (start, stop, reason) in [
         (f64::NAN, None, "startTime"),
         (f64::NEG_INFINITY, None, "startTime"),
@@ -376,8 +384,8 @@ fn steps_at_wrong_times_and_of_wrong_sizes() {
 #[test]
 fn calls_twice_and_on_the_wrong_version() {
     let path = shipped();
-    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), Resources::new(false));
-    let slave = fmi2::Slave::initialised(&api2, &resources);
+    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), UnpackedResources::new(false));
+    let slave = fmi2::Fmi2TestSlave::initialised(&api2, &resources);
     slave.expect(slave.step(0.0, 1e-4));
     slave.expect(slave.reset());
     slave.expect(slave.reset());

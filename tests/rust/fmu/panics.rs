@@ -3,7 +3,7 @@
 
 use std::process::Command;
 
-use tiprub_tests::scene::Resources;
+use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, library, shipped};
 
 /// The magic number of the feature `test-panic`.
@@ -13,9 +13,10 @@ const PANIC: f64 = 1.234_567_890_123e-5;
 fn abuse() {
     let path = library("release", &["test-panic"]);
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
-    let resources = Resources::new(false);
+    let resources = UnpackedResources::new(false);
 
-    let (slave, other) = (fmi2::Slave::initialised(&api2, &resources), fmi2::Slave::initialised(&api2, &resources));
+    let (slave, other) =
+        (fmi2::Fmi2TestSlave::initialised(&api2, &resources), fmi2::Fmi2TestSlave::initialised(&api2, &resources));
     slave.expect(slave.step(0.0, 1e-4));
     let state = slave.save();
     assert_eq!(slave.step(1e-4, PANIC), ERROR, "Error, not Fatal");
@@ -39,7 +40,7 @@ fn abuse() {
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
-                let slave = fmi3::Slave::new(&api3, &resources);
+                let slave = fmi3::Fmi3TestSlave::new(&api3, &resources);
                 slave.initialise();
                 let answer = slave.step(0.0, PANIC);
                 assert_eq!((answer.status, answer.event, answer.terminate, answer.early), (ERROR, false, false, false));
@@ -49,7 +50,7 @@ fn abuse() {
             });
         }
     });
-    let fresh = fmi3::Slave::new(&api3, &resources);
+    let fresh = fmi3::Fmi3TestSlave::new(&api3, &resources);
     fresh.initialise();
     assert_eq!(fresh.step(0.0, 1e-4).status, OK);
 }
@@ -81,6 +82,6 @@ fn a_forced_panic_leaves_the_host_alive_and_prints_nothing() {
 #[test]
 fn the_shipped_library_steps_by_the_magic_size() {
     let api = fmi2::load(&shipped());
-    let slave = fmi2::Slave::initialised(&api, &Resources::new(false));
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &UnpackedResources::new(false));
     slave.expect(slave.step(0.0, PANIC));
 }

@@ -3,7 +3,7 @@
 use std::process::Command;
 
 use tiprub_core::Simulation;
-use tiprub_tests::scene::{Resources, scene};
+use tiprub_tests::scene::{UnpackedResources, scene};
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
 
 const H: f64 = 1.0137e-4;
@@ -16,7 +16,7 @@ fn references() -> Vec<u32> {
 }
 
 /// Step from `first` to `last`, with a step size that changes; all reals at every point, as bits.
-fn march(slave: &fmi2::Slave<'_>, references: &[u32], first: u32, last: u32) -> Vec<Vec<u64>> {
+fn march(slave: &fmi2::Fmi2TestSlave<'_>, references: &[u32], first: u32, last: u32) -> Vec<Vec<u64>> {
     let size = |step: u32| H * (1.0 + 0.5 * f64::from(step % 3));
     let mut time: f64 = (0..first).fold(0.0, |time, step| time + size(step));
     (first..last)
@@ -28,7 +28,7 @@ fn march(slave: &fmi2::Slave<'_>, references: &[u32], first: u32, last: u32) -> 
         .collect()
 }
 
-fn contact(slave: &fmi2::Slave<'_>) -> bool {
+fn contact(slave: &fmi2::Fmi2TestSlave<'_>) -> bool {
     let simulation = Simulation::new(&scene()).expect("the scene is valid");
     let count = simulation.table().find("contact_count").expect("there is a count").reference;
     let mut value = 0;
@@ -39,7 +39,7 @@ fn contact(slave: &fmi2::Slave<'_>) -> bool {
 
 /// March until a blade touches at a communication point; the number of steps taken.
 #[track_caller]
-fn march_into_contact(slave: &fmi2::Slave<'_>, references: &[u32]) -> u32 {
+fn march_into_contact(slave: &fmi2::Fmi2TestSlave<'_>, references: &[u32]) -> u32 {
     for step in 0..2000 {
         if step > 50 && contact(slave) {
             return step;
@@ -52,15 +52,15 @@ fn march_into_contact(slave: &fmi2::Slave<'_>, references: &[u32]) -> u32 {
 #[test]
 fn save_in_contact_run_restore_run_gives_the_same_bits() {
     let api = fmi2::load(&shipped());
-    let (resources, references) = (Resources::new(false), references());
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let (resources, references) = (UnpackedResources::new(false), references());
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     let begin = march_into_contact(&slave, &references);
     let state = slave.save();
     let first = march(&slave, &references, begin, begin + 150);
     slave.expect(slave.restore(state));
     assert_eq!(march(&slave, &references, begin, begin + 150), first, "after restoring");
     // Deserialised in another instance, never initialised.
-    let other = fmi2::Slave::new(&api, &resources);
+    let other = fmi2::Fmi2TestSlave::new(&api, &resources);
     let (status, copy) = other.deserialise(&slave.serialise(state));
     other.expect(status);
     other.expect(other.restore(copy));
@@ -88,8 +88,8 @@ fn child_continues_from_a_file() {
     let bytes = std::fs::read(directory.join("state")).expect("the parent wrote the state");
     let begin: u32 = std::fs::read_to_string(directory.join("begin")).expect("written").parse().expect("a number");
     let api = fmi2::load(&shipped());
-    let (resources, references) = (Resources::new(false), references());
-    let slave = fmi2::Slave::new(&api, &resources);
+    let (resources, references) = (UnpackedResources::new(false), references());
+    let slave = fmi2::Fmi2TestSlave::new(&api, &resources);
     let (status, state) = slave.deserialise(&bytes);
     slave.expect(status);
     slave.expect(slave.restore(state));
@@ -100,8 +100,8 @@ fn child_continues_from_a_file() {
 #[test]
 fn another_process_continues_with_the_same_bits() {
     let api = fmi2::load(&shipped());
-    let (resources, references) = (Resources::new(false), references());
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let (resources, references) = (UnpackedResources::new(false), references());
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     let begin = march_into_contact(&slave, &references);
     let directory = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(directory.path().join("state"), slave.serialise(slave.save())).expect("writable");
@@ -119,8 +119,8 @@ fn another_process_continues_with_the_same_bits() {
 #[test]
 fn a_thousand_resets_give_the_same_bits() {
     let api = fmi2::load(&shipped());
-    let (resources, references) = (Resources::new(false), references());
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let (resources, references) = (UnpackedResources::new(false), references());
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     let begin = march_into_contact(&slave, &references);
     let run = || {
         slave.expect(slave.reset());
@@ -135,15 +135,15 @@ fn a_thousand_resets_give_the_same_bits() {
     slave.expect(slave.reset());
     slave.initialise();
     let touching = march(&slave, &references, 0, begin);
-    let fresh = fmi2::Slave::initialised(&api, &resources);
+    let fresh = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     assert!(march(&fresh, &references, 0, begin) == touching, "a reset instance is as a fresh one, in contact too");
 }
 
 #[test]
 fn the_phase_of_life_is_part_of_the_state() {
     let api = fmi3::load(&shipped());
-    let resources = Resources::new(true);
-    let slave = fmi3::Slave::new(&api, &resources);
+    let resources = UnpackedResources::new(true);
+    let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
     let instantiated = slave.save();
     slave.expect(slave.enter(0.25, Some(1.0)));
     let initialising = slave.save();
@@ -173,8 +173,8 @@ fn the_phase_of_life_is_part_of_the_state() {
 fn wrong_damaged_and_foreign_states_are_refused() {
     let path = shipped();
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
-    let (scalars, arrays) = (Resources::new(false), Resources::new(true));
-    let slave = fmi2::Slave::initialised(&api2, &scalars);
+    let (scalars, arrays) = (UnpackedResources::new(false), UnpackedResources::new(true));
+    let slave = fmi2::Fmi2TestSlave::initialised(&api2, &scalars);
     slave.expect(slave.step(0.0, H));
     let bytes = slave.serialise(slave.save());
     let refused = |bytes: &[u8], reason: &str| {
@@ -196,7 +196,7 @@ fn wrong_damaged_and_foreign_states_are_refused() {
     }
     println!("{flips} single flipped bits found");
     // The same scene packaged otherwise is another FMU.
-    let other = fmi3::Slave::new(&api3, &arrays);
+    let other = fmi3::Fmi3TestSlave::new(&api3, &arrays);
     let foreign = other.serialise(other.save());
     assert_eq!(foreign.len(), bytes.len());
     refused(&foreign, "belongs to token");
@@ -213,8 +213,8 @@ fn wrong_damaged_and_foreign_states_are_refused() {
 #[test]
 fn a_state_saved_after_reading_in_initialization_mode_is_that_of_before() {
     let api = fmi3::load(&shipped());
-    let resources = Resources::new(true);
-    let slave = fmi3::Slave::new(&api, &resources);
+    let resources = UnpackedResources::new(true);
+    let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
     let [clearance, offset] = ["clearance_minimum", "gap_offset"].map(tiprub_tests::scene::reference);
     slave.expect(slave.enter(0.0, None));
     let unread = slave.serialise(slave.save());
@@ -236,8 +236,8 @@ fn a_state_saved_after_reading_in_initialization_mode_is_that_of_before() {
 #[test]
 fn derivatives_of_inputs_are_part_of_the_state() {
     let api = fmi2::load(&shipped());
-    let (resources, references) = (Resources::new(false), references());
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let (resources, references) = (UnpackedResources::new(false), references());
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     let speed = tiprub_tests::scene::reference("speed");
     slave.expect(slave.set_derivatives(&[speed], 1, &[5e4]));
     let state = slave.save();

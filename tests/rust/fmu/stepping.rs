@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use tiprub_core::settings::Scheme;
 use tiprub_core::{Scene, Simulation};
 use tiprub_fmi_host::api::Fmi3Api;
-use tiprub_tests::scene::{Resources, scene};
+use tiprub_tests::scene::{UnpackedResources, scene};
 use tiprub_tests::{DISCARD, ERROR, OK, WARNING, fmi2, fmi3, shipped};
 
 /// Communication step (s): not a multiple of the internal step of 2 µs.
@@ -41,8 +41,9 @@ fn bits(values: &[f64]) -> Vec<u64> {
 fn both_versions_give_the_bits_of_the_core_with_contact() {
     let path = shipped();
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
-    let resources = Resources::new(false);
-    let (two, three) = (fmi2::Slave::initialised(&api2, &resources), fmi3::Slave::new(&api3, &resources));
+    let resources = UnpackedResources::new(false);
+    let (two, three) =
+        (fmi2::Fmi2TestSlave::initialised(&api2, &resources), fmi3::Fmi3TestSlave::new(&api3, &resources));
     three.initialise();
     let mut core = simulation();
     let references = all_reals(&core);
@@ -70,8 +71,8 @@ fn both_versions_give_the_bits_of_the_core_with_contact() {
 #[test]
 fn step_sizes_that_change_and_sixtieths_land_exactly() {
     let path = shipped();
-    let (api, resources) = (fmi3::load(&path), Resources::new(true));
-    let slave = fmi3::Slave::new(&api, &resources);
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::new(true));
+    let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
     slave.initialise();
     let mut time = 0.0;
     for step in 1..200_u32 {
@@ -101,13 +102,13 @@ fn step_sizes_that_change_and_sixtieths_land_exactly() {
 #[test]
 fn a_derivative_of_the_speed_gives_the_exact_angle_of_a_ramp() {
     let path = shipped();
-    let (api, resources) = (fmi2::load(&path), Resources::new(false));
+    let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
     let core = simulation();
     let (speed, angle) = (reference_of(&core, "speed"), reference_of(&core, "rotor_angle"));
     let (start, ramp, size, steps) = (300.0, 4000.0, 2e-3, 10_u32);
     let mut errors = Vec::new();
     for with_derivative in [false, true] {
-        let slave = fmi2::Slave::initialised(&api, &resources);
+        let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
         for step in 0..steps {
             let time = f64::from(step) * size;
             slave.expect(slave.set_reals(&[speed], &[start + ramp * time]));
@@ -129,8 +130,8 @@ fn a_derivative_of_the_speed_gives_the_exact_angle_of_a_ramp() {
 #[test]
 fn derivatives_of_outputs_follow_the_outputs() {
     let path = shipped();
-    let (api, resources) = (fmi3::load(&path), Resources::new(false));
-    let slave = fmi3::Slave::new(&api, &resources);
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::new(false));
+    let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
     slave.initialise();
     let angle = reference_of(&simulation(), "rotor_angle");
     assert_eq!(slave.step(0.0, H).status, OK);
@@ -157,7 +158,7 @@ unsafe extern "C" fn watch(
     at: *mut f64,
 ) {
     // SAFETY: the environment is the importer's context, which nobody else touches during a step.
-    let context = unsafe { &mut *environment.cast::<fmi3::Context>() };
+    let context = unsafe { &mut *environment.cast::<fmi3::CallbackContext>() };
     assert!(get_allowed && finished);
     // SAFETY: the functions outlive the instance.
     let api: &Fmi3Api = unsafe { &*context.api };
@@ -178,21 +179,21 @@ unsafe extern "C" fn watch(
     }
 }
 
-fn watched(resources: &Resources, early_return: bool) -> fmi3::Arguments {
-    fmi3::Arguments { update: Some(watch), early_return, ..fmi3::Arguments::new(resources) }
+fn watched(resources: &UnpackedResources, early_return: bool) -> fmi3::Fmi3Arguments {
+    fmi3::Fmi3Arguments { update: Some(watch), early_return, ..fmi3::Fmi3Arguments::new(resources) }
 }
 
 #[test]
 fn intermediate_updates_see_every_internal_step_and_change_nothing_by_looking() {
     let path = shipped();
-    let (api, resources) = (fmi3::load(&path), Resources::new(false));
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::new(false));
     let core = simulation();
     // Damping loss is gathered per communication step or per look inside: the energies may differ in the last bits.
     let energies =
         ["damping_loss", "energy_residual", "energy_residual_relative"].map(|name| reference_of(&core, name));
     let references: Vec<_> = all_reals(&core).into_iter().filter(|reference| !energies.contains(reference)).collect();
-    let plain = fmi3::Slave::new(&api, &resources);
-    let looked = fmi3::Slave::try_new(&api, &watched(&resources, true)).unwrap_or_else(|log| panic!("{log}"));
+    let plain = fmi3::Fmi3TestSlave::new(&api, &resources);
+    let looked = fmi3::Fmi3TestSlave::try_new(&api, &watched(&resources, true)).unwrap_or_else(|log| panic!("{log}"));
     plain.initialise();
     looked.initialise();
     for step in 0..100 {
@@ -207,8 +208,8 @@ fn intermediate_updates_see_every_internal_step_and_change_nothing_by_looking() 
 #[test]
 fn early_return_ends_the_step_where_the_importer_wants() {
     let path = shipped();
-    let (api, resources) = (fmi3::load(&path), Resources::new(true));
-    let slave = fmi3::Slave::try_new(&api, &watched(&resources, true)).unwrap_or_else(|log| panic!("{log}"));
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::new(true));
+    let slave = fmi3::Fmi3TestSlave::try_new(&api, &watched(&resources, true)).unwrap_or_else(|log| panic!("{log}"));
     slave.initialise();
     slave.wish(4.1e-5);
     let answer = slave.step(0.0, 1e-4);
@@ -222,7 +223,7 @@ fn early_return_ends_the_step_where_the_importer_wants() {
     assert_eq!(slave.step(rest.time, 1e-4).status, OK);
 
     // Without the importer's consent at instantiation a request is not followed, and answered with a warning.
-    let strict = fmi3::Slave::try_new(&api, &watched(&resources, false)).unwrap_or_else(|log| panic!("{log}"));
+    let strict = fmi3::Fmi3TestSlave::try_new(&api, &watched(&resources, false)).unwrap_or_else(|log| panic!("{log}"));
     strict.initialise();
     strict.wish(4.1e-5);
     let answer = strict.step(0.0, 1e-4);
@@ -232,10 +233,10 @@ fn early_return_ends_the_step_where_the_importer_wants() {
 #[test]
 fn inputs_set_during_intermediate_updates_count_from_there() {
     let path = shipped();
-    let (api, resources) = (fmi3::load(&path), Resources::new(true));
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::new(true));
     let core = simulation();
     let angle = reference_of(&core, "rotor_angle");
-    let slave = fmi3::Slave::try_new(&api, &watched(&resources, false)).unwrap_or_else(|log| panic!("{log}"));
+    let slave = fmi3::Fmi3TestSlave::try_new(&api, &watched(&resources, false)).unwrap_or_else(|log| panic!("{log}"));
     slave.initialise();
     slave.wish(-300.0);
     let (size, steps) = (1e-3, 5);
@@ -254,8 +255,8 @@ fn inputs_set_during_intermediate_updates_count_from_there() {
 #[test]
 fn the_stop_time_is_respected_with_room_for_rounding() {
     let path = shipped();
-    let (api, resources) = (fmi2::load(&path), Resources::new(false));
-    let slave = fmi2::Slave::new(&api, &resources);
+    let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
+    let slave = fmi2::Fmi2TestSlave::new(&api, &resources);
     slave.expect(slave.setup(0.0, Some(1e-3)));
     slave.initialise();
     let mut time = 0.0;
@@ -273,12 +274,12 @@ fn the_stop_time_is_respected_with_room_for_rounding() {
 #[test]
 fn values_set_before_initialisation_are_start_values() {
     let path = shipped();
-    let (api, resources) = (fmi2::load(&path), Resources::new(false));
+    let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
     let core = simulation();
     let [speed, friction, angle, clearance] =
         ["speed", "friction_coefficient", "initial_rotor_angle", "blade[1].clearance"]
             .map(|name| reference_of(&core, name));
-    let slave = fmi2::Slave::new(&api, &resources);
+    let slave = fmi2::Fmi2TestSlave::new(&api, &resources);
     slave.expect(slave.set_reals(&[speed, friction], &[250.0, 0.1]));
     assert_eq!(slave.reals(&[speed, friction]), [250.0, 0.1], "start values can be read back");
     slave.expect(slave.enter());
@@ -300,11 +301,11 @@ fn values_set_before_initialisation_are_start_values() {
 #[test]
 fn steps_of_any_length_are_refused_or_leave_numbers_only() {
     let path = shipped();
-    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), Resources::new(false));
+    let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), UnpackedResources::new(false));
     let references = all_reals(&simulation());
     let lengths = [0.0, 5e-324, 1e-310, 1e-300, 1e-160, 1e-17, 9e-13, 1e-12, 1e-9, 2e-6, 1e-3, 1e7, 1e154, 1e300];
     for start in [0.0, 1e-310, -0.37, 1e8] {
-        let (two, three) = (fmi2::Slave::new(&api2, &resources), fmi3::Slave::new(&api3, &resources));
+        let (two, three) = (fmi2::Fmi2TestSlave::new(&api2, &resources), fmi3::Fmi3TestSlave::new(&api3, &resources));
         [two.setup(start, None), two.enter(), two.exit()].into_iter().for_each(|status| two.expect(status));
         [three.enter(start, None), three.exit()].into_iter().for_each(|status| three.expect(status));
         let (mut times, mut taken) = ([start; 2], 0);
@@ -335,11 +336,11 @@ fn a_scheme_that_leaves_no_mode_is_refused_without_a_panic_and_can_be_taken_back
     rom.mass = rom.mass.view((0, 0), (9, 9)).into_owned();
     rom.stiffness = rom.stiffness.view((0, 0), (9, 9)).into_owned();
     rom.contact_map = rom.contact_map.view((0, 0), (9, 9)).into_owned();
-    let resources = Resources::of(&scene, false);
+    let resources = UnpackedResources::of(&scene, false);
     let core = Simulation::new(&scene).expect("the scene is valid");
     let (scheme, output) = (reference_of(&core, "scheme"), reference_of(&core, "clearance_minimum"));
     let api = fmi2::load(&shipped());
-    let slave = fmi2::Slave::new(&api, &resources);
+    let slave = fmi2::Fmi2TestSlave::new(&api, &resources);
     let choose = |choice: i32| {
         // SAFETY: arrays of one element.
         unsafe { (api.fmi2SetInteger)(slave.handle, &raw const scheme, 1, &raw const choice) }
@@ -368,8 +369,8 @@ fn what_holds_for_the_step_taken_is_logged_once() {
     scene.settings.time.step = 1.5e-4;
     scene.settings.experiment.communication_step = 2e-5;
     let api = fmi2::load(&shipped());
-    let resources = Resources::of(&scene, false);
-    let slave = fmi2::Slave::initialised(&api, &resources);
+    let resources = UnpackedResources::of(&scene, false);
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
     let told = || slave.log().matches("not resolved").count();
     assert_eq!(told(), 0);
     let mut time = 0.0;
@@ -396,7 +397,7 @@ unsafe extern "C" fn overreach(
         return;
     }
     // SAFETY: the environment is the importer's context, which nobody else touches during a step.
-    let context = unsafe { &mut *environment.cast::<fmi3::Context>() };
+    let context = unsafe { &mut *environment.cast::<fmi3::CallbackContext>() };
     // SAFETY: the functions outlive the instance.
     let api: &Fmi3Api = unsafe { &*context.api };
     let core = Simulation::new(&whirling()).expect("the scene is valid");
@@ -416,13 +417,13 @@ fn whirling() -> tiprub_core::Scene {
 #[test]
 fn values_refused_together_within_a_step_leave_the_ramps_as_they_were() {
     let path = shipped();
-    let (api, resources) = (fmi3::load(&path), Resources::of(&whirling(), true));
+    let (api, resources) = (fmi3::load(&path), UnpackedResources::of(&whirling(), true));
     let core = Simulation::new(&whirling()).expect("the scene is valid");
     let whirl = [reference_of(&core, "whirl_x"), reference_of(&core, "whirl_y")];
     let clearance = reference_of(&core, "clearance_minimum");
-    let plain = fmi3::Slave::new(&api, &resources);
-    let arguments = fmi3::Arguments { update: Some(overreach), ..fmi3::Arguments::new(&resources) };
-    let asked = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
+    let plain = fmi3::Fmi3TestSlave::new(&api, &resources);
+    let arguments = fmi3::Fmi3Arguments { update: Some(overreach), ..fmi3::Fmi3Arguments::new(&resources) };
+    let asked = fmi3::Fmi3TestSlave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
     for slave in [&plain, &asked] {
         slave.initialise();
         for step in 0..20_u32 {
@@ -487,8 +488,8 @@ fn too_many_internal_steps_are_discarded_by_fmi2_and_the_step_can_be_repeated() 
     let (path, scenes) = (shipped(), [bounded(), marched()]);
     let api = fmi2::load(&path);
     for found in scenes.map(free) {
-        let resources = Resources::of(&found.scene, false);
-        let slave = fmi2::Slave::new(&api, &resources);
+        let resources = UnpackedResources::of(&found.scene, false);
+        let slave = fmi2::Fmi2TestSlave::new(&api, &resources);
         // SAFETY: arrays of one element.
         let set = |most: i32| unsafe { (api.fmi2SetInteger)(slave.handle, &raw const found.bound, 1, &raw const most) };
         // Hostile values, in every mode.
@@ -533,17 +534,17 @@ fn too_many_internal_steps_end_a_step_of_fmi3_early_or_discard_it() {
     let (path, scenes) = (shipped(), [bounded(), marched()]);
     let api = fmi3::load(&path);
     for found in scenes.map(free) {
-        let (resources, count) = (Resources::of(&found.scene, false), found.references.len());
+        let (resources, count) = (UnpackedResources::of(&found.scene, false), found.references.len());
         let time = f64::from(found.step) * LONG;
-        let arguments = fmi3::Arguments::new(&resources);
+        let arguments = fmi3::Fmi3Arguments::new(&resources);
         let all = [
             arguments.clone(),
-            fmi3::Arguments { early_return: true, ..arguments },
+            fmi3::Fmi3Arguments { early_return: true, ..arguments },
             watched(&resources, false),
             watched(&resources, true),
         ];
         for (early, arguments) in [false, true, false, true].into_iter().zip(all) {
-            let slave = fmi3::Slave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
+            let slave = fmi3::Fmi3TestSlave::try_new(&api, &arguments).unwrap_or_else(|log| panic!("{log}"));
             let set = |most: i64| {
                 // SAFETY: arrays of one element.
                 let status = unsafe { (api.fmi3SetInt64)(slave.handle, &raw const found.bound, 1, &raw const most, 1) };

@@ -2,16 +2,16 @@
 //! order is tested with that of the contact unit.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::Patch;
-use tiprub_tests::scene::Resources;
+use tiprub_core::rom::ThermalPatch;
+use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{ERROR, fmi2, fmi3, shipped, thermal};
-use tiprub_thermal::{Model, Simulation};
+use tiprub_thermal::{ConductionModel, ThermalSimulation};
 
 const PATCHES: usize = 3;
 const ORDER: usize = 5;
 
 /// A model that no mesh made.
-pub fn model() -> Model {
+pub fn model() -> ConductionModel {
     let capacity = 50.0_f64;
     let share = 1.0 / capacity.sqrt();
     let number = |seed: usize| (1.0 + seed as f64 * 12.9898).sin();
@@ -26,7 +26,7 @@ pub fn model() -> Model {
     };
     let coupled = |scale: f64| DMatrix::from_element(ORDER, ORDER, scale) + diagonal(scale);
     let angle = |k: usize| std::f64::consts::TAU * k as f64 / PATCHES as f64;
-    Model {
+    ConductionModel {
         name: "toy_thermal".into(),
         origin: "numbers".into(),
         heat_capacity: capacity,
@@ -37,14 +37,14 @@ pub fn model() -> Model {
         patch_means: rows(PATCHES, 19),
         wetted_means: rows(2, 31),
         places: rows(4, 41),
-        patches: (0..PATCHES).map(|k| Patch { angle: [angle(k), angle(k + 1)], axial: [0.0, 0.1] }).collect(),
+        patches: (0..PATCHES).map(|k| ThermalPatch { angle: [angle(k), angle(k + 1)], axial: [0.0, 0.1] }).collect(),
         element_time: 1e-6,
     }
 }
 
 /// References of inputs, and of all reals.
 fn references() -> (u32, u32, Vec<u32>) {
-    let simulation = Simulation::new(model()).expect("valid");
+    let simulation = ThermalSimulation::new(model()).expect("valid");
     let find = |name: &str| simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
     let count = u32::try_from(simulation.table().references()).expect("few variables");
     // Time of an instance is its own in every phase: the rest are reals.
@@ -63,13 +63,13 @@ fn both_faces_give_the_bits_of_the_native_simulation() {
     let path = thermal();
     let (two, three) = (fmi2::load(&path), fmi3::load(&path));
     let (heat, factor, reals) = references();
-    let mut native = Simulation::new(model()).expect("valid");
+    let mut native = ThermalSimulation::new(model()).expect("valid");
     native.initialise(0.0).expect("valid");
-    let (flat, whole) = (Resources::of_thermal(&model(), false), Resources::of_thermal(&model(), true));
-    let old = fmi2::Slave::initialised(&two, &flat);
-    let new = fmi3::Slave::new(&three, &flat);
+    let (flat, whole) = (UnpackedResources::of_thermal(&model(), false), UnpackedResources::of_thermal(&model(), true));
+    let old = fmi2::Fmi2TestSlave::initialised(&two, &flat);
+    let new = fmi3::Fmi3TestSlave::new(&three, &flat);
     new.initialise();
-    let arrays = fmi3::Slave::new(&three, &whole);
+    let arrays = fmi3::Fmi3TestSlave::new(&three, &whole);
     arrays.initialise();
     let mut time = 0.0;
     for step in 0..60 {
@@ -97,9 +97,9 @@ fn both_faces_give_the_bits_of_the_native_simulation() {
 fn states_go_back_go_on_and_go_to_others() {
     let api = fmi2::load(&thermal());
     let (heat, factor, reals) = references();
-    let resources = Resources::of_thermal(&model(), false);
-    let slave = fmi2::Slave::initialised(&api, &resources);
-    let march = |slave: &fmi2::Slave<'_>, first: u32, mut time: f64| -> Vec<u64> {
+    let resources = UnpackedResources::of_thermal(&model(), false);
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
+    let march = |slave: &fmi2::Fmi2TestSlave<'_>, first: u32, mut time: f64| -> Vec<u64> {
         for step in first..first + 30 {
             let (watts, share, length) = inputs(step);
             slave.expect(slave.set_reals(&[heat, heat + 1, heat + 2, factor], &[watts[0], watts[1], watts[2], share]));
@@ -115,7 +115,7 @@ fn states_go_back_go_on_and_go_to_others() {
     let expected = march(&slave, 30, time);
     slave.expect(slave.restore(state));
     assert_eq!(march(&slave, 30, time), expected);
-    let other = fmi2::Slave::new(&api, &resources);
+    let other = fmi2::Fmi2TestSlave::new(&api, &resources);
     let (status, copy) = other.deserialise(&bytes);
     assert_eq!(status, 0);
     other.expect(other.restore(copy));
@@ -131,10 +131,11 @@ fn states_go_back_go_on_and_go_to_others() {
 fn short_steps_are_warned_of_once_through_both_faces() {
     let path = thermal();
     let (two, three) = (fmi2::load(&path), fmi3::load(&path));
-    let resources = Resources::of_thermal(&Model { element_time: 0.5, ..model() }, false);
+    let resources = UnpackedResources::of_thermal(&ConductionModel { element_time: 0.5, ..model() }, false);
     let told = |log: String| log.matches("shorter than the 0.500 s in which heat passes an element").count();
     for _instance in 0..2 {
-        let (old, new) = (fmi2::Slave::initialised(&two, &resources), fmi3::Slave::new(&three, &resources));
+        let (old, new) =
+            (fmi2::Fmi2TestSlave::initialised(&two, &resources), fmi3::Fmi3TestSlave::new(&three, &resources));
         new.initialise();
         old.expect(old.step(0.0, 0.6));
         new.expect(new.step(0.0, 0.6).status);
@@ -152,13 +153,14 @@ fn short_steps_are_warned_of_once_through_both_faces() {
 #[test]
 fn a_library_does_not_take_the_model_of_the_other() {
     let (contact, conduction) = (fmi2::load(&shipped()), fmi2::load(&thermal()));
-    let (scene, model) = (Resources::new(false), Resources::of_thermal(&model(), false));
-    let refused = |api, resources: &Resources| {
-        fmi2::Slave::try_new(api, &fmi2::Arguments::new(resources)).expect_err("must be refused")
+    let (scene, model) = (UnpackedResources::new(false), UnpackedResources::of_thermal(&model(), false));
+    let refused = |api, resources: &UnpackedResources| {
+        fmi2::Fmi2TestSlave::try_new(api, &fmi2::Fmi2Arguments::new(resources)).expect_err("must be refused")
     };
     assert!(refused(&contact, &model).contains("scene.toml"));
     assert!(refused(&conduction, &scene).contains("casing.thermal.safetensors"));
-    let (one, other) = (fmi2::Slave::initialised(&contact, &scene), fmi2::Slave::initialised(&conduction, &model));
+    let (one, other) =
+        (fmi2::Fmi2TestSlave::initialised(&contact, &scene), fmi2::Fmi2TestSlave::initialised(&conduction, &model));
     one.expect(one.step(0.0, 1e-4));
     other.expect(other.step(0.0, 1e-4));
     // A state of one is none of the other.
@@ -170,9 +172,9 @@ fn a_library_does_not_take_the_model_of_the_other() {
 fn derivatives_are_those_of_the_native_simulation() {
     let api = fmi2::load(&thermal());
     let (heat, factor, _) = references();
-    let resources = Resources::of_thermal(&model(), false);
-    let slave = fmi2::Slave::initialised(&api, &resources);
-    let mut native = Simulation::new(model()).expect("valid");
+    let resources = UnpackedResources::of_thermal(&model(), false);
+    let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
+    let mut native = ThermalSimulation::new(model()).expect("valid");
     native.initialise(0.0).expect("valid");
     let output = native.table().find("casing_temperature").expect("there is one").reference;
     let (seed, mut value) = (3.0, 0.0);

@@ -7,7 +7,7 @@ use tiprub_core::settings::{
 };
 use tiprub_test_models::{
     coating, disk, flexible,
-    lattice::{self, Side},
+    lattice::{self, BlockSide},
     rich_blade, rub, several as models, spin,
 };
 
@@ -61,7 +61,7 @@ fn spinning(scene: &mut Scene) {
 
 /// The same blades coupled to their neighbours.
 fn coupled(scene: &mut Scene) {
-    scene.roms[0] = disk::Disk::random(SECTORS, 3, 12, 0.1, 7).cyclic();
+    scene.roms[0] = disk::TestDisk::random(SECTORS, 3, 12, 0.1, 7).cyclic();
 }
 
 fn sticking(scene: &mut Scene) {
@@ -165,7 +165,7 @@ fn bodies() -> Vec<Scene> {
         scene
     };
     let with = |scene, solver, scheme| lattice::with(scene, 0.2, solver, scheme);
-    let between = [(Side::Left, 0.0203), (Side::Right, 0.021)];
+    let between = [(BlockSide::Left, 0.0203), (BlockSide::Right, 0.021)];
     let thrown = lattice::scene(lattice::block([0.0; 3], 3e6), &between, false, [-12.0, 6.0, 1.0]);
     let mut rigid = lattice::squeezed_by(1e-4, [0.0, -40.0, 1.0]);
     rigid.settings.surfaces[1].rigid = true;
@@ -174,7 +174,7 @@ fn bodies() -> Vec<Scene> {
         surface.spline = Some(SplineSettings { interpolation: Interpolation::Facets, ..SplineSettings::default() });
     }
     let distance = 0.5 * lattice::SIDE - 3e-4;
-    let plates = [(Side::Left, distance), (Side::Right, distance)];
+    let plates = [(BlockSide::Left, distance), (BlockSide::Right, distance)];
     let faces = lattice::scene(lattice::faces([0.0, 0.045, 0.0]), &plates, true, [0.0, -40.0, 0.0]);
     let mut marched = with(faces, Solver::Lcp, Scheme::Galerkin);
     marched.settings.time.step = 2e-5;

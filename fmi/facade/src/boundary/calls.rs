@@ -2,10 +2,10 @@
 
 use std::ffi::{CString, c_char};
 
-use super::instance::{Handle, enter, guard};
-use super::{In, Out, Text};
-use crate::slave::order::Rule;
-use crate::slave::{Dialect, Refusal, Request, Result, Slave, Status, Value};
+use super::instance::{InstanceHandle, enter, guard};
+use super::{In, Out, TextArgument};
+use crate::slave::order::CallRule;
+use crate::slave::{AccessRequest, Dialect, FmiStatus, Refusal, Result, Slave, Value};
 
 /// Names of the arguments of get and set functions: references, values.
 fn arguments(dialect: Dialect) -> (&'static str, &'static str) {
@@ -17,67 +17,67 @@ fn arguments(dialect: Dialect) -> (&'static str, &'static str) {
 
 /// Get values of one type; `convert` makes the C value.
 pub(crate) fn get<T: Value, C: Copy>(
-    (handle, rule, type_name): (Handle, &Rule, &'static str),
+    (handle, rule, type_name): (InstanceHandle, &CallRule, &'static str),
     (references, count): (In<u32>, usize),
     (values, n_values): (Out<C>, usize),
     convert: impl Fn(T) -> C,
-) -> Status {
+) -> FmiStatus {
     guard(handle, rule, |slave| {
         let (reference_argument, value_argument) = arguments(slave.dialect());
         let references = references.array(count, slave.reference_limit(), reference_argument)?;
         let window = values.window(n_values, value_argument)?;
-        let read = slave.read::<T>(&Request { type_name, references, values: n_values })?;
+        let read = slave.read::<T>(&AccessRequest { type_name, references, values: n_values })?;
         window.fill(&read.into_iter().map(convert).collect::<Vec<_>>());
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 /// Set values of one type; `convert` makes the Rust value, or says what is wrong with the C value.
 pub(crate) fn set<T: Value, C>(
-    (handle, rule, type_name): (Handle, &Rule, &'static str),
+    (handle, rule, type_name): (InstanceHandle, &CallRule, &'static str),
     (references, count): (In<u32>, usize),
     (values, n_values): (In<C>, usize),
     convert: impl Fn(&C) -> Result<T>,
-) -> Status {
+) -> FmiStatus {
     guard(handle, rule, |slave| {
         let (reference_argument, value_argument) = arguments(slave.dialect());
         let references = references.array(count, slave.reference_limit(), reference_argument)?;
-        let elements = slave.elements(&Request { type_name, references, values: n_values })?;
+        let elements = slave.elements(&AccessRequest { type_name, references, values: n_values })?;
         let values = values.array(elements.len(), usize::MAX, value_argument)?;
         slave.write(&elements, &values.iter().map(convert).collect::<Result<Vec<T>>>()?)?;
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 /// Get texts; they live in the instance until texts are asked for again.
 pub(crate) fn strings(
-    (handle, rule): (Handle, &Rule),
+    (handle, rule): (InstanceHandle, &CallRule),
     (references, count): (In<u32>, usize),
     (values, n_values): (Out<*const c_char>, usize),
-) -> Status {
+) -> FmiStatus {
     guard(handle, rule, |slave| {
         let (reference_argument, value_argument) = arguments(slave.dialect());
         let references = references.array(count, slave.reference_limit(), reference_argument)?;
         let window = values.window(n_values, value_argument)?;
-        let read = slave.read::<String>(&Request { type_name: "String", references, values: n_values })?;
+        let read = slave.read::<String>(&AccessRequest { type_name: "String", references, values: n_values })?;
         let texts = read.into_iter().map(|text| CString::new(text.replace('\0', " ")).unwrap_or_default()).collect();
         window.fill(&slave.keep(texts).iter().map(|text| text.as_ptr()).collect::<Vec<_>>());
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 /// `fmi2SetDebugLogging`, `fmi3SetDebugLogging`.
 pub(crate) fn set_debug_logging(
-    handle: Handle,
-    rule: &Rule,
+    handle: InstanceHandle,
+    rule: &CallRule,
     on: bool,
-    (categories, count): (In<Text>, usize),
-) -> Status {
+    (categories, count): (In<TextArgument>, usize),
+) -> FmiStatus {
     let outcome = enter(handle, rule, |_, instance| {
         let categories = categories.array(count, 64, "categories")?;
         let names = categories.iter().map(|name| name.required("categories")).collect::<Result<Vec<_>>>()?;
         instance.log.choose(on, &names).map_err(Refusal::error)?;
-        Ok((Status::Ok, ()))
+        Ok((FmiStatus::Ok, ()))
     });
     outcome.0
 }
@@ -97,46 +97,46 @@ pub(crate) mod state {
     }
 
     /// Save into a new state, or into the one that `*state` names.
-    pub(crate) fn save(handle: Handle, rule: &Rule, state: Out<StateHandle>) -> Status {
+    pub(crate) fn save(handle: InstanceHandle, rule: &CallRule, state: Out<StateHandle>) -> FmiStatus {
         guard(handle, rule, |slave| {
             let window = state.single("FMUstate")?;
             let existing = window.current().filter(|existing| !existing.is_null());
             let saved = slave.save(existing)?;
             window.fill(&[saved]);
-            Ok(Status::Ok)
+            Ok(FmiStatus::Ok)
         })
     }
 
     /// Restore.
-    pub(crate) fn restore(handle: Handle, rule: &Rule, state: StateHandle) -> Status {
+    pub(crate) fn restore(handle: InstanceHandle, rule: &CallRule, state: StateHandle) -> FmiStatus {
         guard(handle, rule, |slave| {
             slave.restore(required(state)?)?;
-            Ok(Status::Ok)
+            Ok(FmiStatus::Ok)
         })
     }
 
     /// Free; NULL, or a pointer to NULL, is legal.
-    pub(crate) fn free(handle: Handle, rule: &Rule, state: Out<StateHandle>) -> Status {
+    pub(crate) fn free(handle: InstanceHandle, rule: &CallRule, state: Out<StateHandle>) -> FmiStatus {
         guard(handle, rule, |slave| {
             if state.is_null() {
-                return Ok(Status::Ok);
+                return Ok(FmiStatus::Ok);
             }
             let window = state.single("FMUstate")?;
             if let Some(existing) = window.current().filter(|existing| !existing.is_null()) {
                 slave.free_snapshot(existing)?;
                 window.fill(&[std::ptr::null()]);
             }
-            Ok(Status::Ok)
+            Ok(FmiStatus::Ok)
         })
     }
 
     /// Size in bytes.
-    pub(crate) fn size(handle: Handle, rule: &Rule, state: StateHandle, size: Out<usize>) -> Status {
+    pub(crate) fn size(handle: InstanceHandle, rule: &CallRule, state: StateHandle, size: Out<usize>) -> FmiStatus {
         guard(handle, rule, |slave| {
             let window = size.single("size")?;
             let length = slave.serialised(required(state)?)?.len();
             window.fill(&[length]);
-            Ok(Status::Ok)
+            Ok(FmiStatus::Ok)
         })
     }
 
@@ -150,23 +150,29 @@ pub(crate) mod state {
     }
 
     /// Serialise.
-    pub(crate) fn serialise(handle: Handle, rule: &Rule, state: StateHandle, bytes: Out<u8>, size: usize) -> Status {
+    pub(crate) fn serialise(
+        handle: InstanceHandle,
+        rule: &CallRule,
+        state: StateHandle,
+        bytes: Out<u8>,
+        size: usize,
+    ) -> FmiStatus {
         guard(handle, rule, |slave: &mut Slave| {
             let saved = slave.serialised(required(state)?)?;
             check_size(size, saved.len())?;
             bytes.window(size, "serializedState")?.fill(saved);
-            Ok(Status::Ok)
+            Ok(FmiStatus::Ok)
         })
     }
 
     /// Deserialise into a new state, or into the one that `*state` names.
     pub(crate) fn deserialise(
-        handle: Handle,
-        rule: &Rule,
+        handle: InstanceHandle,
+        rule: &CallRule,
         bytes: In<u8>,
         size: usize,
         state: Out<StateHandle>,
-    ) -> Status {
+    ) -> FmiStatus {
         guard(handle, rule, |slave| {
             let window = state.single("FMUstate")?;
             check_size(size, slave.serialised_size())?;
@@ -174,7 +180,7 @@ pub(crate) mod state {
             let existing = window.current().filter(|existing| !existing.is_null());
             let saved = slave.deserialise(bytes, existing)?;
             window.fill(&[saved]);
-            Ok(Status::Ok)
+            Ok(FmiStatus::Ok)
         })
     }
 }

@@ -1,39 +1,39 @@
 //! Directional and adjoint derivatives, of which both versions of the standard have functions.
 
-use super::{Handle, In, Out, guard};
+use super::{In, InstanceHandle, Out, guard};
 use crate::slave::order::unsupported;
-use crate::slave::{Dialect, Request, Result, Slave, Status};
+use crate::slave::{AccessRequest, Dialect, FmiStatus, Result, Slave};
 
 /// Value references with the number of their values, and the names of both arguments.
-pub(crate) type Side = (In<u32>, usize, usize, &'static str);
+pub(crate) type ReferenceArguments = (In<u32>, usize, usize, &'static str);
 
 /// What a function asks for.
-type Answer = fn(&mut Slave, &[u32], &[u32], &[f64]) -> Result<Vec<f64>>;
+type DerivativeFunction = fn(&mut Slave, &[u32], &[u32], &[f64]) -> Result<Vec<f64>>;
 
 /// Forward: outputs move as inputs do.
-pub(crate) const DIRECTIONAL: Answer = Slave::directional;
+pub(crate) const DIRECTIONAL: DerivativeFunction = Slave::directional;
 /// Backward: inputs weigh as outputs do.
-pub(crate) const ADJOINT: Answer = Slave::adjoint;
+pub(crate) const ADJOINT: DerivativeFunction = Slave::adjoint;
 
 /// Answer with derivatives of `unknowns` by `knowns`; `seed` and `sensitivity` with the names of their arguments.
 pub(crate) fn derivatives(
-    (handle, name, answer): (Handle, &'static str, Answer),
-    unknowns: Side,
-    knowns: Side,
+    (handle, name, answer): (InstanceHandle, &'static str, DerivativeFunction),
+    unknowns: ReferenceArguments,
+    knowns: ReferenceArguments,
     (seed, seeds, seed_name): (In<f64>, usize, &'static str),
     (sensitivity, sensitivities, sensitivity_name): (Out<f64>, usize, &'static str),
-) -> Status {
+) -> FmiStatus {
     guard(handle, &unsupported(name), |slave| {
         slave.check_derivatives()?;
         let type_name = if slave.dialect() == Dialect::Fmi2 { "Real" } else { "Float64" };
-        let elements = |slave: &Slave, (references, count, values, name): Side| {
+        let elements = |slave: &Slave, (references, count, values, name): ReferenceArguments| {
             let references = references.array(count, slave.reference_limit(), name)?;
-            slave.elements(&Request { type_name, references, values })
+            slave.elements(&AccessRequest { type_name, references, values })
         };
         let (outputs, inputs) = (elements(slave, unknowns)?, elements(slave, knowns)?);
         let seed = seed.array(seeds, usize::MAX, seed_name)?;
         let window = sensitivity.window(sensitivities, sensitivity_name)?;
         window.fill(&answer(slave, &outputs, &inputs, seed)?);
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }

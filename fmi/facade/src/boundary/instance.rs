@@ -9,9 +9,9 @@ use tiprub_core::shown_time;
 
 use super::float_environment::StandardFloats;
 use super::log::{Log, Sink};
-use super::{Environment, IntermediateUpdate, Text, panics};
-use crate::slave::order::{self, Rule};
-use crate::slave::{Dialect, Phase, Refusal, Result, Slave, Status};
+use super::{ImporterEnvironment, IntermediateUpdate, TextArgument, panics};
+use crate::slave::order::{self, CallRule};
+use crate::slave::{Dialect, FmiStatus, InstancePhase, Refusal, Result, Slave};
 use crate::unit::Load;
 
 /// FMI 3.0 callbacks and flags that belong to stepping.
@@ -22,7 +22,7 @@ pub(crate) struct Callbacks {
     /// `earlyReturnAllowed`.
     pub early_return_allowed: bool,
     /// `instanceEnvironment`.
-    pub environment: Environment,
+    pub environment: ImporterEnvironment,
 }
 
 /// What a handle points to. The mutex costs some twenty nanoseconds a call and buys two answers that the standard leaves
@@ -39,9 +39,9 @@ pub(crate) struct Instance {
 /// `fmi2Component`, `fmi3Instance`: NULL, or what `instantiate` returned and `release` has not yet taken back.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub struct Handle(*mut Instance);
+pub struct InstanceHandle(*mut Instance);
 
-impl Handle {
+impl InstanceHandle {
     const NULL: Self = Self(std::ptr::null_mut());
 
     fn instance(&self) -> Option<&Instance> {
@@ -59,11 +59,11 @@ pub(crate) struct Instantiation<'a> {
     /// Exported function, for messages.
     pub function: &'static str,
     /// `instanceName`.
-    pub name: Text,
+    pub name: TextArgument,
     /// `fmuGUID`, `instantiationToken`.
-    pub token: Text,
+    pub token: TextArgument,
     /// `fmuResourceLocation`, `resourcePath`.
-    pub location: Text,
+    pub location: TextArgument,
     /// Makes the unit.
     pub load: Load,
     /// Reads the location.
@@ -79,7 +79,7 @@ pub(crate) struct Instantiation<'a> {
 }
 
 /// Make an instance; NULL with a message if that is not possible.
-pub(crate) fn instantiate(request: Instantiation<'_>) -> Handle {
+pub(crate) fn instantiate(request: Instantiation<'_>) -> InstanceHandle {
     panics::silence();
     let function = request.function;
     let log = Log::new(request.sink, request.logging_on);
@@ -104,38 +104,38 @@ pub(crate) fn instantiate(request: Instantiation<'_>) -> Handle {
     }));
     match built.unwrap_or_else(|payload| Err(Refusal::error(panics::describe(&*payload)))) {
         Ok(slave) => {
-            log.emit(Status::Ok, &format!("{function}: instantiated from its resources, waiting for start values"));
+            log.emit(FmiStatus::Ok, &format!("{function}: instantiated from its resources, waiting for start values"));
             let instance =
                 Instance { dialect: request.dialect, slave: Mutex::new(slave), log, callbacks: request.callbacks };
-            Handle(Box::into_raw(Box::new(instance)))
+            InstanceHandle(Box::into_raw(Box::new(instance)))
         }
         Err(refusal) => {
-            log.emit(Status::Error, &format!("{function}: {refusal}"));
-            Handle::NULL
+            log.emit(FmiStatus::Error, &format!("{function}: {refusal}"));
+            InstanceHandle::NULL
         }
     }
 }
 
 /// Refuse to instantiate; the message goes to the importer.
-pub(crate) fn refuse_instantiation(sink: Sink, function: &str, reason: &str) -> Handle {
-    Log::new(sink, false).emit(Status::Error, &format!("{function}: {reason}"));
-    Handle::NULL
+pub(crate) fn refuse_instantiation(sink: Sink, function: &str, reason: &str) -> InstanceHandle {
+    Log::new(sink, false).emit(FmiStatus::Error, &format!("{function}: {reason}"));
+    InstanceHandle::NULL
 }
 
 /// Free an instance. NULL is legal. A free from within an intermediate update is refused: the step under way needs it.
-pub(crate) fn release(handle: Handle, rule: &Rule) {
+pub(crate) fn release(handle: InstanceHandle, rule: &CallRule) {
     let Some(instance) = handle.instance() else { return };
     if instance.dialect != rule.dialect() {
-        return instance.log.emit(Status::Error, &format!("{}: {}", rule.name, other_version(instance)));
+        return instance.log.emit(FmiStatus::Error, &format!("{}: {}", rule.name, other_version(instance)));
     }
     let under_way = match instance.slave.try_lock() {
-        Ok(slave) => matches!(slave.phase(), Phase::Updating { .. }),
+        Ok(slave) => matches!(slave.phase(), InstancePhase::Updating { .. }),
         Err(TryLockError::Poisoned(_)) => false,
         Err(TryLockError::WouldBlock) => true,
     };
     if under_way {
         let message = "a step is under way, the instance is not freed. Free it after the step has returned";
-        return instance.log.emit(Status::Error, &format!("{}: {message}", rule.name));
+        return instance.log.emit(FmiStatus::Error, &format!("{}: {message}", rule.name));
     }
     // SAFETY: the handle came from `Box::into_raw` in `instantiate`, and by the contract of both standards this is the last
     // use of it; no borrow is alive, for the shared one above is not used any more and no call is under way.
@@ -152,11 +152,11 @@ fn other_version(instance: &Instance) -> String {
 /// is allowed now; it puts the caller's floating-point environment aside (callbacks have it again), catches panics, hands
 /// messages to the importer and gives the status. `None` if not carried out.
 pub(crate) fn enter<T>(
-    handle: Handle,
-    rule: &Rule,
-    action: impl FnOnce(&mut Slave, &Instance) -> Result<(Status, T)>,
-) -> (Status, Option<T>) {
-    let Some(instance) = handle.instance() else { return (Status::Error, None) };
+    handle: InstanceHandle,
+    rule: &CallRule,
+    action: impl FnOnce(&mut Slave, &Instance) -> Result<(FmiStatus, T)>,
+) -> (FmiStatus, Option<T>) {
+    let Some(instance) = handle.instance() else { return (FmiStatus::Error, None) };
     let call = catch_unwind(AssertUnwindSafe(|| {
         let _floats = StandardFloats::enter();
         let mut slave = instance.slave.try_lock().map_err(|error| {
@@ -199,12 +199,16 @@ pub(crate) fn enter<T>(
 }
 
 /// The guard for calls whose only result is their status.
-pub(crate) fn guard(handle: Handle, rule: &Rule, action: impl FnOnce(&mut Slave) -> Result<Status>) -> Status {
+pub(crate) fn guard(
+    handle: InstanceHandle,
+    rule: &CallRule,
+    action: impl FnOnce(&mut Slave) -> Result<FmiStatus>,
+) -> FmiStatus {
     enter(handle, rule, |slave, _| Ok((action(slave)?, ()))).0
 }
 
 /// Answer of a function whose capability this FMU does not have.
-pub(crate) fn unsupported(handle: Handle, name: &'static str, capability: &str) -> Status {
+pub(crate) fn unsupported(handle: InstanceHandle, name: &'static str, capability: &str) -> FmiStatus {
     guard(handle, &order::unsupported(name), |_| {
         Err(Refusal::error(format!("this FMU has no {capability}, as its modelDescription.xml says. Do not call it")))
     })

@@ -4,14 +4,15 @@ use std::ffi::{CStr, CString, c_char};
 use std::fmt;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::Environment;
-use crate::slave::Status;
+use super::ImporterEnvironment;
+use crate::slave::FmiStatus;
 
 /// `fmi2CallbackLogger`: variadic, with a printf format.
-pub type Fmi2Logger = unsafe extern "C" fn(Environment, *const c_char, Status, *const c_char, *const c_char, ...);
+pub type Fmi2Logger =
+    unsafe extern "C" fn(ImporterEnvironment, *const c_char, FmiStatus, *const c_char, *const c_char, ...);
 
 /// `fmi3LogMessageCallback`.
-pub type Fmi3Logger = unsafe extern "C" fn(Environment, Status, *const c_char, *const c_char);
+pub type Fmi3Logger = unsafe extern "C" fn(ImporterEnvironment, FmiStatus, *const c_char, *const c_char);
 
 /// Categories as `modelDescription.xml` lists them; the last one stands for everything.
 const CATEGORIES: [&CStr; 5] =
@@ -29,7 +30,7 @@ pub(crate) enum Sink {
         /// May be NULL.
         logger: Option<Fmi2Logger>,
         /// Goes back to the importer.
-        environment: Environment,
+        environment: ImporterEnvironment,
         /// Instance name, copied.
         name: CString,
     },
@@ -38,7 +39,7 @@ pub(crate) enum Sink {
         /// May be NULL.
         logger: Option<Fmi3Logger>,
         /// Goes back to the importer.
-        environment: Environment,
+        environment: ImporterEnvironment,
     },
 }
 
@@ -93,12 +94,12 @@ impl Log {
     }
 
     /// Hand a message to the importer, if it wants its category.
-    pub(crate) fn emit(&self, status: Status, message: &str) {
+    pub(crate) fn emit(&self, status: FmiStatus, message: &str) {
         let category = match status {
-            Status::Ok => 4,
-            Status::Warning => 0,
-            Status::Discard => 1,
-            Status::Error => 2,
+            FmiStatus::Ok => 4,
+            FmiStatus::Warning => 0,
+            FmiStatus::Discard => 1,
+            FmiStatus::Error => 2,
         };
         if self.wanted.load(Ordering::Relaxed) & (1 << category | ALL) == 0 {
             return;
@@ -110,7 +111,7 @@ impl Log {
 }
 
 impl Sink {
-    fn send(&self, status: Status, category: &CStr, text: &CStr) {
+    fn send(&self, status: FmiStatus, category: &CStr, text: &CStr) {
         match self {
             Self::Fmi2 { logger: Some(logger), environment, name } => {
                 // SAFETY: the importer's own function, called as the standard says; the texts outlive the call. The format

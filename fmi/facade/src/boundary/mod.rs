@@ -11,17 +11,17 @@ mod pointers;
 pub(crate) use calls::{StateHandle, set_debug_logging, strings};
 pub(crate) use calls::{get, set, state};
 pub(crate) use derivatives::{ADJOINT, DIRECTIONAL, derivatives};
-pub use instance::Handle;
+pub use instance::InstanceHandle;
 pub(crate) use instance::{Callbacks, Instantiation, enter, instantiate, release};
 pub(crate) use instance::{guard, refuse_instantiation, unsupported};
 pub(crate) use log::Sink;
 pub use log::{Fmi2Logger, Fmi3Logger};
 pub(crate) use pointers::Out;
-pub use pointers::{Environment, In, Text};
+pub use pointers::{ImporterEnvironment, In, TextArgument};
 
 /// `fmi3IntermediateUpdateCallback`.
 pub type IntermediateUpdate = unsafe extern "C" fn(
-    environment: Environment,
+    environment: ImporterEnvironment,
     intermediate_update_time: f64,
     set_requested: u8,
     get_allowed: u8,
@@ -34,7 +34,7 @@ pub type IntermediateUpdate = unsafe extern "C" fn(
 /// Call the importer's intermediate update; the time at which it wants the step to end early, if it does.
 pub(crate) fn intermediate_update(
     callback: IntermediateUpdate,
-    environment: Environment,
+    environment: ImporterEnvironment,
     time: f64,
     set_requested: bool,
     can_return_early: bool,
@@ -62,7 +62,7 @@ pub(crate) fn intermediate_update(
 macro_rules! refused {
     ($($name:ident ($($argument:ident: $type:ty),*) $capability:expr;)*) => {$(
         #[unsafe(no_mangle)]
-        pub(crate) extern "C" fn $name(instance: $crate::boundary::Handle $(, $argument: $type)*) -> $crate::slave::Status {
+        pub(crate) extern "C" fn $name(instance: $crate::boundary::InstanceHandle $(, $argument: $type)*) -> $crate::slave::FmiStatus {
             $crate::boundary::unsupported(instance, stringify!($name), $capability)
         }
     )*};

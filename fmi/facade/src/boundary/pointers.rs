@@ -7,7 +7,7 @@ use std::mem::size_of;
 use crate::slave::{Refusal, Result};
 
 /// The importer's pointer that goes back to it with every callback, never followed.
-pub type Environment = *mut c_void;
+pub type ImporterEnvironment = *mut c_void;
 
 /// Array or single value to read from.
 #[derive(Debug, Clone, Copy)]
@@ -22,11 +22,11 @@ pub(crate) struct Out<T>(*mut T);
 /// NUL-terminated text.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
-pub struct Text(*const c_char);
+pub struct TextArgument(*const c_char);
 
 /// A checked place for a known number of values.
 #[derive(Debug)]
-pub(crate) struct Window<T> {
+pub(crate) struct ArrayArgument<T> {
     pointer: *mut T,
     length: usize,
 }
@@ -81,18 +81,18 @@ impl<T: Copy> Out<T> {
     ///
     /// # Errors
     /// NULL or misaligned.
-    pub(crate) fn window(&self, count: usize, name: &str) -> Result<Window<T>> {
+    pub(crate) fn window(&self, count: usize, name: &str) -> Result<ArrayArgument<T>> {
         if count > 0 {
             check(self.0.cast_const(), count, name)?;
         }
-        Ok(Window { pointer: self.0, length: count })
+        Ok(ArrayArgument { pointer: self.0, length: count })
     }
 
     /// ClosestPoint for one value.
     ///
     /// # Errors
     /// NULL or misaligned.
-    pub(crate) fn single(&self, name: &str) -> Result<Window<T>> {
+    pub(crate) fn single(&self, name: &str) -> Result<ArrayArgument<T>> {
         self.window(1, name)
     }
 
@@ -109,7 +109,7 @@ impl<T: Copy> Out<T> {
     }
 }
 
-impl<T: Copy> Window<T> {
+impl<T: Copy> ArrayArgument<T> {
     /// Write the values. Their number must be that of the window; with any other nothing is written.
     pub(crate) fn fill(self, values: &[T]) {
         if values.len() == self.length && self.length > 0 {
@@ -126,7 +126,7 @@ impl<T: Copy> Window<T> {
     }
 }
 
-impl Text {
+impl TextArgument {
     /// The text; `None` if the pointer is NULL.
     ///
     /// # Errors

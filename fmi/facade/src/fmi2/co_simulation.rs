@@ -3,9 +3,9 @@
 use std::ffi::c_char;
 
 use super::Boolean;
-use crate::boundary::{DIRECTIONAL, Handle, In, Out, derivatives, guard};
+use crate::boundary::{DIRECTIONAL, In, InstanceHandle, Out, derivatives, guard};
 use crate::slave::order::fmi2 as order;
-use crate::slave::{Phase, Refusal, Request, Result, Slave, Status};
+use crate::slave::{AccessRequest, FmiStatus, InstancePhase, Refusal, Result, Slave};
 
 /// Kinds of `fmi2StatusKind` that carry information here.
 const LAST_SUCCESSFUL_TIME: i32 = 2;
@@ -14,56 +14,56 @@ const TERMINATED: i32 = 3;
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2SetRealInputDerivatives(
-    c: Handle,
+    c: InstanceHandle,
     vr: In<u32>,
     nvr: usize,
     order: In<i32>,
     value: In<f64>,
-) -> Status {
+) -> FmiStatus {
     guard(c, &order::SET_REAL_INPUT_DERIVATIVES, |slave| {
         let limit = slave.reference_limit();
         let references = vr.array(nvr, limit, "vr")?;
         let (orders, values) = (order.array(nvr, limit, "order")?, value.array(nvr, limit, "value")?);
-        slave.elements(&Request { type_name: "Real", references, values: nvr })?;
+        slave.elements(&AccessRequest { type_name: "Real", references, values: nvr })?;
         slave.set_input_derivatives(references, orders, values)?;
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2GetRealOutputDerivatives(
-    c: Handle,
+    c: InstanceHandle,
     vr: In<u32>,
     nvr: usize,
     order: In<i32>,
     value: Out<f64>,
-) -> Status {
+) -> FmiStatus {
     guard(c, &order::GET_REAL_OUTPUT_DERIVATIVES, |slave| {
         let limit = slave.reference_limit();
         let references = vr.array(nvr, limit, "vr")?;
         let orders = order.array(nvr, limit, "order")?;
         let window = value.window(nvr, "value")?;
-        let elements = slave.elements(&Request { type_name: "Real", references, values: nvr })?;
+        let elements = slave.elements(&AccessRequest { type_name: "Real", references, values: nvr })?;
         window.fill(&slave.output_derivatives(&elements, orders)?);
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2DoStep(
-    c: Handle,
+    c: InstanceHandle,
     currentCommunicationPoint: f64,
     communicationStepSize: f64,
     _noSetFMUStatePriorToCurrentPoint: Boolean,
-) -> Status {
+) -> FmiStatus {
     guard(c, &order::DO_STEP, |slave| {
         slave.step(currentCommunicationPoint, communicationStepSize)?;
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 /// No step is ever pending, so most status kinds have no information: `fmi2Discard` says so (FMI 2.0.4, section 4.2.3).
-fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<Status> {
+fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<FmiStatus> {
     let window = value.single("value")?;
     let nothing = || {
         Refusal::discard(format!(
@@ -72,52 +72,52 @@ fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<Statu
         ))
     };
     window.fill(&[answer.ok_or_else(nothing)?]);
-    Ok(Status::Ok)
+    Ok(FmiStatus::Ok)
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetStatus(c: Handle, s: i32, value: Out<i32>) -> Status {
+pub(super) extern "C" fn fmi2GetStatus(c: InstanceHandle, s: i32, value: Out<i32>) -> FmiStatus {
     guard(c, &order::GET_STATUS, |_| status(s, &value, None))
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetRealStatus(c: Handle, s: i32, value: Out<f64>) -> Status {
+pub(super) extern "C" fn fmi2GetRealStatus(c: InstanceHandle, s: i32, value: Out<f64>) -> FmiStatus {
     guard(c, &order::GET_REAL_STATUS, |slave| status(s, &value, (s == LAST_SUCCESSFUL_TIME).then(|| slave.time())))
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetIntegerStatus(c: Handle, s: i32, value: Out<i32>) -> Status {
+pub(super) extern "C" fn fmi2GetIntegerStatus(c: InstanceHandle, s: i32, value: Out<i32>) -> FmiStatus {
     guard(c, &order::GET_INTEGER_STATUS, |_| status(s, &value, None))
 }
 
 /// Whether the slave wants to end the simulation: only after its state became non-finite.
 fn wants_to_terminate(slave: &Slave) -> Boolean {
-    Boolean::from(matches!(slave.phase(), Phase::Failed { .. }))
+    Boolean::from(matches!(slave.phase(), InstancePhase::Failed { .. }))
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetBooleanStatus(c: Handle, s: i32, value: Out<Boolean>) -> Status {
+pub(super) extern "C" fn fmi2GetBooleanStatus(c: InstanceHandle, s: i32, value: Out<Boolean>) -> FmiStatus {
     guard(c, &order::GET_BOOLEAN_STATUS, |slave| {
         status(s, &value, (s == TERMINATED).then(|| wants_to_terminate(slave)))
     })
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetStringStatus(c: Handle, s: i32, value: Out<*const c_char>) -> Status {
+pub(super) extern "C" fn fmi2GetStringStatus(c: InstanceHandle, s: i32, value: Out<*const c_char>) -> FmiStatus {
     guard(c, &order::GET_STRING_STATUS, |_| status(s, &value, None))
 }
 
 /// By inputs over the last communication step, where the parameter `step_derivatives` is on.
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2GetDirectionalDerivative(
-    c: Handle,
+    c: InstanceHandle,
     vUnknown_ref: In<u32>,
     nUnknown: usize,
     vKnown_ref: In<u32>,
     nKnown: usize,
     dvKnown: In<f64>,
     dvUnknown: Out<f64>,
-) -> Status {
+) -> FmiStatus {
     derivatives(
         (c, "fmi2GetDirectionalDerivative", DIRECTIONAL),
         (vUnknown_ref, nUnknown, nUnknown, "vUnknown_ref"),

@@ -4,12 +4,12 @@ use std::ffi::{CString, c_char};
 
 use super::Boolean;
 use crate::boundary::{
-    self, Environment, Fmi2Logger, Handle, In, Instantiation, Out, Sink, StateHandle, Text, guard, instantiate,
-    refuse_instantiation, release, state,
+    self, Fmi2Logger, ImporterEnvironment, In, InstanceHandle, Instantiation, Out, Sink, StateHandle, TextArgument,
+    guard, instantiate, refuse_instantiation, release, state,
 };
 use crate::location;
 use crate::slave::order::fmi2 as order;
-use crate::slave::{Dialect, Experiment, Refusal, Status};
+use crate::slave::{Dialect, ExperimentTimes, FmiStatus, Refusal};
 use crate::unit::Load;
 
 /// `fmi2CallbackFunctions`. Memory functions and `stepFinished` are never called.
@@ -17,10 +17,10 @@ use crate::unit::Load;
 #[repr(C)]
 pub struct CallbackFunctions {
     logger: Option<Fmi2Logger>,
-    allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> Environment>,
-    free_memory: Option<unsafe extern "C" fn(Environment)>,
-    step_finished: Option<unsafe extern "C" fn(Environment, Status)>,
-    component_environment: Environment,
+    allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> ImporterEnvironment>,
+    free_memory: Option<unsafe extern "C" fn(ImporterEnvironment)>,
+    step_finished: Option<unsafe extern "C" fn(ImporterEnvironment, FmiStatus)>,
+    component_environment: ImporterEnvironment,
 }
 
 /// `fmi2CoSimulation` of `fmi2Type`.
@@ -38,24 +38,24 @@ pub(super) extern "C" fn fmi2GetVersion() -> *const c_char {
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2SetDebugLogging(
-    c: Handle,
+    c: InstanceHandle,
     loggingOn: Boolean,
     nCategories: usize,
-    categories: In<Text>,
-) -> Status {
+    categories: In<TextArgument>,
+) -> FmiStatus {
     boundary::set_debug_logging(c, &order::SET_DEBUG_LOGGING, loggingOn != 0, (categories, nCategories))
 }
 
 /// `fmi2Instantiate` of a library: makes its unit by `load`. The library exports it, see [`crate::library`].
 pub fn instantiate_unit(
     load: Load,
-    instanceName: Text,
+    instanceName: TextArgument,
     fmuType: i32,
-    fmuGUID: Text,
-    fmuResourceLocation: Text,
+    fmuGUID: TextArgument,
+    fmuResourceLocation: TextArgument,
     functions: In<CallbackFunctions>,
     loggingOn: Boolean,
-) -> Handle {
+) -> InstanceHandle {
     let function = "fmi2Instantiate";
     let name = instanceName.read("instanceName").ok().flatten().unwrap_or_default();
     let callbacks = functions.single().copied();
@@ -84,139 +84,153 @@ pub fn instantiate_unit(
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2FreeInstance(c: Handle) {
+pub(super) extern "C" fn fmi2FreeInstance(c: InstanceHandle) {
     release(c, &order::FREE_INSTANCE);
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2SetupExperiment(
-    c: Handle,
+    c: InstanceHandle,
     _toleranceDefined: Boolean,
     _tolerance: f64,
     startTime: f64,
     stopTimeDefined: Boolean,
     stopTime: f64,
-) -> Status {
+) -> FmiStatus {
     guard(c, &order::SETUP_EXPERIMENT, |slave| {
-        slave.set_experiment(Experiment::new(startTime, (stopTimeDefined != 0).then_some(stopTime))?);
-        Ok(Status::Ok)
+        slave.set_experiment(ExperimentTimes::new(startTime, (stopTimeDefined != 0).then_some(stopTime))?);
+        Ok(FmiStatus::Ok)
     })
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2EnterInitializationMode(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2EnterInitializationMode(c: InstanceHandle) -> FmiStatus {
     guard(c, &order::ENTER_INITIALIZATION_MODE, |slave| {
         slave.enter_initialisation(None);
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2ExitInitializationMode(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2ExitInitializationMode(c: InstanceHandle) -> FmiStatus {
     guard(c, &order::EXIT_INITIALIZATION_MODE, |slave| slave.exit_initialisation())
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2Terminate(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2Terminate(c: InstanceHandle) -> FmiStatus {
     guard(c, &order::TERMINATE, |slave| {
         slave.terminate();
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2Reset(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2Reset(c: InstanceHandle) -> FmiStatus {
     guard(c, &order::RESET, |slave| {
         slave.reset();
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetReal(c: Handle, vr: In<u32>, nvr: usize, value: Out<f64>) -> Status {
+pub(super) extern "C" fn fmi2GetReal(c: InstanceHandle, vr: In<u32>, nvr: usize, value: Out<f64>) -> FmiStatus {
     boundary::get((c, &order::GET_REAL, "Real"), (vr, nvr), (value, nvr), |value: f64| value)
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetInteger(c: Handle, vr: In<u32>, nvr: usize, value: Out<i32>) -> Status {
+pub(super) extern "C" fn fmi2GetInteger(c: InstanceHandle, vr: In<u32>, nvr: usize, value: Out<i32>) -> FmiStatus {
     boundary::get((c, &order::GET_INTEGER, "Integer"), (vr, nvr), (value, nvr), |value: i32| value)
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetBoolean(c: Handle, vr: In<u32>, nvr: usize, value: Out<Boolean>) -> Status {
+pub(super) extern "C" fn fmi2GetBoolean(c: InstanceHandle, vr: In<u32>, nvr: usize, value: Out<Boolean>) -> FmiStatus {
     boundary::get((c, &order::GET_BOOLEAN, "Boolean"), (vr, nvr), (value, nvr), |value: bool| Boolean::from(value))
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetString(c: Handle, vr: In<u32>, nvr: usize, value: Out<*const c_char>) -> Status {
+pub(super) extern "C" fn fmi2GetString(
+    c: InstanceHandle,
+    vr: In<u32>,
+    nvr: usize,
+    value: Out<*const c_char>,
+) -> FmiStatus {
     boundary::strings((c, &order::GET_STRING), (vr, nvr), (value, nvr))
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetReal(c: Handle, vr: In<u32>, nvr: usize, value: In<f64>) -> Status {
+pub(super) extern "C" fn fmi2SetReal(c: InstanceHandle, vr: In<u32>, nvr: usize, value: In<f64>) -> FmiStatus {
     boundary::set((c, &order::SET_REAL, "Real"), (vr, nvr), (value, nvr), |value: &f64| Ok(*value))
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetInteger(c: Handle, vr: In<u32>, nvr: usize, value: In<i32>) -> Status {
+pub(super) extern "C" fn fmi2SetInteger(c: InstanceHandle, vr: In<u32>, nvr: usize, value: In<i32>) -> FmiStatus {
     boundary::set((c, &order::SET_INTEGER, "Integer"), (vr, nvr), (value, nvr), |value: &i32| Ok(*value))
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetBoolean(c: Handle, vr: In<u32>, nvr: usize, value: In<Boolean>) -> Status {
+pub(super) extern "C" fn fmi2SetBoolean(c: InstanceHandle, vr: In<u32>, nvr: usize, value: In<Boolean>) -> FmiStatus {
     boundary::set((c, &order::SET_BOOLEAN, "Boolean"), (vr, nvr), (value, nvr), |value: &Boolean| Ok(*value != 0))
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetString(c: Handle, vr: In<u32>, nvr: usize, value: In<Text>) -> Status {
-    boundary::set((c, &order::SET_STRING, "String"), (vr, nvr), (value, nvr), |value: &Text| {
+pub(super) extern "C" fn fmi2SetString(
+    c: InstanceHandle,
+    vr: In<u32>,
+    nvr: usize,
+    value: In<TextArgument>,
+) -> FmiStatus {
+    boundary::set((c, &order::SET_STRING, "String"), (vr, nvr), (value, nvr), |value: &TextArgument| {
         value.required("value").map(str::to_owned)
     })
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2GetFMUstate(c: Handle, FMUstate: Out<StateHandle>) -> Status {
+pub(super) extern "C" fn fmi2GetFMUstate(c: InstanceHandle, FMUstate: Out<StateHandle>) -> FmiStatus {
     state::save(c, &order::GET_FMU_STATE, FMUstate)
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SetFMUstate(c: Handle, FMUstate: StateHandle) -> Status {
+pub(super) extern "C" fn fmi2SetFMUstate(c: InstanceHandle, FMUstate: StateHandle) -> FmiStatus {
     state::restore(c, &order::SET_FMU_STATE, FMUstate)
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2FreeFMUstate(c: Handle, FMUstate: Out<StateHandle>) -> Status {
+pub(super) extern "C" fn fmi2FreeFMUstate(c: InstanceHandle, FMUstate: Out<StateHandle>) -> FmiStatus {
     state::free(c, &order::FREE_FMU_STATE, FMUstate)
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2SerializedFMUstateSize(c: Handle, FMUstate: StateHandle, size: Out<usize>) -> Status {
+pub(super) extern "C" fn fmi2SerializedFMUstateSize(
+    c: InstanceHandle,
+    FMUstate: StateHandle,
+    size: Out<usize>,
+) -> FmiStatus {
     state::size(c, &order::SERIALIZED_FMU_STATE_SIZE, FMUstate, size)
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2SerializeFMUstate(
-    c: Handle,
+    c: InstanceHandle,
     FMUstate: StateHandle,
     serializedState: Out<u8>,
     size: usize,
-) -> Status {
+) -> FmiStatus {
     state::serialise(c, &order::SERIALIZE_FMU_STATE, FMUstate, serializedState, size)
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi2DeSerializeFMUstate(
-    c: Handle,
+    c: InstanceHandle,
     serializedState: In<u8>,
     size: usize,
     FMUstate: Out<StateHandle>,
-) -> Status {
+) -> FmiStatus {
     state::deserialise(c, &order::DESERIALIZE_FMU_STATE, serializedState, size, FMUstate)
 }
 
 /// Answer of `fmi2CancelStep`: there is never an asynchronous step.
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi2CancelStep(c: Handle) -> Status {
+pub(super) extern "C" fn fmi2CancelStep(c: InstanceHandle) -> FmiStatus {
     guard(c, &order::CANCEL_STEP, |_| {
         Err(Refusal::error("no step is pending: steps of this FMU are never asynchronous"))
     })

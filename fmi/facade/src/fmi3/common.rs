@@ -4,12 +4,12 @@ use std::ffi::c_char;
 
 use super::Boolean;
 use crate::boundary::{
-    self, Callbacks, Environment, Fmi3Logger, Handle, In, Instantiation, IntermediateUpdate, Out, Sink, StateHandle,
-    Text, guard, instantiate, refuse_instantiation, release, state,
+    self, Callbacks, Fmi3Logger, ImporterEnvironment, In, InstanceHandle, Instantiation, IntermediateUpdate, Out, Sink,
+    StateHandle, TextArgument, guard, instantiate, refuse_instantiation, release, state,
 };
 use crate::location;
 use crate::slave::order::fmi3 as order;
-use crate::slave::{Dialect, Experiment, Refusal, Status};
+use crate::slave::{Dialect, ExperimentTimes, FmiStatus, Refusal};
 use crate::unit::Load;
 
 #[unsafe(no_mangle)]
@@ -19,24 +19,24 @@ pub(super) extern "C" fn fmi3GetVersion() -> *const c_char {
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3SetDebugLogging(
-    instance: Handle,
+    instance: InstanceHandle,
     loggingOn: Boolean,
     nCategories: usize,
-    categories: In<Text>,
-) -> Status {
+    categories: In<TextArgument>,
+) -> FmiStatus {
     boundary::set_debug_logging(instance, &order::SET_DEBUG_LOGGING, loggingOn != 0, (categories, nCategories))
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3InstantiateModelExchange(
-    _instanceName: Text,
-    _instantiationToken: Text,
-    _resourcePath: Text,
+    _instanceName: TextArgument,
+    _instantiationToken: TextArgument,
+    _resourcePath: TextArgument,
     _visible: Boolean,
     _loggingOn: Boolean,
-    instanceEnvironment: Environment,
+    instanceEnvironment: ImporterEnvironment,
     logMessage: Option<Fmi3Logger>,
-) -> Handle {
+) -> InstanceHandle {
     refuse_instantiation(
         Sink::Fmi3 { logger: logMessage, environment: instanceEnvironment },
         "fmi3InstantiateModelExchange",
@@ -47,18 +47,18 @@ pub(super) extern "C" fn fmi3InstantiateModelExchange(
 /// `fmi3InstantiateCoSimulation` of a library: makes its unit by `load`. The library exports it, see [`crate::library`].
 pub fn instantiate_unit(
     load: Load,
-    instanceName: Text,
-    instantiationToken: Text,
-    resourcePath: Text,
+    instanceName: TextArgument,
+    instantiationToken: TextArgument,
+    resourcePath: TextArgument,
     loggingOn: Boolean,
     eventModeUsed: Boolean,
     earlyReturnAllowed: Boolean,
     requiredIntermediateVariables: In<u32>,
     nRequiredIntermediateVariables: usize,
-    instanceEnvironment: Environment,
+    instanceEnvironment: ImporterEnvironment,
     logMessage: Option<Fmi3Logger>,
     intermediateUpdate: Option<IntermediateUpdate>,
-) -> Handle {
+) -> InstanceHandle {
     instantiate(Instantiation {
         dialect: Dialect::Fmi3,
         load,
@@ -92,17 +92,17 @@ pub fn instantiate_unit(
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3InstantiateScheduledExecution(
-    _instanceName: Text,
-    _instantiationToken: Text,
-    _resourcePath: Text,
+    _instanceName: TextArgument,
+    _instantiationToken: TextArgument,
+    _resourcePath: TextArgument,
     _visible: Boolean,
     _loggingOn: Boolean,
-    instanceEnvironment: Environment,
+    instanceEnvironment: ImporterEnvironment,
     logMessage: Option<Fmi3Logger>,
-    _clockUpdate: Option<unsafe extern "C" fn(Environment)>,
+    _clockUpdate: Option<unsafe extern "C" fn(ImporterEnvironment)>,
     _lockPreemption: Option<unsafe extern "C" fn()>,
     _unlockPreemption: Option<unsafe extern "C" fn()>,
-) -> Handle {
+) -> InstanceHandle {
     refuse_instantiation(
         Sink::Fmi3 { logger: logMessage, environment: instanceEnvironment },
         "fmi3InstantiateScheduledExecution",
@@ -111,87 +111,87 @@ pub(super) extern "C" fn fmi3InstantiateScheduledExecution(
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3FreeInstance(instance: Handle) {
+pub(super) extern "C" fn fmi3FreeInstance(instance: InstanceHandle) {
     release(instance, &order::FREE_INSTANCE);
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3EnterInitializationMode(
-    instance: Handle,
+    instance: InstanceHandle,
     _toleranceDefined: Boolean,
     _tolerance: f64,
     startTime: f64,
     stopTimeDefined: Boolean,
     stopTime: f64,
-) -> Status {
+) -> FmiStatus {
     guard(instance, &order::ENTER_INITIALIZATION_MODE, |slave| {
-        let experiment = Experiment::new(startTime, (stopTimeDefined != 0).then_some(stopTime))?;
+        let experiment = ExperimentTimes::new(startTime, (stopTimeDefined != 0).then_some(stopTime))?;
         slave.enter_initialisation(Some(experiment));
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3ExitInitializationMode(instance: Handle) -> Status {
+pub(super) extern "C" fn fmi3ExitInitializationMode(instance: InstanceHandle) -> FmiStatus {
     guard(instance, &order::EXIT_INITIALIZATION_MODE, |slave| slave.exit_initialisation())
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3Terminate(instance: Handle) -> Status {
+pub(super) extern "C" fn fmi3Terminate(instance: InstanceHandle) -> FmiStatus {
     guard(instance, &order::TERMINATE, |slave| {
         slave.terminate();
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3Reset(instance: Handle) -> Status {
+pub(super) extern "C" fn fmi3Reset(instance: InstanceHandle) -> FmiStatus {
     guard(instance, &order::RESET, |slave| {
         slave.reset();
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3GetFMUState(instance: Handle, FMUState: Out<StateHandle>) -> Status {
+pub(super) extern "C" fn fmi3GetFMUState(instance: InstanceHandle, FMUState: Out<StateHandle>) -> FmiStatus {
     state::save(instance, &order::GET_FMU_STATE, FMUState)
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3SetFMUState(instance: Handle, FMUState: StateHandle) -> Status {
+pub(super) extern "C" fn fmi3SetFMUState(instance: InstanceHandle, FMUState: StateHandle) -> FmiStatus {
     state::restore(instance, &order::SET_FMU_STATE, FMUState)
 }
 
 #[unsafe(no_mangle)]
-pub(super) extern "C" fn fmi3FreeFMUState(instance: Handle, FMUState: Out<StateHandle>) -> Status {
+pub(super) extern "C" fn fmi3FreeFMUState(instance: InstanceHandle, FMUState: Out<StateHandle>) -> FmiStatus {
     state::free(instance, &order::FREE_FMU_STATE, FMUState)
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3SerializedFMUStateSize(
-    instance: Handle,
+    instance: InstanceHandle,
     FMUState: StateHandle,
     size: Out<usize>,
-) -> Status {
+) -> FmiStatus {
     state::size(instance, &order::SERIALIZED_FMU_STATE_SIZE, FMUState, size)
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3SerializeFMUState(
-    instance: Handle,
+    instance: InstanceHandle,
     FMUState: StateHandle,
     serializedState: Out<u8>,
     size: usize,
-) -> Status {
+) -> FmiStatus {
     state::serialise(instance, &order::SERIALIZE_FMU_STATE, FMUState, serializedState, size)
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3DeserializeFMUState(
-    instance: Handle,
+    instance: InstanceHandle,
     serializedState: In<u8>,
     size: usize,
     FMUState: Out<StateHandle>,
-) -> Status {
+) -> FmiStatus {
     state::deserialise(instance, &order::DESERIALIZE_FMU_STATE, serializedState, size, FMUState)
 }

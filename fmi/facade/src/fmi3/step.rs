@@ -5,23 +5,23 @@
 //!
 //! Where the internal steps allowed are used up, the step returns early if the importer allows that, else it is discarded.
 
-use tiprub_core::simulation::Progress;
+use tiprub_core::simulation::StepProgress;
 
 use super::Boolean;
-use crate::boundary::{Callbacks, Handle, In, IntermediateUpdate, Out, enter, guard, intermediate_update};
+use crate::boundary::{Callbacks, In, InstanceHandle, IntermediateUpdate, Out, enter, guard, intermediate_update};
 use crate::slave::order::fmi3 as order;
-use crate::slave::{Refusal, Request, Result, Slave, Status};
+use crate::slave::{AccessRequest, FmiStatus, Refusal, Result, Slave};
 
 /// How a step ended.
-struct Outcome {
-    status: Status,
+struct StepOutcome {
+    status: FmiStatus,
     early: bool,
     time: Option<f64>,
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3DoStep(
-    instance: Handle,
+    instance: InstanceHandle,
     currentCommunicationPoint: f64,
     communicationStepSize: f64,
     _noSetFMUStatePriorToCurrentPoint: Boolean,
@@ -29,7 +29,7 @@ pub(super) extern "C" fn fmi3DoStep(
     terminateSimulation: Out<Boolean>,
     earlyReturn: Out<Boolean>,
     lastSuccessfulTime: Out<f64>,
-) -> Status {
+) -> FmiStatus {
     let names = ["eventHandlingNeeded", "terminateSimulation", "earlyReturn", "lastSuccessfulTime"];
     let absent = [
         eventHandlingNeeded.is_null(),
@@ -46,7 +46,7 @@ pub(super) extern "C" fn fmi3DoStep(
     outcome.status
 }
 
-fn step(instance: Handle, current: f64, size: f64, missing: Option<&str>) -> Outcome {
+fn step(instance: InstanceHandle, current: f64, size: f64, missing: Option<&str>) -> StepOutcome {
     let mut before = None;
     let (status, begun) = enter(instance, &order::DO_STEP, |slave, instance| {
         before = Some(slave.time());
@@ -60,20 +60,20 @@ fn step(instance: Handle, current: f64, size: f64, missing: Option<&str>) -> Out
             } else {
                 slave.step(current, size).map(|()| false)?
             };
-            return Ok((Status::Ok, (None, early, slave.time())));
+            return Ok((FmiStatus::Ok, (None, early, slave.time())));
         };
         slave.begin_step(current, size, partial)?;
-        Ok((Status::Ok, (Some((callbacks, update)), false, slave.time())))
+        Ok((FmiStatus::Ok, (Some((callbacks, update)), false, slave.time())))
     });
     match begun {
         Some((Some((callbacks, update)), _, start)) => march(instance, callbacks, update, start),
-        Some((None, early, time)) => Outcome { status, early, time: Some(time) },
-        None => Outcome { status, early: false, time: before },
+        Some((None, early, time)) => StepOutcome { status, early, time: Some(time) },
+        None => StepOutcome { status, early: false, time: before },
     }
 }
 
 /// What to do after an internal step.
-fn settle(slave: &mut Slave, progress: Progress, return_at: Option<f64>) -> Result<bool> {
+fn settle(slave: &mut Slave, progress: StepProgress, return_at: Option<f64>) -> Result<bool> {
     let early = !progress.finished && return_at.is_some_and(|time| progress.time >= time);
     if progress.finished || early {
         slave.end_step(early)?;
@@ -81,31 +81,31 @@ fn settle(slave: &mut Slave, progress: Progress, return_at: Option<f64>) -> Resu
     Ok(early)
 }
 
-fn march(instance: Handle, callbacks: Callbacks, update: IntermediateUpdate, start: f64) -> Outcome {
+fn march(instance: InstanceHandle, callbacks: Callbacks, update: IntermediateUpdate, start: f64) -> StepOutcome {
     let mut return_at: Option<f64> = None;
-    let mut worst = Status::Ok;
+    let mut worst = FmiStatus::Ok;
     loop {
         let (status, advanced) = enter(instance, &order::CONTINUE_STEP, |slave, _| {
             let progress = slave.advance_partially()?;
-            Ok((Status::Ok, (progress, slave.time())))
+            Ok((FmiStatus::Ok, (progress, slave.time())))
         });
         let progress = match advanced {
-            None => return Outcome { status, early: false, time: Some(start) },
-            Some((None, time)) => return Outcome { status: worst.max(status), early: true, time: Some(time) },
+            None => return StepOutcome { status, early: false, time: Some(start) },
+            Some((None, time)) => return StepOutcome { status: worst.max(status), early: true, time: Some(time) },
             Some((Some(progress), _)) => progress,
         };
         let may_return = callbacks.early_return_allowed && !progress.finished;
         let request = intermediate_update(update, callbacks.environment, progress.time, !progress.finished, may_return);
         let (status, settled) = enter(instance, &order::CONTINUE_STEP, |slave, _| {
-            let mut status = Status::Ok;
+            let mut status = FmiStatus::Ok;
             match request {
                 Some(time) if may_return => return_at = Some(time),
                 Some(_) if !progress.finished => {
                     slave.note(
-                        Status::Warning,
+                        FmiStatus::Warning,
                         "early return requested, but earlyReturnAllowed was false at instantiation",
                     );
-                    status = Status::Warning;
+                    status = FmiStatus::Warning;
                 }
                 _ => {}
             }
@@ -114,9 +114,9 @@ fn march(instance: Handle, callbacks: Callbacks, update: IntermediateUpdate, sta
         });
         worst = worst.max(status);
         match settled {
-            None => return Outcome { status, early: false, time: Some(start) },
+            None => return StepOutcome { status, early: false, time: Some(start) },
             Some((early, time)) if early || progress.finished => {
-                return Outcome { status: worst, early, time: Some(time) };
+                return StepOutcome { status: worst, early, time: Some(time) };
             }
             Some(_) => {}
         }
@@ -125,21 +125,21 @@ fn march(instance: Handle, callbacks: Callbacks, update: IntermediateUpdate, sta
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3GetOutputDerivatives(
-    instance: Handle,
+    instance: InstanceHandle,
     valueReferences: In<u32>,
     nValueReferences: usize,
     orders: In<i32>,
     values: Out<f64>,
     nValues: usize,
-) -> Status {
+) -> FmiStatus {
     guard(instance, &order::GET_OUTPUT_DERIVATIVES, |slave| {
         let limit = slave.reference_limit();
         let references = valueReferences.array(nValueReferences, limit, "valueReferences")?;
         let orders = orders.array(nValueReferences, limit, "orders")?;
         let window = values.window(nValues, "values")?;
-        let elements = slave.elements(&Request { type_name: "Float64", references, values: nValues })?;
+        let elements = slave.elements(&AccessRequest { type_name: "Float64", references, values: nValues })?;
         let orders = slave.orders_of_elements(references, orders);
         window.fill(&slave.output_derivatives(&elements, &orders)?);
-        Ok(Status::Ok)
+        Ok(FmiStatus::Ok)
     })
 }

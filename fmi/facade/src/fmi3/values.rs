@@ -4,9 +4,9 @@
 use std::ffi::c_char;
 
 use super::Boolean;
-use crate::boundary::{self, ADJOINT, DIRECTIONAL, Handle, In, Out, Text, derivatives, guard};
-use crate::slave::order::{Rule, fmi3 as order};
-use crate::slave::{Refusal, Request, Status};
+use crate::boundary::{self, ADJOINT, DIRECTIONAL, In, InstanceHandle, Out, TextArgument, derivatives, guard};
+use crate::slave::order::{CallRule, fmi3 as order};
+use crate::slave::{AccessRequest, FmiStatus, Refusal};
 
 /// Functions of a type that has variables: exported getter and setter, their rules, name of the type, C type, Rust type,
 /// conversions.
@@ -14,12 +14,12 @@ macro_rules! with_variables {
     ($($get:ident $get_rule:ident $set:ident $set_rule:ident $name:literal $c:ty, $rust:ty, $out:expr, $in:expr;)*) => {$(
         #[unsafe(no_mangle)]
         pub(crate) extern "C" fn $get(
-            instance: Handle,
+            instance: InstanceHandle,
             valueReferences: In<u32>,
             nValueReferences: usize,
             values: Out<$c>,
             nValues: usize,
-        ) -> Status {
+        ) -> FmiStatus {
             let convert: fn($rust) -> $c = $out;
             let target = (instance, &order::$get_rule, $name);
             boundary::get(target, (valueReferences, nValueReferences), (values, nValues), convert)
@@ -27,12 +27,12 @@ macro_rules! with_variables {
 
         #[unsafe(no_mangle)]
         pub(crate) extern "C" fn $set(
-            instance: Handle,
+            instance: InstanceHandle,
             valueReferences: In<u32>,
             nValueReferences: usize,
             values: In<$c>,
             nValues: usize,
-        ) -> Status {
+        ) -> FmiStatus {
             let convert: fn(&$c) -> $rust = $in;
             let target = (instance, &order::$set_rule, $name);
             boundary::set(target, (valueReferences, nValueReferences), (values, nValues), |value| Ok(convert(value)))
@@ -48,41 +48,41 @@ with_variables! {
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3GetString(
-    instance: Handle,
+    instance: InstanceHandle,
     valueReferences: In<u32>,
     nValueReferences: usize,
     values: Out<*const c_char>,
     nValues: usize,
-) -> Status {
+) -> FmiStatus {
     boundary::strings((instance, &order::GET_STRING), (valueReferences, nValueReferences), (values, nValues))
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3SetString(
-    instance: Handle,
+    instance: InstanceHandle,
     valueReferences: In<u32>,
     nValueReferences: usize,
-    values: In<Text>,
+    values: In<TextArgument>,
     nValues: usize,
-) -> Status {
+) -> FmiStatus {
     let target = (instance, &order::SET_STRING, "String");
-    boundary::set(target, (valueReferences, nValueReferences), (values, nValues), |value: &Text| {
+    boundary::set(target, (valueReferences, nValueReferences), (values, nValues), |value: &TextArgument| {
         value.required("values").map(str::to_owned)
     })
 }
 
 /// No variable has the type: every reference is refused with the type it really has, no reference is nothing to do.
 fn no_variable(
-    instance: Handle,
-    rule: &Rule,
+    instance: InstanceHandle,
+    rule: &CallRule,
     type_name: &'static str,
     (references, count): (In<u32>, usize),
-) -> Status {
+) -> FmiStatus {
     guard(instance, rule, |slave| {
         let references = references.array(count, slave.reference_limit(), "valueReferences")?;
-        slave.elements(&Request { type_name, references, values: 0 })?;
+        slave.elements(&AccessRequest { type_name, references, values: 0 })?;
         if references.is_empty() {
-            Ok(Status::Ok)
+            Ok(FmiStatus::Ok)
         } else {
             Err(Refusal::error(format!("no variable is a {type_name}")))
         }
@@ -94,23 +94,23 @@ macro_rules! without_variables {
     ($($get:ident $get_rule:ident $set:ident $set_rule:ident $name:literal $c:ty;)*) => {$(
         #[unsafe(no_mangle)]
         pub(crate) extern "C" fn $get(
-            instance: Handle,
+            instance: InstanceHandle,
             valueReferences: In<u32>,
             nValueReferences: usize,
             _values: Out<$c>,
             _nValues: usize,
-        ) -> Status {
+        ) -> FmiStatus {
             no_variable(instance, &order::$get_rule, $name, (valueReferences, nValueReferences))
         }
 
         #[unsafe(no_mangle)]
         pub(crate) extern "C" fn $set(
-            instance: Handle,
+            instance: InstanceHandle,
             valueReferences: In<u32>,
             nValueReferences: usize,
             _values: In<$c>,
             _nValues: usize,
-        ) -> Status {
+        ) -> FmiStatus {
             no_variable(instance, &order::$set_rule, $name, (valueReferences, nValueReferences))
         }
     )*};
@@ -129,45 +129,45 @@ without_variables! {
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3GetBinary(
-    instance: Handle,
+    instance: InstanceHandle,
     valueReferences: In<u32>,
     nValueReferences: usize,
     _valueSizes: Out<usize>,
     _values: Out<*const u8>,
     _nValues: usize,
-) -> Status {
+) -> FmiStatus {
     no_variable(instance, &order::GET_BINARY, "Binary", (valueReferences, nValueReferences))
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3SetBinary(
-    instance: Handle,
+    instance: InstanceHandle,
     valueReferences: In<u32>,
     nValueReferences: usize,
     _valueSizes: In<usize>,
     _values: In<*const u8>,
     _nValues: usize,
-) -> Status {
+) -> FmiStatus {
     no_variable(instance, &order::SET_BINARY, "Binary", (valueReferences, nValueReferences))
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3GetClock(
-    instance: Handle,
+    instance: InstanceHandle,
     valueReferences: In<u32>,
     nValueReferences: usize,
     _values: Out<Boolean>,
-) -> Status {
+) -> FmiStatus {
     no_variable(instance, &order::GET_CLOCK, "Clock", (valueReferences, nValueReferences))
 }
 
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn fmi3SetClock(
-    instance: Handle,
+    instance: InstanceHandle,
     valueReferences: In<u32>,
     nValueReferences: usize,
     _values: In<Boolean>,
-) -> Status {
+) -> FmiStatus {
     no_variable(instance, &order::SET_CLOCK, "Clock", (valueReferences, nValueReferences))
 }
 
@@ -177,7 +177,7 @@ macro_rules! derivative {
     ($($name:ident $answer:ident $nSeed:ident $nSensitivity:ident $unknowns:ident $knowns:ident;)*) => {$(
         #[unsafe(no_mangle)]
         pub(crate) extern "C" fn $name(
-            instance: Handle,
+            instance: InstanceHandle,
             unknowns: In<u32>,
             nUnknowns: usize,
             knowns: In<u32>,
@@ -186,7 +186,7 @@ macro_rules! derivative {
             $nSeed: usize,
             sensitivity: Out<f64>,
             $nSensitivity: usize,
-        ) -> Status {
+        ) -> FmiStatus {
             derivatives(
                 (instance, stringify!($name), $answer),
                 (unknowns, nUnknowns, $unknowns, "unknowns"),

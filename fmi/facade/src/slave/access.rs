@@ -1,14 +1,14 @@
 //! Reading and setting variables: every request is checked in full before anything is read or written.
 
-use tiprub_core::variables::{Causality, Kind, Variability, Variable};
+use tiprub_core::variables::{Causality, DataType, Variability, Variable};
 use tiprub_core::{Error, shown};
 
-use super::{Dialect, Phase, Refusal, Result, Slave};
-use crate::unit::Unit;
+use super::{Dialect, InstancePhase, Refusal, Result, Slave};
+use crate::unit::CoSimulationUnit;
 
 /// A get or set call as the importer made it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Request<'a> {
+pub(crate) struct AccessRequest<'a> {
     /// Type in the function's name: `Real`, `Float64`, ...
     pub type_name: &'static str,
     /// Value references.
@@ -30,10 +30,10 @@ pub(crate) trait Value: Sized {
     }
 
     /// Read one element.
-    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self>;
+    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self>;
 
     /// Set one element.
-    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()>;
+    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()>;
 }
 
 impl Value for f64 {
@@ -58,11 +58,11 @@ impl Value for f64 {
         Some(time)
     }
 
-    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
         unit.real(reference)
     }
 
-    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
+    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
         unit.set_real(reference, *self)
     }
 }
@@ -72,11 +72,11 @@ impl Value for i32 {
         i64::from(*self).problem(variable)
     }
 
-    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
         unit.integer(reference)
     }
 
-    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
+    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
         unit.set_integer(reference, *self)
     }
 }
@@ -84,7 +84,7 @@ impl Value for i32 {
 /// Integers and enumerations of FMI 3.0 travel as 64-bit integers.
 impl Value for i64 {
     fn problem(&self, variable: &Variable) -> Option<String> {
-        let Kind::Enumeration(enumeration) = variable.kind else { return None };
+        let DataType::Enumeration(enumeration) = variable.kind else { return None };
         let item = usize::try_from(*self).ok().filter(|item| (1..=enumeration.items.len()).contains(item));
         item.is_none().then(|| {
             let items =
@@ -93,11 +93,11 @@ impl Value for i64 {
         })
     }
 
-    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
         unit.integer(reference).map(Self::from)
     }
 
-    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
+    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
         let value = i32::try_from(*self).map_err(|_| {
             Error::invalid(
                 format!("value reference {reference}"),
@@ -110,34 +110,34 @@ impl Value for i64 {
 }
 
 impl Value for bool {
-    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
         unit.boolean(reference)
     }
 
-    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
+    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
         unit.set_boolean(reference, *self)
     }
 }
 
 impl Value for String {
-    fn get(unit: &dyn Unit, reference: u32) -> tiprub_core::Result<Self> {
+    fn get(unit: &dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<Self> {
         unit.string(reference).map(Self::from)
     }
 
-    fn set(&self, unit: &mut dyn Unit, reference: u32) -> tiprub_core::Result<()> {
+    fn set(&self, unit: &mut dyn CoSimulationUnit, reference: u32) -> tiprub_core::Result<()> {
         unit.set_string(reference, self)
     }
 }
 
 /// Name of a variable's type in the standard's function names.
-fn type_name(dialect: Dialect, kind: Kind) -> &'static str {
+fn type_name(dialect: Dialect, kind: DataType) -> &'static str {
     match (dialect, kind) {
-        (Dialect::Fmi2, Kind::Real) => "Real",
-        (Dialect::Fmi2, Kind::Integer | Kind::Enumeration(_)) => "Integer",
-        (Dialect::Fmi3, Kind::Real) => "Float64",
-        (Dialect::Fmi3, Kind::Integer | Kind::Enumeration(_)) => "Int64",
-        (_, Kind::Boolean) => "Boolean",
-        (_, Kind::String) => "String",
+        (Dialect::Fmi2, DataType::Real) => "Real",
+        (Dialect::Fmi2, DataType::Integer | DataType::Enumeration(_)) => "Integer",
+        (Dialect::Fmi3, DataType::Real) => "Float64",
+        (Dialect::Fmi3, DataType::Integer | DataType::Enumeration(_)) => "Int64",
+        (_, DataType::Boolean) => "Boolean",
+        (_, DataType::String) => "String",
     }
 }
 
@@ -152,7 +152,7 @@ impl Slave {
     ///
     /// # Errors
     /// Unknown reference, another type, reference into the middle of an array, wrong number of values.
-    pub(crate) fn elements(&self, request: &Request<'_>) -> Result<Vec<u32>> {
+    pub(crate) fn elements(&self, request: &AccessRequest<'_>) -> Result<Vec<u32>> {
         let mut elements = Vec::with_capacity(request.references.len());
         for &reference in request.references {
             let (variable, index) = self.unit.table().locate(reference)?;
@@ -192,9 +192,9 @@ impl Slave {
     ///
     /// # Errors
     /// As [`Slave::elements`]; a value that does not exist yet; an initial state that cannot be computed.
-    pub(crate) fn read<T: Value>(&mut self, request: &Request<'_>) -> Result<Vec<T>> {
+    pub(crate) fn read<T: Value>(&mut self, request: &AccessRequest<'_>) -> Result<Vec<T>> {
         let elements = self.elements(request)?;
-        if matches!(self.phase, Phase::Instantiated { .. }) {
+        if matches!(self.phase, InstancePhase::Instantiated { .. }) {
             self.require_start_values(&elements)?;
         } else if elements.iter().any(|&element| self.is_computed(element)) {
             self.refresh()?;
@@ -273,10 +273,10 @@ impl Slave {
         }
         let input = variable.causality == Causality::Input;
         match self.phase {
-            Phase::Stepping { .. } if !input && variable.variability != Variability::Tunable => {
+            InstancePhase::Stepping { .. } if !input && variable.variability != Variability::Tunable => {
                 Some("is a fixed parameter, and initialisation is over. Set it before, or reset the instance".into())
             }
-            Phase::Updating { .. } if !input || variable.variability != Variability::Continuous => {
+            InstancePhase::Updating { .. } if !input || variable.variability != Variability::Continuous => {
                 Some("is not a continuous input. Set it at a communication point".into())
             }
             _ => None,
@@ -336,7 +336,7 @@ impl Slave {
     fn check_derivative(&self, reference: u32, order: i32, causality: Causality) -> Result<String> {
         let (variable, index) = self.unit.table().locate(reference)?;
         let what = format!("{} (value reference {reference})", variable.element_name(index));
-        let continuous = variable.kind == Kind::Real && variable.variability == Variability::Continuous;
+        let continuous = variable.kind == DataType::Real && variable.variability == Variability::Continuous;
         if variable.causality != causality || !continuous {
             let wanted = if causality == Causality::Input { "input" } else { "output" };
             return Err(Refusal::error(format!("{what} is not a continuous {wanted} of real type. Leave it out")));

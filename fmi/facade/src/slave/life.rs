@@ -2,9 +2,9 @@
 
 use tiprub_core::variables::Causality;
 
-use super::{Experiment, Phase, Refusal, Result, Slave, Status, logged};
+use super::{ExperimentTimes, FmiStatus, InstancePhase, Refusal, Result, Slave, logged};
 
-impl Experiment {
+impl ExperimentTimes {
     /// Check start and stop time as an importer gives them.
     ///
     /// # Errors
@@ -25,8 +25,8 @@ impl Experiment {
 
 impl Slave {
     /// `fmi2SetupExperiment`; may be called again, the last call counts.
-    pub(crate) fn set_experiment(&mut self, experiment: Experiment) {
-        if let Phase::Instantiated { experiment: current } = &mut self.phase {
+    pub(crate) fn set_experiment(&mut self, experiment: ExperimentTimes) {
+        if let InstancePhase::Instantiated { experiment: current } = &mut self.phase {
             *current = experiment;
         }
     }
@@ -34,9 +34,9 @@ impl Slave {
     /// Enter Initialization Mode, with the experiment given here (FMI 3.0) or before (FMI 2.0).
     ///
     /// Nothing is computed yet: parameters may still be set one after the other.
-    pub(crate) fn enter_initialisation(&mut self, given: Option<Experiment>) {
-        if let Phase::Instantiated { experiment } = self.phase {
-            self.phase = Phase::Initialising { experiment: given.unwrap_or(experiment), before: None };
+    pub(crate) fn enter_initialisation(&mut self, given: Option<ExperimentTimes>) {
+        if let InstancePhase::Instantiated { experiment } = self.phase {
+            self.phase = InstancePhase::Initialising { experiment: given.unwrap_or(experiment), before: None };
         }
     }
 
@@ -46,7 +46,7 @@ impl Slave {
     /// The core's refusal to initialise; other parameters can then be set and the call repeated.
     pub(super) fn refresh(&mut self) -> Result<()> {
         match &mut self.phase {
-            Phase::Initialising { experiment, before: before @ None } => {
+            InstancePhase::Initialising { experiment, before: before @ None } => {
                 let mut state = vec![0; self.unit.state_size()];
                 self.unit.save_state(&mut state)?;
                 if let Err(error) = self.unit.initialise(experiment.start) {
@@ -55,7 +55,7 @@ impl Slave {
                 }
                 *before = Some(state);
             }
-            Phase::Updating { fresh: fresh @ false, reached, .. } => {
+            InstancePhase::Updating { fresh: fresh @ false, reached, .. } => {
                 self.unit.update_outputs(*reached)?;
                 *fresh = true;
             }
@@ -66,7 +66,7 @@ impl Slave {
 
     /// A value is about to be set: in Initialization Mode go back to before the outputs were computed.
     pub(super) fn invalidate(&mut self) -> Result<()> {
-        if let Phase::Initialising { before, .. } = &mut self.phase
+        if let InstancePhase::Initialising { before, .. } = &mut self.phase
             && let Some(state) = before.take()
         {
             self.unit.restore_state(&state)?;
@@ -78,28 +78,28 @@ impl Slave {
     ///
     /// # Errors
     /// The core's refusal; the instance stays in Initialization Mode and can be given other parameters.
-    pub(crate) fn exit_initialisation(&mut self) -> Result<Status> {
+    pub(crate) fn exit_initialisation(&mut self) -> Result<FmiStatus> {
         self.refresh()?;
-        if let Phase::Initialising { experiment, .. } = self.phase {
-            self.phase = Phase::Stepping { stop: experiment.stop };
+        if let InstancePhase::Initialising { experiment, .. } = self.phase {
+            self.phase = InstancePhase::Stepping { stop: experiment.stop };
         }
         let warnings: Vec<_> = self.unit.warnings().iter().map(logged).collect();
-        let warns = warnings.iter().any(|(status, _)| *status == Status::Warning);
-        let status = if warns { Status::Warning } else { Status::Ok };
+        let warns = warnings.iter().any(|(status, _)| *status == FmiStatus::Warning);
+        let status = if warns { FmiStatus::Warning } else { FmiStatus::Ok };
         self.notes.extend(warnings);
         Ok(status)
     }
 
     /// Terminate; values can still be read afterwards.
     pub(crate) fn terminate(&mut self) {
-        self.phase = Phase::Terminated { time: self.time() };
+        self.phase = InstancePhase::Terminated { time: self.time() };
     }
 
     /// Back to the state after instantiation. Saved states stay valid.
     pub(crate) fn reset(&mut self) {
         self.unit.reset();
         self.strings.clear();
-        self.phase = Phase::Instantiated { experiment: Experiment::default() };
+        self.phase = InstancePhase::Instantiated { experiment: ExperimentTimes::default() };
     }
 
     /// FMI 3.0: the inputs and outputs which the importer means to access during intermediate updates.

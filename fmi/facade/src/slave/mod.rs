@@ -13,18 +13,18 @@ use std::fmt;
 use std::path::Path;
 
 use tiprub_core::Warning;
-use tiprub_core::warning::Level;
+use tiprub_core::warning::Severity;
 
-use crate::unit::{Load, Unit};
+use crate::unit::{CoSimulationUnit, Load};
 
-pub(crate) use access::{Request, Value};
-pub(crate) use phase::{Experiment, Phase};
+pub(crate) use access::{AccessRequest, Value};
+pub(crate) use phase::{ExperimentTimes, InstancePhase};
 
 /// Answer of a call. The numbers are those of `fmi2Status` and `fmi3Status`; `Fatal` (4) is never answered, because in
 /// FMI 2.0 it would condemn all instances of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(i32)]
-pub enum Status {
+pub enum FmiStatus {
     /// All well.
     Ok = 0,
     /// Done, and the message logged deserves attention.
@@ -48,7 +48,7 @@ pub(crate) enum Dialect {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Refusal {
     /// `Error` or `Discard`.
-    pub status: Status,
+    pub status: FmiStatus,
     /// What, where, and the remedy.
     pub message: String,
 }
@@ -56,12 +56,12 @@ pub(crate) struct Refusal {
 impl Refusal {
     /// A refusal that answers `Error`.
     pub(crate) fn error(message: impl Into<String>) -> Self {
-        Self { status: Status::Error, message: message.into() }
+        Self { status: FmiStatus::Error, message: message.into() }
     }
 
     /// A refusal that answers `Discard`.
     pub(crate) fn discard(message: impl Into<String>) -> Self {
-        Self { status: Status::Discard, message: message.into() }
+        Self { status: FmiStatus::Discard, message: message.into() }
     }
 }
 
@@ -87,20 +87,20 @@ pub(crate) type Result<T, E = Refusal> = std::result::Result<T, E>;
 /// One FMU instance without its callbacks.
 pub(crate) struct Slave {
     dialect: Dialect,
-    unit: Box<dyn Unit>,
+    unit: Box<dyn CoSimulationUnit>,
     token: String,
     arrays: bool,
-    phase: Phase,
+    phase: InstancePhase,
     /// Saved states handed out: the importer holds the address of a box as an opaque handle, which is only ever
     /// compared, never followed. They are freed with the instance at the latest.
     ///
     /// The box is needed: its address is the handle, and must not move when the list grows.
     #[expect(clippy::vec_box)]
-    snapshots: Vec<Box<snapshot::Snapshot>>,
+    snapshots: Vec<Box<snapshot::SavedState>>,
     /// Texts handed out by the last call that returned texts.
     strings: Vec<CString>,
     /// Messages for the importer that do not come with a refusal.
-    notes: Vec<(Status, String)>,
+    notes: Vec<(FmiStatus, String)>,
 }
 
 impl Slave {
@@ -128,7 +128,7 @@ impl Slave {
             unit: (loaded.unit)()?,
             token: loaded.token,
             arrays: loaded.fmi3_arrays && dialect == Dialect::Fmi3,
-            phase: Phase::Instantiated { experiment: Experiment::default() },
+            phase: InstancePhase::Instantiated { experiment: ExperimentTimes::default() },
             snapshots: Vec::new(),
             strings: Vec::new(),
             notes: Vec::new(),
@@ -141,17 +141,19 @@ impl Slave {
     }
 
     /// Phase of life.
-    pub(crate) fn phase(&self) -> &Phase {
+    pub(crate) fn phase(&self) -> &InstancePhase {
         &self.phase
     }
 
     /// Time of the instance (s): what the importer would call the current time, in any phase.
     pub(crate) fn time(&self) -> f64 {
         match self.phase {
-            Phase::Instantiated { experiment } | Phase::Initialising { experiment, .. } => experiment.start,
-            Phase::Stepping { .. } => self.unit.time(),
-            Phase::Updating { reached, .. } => reached,
-            Phase::Failed { last_good: time } | Phase::Terminated { time } => time,
+            InstancePhase::Instantiated { experiment } | InstancePhase::Initialising { experiment, .. } => {
+                experiment.start
+            }
+            InstancePhase::Stepping { .. } => self.unit.time(),
+            InstancePhase::Updating { reached, .. } => reached,
+            InstancePhase::Failed { last_good: time } | InstancePhase::Terminated { time } => time,
         }
     }
 
@@ -162,7 +164,7 @@ impl Slave {
     }
 
     /// Messages that do not come with a refusal, in order; the list is empty afterwards.
-    pub(crate) fn take_notes(&mut self) -> Vec<(Status, String)> {
+    pub(crate) fn take_notes(&mut self) -> Vec<(FmiStatus, String)> {
         std::mem::take(&mut self.notes)
     }
 
@@ -172,16 +174,16 @@ impl Slave {
     }
 
     /// Add a message to be handed to the importer after the call.
-    pub(crate) fn note(&mut self, status: Status, message: impl Into<String>) {
+    pub(crate) fn note(&mut self, status: FmiStatus, message: impl Into<String>) {
         self.notes.push((status, message.into()));
     }
 }
 
 /// A warning as a message of the log: notes have the status `Ok`.
-fn logged(warning: &Warning) -> (Status, String) {
+fn logged(warning: &Warning) -> (FmiStatus, String) {
     let status = match warning.level() {
-        Level::Note => Status::Ok,
-        Level::Warning => Status::Warning,
+        Severity::Note => FmiStatus::Ok,
+        Severity::Warning => FmiStatus::Warning,
     };
     (status, warning.logged())
 }

@@ -10,18 +10,18 @@
 //! `fmi3GetOutputDerivatives` is refused during an intermediate update, because derivatives belong to communication points.
 
 use super::phase::{ANY, FAILED, INITIALISING, INSTANTIATED, STEPPING, States, TERMINATED, UPDATING, names};
-use super::{Dialect, Phase, Refusal, Result};
+use super::{Dialect, InstancePhase, Refusal, Result};
 
 /// One row of a call-order table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Rule {
+pub(crate) struct CallRule {
     /// Name of the exported function.
     pub name: &'static str,
     /// Phases in which it may be called.
     pub states: States,
 }
 
-impl Rule {
+impl CallRule {
     /// Version of the standard, by the prefix of the name.
     pub(crate) fn dialect(&self) -> Dialect {
         if self.name.starts_with("fmi2") { Dialect::Fmi2 } else { Dialect::Fmi3 }
@@ -31,7 +31,7 @@ impl Rule {
     ///
     /// # Errors
     /// The message names the phase and the phases in which the call is allowed.
-    pub(crate) fn check(&self, phase: &Phase) -> Result<()> {
+    pub(crate) fn check(&self, phase: &InstancePhase) -> Result<()> {
         if self.states & phase.state() != 0 {
             return Ok(());
         }
@@ -56,7 +56,7 @@ const WRITABLE: States = INSTANTIATED | INITIALISING | STEPPING | UPDATING;
 /// One `const` per row.
 macro_rules! table {
     ($($constant:ident $name:literal $states:expr;)*) => {
-        $(pub(crate) const $constant: Rule = Rule { name: $name, states: $states };)*
+        $(pub(crate) const $constant: CallRule = CallRule { name: $name, states: $states };)*
     };
 }
 
@@ -151,6 +151,6 @@ pub(crate) mod fmi3 {
 }
 
 /// Row of a function that belongs to a capability this FMU does not have; its own message says so in every phase.
-pub(crate) const fn unsupported(name: &'static str) -> Rule {
-    Rule { name, states: ANY }
+pub(crate) const fn unsupported(name: &'static str) -> CallRule {
+    CallRule { name, states: ANY }
 }

@@ -2,7 +2,7 @@
 
 /// Start and stop time given by the importer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Experiment {
+pub(crate) struct ExperimentTimes {
     /// Start time (s).
     pub start: f64,
     /// Stop time (s), where defined: steps beyond it are refused.
@@ -11,16 +11,16 @@ pub(crate) struct Experiment {
 
 /// Where an instance is in the state machines of the standards.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Phase {
+pub(crate) enum InstancePhase {
     /// Instantiated: start values can be set.
     Instantiated {
         /// Set by `fmi2SetupExperiment`; the default starts at 0 without a stop.
-        experiment: Experiment,
+        experiment: ExperimentTimes,
     },
     /// Initialization Mode.
     Initialising {
         /// As given.
-        experiment: Experiment,
+        experiment: ExperimentTimes,
         /// `None` if a value was set after outputs were last computed; else the core's state from before they were, to go
         /// back to when the next value is set.
         before: Option<Vec<u8>>,
@@ -54,17 +54,17 @@ pub(crate) enum Phase {
 /// Set of phases, one bit each.
 pub(crate) type States = u8;
 
-/// [`Phase::Instantiated`].
+/// [`InstancePhase::Instantiated`].
 pub(crate) const INSTANTIATED: States = 1;
-/// [`Phase::Initialising`].
+/// [`InstancePhase::Initialising`].
 pub(crate) const INITIALISING: States = 2;
-/// [`Phase::Stepping`].
+/// [`InstancePhase::Stepping`].
 pub(crate) const STEPPING: States = 4;
-/// [`Phase::Updating`].
+/// [`InstancePhase::Updating`].
 pub(crate) const UPDATING: States = 8;
-/// [`Phase::Failed`].
+/// [`InstancePhase::Failed`].
 pub(crate) const FAILED: States = 16;
-/// [`Phase::Terminated`].
+/// [`InstancePhase::Terminated`].
 pub(crate) const TERMINATED: States = 32;
 /// Every phase.
 pub(crate) const ANY: States = 63;
@@ -73,7 +73,7 @@ pub(crate) const ANY: States = 63;
 const NAMES: [&str; 6] =
     ["Instantiated", "Initialization Mode", "Step Mode", "Intermediate Update Mode", "Step Failed", "Terminated"];
 
-impl Phase {
+impl InstancePhase {
     /// The phase as a set of one.
     pub(crate) fn state(&self) -> States {
         match self {

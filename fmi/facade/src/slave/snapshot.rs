@@ -4,17 +4,17 @@
 //! zero bytes, time f64, stop time f64, length of the core's state u64, the core's state, FNV-1a 64 of all before. The
 //! length is the same for all states of an FMU.
 
-use super::{Experiment, Phase, Refusal, Result, Slave};
+use super::{ExperimentTimes, InstancePhase, Refusal, Result, Slave};
 
 const MAGIC: &[u8; 8] = b"tiprubST";
 const VERSION: u32 = 1;
 const CHECKSUM: usize = 8;
 
 /// One saved state.
-pub(super) type Snapshot = Vec<u8>;
+pub(super) type SavedState = Vec<u8>;
 
 /// Opaque address by which the importer names a saved state.
-pub(crate) type Handle = *const Snapshot;
+pub(crate) type SnapshotHandle = *const SavedState;
 
 fn damaged(problem: impl std::fmt::Display) -> Refusal {
     Refusal::error(format!(
@@ -28,9 +28,9 @@ fn checksum(bytes: &[u8]) -> u64 {
 }
 
 /// Takes fields off the front of a byte string.
-struct Reader<'a>(&'a [u8]);
+struct SnapshotReader<'a>(&'a [u8]);
 
-impl<'a> Reader<'a> {
+impl<'a> SnapshotReader<'a> {
     fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         let (front, rest) = self.0.split_at_checked(count).ok_or_else(|| damaged("it ends too early"))?;
         self.0 = rest;
@@ -49,33 +49,33 @@ impl<'a> Reader<'a> {
 }
 
 /// Fields of a phase as written: tag, time, stop.
-fn encode_phase(phase: &Phase, out: &mut Snapshot) {
+fn encode_phase(phase: &InstancePhase, out: &mut SavedState) {
     let (tag, time, stop) = match *phase {
-        Phase::Instantiated { experiment } => (0, experiment.start, experiment.stop),
-        Phase::Initialising { experiment, .. } => (1, experiment.start, experiment.stop),
-        Phase::Stepping { stop } | Phase::Updating { stop, .. } => (2, 0.0, stop),
-        Phase::Failed { last_good } => (3, last_good, None),
-        Phase::Terminated { time } => (4, time, None),
+        InstancePhase::Instantiated { experiment } => (0, experiment.start, experiment.stop),
+        InstancePhase::Initialising { experiment, .. } => (1, experiment.start, experiment.stop),
+        InstancePhase::Stepping { stop } | InstancePhase::Updating { stop, .. } => (2, 0.0, stop),
+        InstancePhase::Failed { last_good } => (3, last_good, None),
+        InstancePhase::Terminated { time } => (4, time, None),
     };
     out.extend([tag, u8::from(stop.is_some()), 0, 0]);
     out.extend(time.to_le_bytes());
     out.extend(stop.unwrap_or(0.0).to_le_bytes());
 }
 
-fn decode_phase(reader: &mut Reader<'_>) -> Result<Phase> {
+fn decode_phase(reader: &mut SnapshotReader<'_>) -> Result<InstancePhase> {
     let [tag, has_stop, unused @ ..] = reader.array::<4>()?;
     let [time, stop] = [f64::from_le_bytes(reader.array()?), f64::from_le_bytes(reader.array()?)];
     if has_stop > 1 || unused != [0; 2] || !time.is_finite() || !stop.is_finite() {
         return Err(damaged("its times or flags are none"));
     }
     let stop = (has_stop == 1).then_some(stop);
-    let experiment = Experiment { start: time, stop };
+    let experiment = ExperimentTimes { start: time, stop };
     match tag {
-        0 => Ok(Phase::Instantiated { experiment }),
-        1 => Ok(Phase::Initialising { experiment, before: None }),
-        2 => Ok(Phase::Stepping { stop }),
-        3 => Ok(Phase::Failed { last_good: time }),
-        4 => Ok(Phase::Terminated { time }),
+        0 => Ok(InstancePhase::Instantiated { experiment }),
+        1 => Ok(InstancePhase::Initialising { experiment, before: None }),
+        2 => Ok(InstancePhase::Stepping { stop }),
+        3 => Ok(InstancePhase::Failed { last_good: time }),
+        4 => Ok(InstancePhase::Terminated { time }),
         _ => Err(damaged("it names a phase that does not exist")),
     }
 }
@@ -85,12 +85,12 @@ impl Slave {
     ///
     /// # Errors
     /// A handle that this instance did not hand out.
-    pub(crate) fn save(&mut self, existing: Option<Handle>) -> Result<Handle> {
+    pub(crate) fn save(&mut self, existing: Option<SnapshotHandle>) -> Result<SnapshotHandle> {
         let bytes = self.encode()?;
         self.store(existing, bytes)
     }
 
-    fn store(&mut self, existing: Option<Handle>, bytes: Snapshot) -> Result<Handle> {
+    fn store(&mut self, existing: Option<SnapshotHandle>, bytes: SavedState) -> Result<SnapshotHandle> {
         if let Some(handle) = existing {
             let index = self.index(handle)?;
             *self.snapshots[index] = bytes;
@@ -100,7 +100,7 @@ impl Slave {
         Ok(self.snapshots.last().map_or(std::ptr::null(), |snapshot| std::ptr::from_ref(&**snapshot)))
     }
 
-    fn index(&self, handle: Handle) -> Result<usize> {
+    fn index(&self, handle: SnapshotHandle) -> Result<usize> {
         let found = self.snapshots.iter().position(|snapshot| std::ptr::eq(&raw const **snapshot, handle));
         found.ok_or_else(|| {
             Refusal::error(
@@ -114,7 +114,7 @@ impl Slave {
     ///
     /// # Errors
     /// Not a state of this instance, or not one of this FMU; nothing is changed then.
-    pub(crate) fn restore(&mut self, handle: Handle) -> Result<()> {
+    pub(crate) fn restore(&mut self, handle: SnapshotHandle) -> Result<()> {
         let index = self.index(handle)?;
         let snapshot = std::mem::take(&mut *self.snapshots[index]);
         let outcome = self.decode(&snapshot).and_then(|(phase, state)| {
@@ -130,7 +130,7 @@ impl Slave {
     ///
     /// # Errors
     /// Not a state of this instance.
-    pub(crate) fn free_snapshot(&mut self, handle: Handle) -> Result<()> {
+    pub(crate) fn free_snapshot(&mut self, handle: SnapshotHandle) -> Result<()> {
         let index = self.index(handle)?;
         self.snapshots.swap_remove(index);
         Ok(())
@@ -140,7 +140,7 @@ impl Slave {
     ///
     /// # Errors
     /// Not a state of this instance.
-    pub(crate) fn serialised(&self, handle: Handle) -> Result<&[u8]> {
+    pub(crate) fn serialised(&self, handle: SnapshotHandle) -> Result<&[u8]> {
         Ok(&self.snapshots[self.index(handle)?])
     }
 
@@ -153,12 +153,12 @@ impl Slave {
     ///
     /// # Errors
     /// Wrong length, another FMU's state, damaged bytes.
-    pub(crate) fn deserialise(&mut self, bytes: &[u8], existing: Option<Handle>) -> Result<Handle> {
+    pub(crate) fn deserialise(&mut self, bytes: &[u8], existing: Option<SnapshotHandle>) -> Result<SnapshotHandle> {
         self.decode(bytes)?;
         self.store(existing, bytes.to_vec())
     }
 
-    fn encode(&self) -> Result<Snapshot> {
+    fn encode(&self) -> Result<SavedState> {
         let size = self.serialised_size();
         let mut out = Vec::with_capacity(size);
         out.extend(MAGIC);
@@ -172,15 +172,15 @@ impl Slave {
         out.resize(start + state, 0);
         match &self.phase {
             // Outputs computed in Initialization Mode are computed again when asked for.
-            Phase::Initialising { before: Some(before), .. } => out[start..].copy_from_slice(before),
+            InstancePhase::Initialising { before: Some(before), .. } => out[start..].copy_from_slice(before),
             _ => self.unit.save_state(&mut out[start..])?,
         }
         out.extend(checksum(&out).to_le_bytes());
         Ok(out)
     }
 
-    fn decode<'a>(&self, bytes: &'a [u8]) -> Result<(Phase, &'a [u8])> {
-        let mut reader = Reader(bytes);
+    fn decode<'a>(&self, bytes: &'a [u8]) -> Result<(InstancePhase, &'a [u8])> {
+        let mut reader = SnapshotReader(bytes);
         if reader.take(MAGIC.len())? != MAGIC {
             return Err(damaged("its first bytes are not those of a tiprub state"));
         }
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn phases_that_were_never_written_are_refused() {
-        let read = |bytes: &[u8]| decode_phase(&mut Reader(bytes)).is_ok();
+        let read = |bytes: &[u8]| decode_phase(&mut SnapshotReader(bytes)).is_ok();
         for tag in 0..5 {
             assert!(read(&bytes([tag, 1, 0, 0], 0.25, 1.0)) && read(&bytes([tag, 0, 0, 0], 0.25, 0.0)), "{tag}");
             for head in [[tag, 2, 0, 0], [tag, 0, 1, 0], [tag, 0, 0, 1], [tag + 5, 0, 0, 0]] {

@@ -1,9 +1,9 @@
 //! Communication steps: whole, or internal step by internal step for FMI 3.0 intermediate updates.
 
-use tiprub_core::simulation::Progress;
+use tiprub_core::simulation::StepProgress;
 use tiprub_core::{shown, shown_time};
 
-use super::{Phase, Refusal, Result, Slave, Status};
+use super::{FmiStatus, InstancePhase, Refusal, Result, Slave};
 
 /// How far beyond the stop time a step may end, as a fraction of the step: importers add up their communication points,
 /// and the sum of many steps misses the stop time by rounding.
@@ -17,12 +17,12 @@ const PANIC_STEP_SIZE: f64 = 1.234_567_890_123e-5;
 
 impl Slave {
     /// Begin a communication step, which may end early (`partial`) where the internal steps allowed are used up; the phase becomes
-    /// [`Phase::Updating`] until it is ended.
+    /// [`InstancePhase::Updating`] until it is ended.
     ///
     /// # Errors
     /// Wrong time, bad step size, a step beyond the stop time, too many internal steps; the state is as before.
     pub(crate) fn begin_step(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
-        let Phase::Stepping { stop } = self.phase else {
+        let InstancePhase::Stepping { stop } = self.phase else {
             return Err(Refusal::error("no step can begin in this phase"));
         };
         if let Some(stop) = stop {
@@ -43,38 +43,38 @@ impl Slave {
         self.hear();
         #[cfg(feature = "test-panic")]
         assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic asked for by the test of panics");
-        self.phase = Phase::Updating { stop, reached: self.unit.time(), fresh: false };
+        self.phase = InstancePhase::Updating { stop, reached: self.unit.time(), fresh: false };
         Ok(())
     }
 
-    /// March one internal step. When it finishes the communication step, the phase is [`Phase::Stepping`] again.
+    /// March one internal step. When it finishes the communication step, the phase is [`InstancePhase::Stepping`] again.
     ///
     /// # Errors
-    /// The state became non-finite; the phase is [`Phase::Failed`] then. Or the internal steps allowed are used up: the phase is
-    /// [`Phase::Stepping`] as if the step had not begun, or [`Phase::Updating`] where it may end at the internal step reached.
-    pub(crate) fn advance(&mut self) -> Result<Progress> {
+    /// The state became non-finite; the phase is [`InstancePhase::Failed`] then. Or the internal steps allowed are used up: the phase is
+    /// [`InstancePhase::Stepping`] as if the step had not begun, or [`InstancePhase::Updating`] where it may end at the internal step reached.
+    pub(crate) fn advance(&mut self) -> Result<StepProgress> {
         let last_good = self.unit.time();
-        let Phase::Updating { stop, .. } = self.phase else {
+        let InstancePhase::Updating { stop, .. } = self.phase else {
             return Err(Refusal::error("no step is under way"));
         };
         let progress = match self.unit.advance() {
             Ok(progress) => progress,
             Err(error @ tiprub_core::Error::Exhausted { .. }) => {
                 match &mut self.phase {
-                    Phase::Updating { fresh, .. } if self.unit.is_stepping() => *fresh = false,
-                    phase => *phase = Phase::Stepping { stop },
+                    InstancePhase::Updating { fresh, .. } if self.unit.is_stepping() => *fresh = false,
+                    phase => *phase = InstancePhase::Stepping { stop },
                 }
                 return Err(error.into());
             }
             Err(error) => return Err(self.fail(last_good, error)),
         };
-        self.phase = Phase::Updating { stop, reached: progress.time, fresh: progress.finished };
+        self.phase = InstancePhase::Updating { stop, reached: progress.time, fresh: progress.finished };
         Ok(progress)
     }
 
     /// Ends all stepping until a saved state is restored or the instance is reset, and returns the refusal that says so.
     fn fail(&mut self, last_good: f64, error: tiprub_core::Error) -> Refusal {
-        self.phase = Phase::Failed { last_good };
+        self.phase = InstancePhase::Failed { last_good };
         let Refusal { status, message } = error.into();
         Refusal {
             status,
@@ -86,12 +86,14 @@ impl Slave {
     ///
     /// # Errors
     /// As [`Slave::advance`] and [`Slave::end_step`].
-    pub(crate) fn advance_partially(&mut self) -> Result<Option<Progress>> {
+    pub(crate) fn advance_partially(&mut self) -> Result<Option<StepProgress>> {
         match self.advance() {
-            Err(refusal) if refusal.status == Status::Discard && matches!(self.phase, Phase::Updating { .. }) => {
+            Err(refusal)
+                if refusal.status == FmiStatus::Discard && matches!(self.phase, InstancePhase::Updating { .. }) =>
+            {
                 self.end_step(true)?;
                 let time = self.unit.time();
-                self.note(Status::Ok, format!("ended early at t = {} s: {refusal}", shown_time(time)));
+                self.note(FmiStatus::Ok, format!("ended early at t = {} s: {refusal}", shown_time(time)));
                 Ok(None)
             }
             outcome => outcome.map(Some),
@@ -101,14 +103,14 @@ impl Slave {
     /// End the communication step: at its end, or at the internal step reached (early return).
     ///
     /// # Errors
-    /// Early: the state is not finite; the phase is [`Phase::Failed`] then.
+    /// Early: the state is not finite; the phase is [`InstancePhase::Failed`] then.
     pub(crate) fn end_step(&mut self, early: bool) -> Result<()> {
         let last_good = self.unit.time();
-        if let Phase::Updating { stop, .. } = self.phase {
+        if let InstancePhase::Updating { stop, .. } = self.phase {
             if early {
                 self.unit.end_step_early().map_err(|error| self.fail(last_good, error))?;
             }
-            self.phase = Phase::Stepping { stop };
+            self.phase = InstancePhase::Stepping { stop };
             self.hear();
         }
         Ok(())
@@ -128,7 +130,7 @@ impl Slave {
     /// A communication step, or as much of it as the internal steps allowed are enough for; whether it ended early.
     ///
     /// # Errors
-    /// As [`Slave::step`]; where not even one internal step is allowed, [`Status::Discard`].
+    /// As [`Slave::step`]; where not even one internal step is allowed, [`FmiStatus::Discard`].
     pub(crate) fn step_partially(&mut self, current_time: f64, step_size: f64) -> Result<bool> {
         self.begin_step(current_time, step_size, true)?;
         self.unit.fly_ahead();

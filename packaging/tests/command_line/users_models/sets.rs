@@ -1,9 +1,9 @@
 //! What is asked about a mesh of one's own: sets that hold a part of the tip or the root, and a blade for a rotor that turns the other way.
 
-use super::Project;
+use super::ModelProject;
 
 /// A coarse rotor 37 as a user's mesh, `blade.inp`.
-fn exported(project: &Project) -> String {
+fn exported(project: &ModelProject) -> String {
     project.succeed("reduce rotor37 --mesh 6x1x6 --modes 6 --inp blade.inp -o own.rom.safetensors");
     std::fs::read_to_string(project.root.path().join("blade.inp")).unwrap()
 }
@@ -37,7 +37,7 @@ fn turned_over(mesh: &str) -> String {
     format!("{head}*NODE, NSET=NALL\n{}{}", turned.collect::<String>(), &rest[end..])
 }
 
-fn warnings(project: &Project, mesh: &str, options: &str) -> String {
+fn warnings(project: &ModelProject, mesh: &str, options: &str) -> String {
     project.write("mesh.inp", mesh);
     let line = format!("reduce blade mesh.inp {options} --sectors 36 --modes 12 --force -o w.rom.safetensors");
     project.succeed(&line)["warnings"].to_string()
@@ -45,7 +45,7 @@ fn warnings(project: &Project, mesh: &str, options: &str) -> String {
 
 #[test]
 fn sets_with_a_part_of_tip_or_root_are_asked_about() {
-    let project = Project::new(&[]);
+    let project = ModelProject::new(&[]);
     let mesh = exported(&project);
     let both = "--contact-set TIP --clamp-set HUB";
     let whole = warnings(&project, &mesh, both);
@@ -67,7 +67,7 @@ fn sets_with_a_part_of_tip_or_root_are_asked_about() {
 
 #[test]
 fn a_blade_for_the_other_sense_of_rotation_is_asked_about() {
-    let project = Project::new(&[]);
+    let project = ModelProject::new(&[]);
     let mesh = exported(&project);
     let right = warnings(&project, &mesh, "--clamp-set HUB");
     assert!(!right.contains("locks up"), "{right}");

@@ -4,12 +4,12 @@ use std::{fs, path::Path};
 
 use serde_json::Value;
 
-use super::{Project, data, guide};
+use super::{ModelProject, data, guide};
 
 /// Patches over the whole tip of an exported mesh: those of the blade itself; a scene runs with them.
 #[test]
 fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
-    let project = Project::new(&[]);
+    let project = ModelProject::new(&[]);
     let own = project
         .succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp --contact-patches 4 --contact-rows 1 --modes 20 -o own.rom.safetensors");
     assert!(
@@ -58,7 +58,7 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
 /// Rows of patches across the thickness of an exported mesh: those of the blade itself, with a row in every name and their number in the ROM.
 #[test]
 fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
-    let project = Project::new(&[]);
+    let project = ModelProject::new(&[]);
     let line = "reduce rotor37 --mesh 6x2x4 --inp blade.inp --contact-patches 4 --contact-rows 2 --modes 20 -o own.rom.safetensors";
     let own = project.succeed(line);
     assert!(own["rom"]["origin"].as_str().unwrap().contains("forces on 8 patches in 2 rows and 20"), "{own:#}");
@@ -135,7 +135,7 @@ fn the_tip_of_a_mesh_is_found_and_told() {
         "blade_tet10.msh",
         "blade_hex20_binary.msh",
     ];
-    let project = Project::new(&files);
+    let project = ModelProject::new(&files);
     for file in files {
         let line =
             format!("reduce blade {file} --clamp-set ROOT --units mm-t-s --material titanium --modes 12 --force");
@@ -175,7 +175,7 @@ fn the_tip_of_a_mesh_is_found_and_told() {
 /// Contact at points is warned of where the mesh could carry more, and at one place always.
 #[test]
 fn contact_at_points_of_a_fine_tip_is_warned_of() {
-    let project = Project::new(&["blade_hex20.inp", "bar.inp", "blade_tet10.msh"]);
+    let project = ModelProject::new(&["blade_hex20.inp", "bar.inp", "blade_tet10.msh"]);
     let warned = |line: &str| -> String {
         let common = "--units mm-t-s --material titanium --modes 4 --clamp-set ROOT --force -o w.rom.safetensors";
         project.succeed(&format!("reduce blade {line} {common}"))["warnings"].to_string()
@@ -239,7 +239,7 @@ fn two_blades(farther_in: f64) -> String {
 /// A second surface as far out is told of, one well inside is not; the tip is that of one blade. The texts are those of the guide.
 #[test]
 fn a_second_surface_as_far_out_is_told_of() {
-    let project = Project::new(&[]);
+    let project = ModelProject::new(&[]);
     let reduce = |farther_in: f64| -> Value {
         project.write("two.inp", two_blades(farther_in));
         let line = "reduce blade two.inp --clamp-set ROOT --clamp-set ROOT_TWO --units mm-t-s --material titanium --modes 8 --force";
@@ -267,7 +267,7 @@ fn a_second_surface_as_far_out_is_told_of() {
 /// Of a sector the tip is found as well, and both kinds take patches; static flexibility at them is one.
 #[test]
 fn a_sector_has_patches_of_both_kinds() {
-    let project = Project::new(&["sector.msh"]);
+    let project = ModelProject::new(&["sector.msh"]);
     let line = "reduce sector sector.msh --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH --units mm-t-s --material steel \
                 --modes 6";
     let free = project.succeed(&format!("{line} -o free.rom.safetensors"));

@@ -10,8 +10,8 @@ mod sliding;
 
 use std::fmt::Write as _;
 
-use plot::{Panel, Series, draw};
-use sliding::{AROUND, History, SPEED, STEP, casing, slide};
+use plot::{PlotLine, PlotPanel, draw};
+use sliding::{AROUND, SPEED, STEP, SlidingHistory, casing, slide};
 use tiprub_core::settings::{Closure, Interpolation};
 
 const KINDS: [(&str, &str, Closure, Interpolation); 3] = [
@@ -34,7 +34,7 @@ fn main() -> std::io::Result<()> {
     std::fs::write(path(1, "facets-and-spline.svg"), picture(&histories))
 }
 
-fn table(histories: &[History; 3]) -> String {
+fn table(histories: &[SlidingHistory; 3]) -> String {
     let mut csv = "angle_deg,facets_N,free_ends_N,smooth_N\n".to_owned();
     for (index, angle) in histories[0].angle.iter().enumerate() {
         let _ = write!(csv, "{angle:.5}");
@@ -46,18 +46,18 @@ fn table(histories: &[History; 3]) -> String {
     csv
 }
 
-fn picture(histories: &[History; 3]) -> String {
+fn picture(histories: &[SlidingHistory; 3]) -> String {
     let forces = histories.each_ref().map(|history| history.force.iter().map(|force| force / 1e3).collect::<Vec<_>>());
-    let changes = histories.each_ref().map(History::changes);
+    let changes = histories.each_ref().map(SlidingHistory::changes);
     let panels = [
-        Panel {
+        PlotPanel {
             label: "contact force (kN)",
             range: [0.0, 2.5],
             spacing: 0.5,
             logarithmic: false,
             series: series(&forces),
         },
-        Panel {
+        PlotPanel {
             label: "change per step (N)",
             range: [-4.0, 6.0],
             spacing: 2.0,
@@ -68,7 +68,7 @@ fn picture(histories: &[History; 3]) -> String {
     draw(&histories[0].angle, &panels, "Contact force of a node sliding around a casing of facets and of a spline")
 }
 
-fn series(values: &[Vec<f64>; 3]) -> Vec<Series<'_>> {
+fn series(values: &[Vec<f64>; 3]) -> Vec<PlotLine<'_>> {
     let lines = KINDS.iter().zip(values);
-    lines.map(|((label, color, ..), values)| Series { label, color, values }).collect()
+    lines.map(|((label, color, ..), values)| PlotLine { label, color, values }).collect()
 }

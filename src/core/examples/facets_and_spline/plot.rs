@@ -10,7 +10,7 @@ const GRID: &str = "#e8ebef";
 const BUCKETS: usize = 540;
 
 /// One line.
-pub struct Series<'a> {
+pub struct PlotLine<'a> {
     /// Legend text.
     pub label: &'a str,
     /// Stroke colour.
@@ -20,7 +20,7 @@ pub struct Series<'a> {
 }
 
 /// One panel.
-pub struct Panel<'a> {
+pub struct PlotPanel<'a> {
     /// Label of the vertical axis.
     pub label: &'a str,
     /// Range of the vertical axis; of the decimal logarithm where that is drawn. What lies beyond is cut off.
@@ -30,11 +30,11 @@ pub struct Panel<'a> {
     /// Draw decimal logarithms, and of each bucket the largest value only.
     pub logarithmic: bool,
     /// Lines, drawn in this order.
-    pub series: Vec<Series<'a>>,
+    pub series: Vec<PlotLine<'a>>,
 }
 
 /// Panels above each other over a common axis in degrees, 0 to 360.
-pub fn draw(angles: &[f64], panels: &[Panel<'_>], title: &str) -> String {
+pub fn draw(angles: &[f64], panels: &[PlotPanel<'_>], title: &str) -> String {
     let (height, gap) = (230.0, 84.0);
     let total = 40.0 + (height + gap) * panels.len() as f64 - 32.0;
     let mut svg = format!(
@@ -67,14 +67,14 @@ fn x_of(angle: f64) -> f64 {
     LEFT + (WIDTH - LEFT - RIGHT) * angle / 360.0
 }
 
-fn y_of(value: f64, panel: &Panel<'_>, top: f64, height: f64) -> f64 {
+fn y_of(value: f64, panel: &PlotPanel<'_>, top: f64, height: f64) -> f64 {
     let [low, high] = panel.range;
     let value = if panel.logarithmic { value.max(1e-300).log10() } else { value };
     // Far beyond the frame is far enough.
     top + height * (1.0 - ((value - low) / (high - low)).clamp(-0.1, 1.1))
 }
 
-fn draw_axes(svg: &mut String, panel: &Panel<'_>, top: f64, height: f64) {
+fn draw_axes(svg: &mut String, panel: &PlotPanel<'_>, top: f64, height: f64) {
     let bottom = top + height;
     let right = WIDTH - RIGHT;
     let [low, high] = panel.range;
@@ -106,7 +106,7 @@ fn draw_axes(svg: &mut String, panel: &Panel<'_>, top: f64, height: f64) {
     );
 }
 
-fn draw_legend(svg: &mut String, panel: &Panel<'_>, top: f64) {
+fn draw_legend(svg: &mut String, panel: &PlotPanel<'_>, top: f64) {
     let mut x = WIDTH - RIGHT;
     for series in panel.series.iter().rev() {
         x -= 7.2 * series.label.chars().count() as f64 + 8.0;
@@ -118,7 +118,7 @@ fn draw_legend(svg: &mut String, panel: &Panel<'_>, top: f64) {
 }
 
 /// Least and largest value of each bucket in their order, so that no peak is lost.
-fn path(angles: &[f64], values: &[f64], panel: &Panel<'_>, top: f64, height: f64) -> String {
+fn path(angles: &[f64], values: &[f64], panel: &PlotPanel<'_>, top: f64, height: f64) -> String {
     let bucket = values.len().div_ceil(BUCKETS);
     let mut path = String::new();
     for (angles, values) in angles.chunks(bucket).zip(values.chunks(bucket)) {

@@ -27,14 +27,14 @@ pub const STEP: f64 = 1e-6;
 
 /// Contact forces of the steps of one turn.
 #[derive(Debug, Clone)]
-pub struct History {
+pub struct SlidingHistory {
     /// Angle of the node (degrees).
     pub angle: Vec<f64>,
     /// Normal force λ (N).
     pub force: Vec<f64>,
 }
 
-impl History {
+impl SlidingHistory {
     /// Change of the force from step to step (N); the first entry is zero.
     pub fn changes(&self) -> Vec<f64> {
         let changes = self.force.windows(2).map(|pair| (pair[1] - pair[0]).abs());
@@ -59,13 +59,13 @@ pub fn casing(closure: Closure, interpolation: Interpolation) -> SurfaceSpline {
 }
 
 /// Slide once around, after a first turn in which the start dies out.
-pub fn slide(surface: &SurfaceSpline) -> History {
+pub fn slide(surface: &SurfaceSpline) -> SlidingHistory {
     let frequency = (STIFFNESS / MASS).sqrt();
     let damping = DAMPING * frequency * STEP;
     let (divisor, stiffness) = (1.0 + damping, frequency * frequency * STEP * STEP);
     let compliance = STEP * STEP / (MASS * divisor);
     let turn = (TAU / (SPEED * STEP)).floor() as usize;
-    let mut history = History { angle: Vec::with_capacity(turn), force: Vec::with_capacity(turn) };
+    let mut history = SlidingHistory { angle: Vec::with_capacity(turn), force: Vec::with_capacity(turn) };
     let (mut displacement, mut before) = (-INTERFERENCE, -INTERFERENCE);
     let mut guess = surface.locate([RADIUS, 0.0, 0.01]);
     for step in 0..2 * turn {

@@ -354,7 +354,7 @@ fn fix_signs(shapes: &mut DMatrix<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rom::{ContactNode, Frame, RomChecks};
+    use crate::rom::{ContactNode, DisplacementFrame, RomChecks};
 
     /// Random symmetric positive definite pencil.
     fn rom(order: usize, seed: u64) -> Rom {
@@ -369,7 +369,7 @@ mod tests {
             name: "random".into(),
             origin: String::new(),
             sectors: 1,
-            frame: Frame::Cartesian,
+            frame: DisplacementFrame::Cartesian,
             mass: &a * a.transpose() * 0.1 + DMatrix::identity(order, order),
             stiffness: &b * b.transpose() * 1e6,
             damping_ratio: 0.0,

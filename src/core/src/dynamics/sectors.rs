@@ -3,7 +3,7 @@
 use super::bank::{BankOptions, ModalBank};
 use super::cyclic::{CyclicBank, CyclicModel};
 use super::modal::ModalModel;
-use crate::persist::{Reader, Writer};
+use crate::persist::{StateReader, StateWriter};
 use crate::settings::Scheme;
 
 /// Modes of the sectors.
@@ -105,11 +105,11 @@ impl Sectors {
         /// True when every modal coordinate is finite.
         is_finite[]() -> bool;
         /// Save the state (not the step size).
-        save[](writer: &mut Writer);
+        save[](writer: &mut StateWriter);
         /// Pass over a saved state and refuse what is none.
-        check[](reader: &mut Reader);
+        check[](reader: &mut StateReader);
         /// Restore a saved state, after [`Sectors::set_step`].
-        restore[mut](reader: &mut Reader);
+        restore[mut](reader: &mut StateReader);
     }
 
     /// The uncoupled sectors.

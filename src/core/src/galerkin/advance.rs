@@ -2,9 +2,9 @@
 
 use super::basis::MOST;
 use super::kernels::PADDED;
-use super::level::{Level, ModeSteps};
+use super::level::{ModeSteps, StepTables};
 use super::response::TERMS;
-use super::rows::Rows;
+use super::rows::ContactRows;
 use super::state::SectorState;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 
@@ -88,14 +88,14 @@ impl Advance {
     }
 
     /// q and q̇ at the end of a step without any force, and the damping loss (J).
-    pub fn freely(&mut self, level: &Level, state: &mut SectorState) -> f64 {
+    pub fn freely(&mut self, level: &StepTables, state: &mut SectorState) -> f64 {
         self.finish::<2>(level, state)
     }
 
     /// The same under forces: `forces(node)` has the coefficients of θᵃ of those on a node (N), if there are any.
     pub fn under(
         &mut self,
-        (level, rows): (&Level, &Rows),
+        (level, rows): (&StepTables, &ContactRows),
         state: &mut SectorState,
         forces: impl Fn(usize) -> Option<[[f64; 3]; MOST]>,
     ) -> f64 {
@@ -119,12 +119,12 @@ impl Advance {
     }
 
     /// The same where what acts on all modes is known: coefficients of θᵃ.
-    pub fn driven(&mut self, level: &Level, state: &mut SectorState, modal: &[Vec<f64>; MOST]) -> f64 {
+    pub fn driven(&mut self, level: &StepTables, state: &mut SectorState, modal: &[Vec<f64>; MOST]) -> f64 {
         self.modal.iter_mut().zip(modal).for_each(|(own, modal)| own[..modal.len()].copy_from_slice(modal));
         self.finish::<TERMS>(level, state)
     }
 
-    fn finish<const COUNT: usize>(&mut self, level: &Level, state: &mut SectorState) -> f64 {
+    fn finish<const COUNT: usize>(&mut self, level: &StepTables, state: &mut SectorState) -> f64 {
         let [a, b, c] = &self.modal;
         let losses = level.damped.then_some(&mut self.losses[..]);
         let end = End::<COUNT> {

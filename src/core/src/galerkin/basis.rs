@@ -11,7 +11,7 @@ pub const PLACES: usize = 9;
 
 /// What depends on the degree alone. Entries beyond `degree` are 0.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Basis {
+pub struct TimeBasis {
     /// s.
     pub degree: usize,
     /// Points c₀ = 0 … c_s = 1.
@@ -30,7 +30,7 @@ pub struct Basis {
     pub between: [[f64; POINTS]; PLACES],
 }
 
-impl Basis {
+impl TimeBasis {
     /// Of degree s.
     ///
     /// # Panics
@@ -159,7 +159,7 @@ fn left_out(degree: usize, points: &[f64; POINTS]) -> [f64; POINTS] {
 mod tests {
     use super::*;
 
-    fn at(basis: &Basis, i: usize, theta: f64) -> f64 {
+    fn at(basis: &TimeBasis, i: usize, theta: f64) -> f64 {
         basis.monomials[i].iter().rev().fold(0.0, |sum, c| sum * theta + c)
     }
 
@@ -171,7 +171,7 @@ mod tests {
             vec![1.0 / 12.0, 5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0],
         ];
         for degree in 1..=MOST {
-            let basis = Basis::new(degree);
+            let basis = TimeBasis::new(degree);
             for i in 0..=degree {
                 for k in 0..=degree {
                     let expected = f64::from(u8::from(i == k));
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn the_work_of_a_force_and_that_of_its_displacement_are_parts_of_one_product() {
         for degree in 1..=MOST {
-            let basis = Basis::new(degree);
+            let basis = TimeBasis::new(degree);
             for i in 0..=degree {
                 for k in 0..=degree {
                     let ends = f64::from(u8::from(i == degree && k == degree)) - f64::from(u8::from(i == 0 && k == 0));
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn the_projection_keeps_moments_and_lower_degrees() {
         for degree in 1..=MOST {
-            let basis = Basis::new(degree);
+            let basis = TimeBasis::new(degree);
             for i in 0..=degree {
                 for moment in 0..degree {
                     let of = |coefficients: &[f64]| -> f64 {
@@ -216,7 +216,7 @@ mod tests {
     #[test]
     fn what_is_left_out_of_lower_degrees_is_nothing() {
         for degree in 1..=MOST {
-            let basis = Basis::new(degree);
+            let basis = TimeBasis::new(degree);
             for power in 0..=degree {
                 let sum: f64 =
                     (0..=degree).map(|i| basis.left_out[i] * basis.points[i].powi(i32::try_from(power).unwrap())).sum();

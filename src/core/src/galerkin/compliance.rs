@@ -54,7 +54,7 @@ impl Lanes {
 
 /// Displacements (m) of all lanes per force (N), a column of three rows of lanes for each component of force.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Compliance {
+pub struct LaneCompliance {
     lanes: Lanes,
     /// Forces at point 0 and at points 1 … s: column 3(k·nodes + node) + component.
     columns: Vec<f64>,
@@ -62,7 +62,7 @@ pub struct Compliance {
     held: Vec<f64>,
 }
 
-impl Compliance {
+impl LaneCompliance {
     /// All zero.
     pub fn new(lanes: Lanes) -> Self {
         let stride = 3 * lanes.width();
@@ -98,7 +98,7 @@ impl Compliance {
     }
 
     /// Enter P_ik (rows × rows, m/N) of points i = 1 … s and k = 0 … s. After the last the columns that are held follow with
-    /// [`Compliance::hold`].
+    /// [`LaneCompliance::hold`].
     pub fn set(&mut self, i: usize, k: usize, block: &DMatrix<f64>) {
         let (lanes, stride) = (self.lanes, self.stride());
         for (force, column) in block.column_iter().enumerate() {

@@ -1,6 +1,6 @@
 //! Free flight over any length of time, in closed form.
 
-use super::level::Modes;
+use super::level::ContactModes;
 
 /// A mode of angular frequency ω and damping ratio ξ < 1 over one length of time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -44,16 +44,16 @@ impl Swing {
 
 /// Modes of one kind of sector over one length of time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Flight {
+pub struct FreeFlight {
     length: f64,
     /// ω (rad/s) and ξ.
     modes: Vec<[f64; 2]>,
     swings: Vec<Swing>,
 }
 
-impl Flight {
-    /// Of these modes; [`Flight::set_length`] comes before the first.
-    pub fn new(modes: &Modes) -> Self {
+impl FreeFlight {
+    /// Of these modes; [`FreeFlight::set_length`] comes before the first.
+    pub fn new(modes: &ContactModes) -> Self {
         let ratios = modes.frequencies.iter().zip(&modes.damping_ratios);
         let modes: Vec<[f64; 2]> = ratios.map(|(frequency, ratio)| [*frequency, *ratio]).collect();
         Self { length: 0.0, swings: vec![Swing::default(); modes.len()], modes }
@@ -83,13 +83,13 @@ impl Flight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::galerkin::response::Response;
+    use crate::galerkin::response::ModalResponse;
 
     /// Against the matrix exponential, and energy at long times, where that overflows.
     #[test]
     fn it_is_what_the_steps_do() {
         for (frequency, ratio) in [(4e3, 0.0), (5e3, 0.005), (3e3, 0.3), (8e2, 0.99), (0.0, 0.0)] {
-            let (swing, response) = (Swing::new(frequency, ratio, 7e-4), Response::new(frequency, ratio, 7e-4));
+            let (swing, response) = (Swing::new(frequency, ratio, 7e-4), ModalResponse::new(frequency, ratio, 7e-4));
             let scale: f64 = if frequency == 0.0 { 1.0 } else { frequency };
             for (of, (row, exact)) in swing.end.iter().zip([response.position, response.velocity]).enumerate() {
                 for (term, (value, exact)) in row.iter().zip(&exact[..2]).enumerate() {
@@ -105,7 +105,7 @@ mod tests {
             for length in [1e-3, 0.1, 100.0] {
                 let swing = Swing::new(frequency, ratio, length);
                 let ([mut q, mut v], mut flight) =
-                    ([[2e-6], [3e-3]], Flight { length, modes: Vec::new(), swings: vec![swing] });
+                    ([[2e-6], [3e-3]], FreeFlight { length, modes: Vec::new(), swings: vec![swing] });
                 let energy = |q: f64, v: f64| 0.5 * (v * v + (frequency * q).powi(2));
                 let before = energy(q[0], v[0]);
                 let loss = flight.take(&mut q, &mut v);

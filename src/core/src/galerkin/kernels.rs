@@ -102,7 +102,7 @@ impl Kernel for Withdraw<'_> {
 }
 
 /// Displacements of all lanes per λ of one, from those per force: column = Σ d_c Z_c, and closing = n·column.
-pub struct Column<'a> {
+pub struct ClosingColumn<'a> {
     pub(super) parts: [&'a [f64]; 3],
     pub(super) direction: [f64; 3],
     pub(super) normals: &'a [f64],
@@ -110,7 +110,7 @@ pub struct Column<'a> {
     pub(super) closing: &'a mut [f64],
 }
 
-impl Kernel for Column<'_> {
+impl Kernel for ClosingColumn<'_> {
     #[inline(always)]
     fn run(self) {
         let Self { parts: [x, y, z], direction: [a, b, c], normals, column, closing } = self;
@@ -185,7 +185,7 @@ mod tests {
             let (mut column, mut closing, mut to) = (vec![0.0; 3 * width], vec![0.0; width], vec![0.0; width]);
             let parts = [&parts[0][..], &parts[1][..], &parts[2][..]];
             let direction = [0.3, -1.1, 0.7];
-            instructions.run(Column {
+            instructions.run(ClosingColumn {
                 parts,
                 direction,
                 normals: &normals,

@@ -1,15 +1,15 @@
 //! Tables of the modes of one sector at one length of the step.
 
-use super::basis::{Basis, MOST, POINTS};
-use super::compliance::{Compliance, Lanes};
+use super::basis::{MOST, POINTS, TimeBasis};
+use super::compliance::{LaneCompliance, Lanes};
 use super::kernels::PADDED;
-use super::response::{Response, TERMS, by_points};
-use super::trial::Kind;
+use super::response::{ModalResponse, TERMS, by_points};
+use super::trial::ForceInterpolation;
 use nalgebra::DMatrix;
 
 /// Modes with inertia and residual flexibility of a sector, seen at its contact rows (three per contact node).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Modes {
+pub struct ContactModes {
     /// ω (rad/s).
     pub frequencies: Vec<f64>,
     /// ξ.
@@ -20,7 +20,7 @@ pub struct Modes {
     pub residual: DMatrix<f64>,
 }
 
-impl Modes {
+impl ContactModes {
     /// Number of modes.
     pub fn len(&self) -> usize {
         self.frequencies.len()
@@ -116,7 +116,7 @@ impl ModeSteps {
         rows.for_each(|row| row[to] = row[from]);
     }
 
-    fn set(&mut self, mode: usize, response: &Response, at: &[[f64; TERMS]; MOST]) {
+    fn set(&mut self, mode: usize, response: &ModalResponse, at: &[[f64; TERMS]; MOST]) {
         for (point, terms) in self.points.iter_mut().zip(at) {
             (point[0][mode], point[1][mode]) = (terms[0], terms[1]);
         }
@@ -140,19 +140,19 @@ pub struct Influence {
 
 /// Tables of one length of the step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Level {
+pub struct StepTables {
     /// h (s).
     pub step: f64,
     /// The same as a share of the span.
     pub share: f64,
     /// Points of the step.
-    pub basis: Basis,
+    pub basis: TimeBasis,
     /// Of all modes.
     pub modes: ModeSteps,
     /// Displacements at the points per force at the points, residual flexibility included.
-    pub compliance: Compliance,
+    pub compliance: LaneCompliance,
     /// Displacement at the end per force that is constant over the step, residual flexibility included.
-    pub constant: Compliance,
+    pub constant: LaneCompliance,
     /// Whether any mode is damped.
     pub damped: bool,
     /// Displacement of each mode at point i per force at point k, and at the end per constant force.
@@ -160,33 +160,33 @@ pub struct Level {
     block: DMatrix<f64>,
 }
 
-impl Level {
-    /// Room for tables of degree s; [`Level::set_step`] fills them.
-    pub fn new(modes: &Modes, degree: usize) -> Self {
+impl StepTables {
+    /// Room for tables of degree s; [`StepTables::set_step`] fills them.
+    pub fn new(modes: &ContactModes, degree: usize) -> Self {
         let nodes = modes.rows() / 3;
         Self {
             step: 0.0,
             share: 1.0,
             modes: ModeSteps::new(modes.len()),
-            compliance: Compliance::new(Lanes { points: degree, nodes }),
-            constant: Compliance::new(Lanes { points: 1, nodes }),
+            compliance: LaneCompliance::new(Lanes { points: degree, nodes }),
+            constant: LaneCompliance::new(Lanes { points: 1, nodes }),
             damped: false,
-            basis: Basis::new(degree),
+            basis: TimeBasis::new(degree),
             influence: vec![Influence::default(); modes.len()],
             block: DMatrix::zeros(modes.rows(), modes.rows()),
         }
     }
 
     /// What forces of a kind do.
-    pub fn compliance_of(&self, kind: Kind) -> &Compliance {
+    pub fn compliance_of(&self, kind: ForceInterpolation) -> &LaneCompliance {
         match kind {
-            Kind::Polynomial => &self.compliance,
-            Kind::Constant => &self.constant,
+            ForceInterpolation::Polynomial => &self.compliance,
+            ForceInterpolation::Constant => &self.constant,
         }
     }
 
     /// Fill the tables for step h (s). Does not allocate.
-    pub fn set_step(&mut self, modes: &Modes, step: f64) {
+    pub fn set_step(&mut self, modes: &ContactModes, step: f64) {
         let Self { basis, influence, block, .. } = self;
         self.step = step;
         self.damped = modes.damping_ratios.iter().any(|ratio| *ratio > 0.0);
@@ -196,7 +196,7 @@ impl Level {
                 self.modes.copy(twin, mode);
                 continue;
             }
-            let response = Response::new(modes.frequencies[mode], modes.damping_ratios[mode], step);
+            let response = ModalResponse::new(modes.frequencies[mode], modes.damping_ratios[mode], step);
             let at = response.at_points(basis);
             let points = at.map(|terms| by_points(&terms, basis));
             influence[mode] = Influence { points, constant: response.position[2] };
@@ -229,7 +229,7 @@ mod tests {
         let (frequency, mut threes) = (1e4, 0);
         for place in 1..=84 {
             let step = 0.1 * f64::from(place) / frequency;
-            let of = |flexibility: f64| Modes {
+            let of = |flexibility: f64| ContactModes {
                 frequencies: vec![frequency],
                 damping_ratios: vec![0.0],
                 shapes: DMatrix::from_column_slice(3, 1, &[1.0, 0.0, 0.0]),
@@ -243,7 +243,7 @@ mod tests {
             let modes = of(high);
             threes += usize::from(high > 1e-6 * step * step);
             for share in [0.5, 0.6, 0.75, 0.9, 1.0] {
-                let mut level = Level::new(&modes, 3);
+                let mut level = StepTables::new(&modes, 3);
                 level.set_step(&modes, share * step);
                 for set in 1..8_usize {
                     let members: Vec<usize> = (0..3).filter(|lane| set >> lane & 1 == 1).collect();

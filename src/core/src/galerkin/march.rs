@@ -1,7 +1,7 @@
 //! A span of time in steps as long as the tolerance and the energy allow, of one sector or of all that step together.
 
-use super::sector::{Demand, Effort, HALVINGS, Stopped};
-use super::trial::{Kind, Verdict};
+use super::sector::{Effort, HALVINGS, StepGoal, Stopped};
+use super::trial::{ForceInterpolation, TrialResult};
 
 /// Below this share of the tolerance the next step is twice as long.
 const LENGTHEN: f64 = 1.0 / 32.0;
@@ -14,7 +14,7 @@ const SHORTEST_LOOK: f64 = 2.5e-6;
 
 /// A step within a span: its level, and where it begins and how long it is as shares of the span.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
+pub struct SpanStep {
     /// How often the span is halved.
     pub level: usize,
     /// Start.
@@ -24,7 +24,7 @@ pub struct Step {
 }
 
 /// What is marched.
-pub trait Marched {
+pub trait AdaptiveStepper {
     /// Energy left by contacts that opened and closed (J), and level of the next step; both go on from step to step.
     fn pace(&mut self) -> (&mut f64, &mut usize);
 
@@ -38,20 +38,20 @@ pub trait Marched {
     fn count(&self) -> u64;
 
     /// Take the step without a trial, if nothing can touch on the way.
-    fn fly(&mut self, step: Step) -> bool;
+    fn fly(&mut self, step: SpanStep) -> bool;
 
     /// Try a step.
-    fn attempt(&mut self, step: Step, kind: Kind) -> Verdict;
+    fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult;
 
     /// Take the step that was tried last; what contacts leave to those to come (J).
-    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64;
+    fn take(&mut self, step: SpanStep, kind: ForceInterpolation, verdict: &TrialResult) -> f64;
 }
 
 /// March over a span.
 ///
 /// # Errors
 /// [`Stopped`]; the state is then where the last step taken left it.
-pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Result<(), Stopped> {
+pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Effort) -> Result<(), Stopped> {
     const WHOLE: u64 = 1 << HALVINGS;
     let (count, mut done) = (body.count(), 0_u64);
     while done < WHOLE {
@@ -62,7 +62,7 @@ pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Re
             return Err(Stopped::Exhausted);
         }
         let units = WHOLE >> level;
-        let step = Step { level, from: share(done, WHOLE), length: share(units, WHOLE) };
+        let step = SpanStep { level, from: share(done, WHOLE), length: share(units, WHOLE) };
         if body.fly(step) {
             (effort.steps, effort.flights, done) = (effort.steps + count, effort.flights + count, done + units);
             *body.pace().1 -= usize::from(level > 0 && done.is_multiple_of(2 * units));
@@ -70,7 +70,7 @@ pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Re
         }
         let (verdict, kind) = attempt(body, step, effort);
         let refused = !verdict.solved
-            || (kind == Kind::Polynomial
+            || (kind == ForceInterpolation::Polynomial
                 && (verdict.error > demand.tolerance
                     || (verdict.near && body.length(level) > SHORTEST_LOOK)
                     || (verdict.switches && verdict.switched > *body.pace().0)
@@ -88,7 +88,7 @@ pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Re
         *body.pace().0 += left;
         (effort.steps, done) = (effort.steps + count, done + units);
         let even = done.is_multiple_of(2 * units);
-        if level > 0 && even && kind == Kind::Polynomial && verdict.error < LENGTHEN * demand.tolerance {
+        if level > 0 && even && kind == ForceInterpolation::Polynomial && verdict.error < LENGTHEN * demand.tolerance {
             *body.pace().1 -= 1;
         }
     }
@@ -96,29 +96,29 @@ pub fn march(body: &mut impl Marched, demand: Demand, effort: &mut Effort) -> Re
 }
 
 /// Whether the bank would hold more than it may with `paid` (J) paid in. Where there was no energy yet, nobody knows what is much.
-fn overflows(body: &mut impl Marched, paid: f64) -> bool {
+fn overflows(body: &mut impl AdaptiveStepper, paid: f64) -> bool {
     let largest = body.largest_energy();
     largest > 0.0 && *body.pace().0 + paid > FULL * largest
 }
 
 /// Try one step; the shortest with a constant force where a polynomial cannot be taken.
-fn attempt(body: &mut impl Marched, step: Step, effort: &mut Effort) -> (Verdict, Kind) {
+fn attempt(body: &mut impl AdaptiveStepper, step: SpanStep, effort: &mut Effort) -> (TrialResult, ForceInterpolation) {
     let count = body.count();
-    let mut run = |body: &mut _, kind: Kind| {
-        let verdict = Marched::attempt(body, step, kind);
+    let mut run = |body: &mut _, kind: ForceInterpolation| {
+        let verdict = AdaptiveStepper::attempt(body, step, kind);
         effort.trials += count;
         effort.factorisations += verdict.factorisations as u64;
         effort.unsolved += u64::from(!verdict.solved);
         verdict
     };
-    let verdict = run(body, Kind::Polynomial);
+    let verdict = run(body, ForceInterpolation::Polynomial);
     let affordable = verdict.solved && !(verdict.switches && verdict.switched > *body.pace().0);
     if step.level < HALVINGS || affordable {
-        return (verdict, Kind::Polynomial);
+        return (verdict, ForceInterpolation::Polynomial);
     }
-    let verdict = run(body, Kind::Constant);
+    let verdict = run(body, ForceInterpolation::Constant);
     effort.constant += count;
-    (verdict, Kind::Constant)
+    (verdict, ForceInterpolation::Constant)
 }
 
 /// Small counts as a share.

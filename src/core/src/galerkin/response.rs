@@ -1,6 +1,6 @@
 //! What one mode does over a step under a force that is a polynomial in time, exactly.
 
-use super::basis::{Basis, MOST, POINTS, real};
+use super::basis::{MOST, POINTS, TimeBasis, real};
 use nalgebra::SMatrix;
 
 /// Modal state and force: q, q̇, and the coefficients p_a of θᵃ of the modal force.
@@ -8,7 +8,7 @@ pub const TERMS: usize = 2 + MOST;
 
 /// q̈ + 2ξωq̇ + ω²q = Σ p_a θᵃ over one step: linear in (q, q̇, p₀, p₁, p₂) at its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Response {
+pub struct ModalResponse {
     /// q at the end.
     pub position: [f64; TERMS],
     /// q̇ at the end.
@@ -28,7 +28,7 @@ const DOUBLE: usize = INTEGRAL + 1;
 const STATES: usize = DOUBLE + 1;
 const BOTH: usize = 2 * TERMS;
 
-impl Response {
+impl ModalResponse {
     /// For angular frequency ω (rad/s; 0: rigid), damping ratio ξ and step h (s).
     ///
     /// The state is (q, q̇h/κ, p and its derivatives by θ, ∫q, ∫∫q) with κ = max(ωh, 1), and its flow a matrix
@@ -65,7 +65,7 @@ impl Response {
 
     /// Coefficients of q at point i = 1 … s of the polynomial of degree s that keeps both ends and the moments up to s − 2: those of
     /// (q, q̇, p_a).
-    pub fn at_points(&self, basis: &Basis) -> [[f64; TERMS]; MOST] {
+    pub fn at_points(&self, basis: &TimeBasis) -> [[f64; TERMS]; MOST] {
         let s = basis.degree;
         let moment = |j: usize, i: usize| -> f64 {
             basis.monomials[i].iter().enumerate().map(|(a, c)| c / real(a + j + 1)).sum()
@@ -105,7 +105,7 @@ fn exponential<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N
 }
 
 /// Those of the forces at the points in place of the coefficients of θᵃ.
-pub fn by_points(terms: &[f64; TERMS], basis: &Basis) -> [f64; POINTS] {
+pub fn by_points(terms: &[f64; TERMS], basis: &TimeBasis) -> [f64; POINTS] {
     std::array::from_fn(|k| (0..basis.degree).map(|a| terms[2 + a] * basis.projection[a][k]).sum())
 }
 
@@ -162,7 +162,7 @@ mod tests {
     fn the_response_is_that_of_the_equation() {
         for (frequency, ratio) in [(0.0, 0.0), (1.0, 0.02), (3e4, 0.0), (4e4, 0.01), (9e5, 0.005)] {
             let step = 4e-5;
-            let response = Response::new(frequency, ratio, step);
+            let response = ModalResponse::new(frequency, ratio, step);
             let start = [1e-4, -0.3, 2e3, -3e3, 1.5e3];
             let (expected, lost) = marched(frequency, ratio, step, start);
             let of = |row: &[f64; TERMS]| row.iter().zip(start).map(|(a, b)| a * b).sum::<f64>();
@@ -183,10 +183,10 @@ mod tests {
     fn energy_is_what_the_force_puts_in_less_the_loss() {
         let mut worst: f64 = 0.0;
         for degree in 1..=MOST {
-            let basis = Basis::new(degree);
+            let basis = TimeBasis::new(degree);
             for (frequency, ratio) in [(0.0, 0.0), (2.0, 0.1), (8e3, 0.01), (6e4, 0.0), (8e5, 0.004)] {
                 let step = 8e-5;
-                let response = Response::new(frequency, ratio, step);
+                let response = ModalResponse::new(frequency, ratio, step);
                 let forces = [500.0, -200.0, 900.0, 100.0];
                 let p: [f64; MOST] =
                     std::array::from_fn(|a| (0..=degree).map(|i| basis.projection[a][i] * forces[i]).sum());

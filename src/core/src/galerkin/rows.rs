@@ -1,14 +1,14 @@
 //! Shapes of the modes at the contact rows, laid out for sums over modes and over rows.
 
 use super::kernels::{Combine, PADDED};
-use super::level::{Level, Modes};
+use super::level::{ContactModes, StepTables};
 use super::state::SectorState;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 use nalgebra::DMatrix;
 
 /// What all lengths of the step share.
 #[derive(Debug, Clone)]
-pub struct Rows {
+pub struct ContactRows {
     /// Mode by mode: all nodes of the first component, of the second, of the third, filled up with zeros.
     by_mode: Vec<f64>,
     /// The same without signs.
@@ -68,9 +68,9 @@ impl Kernel for Weigh<'_> {
     }
 }
 
-impl Rows {
+impl ContactRows {
     /// Of the modes of a sector.
-    pub fn new(modes: &Modes) -> Self {
+    pub fn new(modes: &ContactModes) -> Self {
         let (nodes, count) = (modes.rows() / 3, modes.len());
         let stride = modes.rows().next_multiple_of(PADDED);
         let mut by_mode = vec![0.0; stride * count];
@@ -103,13 +103,13 @@ impl Rows {
         &self.residual
     }
 
-    /// See [`Modes::error_form`].
+    /// See [`ContactModes::error_form`].
     pub fn error_form(&self) -> &DMatrix<f64> {
         &self.error_form
     }
 
     /// For the first `points` points of the step, or for its end alone, the sums Σ φ (A q + B q̇).
-    pub fn free(&self, level: &Level, state: &SectorState, points: std::ops::Range<usize>, sums: &mut Sums<3>) {
+    pub fn free(&self, level: &StepTables, state: &SectorState, points: std::ops::Range<usize>, sums: &mut Sums<3>) {
         for (point, to) in points.clone().zip(&mut sums.coefficients) {
             let [a, b] = &level.modes.points[point];
             self.instructions.run(Weigh { tables: [a, b], state: [&state.position, &state.velocity], to });
@@ -156,7 +156,7 @@ impl Rows {
     }
 
     /// Velocities of the rows at the end of a step without forces (m/s).
-    pub fn end_velocities(&self, level: &Level, state: &SectorState, sums: &mut Sums<1>) {
+    pub fn end_velocities(&self, level: &StepTables, state: &SectorState, sums: &mut Sums<1>) {
         let [a, b, ..] = &level.modes.end[1];
         let ([to], [one]) = (&mut sums.coefficients, &mut sums.rows);
         self.instructions.run(Weigh { tables: [a, b], state: [&state.position, &state.velocity], to });
@@ -178,19 +178,19 @@ impl Rows {
 mod tests {
     use super::*;
     use crate::galerkin::advance::Advance;
-    use tiprub_test_models::Random;
+    use tiprub_test_models::SeededRandom;
 
     /// Decaying vibration stays within reach, and without damping goes there.
     #[test]
     fn free_motion_goes_as_far_as_its_reach_and_no_farther() {
-        let mut random = Random(6);
+        let mut random = SeededRandom(6);
         for case in 0..200 {
             let ratio = random.of(&[0.0, 0.02, 0.3, 0.7]);
             let count = 1 + random.below(3);
             let frequencies: Vec<f64> = (0..count).map(|_| random.scale(1e3, 1e4)).collect();
             let (damping_ratios, shapes) = (vec![ratio; count], random.matrix(3, count));
-            let modes = Modes { frequencies, damping_ratios, shapes, residual: DMatrix::zeros(3, 3) };
-            let (rows, mut level) = (Rows::new(&modes), Level::new(&modes, 1));
+            let modes = ContactModes { frequencies, damping_ratios, shapes, residual: DMatrix::zeros(3, 3) };
+            let (rows, mut level) = (ContactRows::new(&modes), StepTables::new(&modes, 1));
             level.set_step(&modes, 5e-6);
             let mut state = SectorState::new(count, 1);
             state.position.iter_mut().for_each(|q| *q = random.signed());

@@ -2,11 +2,11 @@
 
 use super::advance::Advance;
 use super::basis::MOST;
-use super::level::{Level, Modes};
-use super::march::{Marched, Step, march};
-use super::rows::Rows;
+use super::level::{ContactModes, StepTables};
+use super::march::{AdaptiveStepper, SpanStep, march};
+use super::rows::ContactRows;
 use super::state::SectorState;
-use super::trial::{Kind, Obstacle, Trial, Verdict};
+use super::trial::{ForceInterpolation, Obstacle, Trial, TrialResult};
 use crate::persist::persist_fields;
 
 /// Halvings of the span that a step may have.
@@ -16,25 +16,25 @@ pub const HALVINGS: usize = 10;
 #[derive(Debug, Clone)]
 pub struct Tables {
     /// What all levels share.
-    pub rows: Rows,
+    pub rows: ContactRows,
     /// Span, half of it, a quarter, …
-    pub levels: Vec<Level>,
+    pub levels: Vec<StepTables>,
     /// The same of a higher degree, for steps in which no contact changes that may stick; empty without sticking.
-    pub steady: Vec<Level>,
-    modes: Modes,
+    pub steady: Vec<StepTables>,
+    modes: ContactModes,
 }
 
 impl Tables {
     /// For spans up to `longest` (s); [`Tables::set_span`] comes before the first.
-    pub fn new(modes: Modes, longest: f64) -> Self {
+    pub fn new(modes: ContactModes, longest: f64) -> Self {
         let degree = modes.degree_up_to(longest);
         Self::of_degree(modes, degree)
     }
 
     /// The same of a degree that is known to do.
-    pub fn of_degree(modes: Modes, degree: usize) -> Self {
-        let levels = (0..=HALVINGS).map(|_| Level::new(&modes, degree)).collect();
-        Self { rows: Rows::new(&modes), levels, steady: Vec::new(), modes }
+    pub fn of_degree(modes: ContactModes, degree: usize) -> Self {
+        let levels = (0..=HALVINGS).map(|_| StepTables::new(&modes, degree)).collect();
+        Self { rows: ContactRows::new(&modes), levels, steady: Vec::new(), modes }
     }
 
     /// Kinetic and strain energy of a sector (J).
@@ -46,13 +46,16 @@ impl Tables {
     /// The same with steps of degree `degree` while no contact changes.
     #[must_use]
     pub fn steady(mut self, degree: usize) -> Self {
-        self.steady = (0..=HALVINGS).map(|_| Level::new(&self.modes, degree)).collect();
+        self.steady = (0..=HALVINGS).map(|_| StepTables::new(&self.modes, degree)).collect();
         self
     }
 
     /// Tables of a level, for so many points.
-    pub fn of_points(&self, level: usize, kind: Kind, points: usize) -> &Level {
-        let steady = self.steady.get(level).filter(|level| kind == Kind::Polynomial && level.basis.degree == points);
+    pub fn of_points(&self, level: usize, kind: ForceInterpolation, points: usize) -> &StepTables {
+        let steady = self
+            .steady
+            .get(level)
+            .filter(|level| kind == ForceInterpolation::Polynomial && level.basis.degree == points);
         steady.unwrap_or(&self.levels[level])
     }
 
@@ -70,7 +73,7 @@ impl Tables {
     }
 }
 
-impl Modes {
+impl ContactModes {
     /// Largest degree that does for spans up to `longest` (s). They may be shorter: all lengths down to a thousandth of the shortest
     /// step are looked at.
     pub fn degree_up_to(&self, longest: f64) -> usize {
@@ -119,7 +122,7 @@ impl Effort {
 
 /// How exactly a sector is marched.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Demand {
+pub struct StepGoal {
     /// Error of a step in displacements (m).
     pub tolerance: f64,
     /// Gaps of contacts that count as closed (m).
@@ -130,11 +133,11 @@ pub struct Demand {
 
 /// A step that is taken.
 #[derive(Debug)]
-pub struct Taken<'a> {
+pub struct AcceptedStep<'a> {
     /// Tables of its length.
-    pub level: &'a Level,
+    pub level: &'a StepTables,
     /// Kind of its force.
-    pub kind: Kind,
+    pub kind: ForceInterpolation,
     /// Forces, gaps and displacements at its points.
     pub trial: &'a Trial,
     /// Damping loss (J).
@@ -146,7 +149,7 @@ pub struct Taken<'a> {
 /// What is told of a span while it is marched.
 pub trait Witness: Obstacle {
     /// A step of `length` from `from` (shares of the span) is about to be tried, with forces at the points of `level`.
-    fn go(&mut self, from: f64, length: f64, level: &Level, kind: Kind);
+    fn go(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation);
 
     /// Whether nodes that stay within `reach` (m, three per node) of where they rest cannot touch over a step of `length` from `from`
     /// (shares of the span).
@@ -158,13 +161,13 @@ pub trait Witness: Obstacle {
     }
 
     /// The same step is about to be taken, with these gaps and displacements at its points.
-    fn passed(&mut self, _level: &Level, _trial: &Trial) {}
+    fn passed(&mut self, _level: &StepTables, _trial: &Trial) {}
 
     /// A step has been taken in which nothing was in reach; its damping loss (J).
     fn flew(&mut self, damping_loss: f64);
 
     /// The step has been taken.
-    fn took(&mut self, step: &Taken);
+    fn took(&mut self, step: &AcceptedStep);
 }
 
 /// Why a span is not marched to its end.
@@ -178,12 +181,12 @@ pub enum Stopped {
 
 /// Marches sectors over spans, one after the other; allocates only when made.
 #[derive(Debug, Clone)]
-pub struct Marcher {
+pub struct SectorIntegrator {
     trial: Trial,
     advance: Advance,
 }
 
-impl Marcher {
+impl SectorIntegrator {
     /// Room for the modes and contact nodes of one sector.
     pub fn new(modes: usize, nodes: usize) -> Self {
         Self { trial: Trial::new(modes, nodes), advance: Advance::new(modes, nodes) }
@@ -221,24 +224,24 @@ impl Marcher {
         tables: &Tables,
         state: &mut SectorState,
         witness: &mut impl Witness,
-        demand: Demand,
+        demand: StepGoal,
         effort: &mut Effort,
     ) -> Result<(), Stopped> {
         self.trial.forget();
-        march(&mut Alone { marcher: self, tables, state, witness, demand }, demand, effort)
+        march(&mut SingleSector { marcher: self, tables, state, witness, demand }, demand, effort)
     }
 }
 
 /// One sector that steps by itself.
-struct Alone<'a, W> {
-    marcher: &'a mut Marcher,
+struct SingleSector<'a, W> {
+    marcher: &'a mut SectorIntegrator,
     tables: &'a Tables,
     state: &'a mut SectorState,
     witness: &'a mut W,
-    demand: Demand,
+    demand: StepGoal,
 }
 
-impl<W: Witness> Marched for Alone<'_, W> {
+impl<W: Witness> AdaptiveStepper for SingleSector<'_, W> {
     fn pace(&mut self) -> (&mut f64, &mut usize) {
         (&mut self.state.bank, &mut self.state.level)
     }
@@ -256,9 +259,14 @@ impl<W: Witness> Marched for Alone<'_, W> {
         1
     }
 
-    fn fly(&mut self, step: Step) -> bool {
-        let Self { marcher: Marcher { trial, advance }, tables, state, witness, demand: Demand { tolerance, .. } } =
-            self;
+    fn fly(&mut self, step: SpanStep) -> bool {
+        let Self {
+            marcher: SectorIntegrator { trial, advance },
+            tables,
+            state,
+            witness,
+            demand: StepGoal { tolerance, .. },
+        } = self;
         if state.multipliers.iter().any(|value| *value != 0.0)
             || !witness.is_clear(step.from, step.length, trial.reach(&tables.rows, state))
         {
@@ -266,7 +274,7 @@ impl<W: Witness> Marched for Alone<'_, W> {
         }
         let table = &tables.levels[step.level];
         if witness.may_come_closer(step.from, step.length, trial.reach(&tables.rows, state)) {
-            witness.go(step.from, step.length, table, Kind::Polynomial);
+            witness.go(step.from, step.length, table, ForceInterpolation::Polynomial);
             trial.glide(table, &tables.rows, state, *witness);
             if trial.find_minima(&table.basis, true, *tolerance) {
                 trial.follow(tables, table, step.level, state, advance);
@@ -279,8 +287,8 @@ impl<W: Witness> Marched for Alone<'_, W> {
         true
     }
 
-    fn attempt(&mut self, step: Step, kind: Kind) -> Verdict {
-        if let Some(table) = self.tables.steady.get(step.level).filter(|_| kind == Kind::Polynomial) {
+    fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
+        if let Some(table) = self.tables.steady.get(step.level).filter(|_| kind == ForceInterpolation::Polynomial) {
             self.witness.go(step.from, step.length, table, kind);
             let (trial, precision) = (&mut self.marcher.trial, self.demand.precision);
             let verdict = trial.run_steady(table, &self.tables.rows, self.state, self.witness, precision);
@@ -293,23 +301,27 @@ impl<W: Witness> Marched for Alone<'_, W> {
         self.marcher.trial.run((table, kind), &self.tables.rows, self.state, self.witness, self.demand.precision)
     }
 
-    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
-        let Self { marcher, tables, state, witness, demand: Demand { tolerance, .. } } = self;
+    fn take(&mut self, step: SpanStep, kind: ForceInterpolation, verdict: &TrialResult) -> f64 {
+        let Self { marcher, tables, state, witness, demand: StepGoal { tolerance, .. } } = self;
         let level = tables.of_points(step.level, kind, marcher.trial.points());
         if marcher.trial.find_minima(&level.basis, verdict.resolves_motion(kind, *tolerance), *tolerance) {
-            let Marcher { trial, advance } = &mut **marcher;
+            let SectorIntegrator { trial, advance } = &mut **marcher;
             trial.follow(tables, level, step.level, state, advance);
         }
-        let dropped = if kind == Kind::Constant { marcher.trial.dropped(tables.rows.residual(), state) } else { 0.0 };
+        let dropped = if kind == ForceInterpolation::Constant {
+            marcher.trial.dropped(tables.rows.residual(), state)
+        } else {
+            0.0
+        };
         let (trial, basis) = (&marcher.trial, &level.basis);
         let damping_loss =
             marcher.advance.under((level, &tables.rows), state, |node| trial.polynomial(basis, kind, node));
         let left = match kind {
-            Kind::Polynomial if verdict.switches => -verdict.switched,
-            Kind::Polynomial => 0.0,
-            Kind::Constant => dropped + trial.closed(),
+            ForceInterpolation::Polynomial if verdict.switches => -verdict.switched,
+            ForceInterpolation::Polynomial => 0.0,
+            ForceInterpolation::Constant => dropped + trial.closed(),
         };
-        witness.took(&Taken { level, kind, trial, damping_loss, dropped });
+        witness.took(&AcceptedStep { level, kind, trial, damping_loss, dropped });
         marcher.trial.leave(state);
         left
     }

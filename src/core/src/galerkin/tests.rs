@@ -1,15 +1,15 @@
 //! Sectors against a wall that moves: energy, order, tolerance.
 
-use super::level::{Level, Modes};
-use super::sector::{Demand, Effort, Marcher, Tables, Taken, Witness};
+use super::level::{ContactModes, StepTables};
+use super::sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness};
 use super::state::SectorState;
-use super::trial::{Kind, Obstacle, Sliding};
+use super::trial::{ForceInterpolation, Obstacle, SlidingState};
 use nalgebra::DMatrix;
 
 /// Numbers between −1 and 1.
-struct Random(u64);
+struct RandomNumbers(u64);
 
-impl Random {
+impl RandomNumbers {
     fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         f64::from(u32::try_from(self.0 >> 33).unwrap()) / f64::from(1_u32 << 30) - 1.0
@@ -17,7 +17,7 @@ impl Random {
 }
 
 /// Modes from some hundred to some 10⁵ rad/s and what as many beyond leave.
-fn modes(count: usize, nodes: usize, damping: f64, random: &mut Random) -> Modes {
+fn modes(count: usize, nodes: usize, damping: f64, random: &mut RandomNumbers) -> ContactModes {
     let all = 2 * count;
     let shapes = DMatrix::from_fn(3 * nodes, all, |_, _| 3.0 * random.next());
     let frequency = |mode: usize| 900.0 * (1.0 + f64::from(u32::try_from(mode).unwrap()).powf(1.5));
@@ -26,7 +26,7 @@ fn modes(count: usize, nodes: usize, damping: f64, random: &mut Random) -> Modes
         residual += shapes.column(mode) * shapes.column(mode).transpose() / frequency(mode).powi(2);
     }
     residual += DMatrix::identity(3 * nodes, 3 * nodes) * 2e-9;
-    Modes {
+    ContactModes {
         frequencies: (0..count).map(frequency).collect(),
         damping_ratios: vec![damping; count],
         shapes: shapes.columns(0, count).into_owned(),
@@ -35,7 +35,7 @@ fn modes(count: usize, nodes: usize, damping: f64, random: &mut Random) -> Modes
 }
 
 /// A plane across x that swings, along which it slides in y.
-struct Wall {
+struct MovingWall {
     clearance: f64,
     amplitude: f64,
     frequency: f64,
@@ -52,7 +52,7 @@ struct Wall {
     switches: u64,
 }
 
-impl Wall {
+impl MovingWall {
     fn new(clearance: f64, amplitude: f64, friction: f64) -> Self {
         Self {
             clearance,
@@ -76,22 +76,22 @@ impl Wall {
     }
 }
 
-impl Obstacle for Wall {
+impl Obstacle for MovingWall {
     fn gap(&mut self, _: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         (self.place(self.times[point]) - moved[0], [-1.0, 0.0, 0.0])
     }
 
-    fn direction(&mut self, _: usize, _: usize, &Sliding { normal, .. }: &Sliding) -> [f64; 3] {
+    fn direction(&mut self, _: usize, _: usize, &SlidingState { normal, .. }: &SlidingState) -> [f64; 3] {
         [normal[0], -self.friction, 0.0]
     }
 }
 
-impl Witness for Wall {
-    fn go(&mut self, from: f64, length: f64, level: &Level, kind: Kind) {
+impl Witness for MovingWall {
+    fn go(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
         for (time, point) in self.times.iter_mut().zip(level.basis.points) {
             *time = self.start + self.span * (from + length * point);
         }
-        if kind == Kind::Constant {
+        if kind == ForceInterpolation::Constant {
             self.times[1] = self.start + self.span * (from + length);
         }
     }
@@ -106,7 +106,7 @@ impl Witness for Wall {
         self.damping += damping_loss;
     }
 
-    fn took(&mut self, step: &Taken) {
+    fn took(&mut self, step: &AcceptedStep) {
         let (trial, basis) = (step.trial, &step.level.basis);
         self.damping += step.damping_loss;
         self.dropped += step.dropped;
@@ -117,7 +117,7 @@ impl Witness for Wall {
                 if (0..=trial.points()).all(|point| force(point) == 0.0) {
                     continue;
                 }
-                if step.kind == Kind::Constant {
+                if step.kind == ForceInterpolation::Constant {
                     self.work += force(1) * (moved(1) - moved(0));
                     continue;
                 }
@@ -131,7 +131,7 @@ impl Witness for Wall {
             self.switches += u64::from(pushes.iter().any(|one| *one) && !pushes.iter().all(|one| *one));
             for i in 0..=trial.points() {
                 self.lowest = self.lowest.min(trial.gap(i, node));
-                if step.kind == Kind::Polynomial {
+                if step.kind == ForceInterpolation::Polynomial {
                     self.impulse += basis.weights[i] * trial.multiplier(i, node) * step.level.step;
                 }
             }
@@ -139,10 +139,10 @@ impl Witness for Wall {
     }
 }
 
-struct Run {
+struct TestRun {
     displacements: Vec<f64>,
     effort: Effort,
-    wall: Wall,
+    wall: MovingWall,
     /// Largest residual of the ledger, relative to the largest energy.
     residual: f64,
     /// Energy at the start, at the end, and the most at the end of any span (J).
@@ -151,11 +151,11 @@ struct Run {
     most: f64,
 }
 
-fn run(modes: &Modes, mut wall: Wall, span: f64, spans: usize, tolerance: f64, speed: f64) -> Run {
+fn run(modes: &ContactModes, mut wall: MovingWall, span: f64, spans: usize, tolerance: f64, speed: f64) -> TestRun {
     let nodes = modes.rows() / 3;
     let mut tables = Tables::new(modes.clone(), span);
     tables.set_span(span);
-    let (mut state, mut marcher) = (SectorState::new(modes.len(), nodes), Marcher::new(modes.len(), nodes));
+    let (mut state, mut marcher) = (SectorState::new(modes.len(), nodes), SectorIntegrator::new(modes.len(), nodes));
     for (mode, v) in state.velocity.iter_mut().enumerate() {
         *v = speed / f64::from(u32::try_from(mode + 1).unwrap());
     }
@@ -163,7 +163,7 @@ fn run(modes: &Modes, mut wall: Wall, span: f64, spans: usize, tolerance: f64, s
     let sum = |(kinetic, strain): (f64, f64)| kinetic + strain;
     let start = sum(state.energies(&modes.frequencies, &modes.residual));
     let (mut effort, mut displacements, mut residual, mut most) = (Effort::default(), Vec::new(), 0.0_f64, start);
-    let demand = Demand { tolerance, precision: 1e-15, most: u64::MAX };
+    let demand = StepGoal { tolerance, precision: 1e-15, most: u64::MAX };
     let mut energy = start;
     for n in 0..spans {
         (wall.start, wall.span) = (span * f64::from(u32::try_from(n).unwrap()), span);
@@ -176,7 +176,7 @@ fn run(modes: &Modes, mut wall: Wall, span: f64, spans: usize, tolerance: f64, s
             displacements.push(of + (modes.residual.row(row) * nalgebra::DVector::from_column_slice(&state.forces))[0]);
         }
     }
-    Run { displacements, effort, wall, residual, start, energy, most }
+    TestRun { displacements, effort, wall, residual, start, energy, most }
 }
 
 fn apart(a: &[f64], b: &[f64]) -> f64 {
@@ -187,10 +187,10 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 
 #[test]
 fn energy_is_work_less_losses_with_friction_damping_and_a_wall_that_moves() {
-    let mut random = Random(3);
+    let mut random = RandomNumbers(3);
     for (friction, damping) in [(0.0, 0.0), (0.15, 0.0), (0.3, 0.01)] {
         let modes = modes(12, 2, damping, &mut random);
-        let found = run(&modes, Wall::new(2e-4, 1.5e-4, friction), 4e-5, 500, 2e-7, 0.3);
+        let found = run(&modes, MovingWall::new(2e-4, 1.5e-4, friction), 4e-5, 500, 2e-7, 0.3);
         println!(
             "µ {friction}, ξ {damping}: residual {:.1e}, switches {}, {:?}",
             found.residual, found.wall.switches, found.effort
@@ -202,13 +202,13 @@ fn energy_is_work_less_losses_with_friction_damping_and_a_wall_that_moves() {
 /// Statistics: single impacts may be missed by more.
 #[test]
 fn errors_are_those_asked_for() {
-    let mut random = Random(1234);
+    let mut random = RandomNumbers(1234);
     let mut ratios: [Vec<f64>; 3] = Default::default();
     for _ in 0..40 {
         let mut modes = modes(10, 2, 0.002, &mut random);
         modes.residual += DMatrix::identity(6, 6) * (2e-9 * (1.0 + random.next()));
         let amplitude = 2e-4 + 1e-4 * random.next().abs();
-        let of = |tolerance: f64| run(&modes, Wall::new(2e-4, amplitude, 0.1), 4e-5, 150, tolerance, 0.0);
+        let of = |tolerance: f64| run(&modes, MovingWall::new(2e-4, amplitude, 0.1), 4e-5, 150, tolerance, 0.0);
         let truth = of(2e-11);
         for (ratios, tolerance) in ratios.iter_mut().zip([2e-6, 2e-7, 2e-8]) {
             ratios.push(apart(&of(tolerance).displacements, &truth.displacements) / tolerance);
@@ -225,11 +225,11 @@ fn errors_are_those_asked_for() {
 /// nothing.
 #[test]
 fn an_undamped_sector_never_has_more_energy_than_it_was_given() {
-    let mut random = Random(11);
+    let mut random = RandomNumbers(11);
     let mut kept = [1e-3, 1e-6].map(|tolerance| -> Vec<f64> {
         let run = || {
             let modes = modes(10, 2, 0.0, &mut random);
-            let found = run(&modes, Wall::new(1e-4, 0.0, 0.0), 4e-5, 5000, tolerance, 0.5);
+            let found = run(&modes, MovingWall::new(1e-4, 0.0, 0.0), 4e-5, 5000, tolerance, 0.5);
             assert!(found.wall.switches > 100 && found.most <= found.start * (1.0 + 1e-11));
             assert!(found.energy < found.start);
             found.energy / found.start

@@ -2,12 +2,12 @@
 //! the points of that step.
 
 use super::advance::Advance;
-use super::basis::{Basis, MOST, POINTS};
-use super::level::{Influence, Modes};
-use super::march::Step;
+use super::basis::{MOST, POINTS, TimeBasis};
+use super::level::{ContactModes, Influence};
+use super::march::SpanStep;
 use super::sector::Tables;
 use super::state::SectorState;
-use super::trial::Kind;
+use super::trial::ForceInterpolation;
 use nalgebra::DMatrix;
 
 /// Modal coordinates of a body: those with inertia, those that follow forces at once, and places without a mode.
@@ -39,7 +39,7 @@ impl Coordinates {
     }
 
     /// Modes with inertia as they are seen at rows, with the flexibility of the others there. `shapes` (rows × coordinates, 1/√kg).
-    pub fn seen_at(&self, shapes: &DMatrix<f64>) -> Modes {
+    pub fn seen_at(&self, shapes: &DMatrix<f64>) -> ContactModes {
         let (mut dynamic, rows) = (shapes.clone(), shapes.nrows());
         let mut residual = DMatrix::zeros(rows, rows);
         for (mode, softness) in self.softness.iter().enumerate() {
@@ -49,7 +49,7 @@ impl Coordinates {
             }
             dynamic.column_mut(mode).scale_mut(self.inertia[mode]);
         }
-        Modes {
+        ContactModes {
             frequencies: self.frequencies.clone(),
             damping_ratios: self.damping_ratios.clone(),
             shapes: dynamic,
@@ -60,7 +60,7 @@ impl Coordinates {
 
 /// State, tables and scratch of a body; allocates only when made.
 #[derive(Debug, Clone)]
-pub struct Whole {
+pub struct SharedBody {
     coordinates: Coordinates,
     tables: Tables,
     state: SectorState,
@@ -81,8 +81,8 @@ pub struct Whole {
     load_work: f64,
 }
 
-impl Whole {
-    /// With polynomials of degree `degree`; [`Whole::set_span`] comes before the first step.
+impl SharedBody {
+    /// With polynomials of degree `degree`; [`SharedBody::set_span`] comes before the first step.
     pub fn new(coordinates: Coordinates, degree: usize) -> Self {
         let count = coordinates.inertia.len();
         let zeros = || vec![0.0; count];
@@ -178,20 +178,22 @@ impl Whole {
     }
 
     /// A step begins: coordinates without forces after its start, and with loads.
-    pub fn begin(&mut self, step: Step, kind: Kind) {
+    pub fn begin(&mut self, step: SpanStep, kind: ForceInterpolation) {
         self.find_loads(step, kind);
         let Self { coordinates, tables, state, free, loads_at, .. } = self;
         let table = &tables.levels[step.level];
         let degree = table.basis.degree;
-        let points = if kind == Kind::Constant { degree - 1..degree } else { 0..degree };
+        let points = if kind == ForceInterpolation::Constant { degree - 1..degree } else { 0..degree };
         for (point, (free, [a, b])) in free.iter_mut().zip(&table.modes.points[points]).enumerate() {
             let modes = a.iter().zip(b).zip(state.position.iter().zip(&state.velocity));
             free.iter_mut().zip(modes).for_each(|(free, ((a, b), (q, v)))| *free = a * q + b * v);
             for (mode, load) in loads_at[0].iter().enumerate() {
                 let influence = &table.influence[mode];
                 let pushed = match kind {
-                    Kind::Constant => influence.constant * load,
-                    Kind::Polynomial => (0..=degree).map(|k| influence.points[point][k] * loads_at[k][mode]).sum(),
+                    ForceInterpolation::Constant => influence.constant * load,
+                    ForceInterpolation::Polynomial => {
+                        (0..=degree).map(|k| influence.points[point][k] * loads_at[k][mode]).sum()
+                    }
                 };
                 free[mode] += coordinates.inertia[mode] * pushed;
             }
@@ -199,11 +201,11 @@ impl Whole {
     }
 
     /// Loads at the points of a step; under a constant force their mean.
-    fn find_loads(&mut self, step: Step, kind: Kind) {
+    fn find_loads(&mut self, step: SpanStep, kind: ForceInterpolation) {
         let Self { coordinates, tables, loads: [start, end], loads_at, .. } = self;
         let basis = &tables.levels[step.level].basis;
         for (point, loads) in loads_at[..basis.count()].iter_mut().enumerate() {
-            let within = if kind == Kind::Constant { 0.5 } else { basis.points[point] };
+            let within = if kind == ForceInterpolation::Constant { 0.5 } else { basis.points[point] };
             let theta = step.from + step.length * within;
             for (mode, load) in loads.iter_mut().enumerate() {
                 *load = coordinates.inertia[mode] * (start[mode] + theta * (end[mode] - start[mode]));
@@ -212,9 +214,9 @@ impl Whole {
     }
 
     /// Work of the loads over a step (J).
-    fn work_of_loads(&self, basis: &Basis, kind: Kind) -> f64 {
+    fn work_of_loads(&self, basis: &TimeBasis, kind: ForceInterpolation) -> f64 {
         let of = |mode: usize| -> f64 {
-            if kind == Kind::Constant {
+            if kind == ForceInterpolation::Constant {
                 return self.loads_at[0][mode] * (self.at[1][mode] - self.at[0][mode]);
             }
             let moved = |i: usize| (0..basis.count()).map(|k| basis.work[i][k] * self.at[k][mode]).sum::<f64>();
@@ -224,15 +226,15 @@ impl Whole {
     }
 
     /// Coordinates at the points under the forces set there.
-    pub fn push(&mut self, level: usize, kind: Kind) {
+    pub fn push(&mut self, level: usize, kind: ForceInterpolation) {
         let Self { coordinates, tables, forces, free, at, .. } = self;
         let table = &tables.levels[level];
-        let points = if kind == Kind::Constant { 1 } else { table.basis.degree };
+        let points = if kind == ForceInterpolation::Constant { 1 } else { table.basis.degree };
         for i in 1..=points {
             let (target, free) = (&mut at[i], &free[i - 1]);
             for (mode, target) in target.iter_mut().enumerate() {
                 let influence = &table.influence[mode];
-                let pushed = if kind == Kind::Constant {
+                let pushed = if kind == ForceInterpolation::Constant {
                     influence.constant * forces[1][mode]
                 } else {
                     (0..=points).map(|k| influence.points[i - 1][k] * forces[k][mode]).sum()
@@ -244,20 +246,20 @@ impl Whole {
     }
 
     /// The step is taken: the state goes to its end, whose forces become those of the start.
-    pub fn take(&mut self, level: usize, kind: Kind) {
+    pub fn take(&mut self, level: usize, kind: ForceInterpolation) {
         self.load_work += self.work_of_loads(&self.tables.levels[level].basis, kind);
         let Self { coordinates, tables, state, forces, polynomial, advance, loads_at, .. } = self;
         let table = &tables.levels[level];
         let basis = &table.basis;
-        let points = if kind == Kind::Constant { 1 } else { basis.degree };
+        let points = if kind == ForceInterpolation::Constant { 1 } else { basis.degree };
         for (a, polynomial) in polynomial.iter_mut().enumerate() {
             for (mode, value) in polynomial.iter_mut().enumerate() {
                 let all = |k: usize| forces[k][mode] + loads_at[k].get(mode).copied().unwrap_or(0.0);
                 *value = coordinates.inertia[mode]
                     * match kind {
-                        Kind::Constant if a == 0 => all(1),
-                        Kind::Constant => 0.0,
-                        Kind::Polynomial => (0..=points).map(|k| basis.projection[a][k] * all(k)).sum(),
+                        ForceInterpolation::Constant if a == 0 => all(1),
+                        ForceInterpolation::Constant => 0.0,
+                        ForceInterpolation::Polynomial => (0..=points).map(|k| basis.projection[a][k] * all(k)).sum(),
                     };
             }
         }
@@ -312,22 +314,22 @@ impl Whole {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tiprub_test_models::Random;
+    use tiprub_test_models::SeededRandom;
 
     /// Forces at the points do the work Σ p_i S_ik q_k on a body; kept as energy or lost to damping to round-off. And steps of any
     /// length go where those half as long go, if forces are polynomials.
     #[test]
     fn work_on_a_body_is_its_energy_and_what_damping_takes() {
-        let mut random = Random(11);
+        let mut random = SeededRandom(11);
         for case in 0..120 {
             let degree = 1 + case % MOST;
             let frequencies: Vec<f64> = (0..7).map(|_| random.scale(1e3, 3e5)).collect();
             let ratios: Vec<f64> = (0..7).map(|_| random.of(&[0.0, 0.01, 0.2])).collect();
-            let mut whole = Whole::new(Coordinates::new(&frequencies, &ratios, 5), degree).loaded();
+            let mut whole = SharedBody::new(Coordinates::new(&frequencies, &ratios, 5), degree).loaded();
             whole.set_span(4e-5);
             whole.state_mut()[0][..5].iter_mut().for_each(|q| *q = 1e-5 * random.signed());
             whole.state_mut()[1][..5].iter_mut().for_each(|v| *v = random.signed());
-            let energy = |whole: &Whole| -> f64 {
+            let energy = |whole: &SharedBody| -> f64 {
                 let (q, v) = (&whole.state.position, &whole.state.velocity);
                 let of = |m: usize| v[m] * v[m] + (frequencies[m] * q[m]).powi(2);
                 let held = |m: usize| whole.coordinates.softness[m] * whole.forces[0][m].powi(2);
@@ -335,13 +337,14 @@ mod tests {
             };
             for _ in 0..4 {
                 let level = random.below(4);
-                let kind = if random.below(4) == 0 { Kind::Constant } else { Kind::Polynomial };
+                let kind =
+                    if random.below(4) == 0 { ForceInterpolation::Constant } else { ForceInterpolation::Polynomial };
                 let before = energy(&whole);
                 whole.settle();
                 let [from, length] = [0.25, 0.5_f64.powi(i32::try_from(level).unwrap())];
                 whole.loads_mut().iter_mut().flatten().for_each(|load| *load = 1e4 * random.signed());
-                whole.begin(Step { level, from, length }, kind);
-                let points = if kind == Kind::Constant { 1 } else { degree };
+                whole.begin(SpanStep { level, from, length }, kind);
+                let points = if kind == ForceInterpolation::Constant { 1 } else { degree };
                 for point in 1..=points {
                     whole.forces_mut(point).iter_mut().for_each(|p| *p = 1e4 * random.signed());
                 }
@@ -352,15 +355,15 @@ mod tests {
                     for i in 0..=points {
                         for k in 0..=points {
                             let weight = match kind {
-                                Kind::Polynomial => basis.work[i][k],
-                                Kind::Constant if i == 1 => [-1.0, 1.0][k],
-                                Kind::Constant => 0.0,
+                                ForceInterpolation::Polynomial => basis.work[i][k],
+                                ForceInterpolation::Constant if i == 1 => [-1.0, 1.0][k],
+                                ForceInterpolation::Constant => 0.0,
                             };
                             work += whole.forces[i][m] * weight * whole.at(k)[m];
                         }
                     }
                 }
-                if kind == Kind::Constant {
+                if kind == ForceInterpolation::Constant {
                     work -= whole.dropped();
                 }
                 let end = whole.at(points).to_vec();

@@ -2,12 +2,12 @@
 
 /// Radial and tangential direction at an angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct PolarFrame {
     sine: f64,
     cosine: f64,
 }
 
-impl Frame {
+impl PolarFrame {
     /// That of a structure described in fixed directions.
     pub const FIXED: Self = Self { sine: 0.0, cosine: 1.0 };
 

@@ -1,7 +1,7 @@
 //! Where the contact nodes of all sectors stand around the axis, and how they move as a whole.
 
-use super::Drive;
-use super::frame::Frame;
+use super::PrescribedMotion;
+use super::frame::PolarFrame;
 use crate::{Error, Result, Rom};
 
 /// Contact nodes of equally spaced sectors, arrays `[node · lanes + lane]` where they differ by sector.
@@ -70,7 +70,7 @@ impl Layout {
     /// Velocity with the rotor (m/s) of a node displaced by `moved` (m), in the coordinates of its displacements: r Ω around,
     /// since a displacement around is an arc of the undeformed radius r, and what the shaft's centre moves.
     #[inline(always)]
-    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &Drive, moved: [f64; 3]) -> [f64; 3] {
+    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
         let spin = drive.speed * self.radii[node];
         if drive.shaft_velocity[0] == 0.0 && drive.shaft_velocity[1] == 0.0 {
             return [0.0, spin, drive.shaft_velocity[2]];
@@ -97,8 +97,8 @@ impl Layout {
     }
 
     /// Directions at a node that an arc `around` (m) has displaced, at a rotor angle (rad).
-    pub fn displaced_frame(&self, node: usize, index: usize, rotor_angle: f64, around: f64) -> Frame {
-        Frame::new(self.angles[index] + rotor_angle + around * self.per_radius[node])
+    pub fn displaced_frame(&self, node: usize, index: usize, rotor_angle: f64, around: f64) -> PolarFrame {
+        PolarFrame::new(self.angles[index] + rotor_angle + around * self.per_radius[node])
     }
 }
 

@@ -30,7 +30,7 @@ use wrench::At;
 
 /// Prescribed motion of rotor and casing at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Drive {
+pub struct PrescribedMotion {
     /// Angle of the rotor θ_r (rad).
     pub rotor_angle: f64,
     /// Speed of the rotor Ω (rad/s).
@@ -49,7 +49,7 @@ pub struct Drive {
     pub shaft_velocity: [f64; 3],
 }
 
-persist_fields!(Drive {
+persist_fields!(PrescribedMotion {
     rotor_angle,
     speed,
     gap_offset,
@@ -167,7 +167,7 @@ impl GapLaw {
     /// The gap that a node which stays within `reach` (m, own directions) of where it rests keeps at least on a way to `end` that
     /// is linear in time, while the rotor turns by `turn` against the shape (rad): that of the narrowest place at the narrowest time,
     /// less the reach. `None` where that is not known, or not met on the way (m).
-    pub fn least(&self, at: At<'_>, end: &Drive, turn: f64, reach: [f64; 3]) -> Option<f64> {
+    pub fn least(&self, at: At<'_>, end: &PrescribedMotion, turn: f64, reach: [f64; 3]) -> Option<f64> {
         match self {
             Self::Revolution(law) => law.least(at, end, turn, reach),
             Self::Fixed(_) | Self::Spline(_) | Self::Open(_) => None,
@@ -244,7 +244,7 @@ impl GapLaw {
     /// not written.
     pub fn evaluate(
         &mut self,
-        drive: &Drive,
+        drive: &PrescribedMotion,
         displacement: &[f64],
         moved: &[f64],
         before: Option<&Geometry>,
@@ -336,7 +336,7 @@ impl GapLaw {
     /// Prescribed velocity of the master relative to the slave (m/s), of a node displaced by `moved` (m, own directions);
     /// `index` is `node · lanes + lane`. In the coordinates of the displacements, whose arcs are r times angles.
     #[inline(always)]
-    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &Drive, moved: [f64; 3]) -> [f64; 3] {
+    pub fn sliding_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Fixed(law) => law.sliding[index],
             Self::Revolution(law) => law.layout.rigid_velocity(node, index, drive, moved),

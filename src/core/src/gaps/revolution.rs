@@ -11,11 +11,11 @@
 //!
 //! F = r_c(φ + δ) − ρ + m (u_z + e_z),  ∇F = (−cos δ − s' sin δ/ρ, (1 + u_r/r)(−sin δ + s' cos δ/ρ), m).
 
-use super::frame::Frame;
+use super::frame::PolarFrame;
 use super::layout::Layout;
-use super::shape::Surface;
-use super::wrench::{At, Motion};
-use super::{Drive, Geometry};
+use super::shape::CompiledShape;
+use super::wrench::{At, MotionIncrement};
+use super::{Geometry, PrescribedMotion};
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 use crate::settings::Meridian;
 use crate::{Result, Rom};
@@ -23,7 +23,7 @@ use crate::{Result, Rom};
 /// Contact nodes of equally spaced sectors facing a surface of revolution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RevolutionGap {
-    pub(super) surface: Surface,
+    pub(super) surface: CompiledShape,
     instruction_set: InstructionSet,
     /// Where the contact nodes of the structure are.
     pub layout: Layout,
@@ -43,7 +43,13 @@ impl RevolutionGap {
     ///
     /// # Errors
     /// Wrong number of clearances.
-    pub fn new(rom: &Rom, surface: Surface, clearances: &[f64], meridian: Meridian, lanes: usize) -> Result<Self> {
+    pub fn new(
+        rom: &Rom,
+        surface: CompiledShape,
+        clearances: &[f64],
+        meridian: Meridian,
+        lanes: usize,
+    ) -> Result<Self> {
         let slope = |slope: f64| if meridian == Meridian::Contour { slope } else { 0.0 };
         Ok(Self {
             surface,
@@ -82,7 +88,13 @@ impl RevolutionGap {
         Self { shaft_moves, arms: [room(), room()], ..self }
     }
 
-    pub(super) fn evaluate(&mut self, drive: &Drive, displacement: &[f64], geometry: &mut Geometry, gap: &mut [f64]) {
+    pub(super) fn evaluate(
+        &mut self,
+        drive: &PrescribedMotion,
+        displacement: &[f64],
+        geometry: &mut Geometry,
+        gap: &mut [f64],
+    ) {
         if !self.shaft_moves {
             let law = Evaluate::<false> { law: self, drive, displacement, geometry, gap, arms: [&mut [], &mut []] };
             return self.instruction_set.run(law);
@@ -97,7 +109,7 @@ impl RevolutionGap {
 impl RevolutionGap {
     /// How far prescribed motion of the surface has taken it along the normal at a node displaced by `moved` (m), whose
     /// normal has the radial part `facing`: the share n_r/(n_r N) of what it has moved outwards.
-    pub fn surface_motion(&self, at: At<'_>, moved: [f64; 3], facing: f64, motion: &Motion) -> f64 {
+    pub fn surface_motion(&self, at: At<'_>, moved: [f64; 3], facing: f64, motion: &MotionIncrement) -> f64 {
         if motion.casing_rests() {
             return 0.0;
         }
@@ -161,15 +173,15 @@ impl RevolutionGap {
     }
 
     /// See [`super::GapLaw::least`].
-    pub(super) fn least(&self, at: At<'_>, end: &Drive, turn: f64, reach: [f64; 3]) -> Option<f64> {
+    pub(super) fn least(&self, at: At<'_>, end: &PrescribedMotion, turn: f64, reach: [f64; 3]) -> Option<f64> {
         let (node, start) = (at.node, at.drive);
         let factors = [start.shape_factor, end.shape_factor];
-        let round = self.surface == Surface::Circular || factors.iter().all(|one| *one == 0.0);
+        let round = self.surface == CompiledShape::Circular || factors.iter().all(|one| *one == 0.0);
         if self.shaft_moves || !(round || turn.abs() >= std::f64::consts::TAU && factors.iter().all(|one| *one >= 0.0))
         {
             return None;
         }
-        let opening = |drive: &Drive| drive.gap_offset + drive.radius_change;
+        let opening = |drive: &PrescribedMotion| drive.gap_offset + drive.radius_change;
         let shape = |factor: f64| if round { 0.0 } else { factor * self.surface.least() };
         let clearance = self.layout.clearances[at.index % self.layout.lanes] + opening(start).min(opening(end));
         let slope = self.slopes[node];
@@ -183,11 +195,11 @@ impl RevolutionGap {
     }
 
     /// Displacement of the shaft's centre across and along the circumference at an angle (m).
-    fn shaft_offset(&self, angle: f64, drive: &Drive) -> [f64; 2] {
+    fn shaft_offset(&self, angle: f64, drive: &PrescribedMotion) -> [f64; 2] {
         if !self.shaft_moves {
             return [0.0; 2];
         }
-        let [outwards, sideways, _] = Frame::new(angle).local(drive.shaft);
+        let [outwards, sideways, _] = PolarFrame::new(angle).local(drive.shaft);
         [outwards, sideways]
     }
 
@@ -260,7 +272,7 @@ impl RevolutionGap {
 
 /// Gaps and normals of lanes.
 struct EvaluateLanes<'a> {
-    surface: &'a Surface,
+    surface: &'a CompiledShape,
     instants: &'a mut Instants,
     moved: &'a [f64],
     gaps: &'a mut [f64],
@@ -298,7 +310,7 @@ impl Kernel for EvaluateLanes<'_> {
 /// Gaps and normals of all nodes and lanes on a surface of revolution. `SHAFT`: the shaft's centre moves.
 struct Evaluate<'a, const SHAFT: bool> {
     law: &'a RevolutionGap,
-    drive: &'a Drive,
+    drive: &'a PrescribedMotion,
     displacement: &'a [f64],
     geometry: &'a mut Geometry,
     gap: &'a mut [f64],
@@ -371,7 +383,7 @@ mod tests {
     fn lanes_are_single_nodes_at_their_instants() {
         let shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: 0.3 };
         let law = |instruction_set| RevolutionGap {
-            surface: Surface::new(&shape, 3.56e-4).unwrap(),
+            surface: CompiledShape::new(&shape, 3.56e-4).unwrap(),
             instruction_set,
             layout: Layout {
                 lanes: 2,
@@ -386,12 +398,12 @@ mod tests {
             shaft_moves: false,
             arms: [Vec::new(), Vec::new()],
         };
-        let drive = |rotor_angle| Drive {
+        let drive = |rotor_angle| PrescribedMotion {
             rotor_angle,
             shape_factor: 0.9,
             shape_rotation: 0.05,
             gap_offset: 1e-5,
-            ..Drive::default()
+            ..PrescribedMotion::default()
         };
         let (drives, width) = ([0.0, 0.4, 1.3].map(drive), 8);
         let moved: Vec<f64> = (0..24).map(|i| 1e-4 * f64::from(i).sin()).collect();
@@ -420,7 +432,7 @@ mod tests {
         let lanes = 16;
         let shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: 0.3 };
         let law = |instruction_set| RevolutionGap {
-            surface: Surface::new(&shape, 3.56e-4).unwrap(),
+            surface: CompiledShape::new(&shape, 3.56e-4).unwrap(),
             instruction_set,
             layout: Layout {
                 lanes,
@@ -436,7 +448,7 @@ mod tests {
             arms: [Vec::new(), Vec::new()],
         };
         let displacement: Vec<f64> = (0..48).map(|i| 1e-4 * f64::from(i).sin()).collect();
-        let drive = Drive { rotor_angle: 1.1, shape_factor: 1.0, ..Drive::default() };
+        let drive = PrescribedMotion { rotor_angle: 1.1, shape_factor: 1.0, ..PrescribedMotion::default() };
         let run = |instruction_set| {
             let mut law = crate::gaps::GapLaw::Revolution(law(instruction_set));
             let (mut geometry, mut gap) = (Geometry::new(lanes, false), vec![0.0; 16]);

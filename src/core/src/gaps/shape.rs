@@ -10,7 +10,7 @@ use crate::{Error, Result};
 
 /// Shape compiled for evaluation.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Surface {
+pub enum CompiledShape {
     /// s = 0.
     Circular,
     /// s = −A cos(kθ − φ).
@@ -42,7 +42,7 @@ pub enum Surface {
     },
 }
 
-impl Surface {
+impl CompiledShape {
     /// Compile a shape; `gap` is the nominal clearance that the two-lobe law refers to (m).
     ///
     /// # Errors
@@ -145,7 +145,7 @@ impl Surface {
         self.evaluate(from).0.min(self.evaluate(to).0) - 0.125 * curvature * width * width
     }
 
-    /// [`Surface::evaluate`] for a row of angles, in a form that compiles to vector instructions where it can.
+    /// [`CompiledShape::evaluate`] for a row of angles, in a form that compiles to vector instructions where it can.
     #[inline(always)]
     pub fn evaluate_row(&self, angles: &[f64], shape: &mut [f64], slope: &mut [f64]) {
         let places = angles.iter().zip(shape).zip(slope);
@@ -314,7 +314,7 @@ mod tests {
     #[test]
     fn no_value_between_two_angles_is_below_the_bound() {
         for shape in shapes().into_iter().chain([Shape::TwoLobe { depth: -0.7, width: 0.4, phase: 0.1 }]) {
-            let surface = Surface::new(&shape, 3.56e-4).unwrap();
+            let surface = CompiledShape::new(&shape, 3.56e-4).unwrap();
             let (mut tightest, mut lowest) = (f64::INFINITY, 0.0_f64);
             for i in 0..400 {
                 let (from, width) = (-4.0 + 0.023 * f64::from(i), 0.01 * f64::from(1 + i % 17));
@@ -335,7 +335,7 @@ mod tests {
         let dents = Shape::TwoLobe { depth: -0.7, width: 0.4, phase: 0.1 };
         let turned = Shape::Lobes { amplitude: -1e-4, order: 2, phase: 0.3 };
         for shape in shapes().into_iter().chain([dents, turned]) {
-            let surface = Surface::new(&shape, 3.56e-4).unwrap();
+            let surface = CompiledShape::new(&shape, 3.56e-4).unwrap();
             let sampled = |from: f64, width: f64| {
                 let values = (0..=2000).map(|k| surface.evaluate(from + width * f64::from(k) / 2000.0).0);
                 values.fold(f64::INFINITY, f64::min)
@@ -357,7 +357,7 @@ mod tests {
     #[test]
     fn slope_is_the_derivative_and_shape_is_periodic() {
         for shape in shapes() {
-            let surface = Surface::new(&shape, 3.56e-4).unwrap();
+            let surface = CompiledShape::new(&shape, 3.56e-4).unwrap();
             for i in 0..500 {
                 let angle = -7.0 + 0.031 * f64::from(i);
                 let (value, slope) = surface.evaluate(angle);
@@ -384,7 +384,7 @@ mod tests {
     #[test]
     fn rows_are_the_same_as_single_values() {
         for shape in shapes() {
-            let surface = Surface::new(&shape, 3.56e-4).unwrap();
+            let surface = CompiledShape::new(&shape, 3.56e-4).unwrap();
             let angles: Vec<f64> = (0..40).map(|i| 0.37 * f64::from(i) - 5.0).collect();
             let (mut values, mut slopes) = (vec![1.0; 40], vec![1.0; 40]);
             surface.evaluate_row(&angles, &mut values, &mut slopes);
@@ -398,7 +398,7 @@ mod tests {
     #[test]
     fn two_lobe_law_matches_its_formula() {
         let gap = 3.56e-4;
-        let surface = Surface::new(&Shape::TwoLobe { depth: 1.0, width: 0.15, phase: 0.0 }, gap).unwrap();
+        let surface = CompiledShape::new(&Shape::TwoLobe { depth: 1.0, width: 0.15, phase: 0.0 }, gap).unwrap();
         for i in 0..100 {
             let angle: f64 = 0.1 * f64::from(i);
             let x = (angle % std::f64::consts::PI / std::f64::consts::PI - 0.5) / 0.15;
@@ -412,7 +412,7 @@ mod tests {
     fn a_table_of_a_sine_is_fourth_order_accurate() {
         let error = |count: u32| {
             let values = (0..count).map(|i| (std::f64::consts::TAU * f64::from(i) / f64::from(count)).sin()).collect();
-            let surface = Surface::new(&Shape::Table { radius_change: values }, 1.0).unwrap();
+            let surface = CompiledShape::new(&Shape::Table { radius_change: values }, 1.0).unwrap();
             (0..1000)
                 .map(|i| 0.0123 * f64::from(i))
                 .map(|x| (surface.evaluate(x).0 - x.sin()).abs())

@@ -1,11 +1,11 @@
 //! Gaps to a surface through data points: closest point, normal, and the place where the force is handed over.
 
-use super::frame::Frame;
+use super::frame::PolarFrame;
 use super::layout::Layout;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
-use super::wrench::{At, Motion};
-use super::{Drive, Geometry, dot};
-use crate::persist::{Persist, Reader, Writer};
+use super::wrench::{At, MotionIncrement};
+use super::{Geometry, PrescribedMotion, dot};
+use crate::persist::{Persist, StateReader, StateWriter};
 
 /// Gap of a node that has nothing to touch: infinite, so that no distance can be made of it.
 pub const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
@@ -100,7 +100,7 @@ impl SplineGap {
     /// Nodes out of reach have nothing to touch, and are told of in [`SplineGap::out_of_reach`].
     pub fn evaluate(
         &mut self,
-        drive: &Drive,
+        drive: &PrescribedMotion,
         displacement: &[f64],
         moved: &[f64],
         guess: Option<&[ClosestPoint]>,
@@ -139,9 +139,9 @@ impl SplineGap {
 
     /// The closest point of a node displaced by `moved` (m), sought from the place it had, or from its angle; and its directions.
     #[inline(always)]
-    fn project(&self, at: At<'_>, moved: [f64; 3], guess: Option<ClosestPoint>) -> (Projection, Frame) {
+    fn project(&self, at: At<'_>, moved: [f64; 3], guess: Option<ClosestPoint>) -> (Projection, PolarFrame) {
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle - at.drive.shape_rotation;
-        let frame = Frame::new(angle);
+        let frame = PolarFrame::new(angle);
         let [radial, tangential, axial] = self.shaft_offset(angle, at.drive);
         let arm = self.arm(at.node, at.index % self.layout.lanes, at.drive, moved);
         let place = [arm[0] + radial, arm[1] + tangential, arm[2] + axial];
@@ -175,21 +175,25 @@ impl SplineGap {
     }
 
     /// Displacement of the shaft's centre along the directions of a node at `angle` from the shape (m).
-    fn shaft_offset(&self, angle: f64, drive: &Drive) -> [f64; 3] {
+    fn shaft_offset(&self, angle: f64, drive: &PrescribedMotion) -> [f64; 3] {
         let [x, y, z] = drive.shaft;
-        if x == 0.0 && y == 0.0 { [0.0, 0.0, z] } else { Frame::new(angle + drive.shape_rotation).local([x, y, z]) }
+        if x == 0.0 && y == 0.0 {
+            [0.0, 0.0, z]
+        } else {
+            PolarFrame::new(angle + drive.shape_rotation).local([x, y, z])
+        }
     }
 
     /// A node displaced by `moved` from the shaft's centre (m, own directions); clearance that the surface does not have
     /// moves it inwards.
     #[inline(always)]
-    pub fn arm(&self, node: usize, lane: usize, drive: &Drive, moved: [f64; 3]) -> [f64; 3] {
+    pub fn arm(&self, node: usize, lane: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
         let clearance = self.layout.clearances[lane] - self.nominal_clearance + drive.gap_offset + drive.radius_change;
         [self.layout.radii[node] - clearance + moved[0], moved[1], self.layout.axial[node] + moved[2]]
     }
 
     /// Velocity with the rotor (m/s) of a node displaced by `moved` (m), in its own directions: Ω × (x − e) + ė.
-    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &Drive, moved: [f64; 3]) -> [f64; 3] {
+    pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
         let [outwards, around, _] = self.arm(node, index % self.layout.lanes, drive, moved);
         let [x, y, z] = drive.shaft_velocity;
         let [radial, tangential, axial] =
@@ -198,9 +202,9 @@ impl SplineGap {
     }
 
     /// The contact point at `place` from the shaft's centre (m), in the directions of the node.
-    pub fn contact_arm(&self, index: usize, drive: &Drive, place: ClosestPoint) -> [f64; 3] {
+    pub fn contact_arm(&self, index: usize, drive: &PrescribedMotion, place: ClosestPoint) -> [f64; 3] {
         let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
-        let point = Frame::new(angle).local(self.surface.evaluate(place).point);
+        let point = PolarFrame::new(angle).local(self.surface.evaluate(place).point);
         let shaft = self.shaft_offset(angle, drive);
         std::array::from_fn(|i| point[i] - shaft[i])
     }
@@ -213,7 +217,7 @@ impl SplineGap {
         arm: [f64; 3],
         normal: [f64; 3],
         place: ClosestPoint,
-        motion: &Motion,
+        motion: &MotionIncrement,
     ) -> f64 {
         if motion.casing_rests() {
             return 0.0;
@@ -225,7 +229,7 @@ impl SplineGap {
                 grown = std::array::from_fn(|i| grown[i] + motion.shape_factor * weight * self.shape[index][i]);
             }
         }
-        let grown = Frame::new(angle).local(grown);
+        let grown = PolarFrame::new(angle).local(grown);
         let shaft = self.shaft_offset(angle, at.drive);
         let turned = [-(arm[1] + shaft[1]), arm[0] + shaft[0], 0.0].map(|arm| motion.shape_rotation * arm);
         normal[0] * motion.opening + dot(normal, grown) + dot(normal, turned)
@@ -235,13 +239,13 @@ impl SplineGap {
     pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle;
         let arm = self.arm(at.node, at.index % self.layout.lanes, at.drive, moved);
-        let shaft = Frame::new(angle).local(at.drive.shaft);
+        let shaft = PolarFrame::new(angle).local(at.drive.shaft);
         angle + libm::atan2(arm[1] + shaft[1], arm[0] + shaft[0])
     }
 
     /// Radial, tangential and axial directions of a node at a rotor angle (rad), in the fixed frame.
-    pub fn frame(&self, index: usize, rotor_angle: f64) -> Frame {
-        Frame::new(self.layout.angles[index] + rotor_angle)
+    pub fn frame(&self, index: usize, rotor_angle: f64) -> PolarFrame {
+        PolarFrame::new(self.layout.angles[index] + rotor_angle)
     }
 }
 
@@ -252,14 +256,14 @@ pub fn faces_inwards(normal: [f64; 3]) -> bool {
 }
 
 impl Persist for ClosestPoint {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         for part in self.patch {
             u64::try_from(part).unwrap_or(u64::MAX).save(writer);
         }
         self.s.save(writer);
         self.t.save(writer);
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         for part in &mut self.patch {
             let mut value = 0_u64;
             value.restore(reader);
@@ -269,7 +273,7 @@ impl Persist for ClosestPoint {
         self.t.restore(reader);
     }
     /// Checks the numbers only: the surface is unknown here.
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         let mut place = *self;
         place.restore(reader);
         if !(place.s.is_finite() && place.t.is_finite()) {

@@ -9,9 +9,9 @@
 //! tangential force there is r/(r + u_r) times the one conjugate to u_θ, and the torque r times the latter. On a surface
 //! through data points x is the contact point on the surface, where the force is handed to its control points.
 
-use super::frame::Frame;
+use super::frame::PolarFrame;
 use super::surface_spline::ClosestPoint;
-use super::{Drive, GapLaw};
+use super::{GapLaw, PrescribedMotion};
 
 /// A contact force on the master in fixed directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -26,7 +26,7 @@ pub struct Wrench {
 
 /// How prescribed inputs have moved over a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Motion {
+pub struct MotionIncrement {
     /// Length of the step (s).
     pub step: f64,
     /// The rotor (rad), over the step.
@@ -41,12 +41,12 @@ pub struct Motion {
     pub shape_rotation: f64,
 }
 
-crate::persist::persist_fields!(Motion { step, turn, shaft, opening, shape_factor, shape_rotation });
+crate::persist::persist_fields!(MotionIncrement { step, turn, shaft, opening, shape_factor, shape_rotation });
 
-impl Motion {
+impl MotionIncrement {
     /// From `before` to `now`, a step of length `step` (s). Angles are known to whole turns only: the rotor's turn is the one
     /// nearest to what its speed tells, that of the shape the smallest.
-    pub fn between(before: &Drive, now: &Drive, step: f64) -> Self {
+    pub fn between(before: &PrescribedMotion, now: &PrescribedMotion, step: f64) -> Self {
         let full = std::f64::consts::TAU;
         let turned = now.rotor_angle - before.rotor_angle;
         let rotated = now.shape_rotation - before.shape_rotation;
@@ -116,7 +116,7 @@ pub struct At<'a> {
     /// `node · lanes + lane`.
     pub index: usize,
     /// Prescribed motion.
-    pub drive: &'a Drive,
+    pub drive: &'a PrescribedMotion,
 }
 
 impl GapLaw {
@@ -155,7 +155,7 @@ impl GapLaw {
     /// Displacement over a step (m) with the rotor, or with what slides along fixed obstacles, in the coordinates of the
     /// displacements of a node with this contact point.
     #[inline(always)]
-    pub fn spin_motion(&self, at: At<'_>, point: [f64; 3], motion: &Motion) -> [f64; 3] {
+    pub fn spin_motion(&self, at: At<'_>, point: [f64; 3], motion: &MotionIncrement) -> [f64; 3] {
         match self {
             Self::Fixed(law) => law.sliding[at.index].map(|velocity| velocity * motion.step),
             Self::Open(_) => [0.0; 3],
@@ -166,7 +166,12 @@ impl GapLaw {
 
     /// The same with the shaft's centre.
     #[inline(always)]
-    pub fn shaft_motion(&self, At { node, index, drive }: At<'_>, point: [f64; 3], motion: &Motion) -> [f64; 3] {
+    pub fn shaft_motion(
+        &self,
+        At { node, index, drive }: At<'_>,
+        point: [f64; 3],
+        motion: &MotionIncrement,
+    ) -> [f64; 3] {
         match self {
             Self::Fixed(_) | Self::Open(_) => [0.0; 3],
             Self::Revolution(law) => law.layout.shaft_motion(node, index, drive.rotor_angle, point, motion.shaft),
@@ -182,7 +187,7 @@ impl GapLaw {
         point: [f64; 3],
         normal: [f64; 3],
         place: ClosestPoint,
-        motion: &Motion,
+        motion: &MotionIncrement,
     ) -> f64 {
         match self {
             Self::Fixed(_) | Self::Open(_) => 0.0,
@@ -203,7 +208,7 @@ impl GapLaw {
 
 /// A force at `arm` from the shaft's centre, both in the directions of `frame`.
 #[inline(always)]
-fn around(frame: Frame, drive: &Drive, arm: [f64; 3], force: [f64; 3]) -> Wrench {
+fn around(frame: PolarFrame, drive: &PrescribedMotion, arm: [f64; 3], force: [f64; 3]) -> Wrench {
     let point = frame.fixed(arm);
     Wrench {
         point: std::array::from_fn(|i| point[i] + drive.shaft[i]),

@@ -41,7 +41,7 @@ const LARGE: usize = 32;
 
 /// What one solve did, and whether it succeeded.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Outcome {
+pub struct SolverOutcome {
     /// The complementarity conditions hold.
     pub solved: bool,
     /// Linear systems factorised.
@@ -54,7 +54,7 @@ pub struct Outcome {
     pub fallback: bool,
 }
 
-impl Outcome {
+impl SolverOutcome {
     /// The outcome of a direct method.
     pub(super) fn direct(solved: bool, factorisations: usize) -> Self {
         Self { solved, factorisations, sweeps: 0, residual: 0.0, fallback: false }
@@ -140,34 +140,34 @@ impl ContactSolver {
     }
 
     /// The paper's correction (eqs 10-11): equality on the nodes that penetrate in the prediction.
-    pub fn film(&mut self) -> Outcome {
+    pub fn film(&mut self) -> SolverOutcome {
         for node in 0..self.size {
             self.active[node] = self.gaps[node] < 0.0;
         }
         self.solve_active(None);
         self.correct_gaps();
         std::mem::swap(&mut self.gaps, &mut self.corrected);
-        Outcome::direct(true, 1)
+        SolverOutcome::direct(true, 1)
     }
 
     /// Complementarity on all nodes; `active` is the starting guess and returns the set found.
-    pub fn lcp(&mut self) -> Outcome {
+    pub fn lcp(&mut self) -> SolverOutcome {
         let scale = self.gaps[..self.size].iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
         self.yielding.begin();
         let mut outcome = self.exchange(scale);
         if !outcome.solved {
             let driven = self.drive_all(scale, drive_limit(self.size));
-            outcome = Outcome::direct(driven.solved, outcome.factorisations + driven.factorisations);
+            outcome = SolverOutcome::direct(driven.solved, outcome.factorisations + driven.factorisations);
         }
         if !outcome.solved && self.monotone {
             let approached = self.approach(scale);
-            outcome = Outcome::direct(approached.solved, outcome.factorisations + approached.factorisations);
+            outcome = SolverOutcome::direct(approached.solved, outcome.factorisations + approached.factorisations);
         }
         outcome
     }
 
     /// Block exchanges, and the least-index rule where they make no progress.
-    fn exchange(&mut self, scale: f64) -> Outcome {
+    fn exchange(&mut self, scale: f64) -> SolverOutcome {
         for node in 0..self.size {
             self.active[node] |= self.gaps[node] < 0.0;
         }
@@ -185,7 +185,7 @@ impl ContactSolver {
                 continue;
             }
             if count == 0 {
-                return Outcome::direct(self.settle(scale), factorisations);
+                return SolverOutcome::direct(self.settle(scale), factorisations);
             }
             if count < best {
                 (best, patience) = (count, PATIENCE);
@@ -198,11 +198,11 @@ impl ContactSolver {
                 self.active[last] = !self.active[last];
             }
         }
-        Outcome::direct(false, limit)
+        SolverOutcome::direct(false, limit)
     }
 
     /// Solve from the predicted gaps, whatever the rank of W. Not solved where no motion opens all contacts.
-    fn approach(&mut self, gap_scale: f64) -> Outcome {
+    fn approach(&mut self, gap_scale: f64) -> SolverOutcome {
         let (size, limit, mut factorisations) = (self.size, APPROACH * drive_limit(self.size), 0);
         self.yielding.keep(&self.delassus, &self.gaps[..size], gap_scale);
         for _ in 0..ROUNDS {
@@ -213,10 +213,10 @@ impl ContactSolver {
                 for node in (0..size).filter(|node| !self.active[*node]) {
                     self.gaps[node] -= self.yielding.yielded(node, 0.0);
                 }
-                return Outcome::direct(true, factorisations);
+                return SolverOutcome::direct(true, factorisations);
             }
         }
-        Outcome::direct(false, factorisations)
+        SolverOutcome::direct(false, factorisations)
     }
 
     fn infeasible(&self, node: usize, gap_scale: f64, multiplier_scale: f64) -> bool {

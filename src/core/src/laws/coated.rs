@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, Prediction};
-use crate::laws::active_set::Outcome;
+use super::{ContactLaw, ContactPrediction};
+use crate::laws::active_set::SolverOutcome;
 use crate::laws::coating::{CoatedProblem, Coating};
 
 /// A coating with its wear, and the problem of the blades on it. Groups are whole blades, whose nodes share cells.
@@ -64,7 +64,7 @@ impl ContactLaw for Coated {
         &mut self.problem.delassus
     }
 
-    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl Prediction) {
+    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl ContactPrediction) {
         self.angles[contact] = at.angle();
         self.gaps[contact] = at.gap();
         self.problem.monotone &= at.friction() == 0.0;
@@ -72,7 +72,7 @@ impl ContactLaw for Coated {
     }
 
     #[inline(never)]
-    fn solve(&mut self) -> Outcome {
+    fn solve(&mut self) -> SolverOutcome {
         let size = self.size;
         for blade in self.angles[..size].chunks_exact(self.coating.nodes()) {
             self.coating.locate(&mut self.problem, blade);

@@ -16,14 +16,14 @@ mod tip;
 
 use std::f64::consts::TAU;
 
-use cutting::Cutting;
-pub use cutting::Way;
+pub use cutting::BladePassage;
+use cutting::CoatingCut;
 use nalgebra::DMatrix;
 pub use problem::CoatedProblem;
-pub use rod::{Branch, Rod};
-pub use tip::Tip;
+pub use rod::{Branch, RodMaterial};
+pub use tip::BladeTip;
 
-use crate::persist::{Persist, Reader, Writer};
+use crate::persist::{Persist, StateReader, StateWriter};
 use crate::settings::CoatingSettings;
 use crate::{Error, Result, shown};
 
@@ -32,7 +32,7 @@ const SAME_PLACE: f64 = 1e-6;
 
 /// Cells of one axial position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Row {
+struct CellRow {
     /// Contact nodes of the blade that see it.
     nodes: [usize; 2],
     /// Their weights, sum 1.
@@ -48,7 +48,7 @@ struct Row {
     covers: f64,
 }
 
-impl Row {
+impl CellRow {
     /// Cells that a blade can press or cut at once.
     fn most_cells(&self) -> usize {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ cells around")]
@@ -87,16 +87,16 @@ struct CellContact {
 /// The coating of one slave: material, cells, wear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coating {
-    rod: Rod,
+    rod: RodMaterial,
     thickness: f64,
     around: usize,
     /// Contact nodes per blade.
     nodes: usize,
-    rows: Vec<Row>,
+    rows: Vec<CellRow>,
     /// Plastic strain, `[row · around + place around]`: wear depth as a share of the thickness.
     plastic: Vec<f64>,
     /// Where it is cut instead of pressed in.
-    cutting: Option<Cutting>,
+    cutting: Option<CoatingCut>,
 }
 
 impl Coating {
@@ -105,8 +105,8 @@ impl Coating {
     /// # Errors
     /// [`Error::Invalid`] naming what does not fit: no extent, two nodes at one axial position, too few cells or too wide a tip
     /// to give every blade its own.
-    pub fn new(settings: &CoatingSettings, tip: &Tip, blades: usize) -> Result<Self> {
-        let Tip { axial, radii, widths, extent } = tip;
+    pub fn new(settings: &CoatingSettings, tip: &BladeTip, blades: usize) -> Result<Self> {
+        let BladeTip { axial, radii, widths, extent } = tip;
         let order = sorted(tip)?;
         let (around, along) = (settings.cells_around, settings.cells_along);
         // Two cells per pitch: deformed blades never share a cell.
@@ -125,9 +125,9 @@ impl Coating {
             let radius = mean(radii);
             let arc = radius * TAU / number(around);
             let covers = if settings.cutting.is_some() { 0.0 } else { mean(widths) / arc };
-            Row { nodes, weights, area: arc * width, axial: centre, radius, width, covers }
+            CellRow { nodes, weights, area: arc * width, axial: centre, radius, width, covers }
         };
-        let rows: Vec<Row> = (0..along).map(row).collect();
+        let rows: Vec<CellRow> = (0..along).map(row).collect();
         // The cells of a band are up to one cell wider than it is.
         let pitch = number(around) / number(blades);
         if let Some(row) = rows.iter().find(|row| row.covers.is_nan() || row.covers + 1.0 > pitch) {
@@ -141,19 +141,19 @@ impl Coating {
             ));
         }
         Ok(Self {
-            rod: settings.cutting.map_or_else(|| Rod::new(settings), Cutting::rod),
+            rod: settings.cutting.map_or_else(|| RodMaterial::new(settings), CoatingCut::rod),
             thickness: settings.thickness,
             around,
             nodes: axial.len(),
             rows,
             plastic: vec![0.0; around * along],
-            cutting: settings.cutting.map(|cutting| Cutting::new(cutting, blades, along, axial.len())),
+            cutting: settings.cutting.map(|cutting| CoatingCut::new(cutting, blades, along, axial.len())),
         })
     }
 
     /// Scratch for groups of at most `blades` coupled blades.
     pub fn problem(&self, blades: usize) -> CoatedProblem {
-        let cells = self.rows.iter().map(Row::most_cells).sum::<usize>();
+        let cells = self.rows.iter().map(CellRow::most_cells).sum::<usize>();
         CoatedProblem::new(self.rod, self.thickness, blades * self.nodes, blades * cells)
     }
 
@@ -278,21 +278,21 @@ impl Coating {
     /// Unworn again.
     pub fn reset(&mut self) {
         self.plastic.fill(0.0);
-        self.cutting.iter_mut().for_each(Cutting::reset);
+        self.cutting.iter_mut().for_each(CoatingCut::reset);
     }
 }
 
 /// The wear is the state; material and cells belong to the scene.
 impl Persist for Coating {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         self.plastic.save(writer);
         self.cutting.iter().for_each(|cutting| cutting.save(writer));
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         self.plastic.restore(reader);
         self.cutting.iter_mut().for_each(|cutting| cutting.restore(reader));
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         let mut bytes = reader.clone();
         self.plastic.check(reader);
         for _ in &self.plastic {
@@ -307,7 +307,7 @@ impl Persist for Coating {
 }
 
 /// Nodes in order of growing z, all at different places of a finite extent.
-fn sorted(Tip { axial, radii, extent, .. }: &Tip) -> Result<Vec<usize>> {
+fn sorted(BladeTip { axial, radii, extent, .. }: &BladeTip) -> Result<Vec<usize>> {
     let length = extent[1] - extent[0];
     let refuse = |problem: String, remedy: &str| Err(Error::invalid("contact.coating", problem, remedy));
     let mut order: Vec<usize> = (0..axial.len()).collect();

@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, Prediction};
+use super::{ContactLaw, ContactPrediction};
 use crate::gaps::dot;
-use crate::laws::active_set::Outcome;
+use crate::laws::active_set::SolverOutcome;
 use crate::laws::de_saxce::CoulombSolver;
 
 /// Coulomb friction, started from the forces of the last step.
@@ -36,7 +36,7 @@ impl ContactLaw for Coulomb {
         &mut self.solver.delassus
     }
 
-    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl Prediction) {
+    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl ContactPrediction) {
         let (slip, last) = (at.slip(), at.last_force());
         self.solver.friction[contact] = at.friction();
         for (along, direction) in directions.iter().enumerate() {
@@ -47,7 +47,7 @@ impl ContactLaw for Coulomb {
     }
 
     #[inline(never)]
-    fn solve(&mut self) -> Outcome {
+    fn solve(&mut self) -> SolverOutcome {
         let outcome = self.solver.solve(self.size);
         for (contact, gap) in self.corrected[..self.size].iter_mut().enumerate() {
             let touching = self.solver.reactions[3 * contact] > 0.0;

@@ -3,20 +3,20 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, Prediction};
+use super::{ContactLaw, ContactPrediction};
 use crate::gaps::dot;
-use crate::laws::active_set::Outcome;
-use crate::laws::coating::{CoatedProblem, Coating, Way};
+use crate::laws::active_set::SolverOutcome;
+use crate::laws::coating::{BladePassage, CoatedProblem, Coating};
 
 /// A coating with what is cut of it, and the problem of the blades on it. Groups are whole blades, whose nodes share cells.
 #[derive(Debug, Clone)]
-pub struct Cutting {
+pub struct CuttingLaw {
     coating: Coating,
     problem: CoatedProblem,
     size: usize,
     /// Delassus matrix along normals and tangents (m/N).
     matrix: DMatrix<f64>,
-    contacts: Vec<Posed>,
+    contacts: Vec<CuttingContact>,
     angles: Vec<f64>,
     /// Way of each contact over the step (m), positive along its first tangent.
     slid: Vec<f64>,
@@ -26,7 +26,7 @@ pub struct Cutting {
 
 /// A contact as it was posed.
 #[derive(Debug, Clone, Copy, Default)]
-struct Posed {
+struct CuttingContact {
     gap: f64,
     closed: bool,
     /// Coulomb coefficient of the hard casing.
@@ -36,7 +36,7 @@ struct Posed {
     sector: usize,
 }
 
-impl Cutting {
+impl CuttingLaw {
     /// Room for `contacts` contacts, all of whole blades.
     pub fn new(coating: Coating, contacts: usize) -> Self {
         let mut problem = coating.problem(contacts / coating.nodes());
@@ -46,7 +46,7 @@ impl Cutting {
             coating,
             size: 0,
             matrix: DMatrix::zeros(3 * contacts, 3 * contacts),
-            contacts: vec![Posed::default(); contacts],
+            contacts: vec![CuttingContact::default(); contacts],
             angles: vec![0.0; contacts],
             slid: vec![0.0; contacts],
             multipliers: vec![0.0; 3 * contacts],
@@ -72,7 +72,7 @@ impl Cutting {
     fn fill(&mut self) {
         let tangential = self.coating.tangential_ratio();
         let Some(cut) = &mut self.problem.cut else { return };
-        for (j, &Posed { friction, sense, .. }) in self.contacts[..self.size].iter().enumerate() {
+        for (j, &CuttingContact { friction, sense, .. }) in self.contacts[..self.size].iter().enumerate() {
             for i in 0..self.size {
                 let (normal, across) = (self.matrix[(3 * i, 3 * j)], sense * self.matrix[(3 * i, 3 * j + 1)]);
                 self.problem.delassus[(i, j)] = normal - friction * across;
@@ -82,7 +82,7 @@ impl Cutting {
     }
 }
 
-impl ContactLaw for Cutting {
+impl ContactLaw for CuttingLaw {
     const DIRECTIONS: usize = 3;
     const LOOKS_AGAIN: bool = true;
 
@@ -96,22 +96,22 @@ impl ContactLaw for Cutting {
         &mut self.matrix
     }
 
-    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl Prediction) {
+    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl ContactPrediction) {
         let (along, friction) = (at.slip_direction(), at.friction());
         let (gap, closed) = (at.gap(), at.gap_before() <= -self.coating.thickness());
         let sense = dot(along, directions[1]);
-        self.contacts[contact] = Posed { gap, closed, friction, sense, sector: at.sector() };
+        self.contacts[contact] = CuttingContact { gap, closed, friction, sense, sector: at.sector() };
         self.angles[contact] = at.angle();
         self.slid[contact] = sense * dot(along, at.slip());
     }
 
     #[inline(never)]
-    fn solve(&mut self) -> Outcome {
+    fn solve(&mut self) -> SolverOutcome {
         let (size, nodes) = (self.size, self.coating.nodes());
         self.fill();
         for first in (0..size).step_by(nodes) {
             let (angles, slid) = (&self.angles[first..first + nodes], &self.slid[first..first + nodes]);
-            let way = Way { blade: self.contacts[first].sector, angles, slid };
+            let way = BladePassage { blade: self.contacts[first].sector, angles, slid };
             self.coating.locate_cut(&mut self.problem, way);
         }
         for (contact, posed) in self.contacts[..size].iter().enumerate() {
@@ -119,7 +119,7 @@ impl ContactLaw for Cutting {
         }
         let outcome = self.problem.solve();
         let tangential = self.coating.tangential_ratio();
-        for (contact, &Posed { friction, sense, .. }) in self.contacts[..size].iter().enumerate() {
+        for (contact, &CuttingContact { friction, sense, .. }) in self.contacts[..size].iter().enumerate() {
             let (cut, hard) = (self.problem.coating[contact], self.problem.hard[contact]);
             let across = -sense * (tangential * cut + friction * hard);
             self.multipliers[3 * contact..][..3].copy_from_slice(&[cut + hard, across, 0.0]);

@@ -24,8 +24,8 @@ use nalgebra::DMatrix;
 
 pub(crate) use self::linear::Eliminate;
 use self::newton::Newton;
-use self::problem::Problem;
-use super::active_set::Outcome;
+use self::problem::ScaledProblem;
+use super::active_set::SolverOutcome;
 
 /// Residual at which a problem counts as solved, relative to the terms that displacements and forces are made of.
 const TOLERANCE: f64 = 1e-12;
@@ -75,7 +75,7 @@ pub struct CoulombSolver {
     pub reactions: Vec<f64>,
     /// Corrected gap and slips, free + W·reactions (m), set by the solver.
     pub relative: Vec<f64>,
-    problem: Problem,
+    problem: ScaledProblem,
     newton: Newton,
     kept: Vec<f64>,
 }
@@ -91,7 +91,7 @@ impl CoulombSolver {
             friction: vec![0.0; capacity],
             reactions: vec![0.0; order],
             relative: vec![0.0; order],
-            problem: Problem::new(capacity),
+            problem: ScaledProblem::new(capacity),
             newton: Newton::new(capacity),
             kept: vec![0.0; order],
         }
@@ -107,7 +107,7 @@ impl CoulombSolver {
     ///
     /// # Panics
     /// When `size` exceeds the capacity.
-    pub fn solve(&mut self, size: usize) -> Outcome {
+    pub fn solve(&mut self, size: usize) -> SolverOutcome {
         assert!(size <= self.capacity, "{size} contacts in a solver made for {}", self.capacity);
         self.problem.size = size;
         self.newton.factorisations = 0;
@@ -115,13 +115,13 @@ impl CoulombSolver {
         if !self.problem.load(&self.delassus, &self.free, &self.friction, &self.reactions) {
             self.reactions[..order].fill(0.0);
             self.relative[..order].copy_from_slice(&self.free[..order]);
-            return Outcome { residual: f64::INFINITY, ..Outcome::direct(false, 0) };
+            return SolverOutcome { residual: f64::INFINITY, ..SolverOutcome::direct(false, 0) };
         }
-        let mut run = Run { sweeps: 0, residual: f64::INFINITY };
+        let mut run = SolverProgress { sweeps: 0, residual: f64::INFINITY };
         self.iterate(&mut run);
         self.problem.store(&mut self.reactions, &mut self.relative);
         let factorisations = self.newton.factorisations;
-        Outcome {
+        SolverOutcome {
             solved: run.residual <= TOLERANCE,
             factorisations,
             sweeps: run.sweeps,
@@ -131,7 +131,7 @@ impl CoulombSolver {
     }
 
     /// Sweeps and Newton attempts in turn; ends with the best reactions met.
-    fn iterate(&mut self, run: &mut Run) {
+    fn iterate(&mut self, run: &mut SolverProgress) {
         self.problem.refresh();
         run.residual = self.problem.residual();
         if run.residual <= TOLERANCE {
@@ -197,7 +197,7 @@ impl CoulombSolver {
     }
 
     /// Sweeps until solved, or until Newton's method is likely to be cheaper.
-    fn sweep_round(&mut self, round: u32, run: &mut Run) {
+    fn sweep_round(&mut self, round: u32, run: &mut SolverProgress) {
         let least = SWEEPS << round;
         let relaxation = RELAXATION[round as usize % RELAXATION.len()];
         let mut history = [f64::INFINITY; RATE_SPAN];
@@ -238,7 +238,7 @@ impl CoulombSolver {
 }
 
 /// Progress of one solve.
-struct Run {
+struct SolverProgress {
     sweeps: usize,
     residual: f64,
 }

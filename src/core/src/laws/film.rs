@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, Prediction};
-use crate::laws::active_set::{ContactSolver, Outcome};
+use super::{ContactLaw, ContactPrediction};
+use crate::laws::active_set::{ContactSolver, SolverOutcome};
 
 /// Penetration is detected once; neither a negative λ nor a penetration caused elsewhere is looked at again.
 #[derive(Debug, Clone)]
@@ -28,11 +28,11 @@ impl ContactLaw for Film {
         &mut self.0.delassus
     }
 
-    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl Prediction) {
+    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl ContactPrediction) {
         self.0.gaps[contact] = at.gap();
     }
 
-    fn solve(&mut self) -> Outcome {
+    fn solve(&mut self) -> SolverOutcome {
         self.0.film()
     }
 

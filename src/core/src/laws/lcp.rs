@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{ContactLaw, Prediction};
-use crate::laws::active_set::{ContactSolver, Outcome};
+use super::{ContactLaw, ContactPrediction};
+use crate::laws::active_set::{ContactSolver, SolverOutcome};
 
 /// Linear complementarity, started from what was closed one step before.
 #[derive(Debug, Clone)]
@@ -29,14 +29,14 @@ impl ContactLaw for Lcp {
         &mut self.0.delassus
     }
 
-    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl Prediction) {
+    fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl ContactPrediction) {
         self.0.gaps[contact] = at.gap();
         // Closed in the last step: the likeliest guess for this one.
         self.0.active[contact] = at.gap_before() <= 0.0;
         self.0.monotone &= at.friction() == 0.0;
     }
 
-    fn solve(&mut self) -> Outcome {
+    fn solve(&mut self) -> SolverOutcome {
         self.0.lcp()
     }
 

@@ -18,13 +18,13 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::gaps::dot;
-use crate::laws::active_set::Outcome;
+use crate::laws::active_set::SolverOutcome;
 use crate::laws::coating::Coating;
-use crate::persist::{Persist, Reader, Writer};
+use crate::persist::{Persist, StateReader, StateWriter};
 use crate::variables::Enumeration;
 pub use coated::Coated;
 pub use coulomb::Coulomb;
-pub use cutting::Cutting;
+pub use cutting::CuttingLaw;
 pub use film::Film;
 pub use lcp::Lcp;
 
@@ -63,7 +63,7 @@ pub(crate) static SOLVERS: Enumeration = Enumeration {
 };
 
 /// What is known of a contact before its force is.
-pub trait Prediction {
+pub trait ContactPrediction {
     /// Predicted gap (m).
     fn gap(&self) -> f64;
     /// Gap one step earlier (m).
@@ -95,9 +95,9 @@ pub trait ContactLaw {
     /// Delassus matrix (m/N), to be filled.
     fn matrix(&mut self) -> &mut DMatrix<f64>;
     /// Contact `contact` of the group, in order; `directions` are its rows of the matrix.
-    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl Prediction);
+    fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl ContactPrediction);
     /// Forces of all contacts posed.
-    fn solve(&mut self) -> Outcome;
+    fn solve(&mut self) -> SolverOutcome;
     /// Multipliers along the columns (N).
     fn multipliers(&self) -> &[f64];
     /// Corrected gaps (m).
@@ -120,7 +120,7 @@ pub enum Law {
     /// Complementarity on an abradable coating that is pressed in.
     Coated(Coated),
     /// Complementarity on one that is cut.
-    Cutting(Cutting),
+    Cutting(CuttingLaw),
 }
 
 /// The same call on every law.
@@ -138,7 +138,7 @@ macro_rules! each_law {
 
 /// One body of code for each law: all of them in their caller are too much for the instruction cache.
 #[inline(never)]
-fn pose_all<L: ContactLaw, P: Prediction>(law: &mut L, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
+fn pose_all<L: ContactLaw, P: ContactPrediction>(law: &mut L, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
     for (contact, at) in contacts.enumerate() {
         law.pose(contact, &rows[L::DIRECTIONS * contact..][..L::DIRECTIONS], &at);
     }
@@ -160,7 +160,7 @@ impl Law {
     /// Room for groups of up to `contacts` contacts; on a coating for whole blades.
     pub fn new(solver: Solver, coating: Option<Coating>, contacts: usize) -> Self {
         match (coating, solver) {
-            (Some(coating), _) if coating.is_cut() => Self::Cutting(Cutting::new(coating, contacts)),
+            (Some(coating), _) if coating.is_cut() => Self::Cutting(CuttingLaw::new(coating, contacts)),
             (Some(coating), _) => Self::Coated(Coated::new(coating, contacts)),
             (None, Solver::Film) => Self::Film(Film::new(contacts)),
             (None, Solver::Lcp) => Self::Lcp(Lcp::new(contacts)),
@@ -209,13 +209,13 @@ impl Law {
 
     /// [`ContactLaw::pose`] of all contacts; `rows` are all rows of the matrix.
     #[inline(always)]
-    pub fn pose_all<P: Prediction>(&mut self, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
+    pub fn pose_all<P: ContactPrediction>(&mut self, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
         each_law!(self, law => pose_all(law, rows, contacts));
     }
 
     /// [`ContactLaw::solve`].
     #[inline(always)]
-    pub fn solve(&mut self) -> Outcome {
+    pub fn solve(&mut self) -> SolverOutcome {
         each_law!(self, law => law.solve())
     }
 
@@ -270,13 +270,13 @@ impl Law {
 
 /// The state of a law is the wear of its coating.
 impl Persist for Law {
-    fn save(&self, writer: &mut Writer) {
+    fn save(&self, writer: &mut StateWriter) {
         self.coating().into_iter().for_each(|coating| coating.save(writer));
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         self.coating_mut().into_iter().for_each(|coating| coating.restore(reader));
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         self.coating().into_iter().for_each(|coating| coating.check(reader));
     }
 }

@@ -1,6 +1,6 @@
 //! Contact grids, what a surface can be laid through; rows of contact patches.
 
-use super::{ContactGrid, ContactNode, Frame, Rom};
+use super::{ContactGrid, ContactNode, DisplacementFrame, Rom};
 use crate::{Error, Result};
 
 /// Nodes this much nearer than the longest edge of an open grid are the same node.
@@ -40,10 +40,14 @@ impl Rom {
             return refuse("a contact grid needs one sector".to_owned());
         }
         match (grid.closed, self.frame) {
-            (true, Frame::Cylindrical) => closed_ring(grid, &self.contact_nodes),
-            (false, Frame::Cartesian) => open_grid(grid, &self.contact_nodes),
-            (true, Frame::Cartesian) => refuse("a closed contact grid needs a cylindrical frame".to_owned()),
-            (false, Frame::Cylindrical) => refuse("an open contact grid needs a Cartesian frame".to_owned()),
+            (true, DisplacementFrame::Cylindrical) => closed_ring(grid, &self.contact_nodes),
+            (false, DisplacementFrame::Cartesian) => open_grid(grid, &self.contact_nodes),
+            (true, DisplacementFrame::Cartesian) => {
+                refuse("a closed contact grid needs a cylindrical frame".to_owned())
+            }
+            (false, DisplacementFrame::Cylindrical) => {
+                refuse("an open contact grid needs a Cartesian frame".to_owned())
+            }
         }
     }
 }

@@ -14,7 +14,7 @@ pub const SUPPORT_ROWS: usize = 6;
 /// With r the six rigid motions of the held nodes s and u = Vq the displacements of the others f, S_K = rᵀK_sf V, S_M =
 /// rᵀM_sf V, and S_T = rᵀf_s with the loads f per kelvin of each patch.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Support {
+pub struct SupportRows {
     /// S_K, 6 × n (N or N·m per unit coordinate).
     pub stiffness: DMatrix<f64>,
     /// S_M, 6 × n (kg or kg·m for coordinates that are displacements).

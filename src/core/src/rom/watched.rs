@@ -7,7 +7,7 @@ use crate::{Error, Result, ranges};
 
 /// Points that are looked at, and that touch nothing.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Watched {
+pub struct WatchedPoints {
     /// What is there per unit of each coordinate, rows (point, component) × n, directions as for contact nodes: three displacements, or
     /// six stresses σ₁₁, σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁ (Pa).
     pub map: DMatrix<f64>,
@@ -57,7 +57,7 @@ impl Rom {
     fn validate_points(
         &self,
         of: &str,
-        watched: Option<&Watched>,
+        watched: Option<&WatchedPoints>,
         (components, largest): (usize, f64),
         remedy: &str,
     ) -> Result<()> {

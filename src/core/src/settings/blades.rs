@@ -7,7 +7,7 @@ use super::is_positive_zero;
 /// Component of a displacement or force at a contact node of a structure that turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Direction {
+pub enum ForceDirection {
     /// Away from the axis.
     Radial,
     /// Around it, with the angle.
@@ -32,7 +32,7 @@ pub struct ExcitationSettings {
     pub node: Option<String>,
     /// Direction of the force at that node.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub direction: Option<Direction>,
+    pub direction: Option<ForceDirection>,
     /// Start value of the amplitude input (N per blade).
     #[serde(default, skip_serializing_if = "is_positive_zero")]
     pub amplitude: f64,

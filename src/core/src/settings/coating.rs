@@ -17,7 +17,7 @@ pub struct CuttingSettings {
 /// Nonlinear Dyn. 2012), or that are cut. Its unworn surface is where `gap` ends; the hard surface lies `thickness`
 /// behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(into = "Written")]
+#[serde(into = "CoatingInFile")]
 pub struct CoatingSettings {
     /// Thickness h₀ (m), 1e-9 to 0.1.
     pub thickness: f64,
@@ -41,7 +41,7 @@ pub struct CoatingSettings {
 /// As in a scene file: a coating that is cut has no modulus, yield stress and hardening, any other gives all of them.
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "CoatingSettings", deny_unknown_fields)]
-struct Written {
+struct CoatingInFile {
     thickness: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     modulus: Option<f64>,
@@ -57,7 +57,7 @@ struct Written {
     cutting: Option<CuttingSettings>,
 }
 
-impl From<CoatingSettings> for Written {
+impl From<CoatingSettings> for CoatingInFile {
     fn from(settings: CoatingSettings) -> Self {
         let CoatingSettings {
             thickness,
@@ -77,8 +77,16 @@ impl From<CoatingSettings> for Written {
 
 impl<'de> Deserialize<'de> for CoatingSettings {
     fn deserialize<D: Deserializer<'de>>(source: D) -> Result<Self, D::Error> {
-        let Written { thickness, modulus, yield_stress, hardening, cells_around, cells_along, contact_width, cutting } =
-            Written::deserialize(source)?;
+        let CoatingInFile {
+            thickness,
+            modulus,
+            yield_stress,
+            hardening,
+            cells_around,
+            cells_along,
+            contact_width,
+            cutting,
+        } = CoatingInFile::deserialize(source)?;
         let given = |value: Option<f64>, key: &'static str| match (value, cutting) {
             (None, None) => Err(D::Error::missing_field(key)),
             (value, _) => Ok(value.unwrap_or(0.0)),

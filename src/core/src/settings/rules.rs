@@ -7,53 +7,63 @@ mod place;
 mod tests;
 
 use super::relations::Relations;
-use super::{Motion, Preset, Scene, SceneSettings, Scheme, Solver, SpinSettings, StructureSettings};
-use crate::rom::Frame;
+use super::{BodyMotion, Preset, Scene, SceneSettings, Scheme, Solver, SpinSettings, StructureSettings};
+use crate::rom::DisplacementFrame;
 use crate::{Error, Result, Rom};
 use facts::*;
-use place::{Place, path};
+use place::{ScenePlace, path};
 
 /// What a feature may need or exclude, at the same place.
-type Other = (&'static str, fn(&Place) -> bool);
+type RelatedFeature = (&'static str, fn(&ScenePlace) -> bool);
 
 /// One row.
-pub struct Rule {
+pub struct FeatureRule {
     features: &'static [Fact],
     needed: bool,
-    other: Other,
+    other: RelatedFeature,
     because: &'static str,
     remedy: &'static str,
 }
 
-const fn needs(features: &'static [Fact], other: Other, because: &'static str, remedy: &'static str) -> Rule {
-    Rule { features, needed: true, other, because, remedy }
+const fn needs(
+    features: &'static [Fact],
+    other: RelatedFeature,
+    because: &'static str,
+    remedy: &'static str,
+) -> FeatureRule {
+    FeatureRule { features, needed: true, other, because, remedy }
 }
 
-const fn excludes(features: &'static [Fact], other: Other, because: &'static str, remedy: &'static str) -> Rule {
-    Rule { features, needed: false, other, because, remedy }
+const fn excludes(
+    features: &'static [Fact],
+    other: RelatedFeature,
+    because: &'static str,
+    remedy: &'static str,
+) -> FeatureRule {
+    FeatureRule { features, needed: false, other, because, remedy }
 }
 
-const FREE: Other = ("a free master", |at| at.is_free());
-const ALL_FREE: Other = ("a scene of free masters only", |at| at.contacts().all(|at| at.is_free()));
-const COUPLED: Other = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
+const FREE: RelatedFeature = ("a free master", |at| at.is_free());
+const ALL_FREE: RelatedFeature = ("a scene of free masters only", |at| at.contacts().all(|at| at.is_free()));
+const COUPLED: RelatedFeature = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
 
 /// Of structures, surfaces and contacts.
-static PARTS: &[Rule] = &[
+static PARTS: &[FeatureRule] = &[
     needs(
         &[SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT, SOFTENING, EXCITATION, INITIAL],
-        ("`motion = \"rotating\"`", |at| at.structure().motion == Motion::Rotating),
+        ("`motion = \"rotating\"`", |at| at.structure().motion == BodyMotion::Rotating),
         "only a rotating structure has a speed, blades and a shaft",
         "Remove the line, or set motion = \"rotating\"",
     ),
     needs(
         &[LOAD],
-        ("`motion = \"still\"`", |at| at.structure().motion == Motion::Still),
+        ("`motion = \"still\"`", |at| at.structure().motion == BodyMotion::Still),
         "only a structure that stands still has a load on its contact grid",
         "Remove the line, or set motion = \"still\"",
     ),
     excludes(
         &[THERMAL],
-        ("`motion = \"free\"`", |at| at.structure().motion == Motion::Free),
+        ("`motion = \"free\"`", |at| at.structure().motion == BodyMotion::Free),
         "what flies has no inputs",
         "Remove the line",
     ),
@@ -65,13 +75,13 @@ static PARTS: &[Rule] = &[
     ),
     needs(
         &[VELOCITY],
-        ("`motion = \"free\"`", |at| at.structure().motion == Motion::Free),
+        ("`motion = \"free\"`", |at| at.structure().motion == BodyMotion::Free),
         "only a free structure starts with one",
         "Remove the line, or set motion = \"free\"",
     ),
     needs(
         &[CARRIED],
-        ("a structure with `motion = \"still\"`", |at| at.carrier().is_some_and(|own| own.motion == Motion::Still)),
+        ("a structure with `motion = \"still\"`", |at| at.carrier().is_some_and(|own| own.motion == BodyMotion::Still)),
         "a surface stands still",
         "Name a structure that stands still, or remove the line for a rigid surface",
     ),
@@ -150,7 +160,7 @@ static PARTS: &[Rule] = &[
 ];
 
 /// Of outputs and inputs.
-static VARIABLES: &[Rule] = &[
+static VARIABLES: &[FeatureRule] = &[
     needs(
         &[WEAR, WEAR_PROFILE],
         ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
@@ -195,7 +205,7 @@ static VARIABLES: &[Rule] = &[
 ];
 
 /// Of schemes and solvers: those of the scene, and those chosen by parameters.
-static METHODS: &[Rule] = &[
+static METHODS: &[FeatureRule] = &[
     needs(
         &[COULOMB],
         ("a scene packaged with it, or with rotors of uncoupled sectors, rigid surfaces and friction", |at| {
@@ -231,7 +241,7 @@ static METHODS: &[Rule] = &[
     excludes(
         &[GALERKIN],
         ("`structure.thermal` of a rotor, and `structure.excitation`", |at| {
-            let loaded = |own: &StructureSettings| own.thermal && own.motion == Motion::Rotating;
+            let loaded = |own: &StructureSettings| own.thermal && own.motion == BodyMotion::Rotating;
             at.settings.structures.iter().any(|own| loaded(own) || own.excitation.is_some())
         }),
         "its tables are those of blades that are loaded by contact alone",
@@ -290,7 +300,7 @@ static METHODS: &[Rule] = &[
 ];
 
 /// Of a preset: what the scene file says beside it. Parameters may be set to anything.
-static PRESETS: &[Rule] = &[excludes(
+static PRESETS: &[FeatureRule] = &[excludes(
     &[OTHER_SCHEME, OTHER_SOLVER],
     ("`preset = \"paper\"`", |at| at.settings.preset == Preset::Paper),
     "the preset is the method of the paper whole",
@@ -298,16 +308,16 @@ static PRESETS: &[Rule] = &[excludes(
 )];
 
 /// Of ROMs.
-static ROMS: &[Rule] = &[
+static ROMS: &[FeatureRule] = &[
     needs(
         &[ROM_AROUND],
-        ("`frame = cylindrical`", |at| at.rom().frame == Frame::Cylindrical),
+        ("`frame = cylindrical`", |at| at.rom().frame == DisplacementFrame::Cylindrical),
         "surfaces around an axis meet displacements along (r, θ, z)",
         "Write the ROM with frame = cylindrical",
     ),
     needs(
         &[ROM_FREE],
-        ("`frame = cartesian`", |at| at.rom().frame == Frame::Cartesian),
+        ("`frame = cartesian`", |at| at.rom().frame == DisplacementFrame::Cartesian),
         "a free master and what it meets are described along x, y, z",
         "Write the ROM with frame = cartesian",
     ),
@@ -422,11 +432,11 @@ static ROMS: &[Rule] = &[
 ];
 
 /// All rows, in the order of the guide.
-pub fn all() -> impl Iterator<Item = &'static Rule> {
+pub fn all() -> impl Iterator<Item = &'static FeatureRule> {
     PARTS.iter().chain(VARIABLES).chain(METHODS).chain(PRESETS).chain(ROMS)
 }
 
-impl Rule {
+impl FeatureRule {
     fn relation(&self) -> String {
         format!("{} {}", if self.needed { "needs" } else { "excludes" }, self.other.0)
     }
@@ -453,14 +463,14 @@ impl SceneSettings {
     /// Returns which rule excludes a scheme from this scene, and why; `roms` may be empty before they are known.
     pub(super) fn excluded_method(&self, roms: &[Rom], scheme: Scheme) -> Option<String> {
         let relations = Relations::of(self);
-        let refusal = check(METHODS, Place { roms, scheme, ..self.place(&relations) }, path).err()?;
+        let refusal = check(METHODS, ScenePlace { roms, scheme, ..self.place(&relations) }, path).err()?;
         let Error::Invalid { problem, .. } = refusal else { return None };
         Some(problem)
     }
 
-    fn place<'a>(&'a self, relations: &'a Relations) -> Place<'a> {
+    fn place<'a>(&'a self, relations: &'a Relations) -> ScenePlace<'a> {
         let (scheme, solver) = (self.time.scheme, self.contacts[0].solver);
-        Place { settings: self, relations, roms: &[], scheme, solver, index: 0 }
+        ScenePlace { settings: self, relations, roms: &[], scheme, solver, index: 0 }
     }
 }
 
@@ -468,7 +478,7 @@ impl Scene {
     /// What a validated scene needs of its ROMs, and what they exclude.
     pub(crate) fn check_roms(&self) -> Result<()> {
         let relations = Relations::of(&self.settings);
-        check(ROMS, Place { roms: &self.roms, ..self.settings.place(&relations) }, path)
+        check(ROMS, ScenePlace { roms: &self.roms, ..self.settings.place(&relations) }, path)
     }
 
     /// Whether a validated scene can be stepped with a scheme and a solver.
@@ -476,16 +486,16 @@ impl Scene {
     /// # Errors
     /// Naming parameter and remedy.
     pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
-        let parameter = |_: &Place, key: &str| format!("parameter `{}`", key.rsplit('.').next().unwrap_or(key));
+        let parameter = |_: &ScenePlace, key: &str| format!("parameter `{}`", key.rsplit('.').next().unwrap_or(key));
         let relations = Relations::of(&self.settings);
-        check(METHODS, Place { roms: &self.roms, scheme, solver, ..self.settings.place(&relations) }, parameter)
+        check(METHODS, ScenePlace { roms: &self.roms, scheme, solver, ..self.settings.place(&relations) }, parameter)
     }
 }
 
 /// Refuse what breaks a row; `name` tells of a key at a place what it is called.
-fn check(rules: &[Rule], scene: Place, name: impl Fn(&Place, &str) -> String) -> Result<()> {
+fn check(rules: &[FeatureRule], scene: ScenePlace, name: impl Fn(&ScenePlace, &str) -> String) -> Result<()> {
     for (rule, feature) in rules.iter().flat_map(|rule| rule.features.iter().map(move |feature| (rule, feature))) {
-        let breaks = |at: &Place| (feature.holds)(at) && (rule.other.1)(at) != rule.needed;
+        let breaks = |at: &ScenePlace| (feature.holds)(at) && (rule.other.1)(at) != rule.needed;
         if let Some(at) = scene.all_of(feature.key).find(breaks) {
             let words = if feature.words.is_empty() { String::new() } else { format!("{} ", feature.words) };
             let problem = format!("{words}{}: {}", rule.relation(), rule.because);

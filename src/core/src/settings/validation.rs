@@ -6,7 +6,7 @@ use std::collections::HashSet;
 
 use super::relations::{Relations, structure};
 use super::{
-    CoatingSettings, ContactSettings, ExcitationSettings, InitialSettings, Motion, SceneSettings, Shape,
+    BodyMotion, CoatingSettings, ContactSettings, ExcitationSettings, InitialSettings, SceneSettings, Shape,
     SplineSettings, StructureSettings, SurfaceSettings,
 };
 use crate::ranges::{self, at_most, within};
@@ -57,7 +57,7 @@ impl SceneSettings {
         let relations = Relations::of(self);
         for (index, contact) in self.contacts.iter().enumerate() {
             let master = structure(self, relations.masters[index]);
-            let flies = master.is_some_and(|master| master.motion == Motion::Free);
+            let flies = master.is_some_and(|master| master.motion == BodyMotion::Free);
             contact.validate(flies, &format!("contact[{}]", index + 1))?;
         }
         within("time.steps_at_most", f64::from(self.time.steps_at_most.unwrap_or(0)), 0.0, ranges::STEPS)?;
@@ -224,7 +224,7 @@ impl SurfaceSettings {
         if names.contains(name.as_str()) {
             return Ok(());
         }
-        let still = scene.structures.iter().filter(|structure| structure.motion == Motion::Still);
+        let still = scene.structures.iter().filter(|structure| structure.motion == BodyMotion::Still);
         let candidates: Vec<&str> = still.map(|structure| structure.name.as_str()).collect();
         let remedy = if candidates.is_empty() {
             "Add a [[structure]] with motion = \"still\", or remove the line for a rigid surface".to_owned()
@@ -252,7 +252,7 @@ impl SurfaceSettings {
                 within(&format!("{at}.shape.width"), *width, 1e-3, 0.25)
             }
             Shape::Table { radius_change } => {
-                crate::gaps::shape::Surface::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
+                crate::gaps::shape::CompiledShape::new(&Shape::Table { radius_change: radius_change.clone() }, 0.0)
                     .map_or_else(|error| Err(error.placed("surface", at)), |_| Ok(()))
             }
         }

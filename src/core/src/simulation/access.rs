@@ -1,8 +1,8 @@
 //! Reading and setting variables: what is legal for which kind, causality and variability.
 
 use super::drive::Input;
-use super::{Phase, Simulation};
-use crate::variables::{Causality, Kind, Quantity, Start, Variability, Variable};
+use super::{Simulation, SimulationPhase};
+use crate::variables::{Causality, DataType, Quantity, StartValue, Variability, Variable};
 use crate::{Error, Result, shown};
 
 impl Simulation {
@@ -11,7 +11,7 @@ impl Simulation {
     /// # Errors
     /// Unknown reference, or not a real.
     pub fn real(&self, reference: u32) -> Result<f64> {
-        self.expect_kind(reference, "real", |kind| kind == Kind::Real)?;
+        self.expect_kind(reference, "real", |kind| kind == DataType::Real)?;
         Ok(self.values[reference as usize])
     }
 
@@ -20,7 +20,7 @@ impl Simulation {
     /// # Errors
     /// Unknown reference, or neither integer nor enumeration.
     pub fn integer(&self, reference: u32) -> Result<i32> {
-        self.expect_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
+        self.expect_kind(reference, "integer", |kind| matches!(kind, DataType::Integer | DataType::Enumeration(_)))?;
         #[expect(clippy::cast_possible_truncation, reason = "integers are stored as the i32 they were set from")]
         Ok(self.values[reference as usize] as i32)
     }
@@ -30,7 +30,7 @@ impl Simulation {
     /// # Errors
     /// Unknown reference, or not a boolean.
     pub fn boolean(&self, reference: u32) -> Result<bool> {
-        self.expect_kind(reference, "boolean", |kind| kind == Kind::Boolean)?;
+        self.expect_kind(reference, "boolean", |kind| kind == DataType::Boolean)?;
         Ok(self.values[reference as usize] != 0.0)
     }
 
@@ -39,14 +39,14 @@ impl Simulation {
     /// # Errors
     /// Unknown reference, or not a string.
     pub fn string(&self, reference: u32) -> Result<&str> {
-        self.expect_kind(reference, "string", |kind| kind == Kind::String)?;
+        self.expect_kind(reference, "string", |kind| kind == DataType::String)?;
         match &self.table.locate(reference)?.0.start {
-            Some(Start::String(text)) => Ok(text),
+            Some(StartValue::String(text)) => Ok(text),
             _ => Ok(""),
         }
     }
 
-    fn expect_kind(&self, reference: u32, wanted: &str, fits: impl Fn(Kind) -> bool) -> Result<()> {
+    fn expect_kind(&self, reference: u32, wanted: &str, fits: impl Fn(DataType) -> bool) -> Result<()> {
         let (variable, _) = self.table.locate(reference)?;
         if fits(variable.kind) {
             return Ok(());
@@ -68,7 +68,7 @@ impl Simulation {
             ));
         }
         let fixed = variable.causality == Causality::Parameter && variable.variability == Variability::Fixed;
-        if fixed && self.phase != Phase::Created {
+        if fixed && self.phase != SimulationPhase::Created {
             return Err(Error::invalid(
                 format!("parameter `{}`", variable.name),
                 "is fixed and cannot be set after initialisation",
@@ -87,7 +87,7 @@ impl Simulation {
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
         self.check_real(reference, value)?;
         let (variable, _) = self.table.locate(reference)?;
-        if variable.quantity == Quantity::Friction && self.phase != Phase::Created {
+        if variable.quantity == Quantity::Friction && self.phase != SimulationPhase::Created {
             let before = std::mem::replace(&mut self.values[reference as usize], value);
             let parameters = self.parameters();
             let outcome = self.check_limits(&parameters);
@@ -108,7 +108,7 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::set_real`].
     pub fn check_real(&self, reference: u32, value: f64) -> Result<()> {
-        self.expect_kind(reference, "real", |kind| kind == Kind::Real)?;
+        self.expect_kind(reference, "real", |kind| kind == DataType::Real)?;
         self.settable(reference)?;
         let (variable, _) = self.table.locate(reference)?;
         check_range(variable, value)
@@ -130,10 +130,10 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::set_real`].
     pub fn check_integer(&self, reference: u32, value: i32) -> Result<()> {
-        self.expect_kind(reference, "integer", |kind| matches!(kind, Kind::Integer | Kind::Enumeration(_)))?;
+        self.expect_kind(reference, "integer", |kind| matches!(kind, DataType::Integer | DataType::Enumeration(_)))?;
         let (_, name, _) = self.settable(reference)?;
         let (variable, _) = self.table.locate(reference)?;
-        let Kind::Enumeration(choices) = variable.kind else { return check_range(variable, f64::from(value)) };
+        let DataType::Enumeration(choices) = variable.kind else { return check_range(variable, f64::from(value)) };
         let item = usize::try_from(value).unwrap_or(0);
         if (1..=choices.items.len()).contains(&item) {
             return Ok(());
@@ -151,7 +151,7 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::set_real`].
     pub fn set_boolean(&mut self, reference: u32, value: bool) -> Result<()> {
-        self.expect_kind(reference, "boolean", |kind| kind == Kind::Boolean)?;
+        self.expect_kind(reference, "boolean", |kind| kind == DataType::Boolean)?;
         self.settable(reference)?;
         self.values[reference as usize] = f64::from(u8::from(value));
         Ok(())
@@ -162,7 +162,7 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::set_real`].
     pub fn set_string(&mut self, reference: u32, _value: &str) -> Result<()> {
-        self.expect_kind(reference, "string", |kind| kind == Kind::String)?;
+        self.expect_kind(reference, "string", |kind| kind == DataType::String)?;
         let (_, name, _) = self.settable(reference)?;
         Err(Error::invalid(format!("variable `{name}`"), "cannot be set", "Leave it as it is"))
     }
@@ -183,7 +183,7 @@ impl Simulation {
     fn change_input(&mut self, reference: u32, change: impl FnOnce(&mut Input)) -> Result<()> {
         let (variable, element) = self.table.locate(reference)?;
         let (quantity, of) = (variable.quantity, variable.of);
-        let (stepping, at_once) = (self.phase == Phase::Stepping, self.acts_at_once(quantity));
+        let (stepping, at_once) = (self.phase == SimulationPhase::Stepping, self.acts_at_once(quantity));
         if stepping {
             self.tangent.forget();
         }
@@ -193,7 +193,7 @@ impl Simulation {
         if stepping {
             self.check_course(variable, element, &input, at_once, [offset, length])?;
         }
-        if at_once || self.phase == Phase::Created {
+        if at_once || self.phase == SimulationPhase::Created {
             input.take();
         } else if stepping {
             input.aim(offset, self.inputs.until);
@@ -240,7 +240,7 @@ impl Simulation {
     pub fn check_input_derivative(&self, reference: u32, order: i32, value: f64) -> Result<()> {
         let (variable, _) = self.table.locate(reference)?;
         let what = format!("derivative of `{}`", variable.name);
-        if variable.causality != Causality::Input || variable.kind != Kind::Real {
+        if variable.causality != Causality::Input || variable.kind != DataType::Real {
             return Err(Error::invalid(
                 what,
                 "the variable is not a real input",
@@ -267,7 +267,7 @@ impl Simulation {
         let (variable, element) = self.table.locate(reference)?;
         let what = format!("derivative of `{}`", variable.name);
         let continuous = variable.causality == Causality::Output && variable.variability == Variability::Continuous;
-        if !continuous || variable.kind != Kind::Real {
+        if !continuous || variable.kind != DataType::Real {
             let remedy = "Ask for derivatives of continuous real outputs only";
             return Err(Error::invalid(what, "the variable is not a continuous real output", remedy));
         }

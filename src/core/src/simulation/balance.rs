@@ -1,6 +1,6 @@
 //! Whether the energy of a run is there: at every communication point, and what is said where it is not.
 
-use super::{Phase, Simulation};
+use super::{Simulation, SimulationPhase};
 use crate::ledger::Ledger;
 use crate::settings::{Scheme, Solver};
 use crate::system::Loss;
@@ -46,7 +46,7 @@ impl Simulation {
             return Ok(());
         }
         let Some(set) = (0..self.energies.len()).find(|set| !self.has_its_energy(*set)) else { return Ok(()) };
-        self.phase = Phase::Failed;
+        self.phase = SimulationPhase::Failed;
         Err(Error::Unstable {
             problem: format!(
                 "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, where it was {:.4e} J at the start \

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::compile::{Body, Compiled};
+use super::compile::{Compiled, CompiledBody};
 use super::drive::Input;
 use super::{Quantity, Simulation};
 use crate::dynamics::bank::BankOptions;
@@ -10,7 +10,7 @@ use crate::dynamics::excitation::{Excitation, most_moved};
 use crate::dynamics::modal::{ModalModel, ModalSpin};
 use crate::dynamics::sectors::Sectors;
 use crate::ranges::SOFTENED;
-use crate::rom::Watched;
+use crate::rom::WatchedPoints;
 use crate::settings::{InitialSettings, Scheme, StructureSettings};
 use crate::{Error, Result, Rom, shown, shown_time};
 
@@ -56,8 +56,8 @@ pub fn expansion(structure: &StructureSettings, rom: &Rom, model: &ModalModel, t
 pub fn static_stress(
     structure: &StructureSettings,
     rom: &Rom,
-    stress: &Watched,
-    body: &Body,
+    stress: &WatchedPoints,
+    body: &CompiledBody,
 ) -> Result<(Vec<f64>, Vec<f64>)> {
     let beyond = |whole: DVector<f64>, modes: DVector<f64>| (whole - modes).as_slice().to_vec();
     let heat = rom.extras.stress_thermal.as_ref().filter(|_| structure.thermal);
@@ -123,7 +123,7 @@ impl Compiled {
         if let Some(mode) = asked.mode {
             self.check_mode(body, &format!("{at}.mode"), mode, self.fewest_modes(body, None))?;
         }
-        let row = |(name, direction): (&String, crate::settings::Direction)| {
+        let row = |(name, direction): (&String, crate::settings::ForceDirection)| {
             let node = rom.contact_nodes.iter().position(|node| node.name == *name);
             let names: Vec<&str> = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
             let unknown = || {

@@ -6,14 +6,14 @@ use crate::dynamics::rigid::{Translations, free_modes};
 use crate::dynamics::sectors::SectorModel;
 use crate::gaps::layout::Layout;
 use crate::gaps::open::{OpenGap, OpenSurface};
-use crate::gaps::shape::Surface;
+use crate::gaps::shape::CompiledShape;
 use crate::gaps::surface_spline::SurfaceSpline;
 use crate::gaps::{GapLaw, RevolutionGap};
-use crate::laws::coating::{Coating, Tip};
+use crate::laws::coating::{BladeTip, Coating};
 use crate::ranges::SMALL;
-use crate::rom::{ContactNode, Support};
-use crate::settings::{ContactSettings, Meridian, Motion, StructureSettings};
-use crate::system::{Carrier, PairParts, StructureParts, System, SystemSettings, joined};
+use crate::rom::{ContactNode, SupportRows};
+use crate::settings::{BodyMotion, ContactSettings, Meridian, StructureSettings};
+use crate::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings, joined};
 use crate::variables::Quantity;
 use crate::{Error, Result, Rom, Scene, Warning, shown};
 use nalgebra::DMatrix;
@@ -21,8 +21,8 @@ use nalgebra::DMatrix;
 use super::blades::{disk_heat, expansion, softened, static_stress};
 use super::contour::check_contour;
 use super::loads::{CarrierLoads, centrifugal};
-use super::patches::Patches;
-use super::plan::{PairPlan, Plan, prefix};
+use super::patches::HeatPatches;
+use super::plan::{PairPlan, SteppingOrder, prefix};
 use super::slave_surface::{CarrierModes, Lining, Share, spline_gap};
 
 /// Most contact nodes of all sectors together that a flexible slave or the disk couples: their Delassus matrix is dense.
@@ -30,7 +30,7 @@ pub const MOST_COUPLED: usize = 2000;
 
 /// Places of values that the step reads.
 #[derive(Debug, Clone)]
-pub struct References {
+pub struct ValuePlaces {
     pub step_max: usize,
     pub input_interpolation: Option<usize>,
     /// Of each pair whose shape grows in.
@@ -41,7 +41,7 @@ pub struct References {
 
 /// A structure whose contact nodes touch.
 #[derive(Debug, Clone)]
-pub struct Body {
+pub struct CompiledBody {
     /// Modes, at the reference speed where spin stiffens it; of coupled sectors those of nodal diameter 0.
     pub model: ModalModel,
     /// Modes of coupled sectors.
@@ -83,32 +83,32 @@ pub struct CarrierParts {
     pub load_order: u32,
     pub loads: CarrierLoads,
     /// What its support feels per unit of each mode, where that is asked for.
-    pub support: Option<Support>,
+    pub support: Option<SupportRows>,
 }
 
 /// The parts of a scene that do not change while it runs.
 #[derive(Debug, Clone)]
 pub struct Compiled {
     pub scene: Scene,
-    pub plan: Plan,
+    pub plan: SteppingOrder,
     /// As in the plan.
-    pub bodies: Vec<Body>,
+    pub bodies: Vec<CompiledBody>,
     /// As in the plan; in the system they follow the bodies.
     pub carriers: Vec<CarrierParts>,
     /// Where friction heat is counted, per pair.
-    pub patches: Vec<Option<Patches>>,
+    pub patches: Vec<Option<HeatPatches>>,
     /// Between surface and mesh, per pair; empty where no support is asked for.
     pub linings: Vec<Option<Lining>>,
     /// Hash of settings and ROMs; saved states carry it.
     pub fingerprint: u64,
-    pub references: References,
+    pub references: ValuePlaces,
 }
 
-impl Body {
-    fn new(scene: &Scene, plan: &Plan, body: usize) -> Result<Self> {
+impl CompiledBody {
+    fn new(scene: &Scene, plan: &SteppingOrder, body: usize) -> Result<Self> {
         let (structure, rom) = plan.structure(scene, body);
         let ratio = structure.damping_ratio.unwrap_or(rom.damping_ratio);
-        let (model, translations) = if structure.motion == Motion::Free {
+        let (model, translations) = if structure.motion == BodyMotion::Free {
             let (model, translations) = free_modes(rom, ratio)?;
             (model, Some(translations))
         } else {
@@ -157,14 +157,14 @@ impl Compiled {
     /// Invalid settings or ROM; ROMs without what the scene asks of them.
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.settings.validate()?;
-        let plan = Plan::new(scene)?;
-        let bodies = (0..plan.bodies.len()).map(|body| Body::new(scene, &plan, body)).collect::<Result<_>>()?;
+        let plan = SteppingOrder::new(scene)?;
+        let bodies = (0..plan.bodies.len()).map(|body| CompiledBody::new(scene, &plan, body)).collect::<Result<_>>()?;
         let carrier = |structure: &usize| {
             let (settings, rom) = (&scene.settings.structures[*structure], &scene.roms[*structure]);
             let load_order = settings.load.map_or(0, |load| load.order);
             let (model, loads) = (modes(settings, rom, [0.0; 2])?, CarrierLoads::default());
             let support = rom.extras.support.as_ref().filter(|_| scene.settings.outputs.support_reaction);
-            let support = support.map(|rows| Support {
+            let support = support.map(|rows| SupportRows {
                 stiffness: &rows.stiffness * &model.shapes,
                 mass: &rows.mass * &model.shapes,
                 thermal: rows.thermal.clone(),
@@ -176,7 +176,7 @@ impl Compiled {
         let place = |quantity| table.with_quantity(quantity).map(|variable| variable.reference as usize);
         let ramp = |pair: usize| Some(table.with_quantity_of(Quantity::RampTime, pair)?.reference as usize);
         let order = |body: usize| Some(table.with_quantity_of(Quantity::ExcitationOrder, body)?.reference as usize);
-        let references = References {
+        let references = ValuePlaces {
             step_max: place(Quantity::StepMax).unwrap_or(0),
             input_interpolation: place(Quantity::InputInterpolation),
             ramp_times: (0..plan.pairs.len()).map(ramp).collect(),
@@ -184,7 +184,7 @@ impl Compiled {
         };
         let mut compiled = Self {
             fingerprint: super::fingerprint::of_scene(scene),
-            patches: plan.pairs.iter().map(|pair| Patches::new(scene, &plan, pair)).collect(),
+            patches: plan.pairs.iter().map(|pair| HeatPatches::new(scene, &plan, pair)).collect(),
             linings: Vec::new(),
             scene: scene.clone(),
             plan,
@@ -415,7 +415,7 @@ impl Compiled {
             let carrier = plan.carrier.map(|carrier| {
                 let first_row = rows[carrier];
                 rows[carrier] += 3 * gap.spline().map_or(0, |surface| surface.control_points().len());
-                Carrier { structure: self.bodies.len() + carrier, first_row }
+                SurfaceCarrier { structure: self.bodies.len() + carrier, first_row }
             });
             let contact = self.contact(index);
             let cutting = contact.coating.and_then(|coating| coating.cutting).map_or(0.0, |cut| 1.0 / cut.normal_ratio);
@@ -480,7 +480,7 @@ impl Compiled {
         let (structure, rom) = self.body(plan.body);
         let clearances =
             if contact.sector_gaps.is_empty() { vec![contact.gap; rom.sectors] } else { contact.sector_gaps.clone() };
-        let surface = Surface::new(&settings.shape, contact.nominal_gap())?;
+        let surface = CompiledShape::new(&settings.shape, contact.nominal_gap())?;
         check_lengths(rom, &clearances, &surface)?;
         let lanes = crate::dynamics::bank::lanes(rom.sectors);
         let spline = settings.spline.is_some() || plan.carrier.is_some();
@@ -539,11 +539,11 @@ impl Compiled {
         let plan = &self.plan.pairs[pair];
         let rom = self.body(plan.body).1;
         let nodes: Vec<&ContactNode> = plan.nodes.iter().map(|node| &rom.contact_nodes[*node]).collect();
-        Ok(Some(Coating::new(settings, &Tip::of(&nodes, settings), rom.sectors)?))
+        Ok(Some(Coating::new(settings, &BladeTip::of(&nodes, settings), rom.sectors)?))
     }
 }
 
-fn check_lengths(rom: &Rom, clearances: &[f64], surface: &Surface) -> Result<()> {
+fn check_lengths(rom: &Rom, clearances: &[f64], surface: &CompiledShape) -> Result<()> {
     let smallest = rom.contact_nodes.iter().fold(f64::INFINITY, |low, node| low.min(node.position[0]));
     let largest_gap = clearances.iter().fold(0.0, |largest: f64, gap| largest.max(*gap));
     for (what, value) in [("contact.gap", largest_gap), ("surface.shape", surface.largest_change())] {

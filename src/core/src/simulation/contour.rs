@@ -19,7 +19,7 @@ const UNEVEN: f64 = 1e-4;
 
 /// A place along the axis: its first node, and the means there.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct AxialStation {
     node: usize,
     count: f64,
     axial: f64,
@@ -53,7 +53,7 @@ pub fn check_contour(rom: &Rom, nodes: &[usize], uses_slopes: bool) -> Result<()
     Ok(())
 }
 
-fn contradicted(rom: &Rom, [low, high]: [Place; 2], rise: f64, straight: bool) -> Error {
+fn contradicted(rom: &Rom, [low, high]: [AxialStation; 2], rise: f64, straight: bool) -> Error {
     let [first, last] = [low, high].map(|place| &rom.contact_nodes[place.node].name);
     let remedy = if straight {
         "Give dr/dz of the tip contour at each node, which is 0 where the array is left out, or set meridian = \"cylinder\" for the contact"
@@ -73,11 +73,11 @@ fn contradicted(rom: &Rom, [low, high]: [Place; 2], rise: f64, straight: bool) -
 }
 
 /// Places of some contact nodes by growing axial position; none without an extent along the axis.
-fn places(rom: &Rom, nodes: &[usize]) -> Vec<Place> {
+fn places(rom: &Rom, nodes: &[usize]) -> Vec<AxialStation> {
     let mut order = nodes.to_vec();
     let axial = |node: &usize| rom.contact_nodes[*node].position[2];
     order.sort_by(|a, b| axial(a).total_cmp(&axial(b)));
-    let mut places: Vec<Place> = Vec::new();
+    let mut places: Vec<AxialStation> = Vec::new();
     let [Some(first), Some(last)] = [order.first(), order.last()] else { return places };
     let extent = axial(last) - axial(first);
     if extent <= FLAT * rom.contact_nodes[*first].position[0] {
@@ -92,7 +92,7 @@ fn places(rom: &Rom, nodes: &[usize]) -> Vec<Place> {
                 place.radius += (radius - place.radius) / place.count;
                 place.slope += (slope - place.slope) / place.count;
             }
-            _ => places.push(Place { node, count: 1.0, axial, radius, slope }),
+            _ => places.push(AxialStation { node, count: 1.0, axial, radius, slope }),
         }
     }
     places

@@ -1,14 +1,14 @@
 //! Why a step failed, in words: what, where, and what helps.
 
 use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
-use super::{Phase, Simulation};
-use crate::system::{Curved, Pair, StepFailure};
+use super::{Simulation, SimulationPhase};
+use crate::system::{ContactPair, Curved, StepFailure};
 use crate::{Error, shown_time};
 
 impl Simulation {
     /// The error of a step that should have ended at `time`; the simulation is of no use until restored or reset.
     pub(super) fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
-        self.phase = Phase::Failed;
+        self.phase = SimulationPhase::Failed;
         if failure == StepFailure::NonFinite {
             return Error::NonFinite {
                 last_good_time: self.time,
@@ -135,7 +135,7 @@ impl Simulation {
     /// No forces fulfil the conditions of contact. Friction can do that; without it only contacts that no motion opens at once.
     fn unsolved(&self, structure: usize, name: &str, with_friction: &str) -> (String, String) {
         let sets = self.system.sets();
-        let felt = |pair: &Pair| sets.of(pair.structure()) == sets.of(structure);
+        let felt = |pair: &ContactPair| sets.of(pair.structure()) == sets.of(structure);
         if self.system.pairs().iter().any(|pair| felt(pair) && pair.cutting() > 0.0) {
             let problem = format!("the contact problem of {name} has no solution{}", self.instability(structure));
             return (problem, "Use a larger `normal_ratio`, less friction or another internal step".to_owned());

@@ -2,8 +2,8 @@
 
 use super::Simulation;
 use super::compile::Compiled;
-use crate::rom::Frame;
-use crate::settings::Motion;
+use crate::rom::DisplacementFrame;
+use crate::settings::BodyMotion;
 use crate::warning::Topic;
 use crate::{Warning, shown};
 
@@ -25,7 +25,7 @@ impl Compiled {
     fn fast_rotation(&self, body: usize, speed: f64) -> Option<Warning> {
         let (structure, rom) = self.body(body);
         let ratio = speed.abs() / self.bodies[body].lowest_frequency();
-        let turns = structure.motion == Motion::Rotating && rom.frame == Frame::Cylindrical;
+        let turns = structure.motion == BodyMotion::Rotating && rom.frame == DisplacementFrame::Cylindrical;
         if !turns || structure.spin.stiffening || ratio <= SLOW {
             return None;
         }

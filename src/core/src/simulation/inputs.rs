@@ -206,19 +206,19 @@ impl Inputs {
 
 /// All inputs over time at one instant, to go back to where a set of values is refused as a whole.
 #[derive(Debug, Clone)]
-pub struct Courses {
+pub struct InputCourses {
     inputs: Inputs,
     rotors: Vec<RotorAngle>,
 }
 
 impl Simulation {
     /// What the inputs do, derivatives included.
-    pub fn courses(&self) -> Courses {
-        Courses { inputs: self.inputs.clone(), rotors: self.rotors.clone() }
+    pub fn courses(&self) -> InputCourses {
+        InputCourses { inputs: self.inputs.clone(), rotors: self.rotors.clone() }
     }
 
     /// Back to what the inputs did at the same instant; values as read are set back by [`Simulation::set_real`] before.
-    pub fn restore_courses(&mut self, courses: Courses) {
+    pub fn restore_courses(&mut self, courses: InputCourses) {
         (self.inputs, self.rotors) = (courses.inputs, courses.rotors);
     }
 

@@ -18,7 +18,7 @@ use crate::{Error, Result, Warning};
 use checking::Checking;
 use closing::Closing;
 use sliding::Sense;
-pub(super) use told::Told;
+pub(super) use told::WarningState;
 
 /// Parameters that decide stability.
 #[derive(Debug, Clone, PartialEq)]
@@ -134,7 +134,7 @@ impl Simulation {
     pub(super) fn renew_limits(&mut self) {
         let parameters = self.parameters();
         let known = self.limits.as_ref().is_some_and(|limits| limits.are_of(&parameters));
-        if self.phase != super::Phase::Created && !known {
+        if self.phase != super::SimulationPhase::Created && !known {
             self.limits = Some(self.compiled.limits(&parameters, &self.system));
         }
     }

@@ -28,17 +28,17 @@ mod units;
 mod watched;
 mod window;
 
-use crate::gaps::Drive;
-use crate::system::{Growth, System};
-use crate::variables::{Quantity, Start, VariableTable};
+use crate::gaps::PrescribedMotion;
+use crate::system::{ShapeGrowth, System};
+use crate::variables::{Quantity, StartValue, VariableTable};
 use crate::{Result, Scene, Warning, ranges};
 use compile::Compiled;
 use drive::{Input, RotorAngle};
-pub use inputs::Courses;
+pub use inputs::InputCourses;
 use inputs::{CarrierInputs, Inputs, PairInputs, RotorInputs};
-use tangent::Tangent;
+use tangent::StepReplay;
 use watched::WatchedGaps;
-use window::Window;
+use window::StepWindow;
 
 /// Communication points may differ from the simulation's own time by this fraction of H (rounding in the importer).
 const TIME_TOLERANCE: f64 = 1e-3;
@@ -58,7 +58,7 @@ const MOST_STEPS: f64 = 1e9;
 
 /// What one call of [`Simulation::advance`] did.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
+pub struct StepProgress {
     /// Internal time reached (s).
     pub time: f64,
     /// True when the communication point is reached (and outputs are up to date there).
@@ -67,7 +67,7 @@ pub struct Progress {
 
 /// Where in its life the simulation is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Phase {
+enum SimulationPhase {
     /// Values can be set, nothing is computed.
     Created,
     /// At a communication point.
@@ -118,7 +118,7 @@ impl Communication {
 pub struct Simulation {
     table: VariableTable,
     /// What fills the outputs, in the order of the table.
-    readers: Vec<outputs::Reader>,
+    readers: Vec<outputs::OutputReader>,
     compiled: Compiled,
     system: System,
     /// Current value of every reference; strings live in the table.
@@ -129,24 +129,24 @@ pub struct Simulation {
     /// Of the structures that touch.
     rotors: Vec<RotorAngle>,
     /// Prescribed motion at the end of the internal step under way, per contact pair.
-    drives: Vec<Drive>,
+    drives: Vec<PrescribedMotion>,
     /// By how much the rotor turns against the shape in free flight, per contact pair (rad).
     turns: Vec<f64>,
     /// Share of the friction heat that goes into what carries the surface, per pair.
     slave_shares: Vec<f64>,
-    window: Window,
+    window: StepWindow,
     watched_gaps: WatchedGaps,
     communication: Communication,
     /// Length of the step before the last (s), 0 before there was one.
     previous_length: f64,
     time: f64,
     initial_time: f64,
-    phase: Phase,
+    phase: SimulationPhase,
     warnings: Vec<Warning>,
     /// Warnings since the last [`Simulation::take_notes`].
     notes: Vec<Warning>,
     /// What was told since the start.
-    told: limits::Told,
+    told: limits::WarningState,
     /// Parameters that the system was prepared for.
     prepared: Option<limits::Parameters>,
     /// Limits found for the parameters checked last.
@@ -156,7 +156,7 @@ pub struct Simulation {
     /// State to go back to where a communication step takes too many internal steps; empty where nothing bounds them.
     mark: Vec<u8>,
     /// What derivatives of the last communication step take.
-    tangent: Tangent,
+    tangent: StepReplay,
     /// Whether the communication step under way may end early.
     partial: bool,
     /// Most internal steps tried within a communication step since the start.
@@ -185,7 +185,7 @@ impl Simulation {
         let compiled = Compiled::new(scene)?;
         let (table, readers) = table::build(scene)?;
         let system = compiled.system()?;
-        let window = Window::new(system.structures(), &compiled.patches, &compiled.scene.settings.outputs);
+        let window = StepWindow::new(system.structures(), &compiled.patches, &compiled.scene.settings.outputs);
         let watched_gaps = WatchedGaps::new(&compiled)?;
         let sets = system.sets().count();
         let (energies, initial_energies) = (vec![SetEnergy::default(); sets], vec![0.0; sets]);
@@ -207,7 +207,7 @@ impl Simulation {
             table,
             inputs,
             rotors: vec![RotorAngle::default(); bodies],
-            drives: vec![Drive::default(); pairs],
+            drives: vec![PrescribedMotion::default(); pairs],
             turns: vec![0.0; pairs],
             slave_shares: vec![1.0; pairs],
             compiled,
@@ -218,15 +218,15 @@ impl Simulation {
             previous_length: 0.0,
             time: 0.0,
             initial_time: 0.0,
-            phase: Phase::Created,
+            phase: SimulationPhase::Created,
             warnings: Vec::new(),
             notes: Vec::new(),
-            told: limits::Told::new(bodies, carriers),
+            told: limits::WarningState::new(bodies, carriers),
             prepared: None,
             limits: None,
             state_size: 0,
             mark: Vec::new(),
-            tangent: Tangent::default(),
+            tangent: StepReplay::default(),
             partial: false,
             most_tried: 0,
             energies,
@@ -255,7 +255,7 @@ impl Simulation {
         ranges::at_most("start time", start_time, ranges::TIME)?;
         let parameters = self.parameters();
         // A refusal leaves an instance that has to be initialised.
-        self.phase = Phase::Created;
+        self.phase = SimulationPhase::Created;
         self.warnings.clear();
         self.notes.clear();
         self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
@@ -296,7 +296,7 @@ impl Simulation {
             *initial = energy.now;
         }
         self.check_outputs(start_time)?;
-        self.phase = Phase::Ready;
+        self.phase = SimulationPhase::Ready;
         self.previous.copy_from_slice(&self.values);
         Ok(())
     }
@@ -418,7 +418,7 @@ impl Simulation {
 
     fn offset_now(&self) -> f64 {
         match self.phase {
-            Phase::Stepping => self.communication.offset(self.communication.done),
+            SimulationPhase::Stepping => self.communication.offset(self.communication.done),
             _ => 0.0,
         }
     }
@@ -435,10 +435,10 @@ impl Simulation {
         }
     }
 
-    fn drive(&self, pair: usize, offset: f64, time: f64) -> Drive {
+    fn drive(&self, pair: usize, offset: f64, time: f64) -> PrescribedMotion {
         let body = self.compiled.plan.pairs[pair].body;
         let (rotor, surface) = (&self.inputs.rotors[body], &self.inputs.pairs[pair]);
-        Drive {
+        PrescribedMotion {
             rotor_angle: self.rotors[body].phase(&rotor.speed, offset),
             speed: rotor.speed.at(offset),
             gap_offset: surface.gap_offset.at(offset),
@@ -460,12 +460,12 @@ impl Simulation {
     /// Share of the casing shape that has grown in: ½(1 − cos(πt/T)) until T.
     fn ramp(&self, pair: usize, time: f64) -> f64 {
         let Some(reference) = self.compiled.references.ramp_times[pair] else { return 1.0 };
-        Growth::share(time - self.initial_time, self.values[reference])
+        ShapeGrowth::share(time - self.initial_time, self.values[reference])
     }
 
     /// How the shape of a pair grows between two offsets and times (s).
-    fn growth(&self, pair: usize, offsets: [f64; 2], times: [f64; 2]) -> Growth {
-        Growth {
+    fn growth(&self, pair: usize, offsets: [f64; 2], times: [f64; 2]) -> ShapeGrowth {
+        ShapeGrowth {
             factors: offsets.map(|offset| self.inputs.pairs[pair].shape_factor.at(offset)),
             elapsed: times.map(|time| time - self.initial_time),
             length: self.compiled.references.ramp_times[pair].map_or(0.0, |reference| self.values[reference]),
@@ -480,7 +480,7 @@ impl Simulation {
         for variable in self.table.variables() {
             let reference = variable.reference as usize;
             match &variable.start {
-                Some(Start::Real(values)) => {
+                Some(StartValue::Real(values)) => {
                     self.values[reference..][..values.len()].copy_from_slice(values);
                     for (element, value) in values.iter().enumerate() {
                         if let Some(input) = self.inputs.get_mut(variable.quantity, variable.of, element) {
@@ -489,9 +489,9 @@ impl Simulation {
                         }
                     }
                 }
-                Some(Start::Integer(value)) => self.values[reference] = f64::from(*value),
-                Some(Start::Boolean(value)) => self.values[reference] = f64::from(u8::from(*value)),
-                Some(Start::String(_)) | None => {}
+                Some(StartValue::Integer(value)) => self.values[reference] = f64::from(*value),
+                Some(StartValue::Boolean(value)) => self.values[reference] = f64::from(u8::from(*value)),
+                Some(StartValue::String(_)) | None => {}
             }
         }
         self.system.structures_mut().iter_mut().for_each(|structure| structure.modes_mut().rest());
@@ -502,6 +502,6 @@ impl Simulation {
         self.warnings.clear();
         self.notes.clear();
         self.tangent.renew();
-        self.phase = Phase::Created;
+        self.phase = SimulationPhase::Created;
     }
 }

@@ -7,8 +7,8 @@ use nalgebra::DMatrix;
 
 use super::compile::Compiled;
 use super::units::LENGTH;
-use super::window::{Window, speed_of};
-use super::{Phase, Simulation};
+use super::window::{StepWindow, speed_of};
+use super::{Simulation, SimulationPhase};
 use crate::dynamics::sectors::Sectors;
 use crate::gaps::sector_angle;
 use crate::laws::coating::Coating;
@@ -17,40 +17,40 @@ use crate::rom::{STRESSES, von_mises};
 use crate::system::System;
 use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
-type Fill = dyn Fn(&View, &mut [f64]) + Send + Sync;
+type Fill = dyn Fn(&OutputView, &mut [f64]) + Send + Sync;
 
 /// What fills the elements of an output.
 #[derive(Clone)]
-pub struct Reader(Arc<Fill>);
+pub struct OutputReader(Arc<Fill>);
 
-impl fmt::Debug for Reader {
+impl fmt::Debug for OutputReader {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str("Reader")
     }
 }
 
 /// Of a scalar.
-pub fn scalar(read: impl Fn(&View) -> f64 + Send + Sync + 'static) -> Reader {
-    Reader(Arc::new(move |view, out| out[0] = read(view)))
+pub fn scalar(read: impl Fn(&OutputView) -> f64 + Send + Sync + 'static) -> OutputReader {
+    OutputReader(Arc::new(move |view, out| out[0] = read(view)))
 }
 
 /// Of an array, element by element.
-pub fn each(read: impl Fn(&View, usize) -> f64 + Send + Sync + 'static) -> Reader {
-    Reader(Arc::new(move |view, out| {
+pub fn each(read: impl Fn(&OutputView, usize) -> f64 + Send + Sync + 'static) -> OutputReader {
+    OutputReader(Arc::new(move |view, out| {
         out.iter_mut().enumerate().for_each(|(index, value)| *value = read(view, index));
     }))
 }
 
 /// Of an array as a whole.
-pub fn whole(read: impl Fn(&View, &mut [f64]) + Send + Sync + 'static) -> Reader {
-    Reader(Arc::new(read))
+pub fn whole(read: impl Fn(&OutputView, &mut [f64]) + Send + Sync + 'static) -> OutputReader {
+    OutputReader(Arc::new(read))
 }
 
 /// What outputs are read from, and what all of them share at one instant.
-pub struct View<'a> {
+pub struct OutputView<'a> {
     simulation: &'a Simulation,
     pub system: &'a System,
-    pub window: &'a Window,
+    pub window: &'a StepWindow,
     /// 1/time since the communication step began, 0 if none has passed (1/s).
     pub mean: f64,
     /// That time (s).
@@ -67,7 +67,7 @@ impl Simulation {
     /// Bring the outputs up to the internal time reached (means cover the part of the step done), for an importer that
     /// looks inside a communication step. At communication points they are up to date, and this does nothing.
     pub fn update_outputs(&mut self) {
-        if self.phase == Phase::Stepping {
+        if self.phase == SimulationPhase::Stepping {
             self.compute_outputs();
         }
     }
@@ -95,7 +95,7 @@ impl Simulation {
         let mut values = std::mem::take(&mut self.values);
         let (system, window) = (&self.system, &self.window);
         let ledger = system.ledger();
-        let view = View { simulation: self, system, window, mean, elapsed, energies, conserved, ledger };
+        let view = OutputView { simulation: self, system, window, mean, elapsed, energies, conserved, ledger };
         let outputs = self.table.variables().iter().filter(|variable| variable.causality == Causality::Output);
         for (variable, read) in outputs.zip(&self.readers) {
             let start = variable.reference as usize;
@@ -114,7 +114,7 @@ fn smallest<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
     values.fold(f64::INFINITY, |low: f64, value| low.min(*value)).min(NO_CLEARANCE)
 }
 
-impl View<'_> {
+impl OutputView<'_> {
     pub fn rotor_angle(&self, body: usize) -> f64 {
         self.simulation.rotors[body].total(&self.simulation.inputs.rotors[body].speed, self.elapsed)
     }
@@ -360,7 +360,7 @@ impl Simulation {
         let (now, before) = (self.values[reference as usize], self.previous[reference as usize]);
         let length = self.communication.length;
         match (variable.quantity, variable.span) {
-            _ if self.phase == Phase::Created || length == 0.0 => 0.0,
+            _ if self.phase == SimulationPhase::Created || length == 0.0 => 0.0,
             // From nothing to touch to a clearance, and back, there is no rate.
             _ if variable.unit == Some(&LENGTH) && now.max(before) >= NO_CLEARANCE => 0.0,
             (Quantity::Clearance(sector), _) => self.system.structures()[variable.of].gap_rate(element, sector),

@@ -1,7 +1,7 @@
 //! What internal steps a communication step takes: a bound on their number, a tolerance that is missed, flight over many at once.
 
 use super::limits::Parameters;
-use super::{Communication, Phase, Simulation};
+use super::{Communication, Simulation, SimulationPhase};
 use crate::galerkin::sector::shortest;
 use crate::settings::Scheme;
 use crate::variables::Quantity;
@@ -20,7 +20,7 @@ impl Simulation {
 
     /// Whether a communication step is under way.
     pub fn is_stepping(&self) -> bool {
-        self.phase == Phase::Stepping
+        self.phase == SimulationPhase::Stepping
     }
 
     /// Most internal steps of a communication step, 0 for any number.

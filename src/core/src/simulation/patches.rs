@@ -1,13 +1,13 @@
 //! Patches of the slave surface that friction power is gathered for.
 
-use super::plan::{PairPlan, Plan};
+use super::plan::{PairPlan, SteppingOrder};
 use crate::Scene;
-use crate::rom::Patch;
+use crate::rom::ThermalPatch;
 use crate::settings::PatchSettings;
 
 /// Where heat is counted.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Patches {
+pub enum HeatPatches {
     /// Equal parts of the circumference and of an axial extent (m).
     Equal {
         /// Parts.
@@ -16,12 +16,12 @@ pub enum Patches {
         extent: [f64; 2],
     },
     /// Those of the structure that carries the surface.
-    Listed(Vec<Patch>),
+    Listed(Vec<ThermalPatch>),
 }
 
-impl Patches {
+impl HeatPatches {
     /// What the scene asks of a pair: patches of its surface, else those of a thermal structure under it.
-    pub fn new(scene: &Scene, plan: &Plan, pair: &PairPlan) -> Option<Self> {
+    pub fn new(scene: &Scene, plan: &SteppingOrder, pair: &PairPlan) -> Option<Self> {
         if let Some(parts) = scene.settings.surfaces[pair.surface].patches {
             let nodes = &plan.structure(scene, pair.body).1.contact_nodes;
             let axial = || pair.nodes.iter().map(|node| nodes[*node].position[2]);
@@ -53,8 +53,8 @@ impl Patches {
                 along * parts.around + around
             }
             Self::Listed(patches) => {
-                let within = |patch: &Patch| turn(angle - patch.angle[0]) <= patch.angle[1] - patch.angle[0];
-                let beyond = |patch: &Patch| (patch.axial[0] - axial).max(axial - patch.axial[1]).max(0.0);
+                let within = |patch: &ThermalPatch| turn(angle - patch.angle[0]) <= patch.angle[1] - patch.angle[0];
+                let beyond = |patch: &ThermalPatch| (patch.axial[0] - axial).max(axial - patch.axial[1]).max(0.0);
                 let candidates = patches.iter().enumerate().filter(|(_, patch)| within(patch));
                 candidates.min_by(|a, b| beyond(a.1).total_cmp(&beyond(b.1))).map_or(0, |(index, _)| index)
             }
@@ -83,10 +83,10 @@ mod tests {
             let (around, along) =
                 (f64::from(u32::try_from(index % 4).unwrap()), f64::from(u32::try_from(index / 4).unwrap()));
             let from = (around - 0.5) * quarter;
-            Patch { angle: [from, from + quarter], axial: [0.02 * along, 0.02 * (along + 1.0)] }
+            ThermalPatch { angle: [from, from + quarter], axial: [0.02 * along, 0.02 * (along + 1.0)] }
         };
-        let listed = Patches::Listed((0..8).map(patch).collect());
-        let equal = Patches::Equal { parts: PatchSettings { around: 4, along: 2 }, extent: [0.0, 0.04] };
+        let listed = HeatPatches::Listed((0..8).map(patch).collect());
+        let equal = HeatPatches::Equal { parts: PatchSettings { around: 4, along: 2 }, extent: [0.0, 0.04] };
         for turns in [-1.0, 0.0, 2.0] {
             for (index, quarters) in [0.1, 0.9, 2.2, 3.4].into_iter().enumerate() {
                 let angle = (4.0 * turns + quarters) * quarter;

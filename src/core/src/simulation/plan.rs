@@ -1,7 +1,7 @@
 //! Which structures and surfaces of a scene meet: found once, from names.
 
 use crate::settings::relations::Relations;
-use crate::settings::{ContactSettings, Motion, SceneSettings, StructureSettings, SurfaceSettings};
+use crate::settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings, SurfaceSettings};
 use crate::{Error, Result, Rom, Scene};
 
 /// A contact pair of a scene.
@@ -9,11 +9,11 @@ use crate::{Error, Result, Rom, Scene};
 pub struct PairPlan {
     /// Surface.
     pub surface: usize,
-    /// Structure whose contact nodes touch: place in [`Plan::bodies`].
+    /// Structure whose contact nodes touch: place in [`SteppingOrder::bodies`].
     pub body: usize,
     /// Structure through whose contact grid an open surface is laid.
     pub grid: Option<usize>,
-    /// Structure that deforms the surface: place in [`Plan::carriers`].
+    /// Structure that deforms the surface: place in [`SteppingOrder::carriers`].
     pub carrier: Option<usize>,
     /// Contact nodes that take part.
     pub nodes: Vec<usize>,
@@ -21,7 +21,7 @@ pub struct PairPlan {
 
 /// Structures in the order in which they are stepped, and the pairs between them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct SteppingOrder {
     /// Structures whose contact nodes touch, in the order of the scene.
     pub bodies: Vec<usize>,
     /// Structures that carry surfaces and deform them, in the order of the pairs.
@@ -37,7 +37,7 @@ pub fn prefix(count: usize, name: &str) -> String {
     if count > 1 { format!("{name}.") } else { String::new() }
 }
 
-impl Plan {
+impl SteppingOrder {
     /// Of a validated scene.
     ///
     /// # Errors
@@ -60,7 +60,7 @@ impl Plan {
                 unreachable!("validated")
             };
             let under = relations.carriers[index];
-            let open = settings.structures[master].motion == Motion::Free;
+            let open = settings.structures[master].motion == BodyMotion::Free;
             let body = plan.bodies.binary_search(&master).unwrap_or(0);
             let carrier = under.filter(|_| !settings.surfaces[surface].rigid).map(|under| {
                 *carriers[under].get_or_insert_with(|| {
@@ -108,7 +108,7 @@ impl Plan {
 
     /// Whether a body meets surfaces that are open, described along x, y, z.
     pub fn is_free(&self, scene: &Scene, body: usize) -> bool {
-        self.structure(scene, body).0.motion == Motion::Free
+        self.structure(scene, body).0.motion == BodyMotion::Free
     }
 }
 

@@ -2,11 +2,11 @@
 
 use crate::dynamics::modal::ModalModel;
 use crate::gaps::layout::Layout;
-use crate::gaps::shape::Surface;
+use crate::gaps::shape::CompiledShape;
 use crate::gaps::spline::SplineGap;
 use crate::gaps::surface_spline::SurfaceSpline;
 use crate::gaps::wrench::cross;
-use crate::rom::{ContactNode, Frame};
+use crate::rom::{ContactNode, DisplacementFrame};
 use crate::settings::{ContactSettings, SplineSettings, SurfaceSettings};
 use crate::{Error, Result, Rom};
 use nalgebra::DMatrix;
@@ -20,7 +20,7 @@ const SAME_RADIUS: f64 = 0.1;
 
 /// Where the data points of a surface are.
 #[derive(Debug, Clone)]
-struct Grid {
+struct DataGrid {
     around: usize,
     /// The first data point among the nodes of a contact grid.
     first_node: usize,
@@ -50,7 +50,7 @@ pub fn spline_gap(
     carrier: Option<(&Rom, Share)>,
 ) -> Result<SplineGap> {
     let settings = surface.spline.unwrap_or_default();
-    let (contour, clearance) = (Contour::new(master, nodes), contact.nominal_gap());
+    let (contour, clearance) = (TipContour::new(master, nodes), contact.nominal_gap());
     let grid = match carrier {
         Some((rom, share)) => carried_grid(rom, share, &contour)?,
         None => rigid_grid(settings, &contour),
@@ -60,10 +60,10 @@ pub fn spline_gap(
         check_radii(rom, grid.first_node, &round)?;
     }
     let spline = SurfaceSpline::new(&round, grid.around, grid.rings.len(), settings.closure, settings.interpolation)?;
-    let shape = Surface::new(&surface.shape, clearance)?;
+    let shape = CompiledShape::new(&surface.shape, clearance)?;
     let mut change = data(&grid, |_, angle| shape.evaluate(angle).0);
     change.iter_mut().for_each(|point| point[2] = 0.0);
-    if shape == Surface::Circular {
+    if shape == CompiledShape::Circular {
         change.clear();
     } else {
         spline.interpolate(&mut change);
@@ -102,7 +102,7 @@ impl CarrierModes<'_> {
 
 /// A displacement of a contact node along x, y, z.
 fn along_axes(rom: &Rom, node: usize, own: [f64; 3]) -> [f64; 3] {
-    if rom.frame == Frame::Cartesian {
+    if rom.frame == DisplacementFrame::Cartesian {
         return own;
     }
     let [radial, tangential, axial] = own;
@@ -119,7 +119,7 @@ pub enum Share {
     Near,
 }
 
-fn carried_grid(rom: &Rom, share: Share, contour: &Contour) -> Result<Grid> {
+fn carried_grid(rom: &Rom, share: Share, contour: &TipContour) -> Result<DataGrid> {
     let Some(grid) = rom.extras.grid else { unreachable!("checked") };
     let mut rings: Vec<f64> = rom.contact_nodes.chunks(grid.around).map(|ring| ring[0].position[2]).collect();
     let (low, high) = (rings[0], rings[rings.len() - 1]);
@@ -142,21 +142,21 @@ fn carried_grid(rom: &Rom, share: Share, contour: &Contour) -> Result<Grid> {
         rings = rings[first_ring..rings.len().min(above + 1)].to_vec();
     }
     let first_angle = rom.contact_nodes[0].position[1];
-    Ok(Grid { around: grid.around, first_node: first_ring * grid.around, first_angle, rings })
+    Ok(DataGrid { around: grid.around, first_node: first_ring * grid.around, first_angle, rings })
 }
 
-fn rigid_grid(settings: SplineSettings, contour: &Contour) -> Grid {
+fn rigid_grid(settings: SplineSettings, contour: &TipContour) -> DataGrid {
     let [first, last] = contour.extent();
     let margin = contour.margin();
     let (low, length) = (first - margin, last - first + 2.0 * margin);
     #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
     let ring = |ring: usize| low + length * ring as f64 / (settings.along - 1) as f64;
     let rings = (0..settings.along).map(ring).collect();
-    Grid { around: settings.around, first_node: 0, first_angle: 0.0, rings }
+    DataGrid { around: settings.around, first_node: 0, first_angle: 0.0, rings }
 }
 
 /// Points of all rings at the radius (m) given for (z, θ).
-fn data(grid: &Grid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
+fn data(grid: &DataGrid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
     let mut points = Vec::with_capacity(grid.rings.len() * grid.around);
     for z in &grid.rings {
         for index in 0..grid.around {
@@ -191,7 +191,7 @@ impl Lining {
         (master, nodes): (&Rom, &[usize]),
         contact: &ContactSettings,
     ) -> Result<Self> {
-        let contour = Contour::new(master, nodes);
+        let contour = TipContour::new(master, nodes);
         let grid = carried_grid(rom, share, &contour)?;
         let rings = grid.rings.iter().zip(rom.contact_nodes[grid.first_node..].chunks(grid.around));
         #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
@@ -231,14 +231,14 @@ fn check_radii(rom: &Rom, first: usize, points: &[[f64; 3]]) -> Result<()> {
 
 /// Tip contour r(z) through the contact nodes: natural cubic spline through three or more, straight through fewer and
 /// beyond the ends.
-struct Contour {
+struct TipContour {
     /// (z, r, r''), ascending in z.
     points: Vec<(f64, f64, f64)>,
     /// dr/dz where there is a single point.
     slope: f64,
 }
 
-impl Contour {
+impl TipContour {
     fn new(rom: &Rom, nodes: &[usize]) -> Self {
         let place = |node: &usize| rom.contact_nodes[*node].position;
         let mut points: Vec<(f64, f64, f64)> = nodes.iter().map(place).map(|[r, _, z]| (z, r, 0.0)).collect();

@@ -6,7 +6,7 @@ use super::Simulation;
 use super::compile::Compiled;
 use super::limits::Parameters;
 use crate::dynamics::modal::ModalModel;
-use crate::gaps::shape::Surface;
+use crate::gaps::shape::CompiledShape;
 use crate::settings::Solver;
 use crate::warning::Topic;
 use crate::{Warning, shown};
@@ -69,7 +69,7 @@ impl Compiled {
     fn reach_of(&self, pair: usize) -> f64 {
         let gap = self.contact(pair).nominal_gap();
         let shape = &self.plan.surface(&self.scene.settings, pair).shape;
-        let Ok(shape) = Surface::new(shape, gap) else { return gap };
+        let Ok(shape) = CompiledShape::new(shape, gap) else { return gap };
         let angle = |place: u32| std::f64::consts::TAU * f64::from(place) / f64::from(ANGLES);
         (0..ANGLES).fold(gap, |most, place| most.max(-shape.evaluate(angle(place)).0))
     }

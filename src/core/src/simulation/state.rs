@@ -5,9 +5,9 @@
 
 use super::access::check_range;
 use super::drive::RotorAngle;
-use super::{Communication, Inputs, MOST_STEPS, Phase, SAME_STEP, Simulation, TIME_TOLERANCE, same_step};
-use crate::persist::{Persist, Reader, Writer, fingerprint, persist_fields};
-use crate::variables::{Causality, Kind, Variable};
+use super::{Communication, Inputs, MOST_STEPS, SAME_STEP, Simulation, SimulationPhase, TIME_TOLERANCE, same_step};
+use crate::persist::{Persist, StateReader, StateWriter, fingerprint, persist_fields};
+use crate::variables::{Causality, DataType, Variable};
 use crate::{Error, Result, shown};
 
 const MAGIC: [u8; 8] = *b"tiprubST";
@@ -16,8 +16,8 @@ const CHECKSUM_BYTES: usize = 8;
 
 persist_fields!(Communication { start, length, count, done, tried, most });
 
-impl Persist for Phase {
-    fn save(&self, writer: &mut Writer) {
+impl Persist for SimulationPhase {
+    fn save(&self, writer: &mut StateWriter) {
         let code: u64 = match self {
             Self::Created => 0,
             Self::Ready => 1,
@@ -26,7 +26,7 @@ impl Persist for Phase {
         };
         code.save(writer);
     }
-    fn restore(&mut self, reader: &mut Reader) {
+    fn restore(&mut self, reader: &mut StateReader) {
         let mut code = 0_u64;
         code.restore(reader);
         *self = match code {
@@ -37,7 +37,7 @@ impl Persist for Phase {
             _ => return reader.refuse("it names a phase that does not exist"),
         };
     }
-    fn check(&self, reader: &mut Reader) {
+    fn check(&self, reader: &mut StateReader) {
         (*self).clone().restore(reader);
     }
 }
@@ -47,7 +47,7 @@ const LARGEST: f64 = 1e50;
 
 /// What the rest of a state follows from: read and checked before anything is changed.
 struct Lead {
-    phase: Phase,
+    phase: SimulationPhase,
     time: f64,
     /// Start of the run (s), from which shapes grow.
     initial_time: f64,
@@ -73,7 +73,7 @@ impl Simulation {
     }
 
     pub(super) fn measured_state(&self) -> usize {
-        let mut writer = Writer::new(&mut []);
+        let mut writer = StateWriter::new(&mut []);
         self.write(&mut writer);
         writer.written() + CHECKSUM_BYTES
     }
@@ -85,7 +85,7 @@ impl Simulation {
     pub fn save_state(&self, buffer: &mut [u8]) -> Result<()> {
         self.check_size(buffer.len())?;
         let end = buffer.len() - CHECKSUM_BYTES;
-        self.write(&mut Writer::new(&mut buffer[..end]));
+        self.write(&mut StateWriter::new(&mut buffer[..end]));
         let checksum = fingerprint(&buffer[..end], 0);
         buffer[end..].copy_from_slice(&checksum.to_le_bytes());
         Ok(())
@@ -101,7 +101,7 @@ impl Simulation {
         if content[..MAGIC.len()] != MAGIC {
             return damaged("it is not a state of this software");
         }
-        let mut reader = Reader::new(&content[MAGIC.len()..]);
+        let mut reader = StateReader::new(&content[MAGIC.len()..]);
         let (mut version, mut scene) = (0_u64, 0_u64);
         version.restore(&mut reader);
         scene.restore(&mut reader);
@@ -128,7 +128,7 @@ impl Simulation {
         Err(Error::State { problem: format!("it has {found} bytes where this scene needs {expected}") })
     }
 
-    fn write(&self, writer: &mut Writer) {
+    fn write(&self, writer: &mut StateWriter) {
         u64::from_le_bytes(MAGIC).save(writer);
         VERSION.save(writer);
         self.compiled.fingerprint.save(writer);
@@ -151,7 +151,7 @@ impl Simulation {
 
     /// Look at all of a state. The checksum finds accidents; bytes with a right one may still hold what no simulation can
     /// go on from. In the order of `write`.
-    fn lead(&self, mut reader: Reader) -> Result<Lead> {
+    fn lead(&self, mut reader: StateReader) -> Result<Lead> {
         let reader = &mut reader;
         let mut lead = Lead {
             phase: self.phase,
@@ -167,7 +167,7 @@ impl Simulation {
         };
         lead.phase.restore(reader);
         // Before the start, and after a failure, a state may hold anything: nothing goes on from it.
-        let runs = matches!(lead.phase, Phase::Ready | Phase::Stepping);
+        let runs = matches!(lead.phase, SimulationPhase::Ready | SimulationPhase::Stepping);
         let largest = if runs { LARGEST } else { f64::INFINITY };
         take(&mut lead.time, reader);
         take(&mut lead.initial_time, reader);
@@ -207,15 +207,17 @@ impl Simulation {
 
     /// Times, step sizes and counts belong together.
     fn check_counts(&self, lead: &Lead) -> Result<()> {
-        if lead.phase == Phase::Created {
+        if lead.phase == SimulationPhase::Created {
             return if lead.time.is_finite() { Ok(()) } else { damaged("its time is not finite") };
         }
         let Communication { start, length, count, done, .. } = lead.communication;
         #[expect(clippy::cast_precision_loss, reason = "checked to be at most 2^53")]
         let number = count as f64;
         let (ends, within) = match lead.phase {
-            Phase::Ready => (done == count, lead.time.to_bits() == lead.communication.time(count).to_bits()),
-            phase => (done < count || phase == Phase::Failed, (lead.time - start).abs() <= TIME_TOLERANCE * length),
+            SimulationPhase::Ready => (done == count, lead.time.to_bits() == lead.communication.time(count).to_bits()),
+            phase => {
+                (done < count || phase == SimulationPhase::Failed, (lead.time - start).abs() <= TIME_TOLERANCE * length)
+            }
         };
         // A first step may begin that much before the start.
         let started = lead.initial_time.is_finite() && lead.initial_time <= lead.time + TIME_TOLERANCE * length;
@@ -247,7 +249,7 @@ impl Simulation {
     /// Inputs within their ranges, by more than rounding, now and at the end of the step under way.
     fn check_inputs(&self, lead: &mut Lead) -> Result<()> {
         let Communication { length, count, done, .. } = lead.communication;
-        let stepping = lead.phase == Phase::Stepping && count > 0;
+        let stepping = lead.phase == SimulationPhase::Stepping && count > 0;
         let offsets = if stepping { [lead.communication.offset(done), length] } else { [0.0; 2] };
         let mut rotors = lead.rotors.iter().zip(&lead.inputs.rotors);
         let counts = |(angle, rotor): (&RotorAngle, &super::RotorInputs)| {
@@ -282,13 +284,15 @@ impl Simulation {
         let references = lead.reference_speeds.iter().zip(&lead.reference_temperatures);
         let references: Vec<[f64; 2]> = references.map(|(speed, temperature)| [*speed, *temperature]).collect();
         let outcome = match lead.phase {
-            Phase::Ready | Phase::Stepping if !moves => damaged("an input moves something beyond all bounds"),
-            Phase::Created => Ok(()),
+            SimulationPhase::Ready | SimulationPhase::Stepping if !moves => {
+                damaged("an input moves something beyond all bounds")
+            }
+            SimulationPhase::Created => Ok(()),
             // Looked at when a step begins and when a speed is given, not at every internal step.
-            Phase::Stepping => {
+            SimulationPhase::Stepping => {
                 self.check_turning_of_all(lead.step, lead.communication.length).and_then(|()| self.adopt(&references))
             }
-            Phase::Ready | Phase::Failed => self.adopt(&references),
+            SimulationPhase::Ready | SimulationPhase::Failed => self.adopt(&references),
         };
         if outcome.is_err() {
             (self.values, self.inputs, self.initial_time) = before;
@@ -327,7 +331,7 @@ impl Simulation {
     }
 
     /// Take over a state that was looked at.
-    fn read(&mut self, reader: &mut Reader) {
+    fn read(&mut self, reader: &mut StateReader) {
         self.read_values(reader);
         // What the step takes from parameters follows from the restored values.
         let parameters = self.parameters();
@@ -338,12 +342,12 @@ impl Simulation {
             self.apply_methods(&parameters);
         }
         self.system.restore(reader);
-        if self.phase != Phase::Created {
+        if self.phase != SimulationPhase::Created {
             self.renew_limits();
         }
         self.make_room();
         self.make_room_for_tangent();
-        if self.phase == Phase::Stepping {
+        if self.phase == SimulationPhase::Stepping {
             self.set_mark();
         }
     }
@@ -352,7 +356,7 @@ impl Simulation {
     pub(super) fn set_mark(&mut self) {
         let mut mark = std::mem::take(&mut self.mark);
         if !mark.is_empty() {
-            self.write(&mut Writer::new(&mut mark));
+            self.write(&mut StateWriter::new(&mut mark));
         }
         self.mark = mark;
     }
@@ -367,7 +371,7 @@ impl Simulation {
 
     /// Back to a state of this simulation, with the same parameters. Does not allocate.
     pub(super) fn go_back_to(&mut self, mark: &[u8]) {
-        let reader = &mut Reader::new(mark);
+        let reader = &mut StateReader::new(mark);
         // Magic, version, scene.
         [0_u64; 3].restore(reader);
         self.read_values(reader);
@@ -375,7 +379,7 @@ impl Simulation {
     }
 
     /// All of a state but that of the system.
-    fn read_values(&mut self, reader: &mut Reader) {
+    fn read_values(&mut self, reader: &mut StateReader) {
         self.phase.restore(reader);
         self.time.restore(reader);
         self.initial_time.restore(reader);
@@ -394,7 +398,7 @@ impl Simulation {
 }
 
 /// Check the bytes of a value and read them.
-fn take(value: &mut impl Persist, reader: &mut Reader) {
+fn take(value: &mut impl Persist, reader: &mut StateReader) {
     let mut bytes = reader.clone();
     value.check(reader);
     value.restore(&mut bytes);
@@ -412,15 +416,15 @@ fn is_possible(variable: &Variable, value: f64) -> bool {
     let settable = variable.is_settable();
     match variable.kind {
         // The range of inputs is looked at where they are now.
-        Kind::Real if settable && variable.causality != Causality::Input => check_range(variable, value).is_ok(),
-        Kind::Real => value.is_finite(),
-        Kind::Boolean => matches!(whole(value), Some(0 | 1)),
-        Kind::Enumeration(choices) if settable => {
+        DataType::Real if settable && variable.causality != Causality::Input => check_range(variable, value).is_ok(),
+        DataType::Real => value.is_finite(),
+        DataType::Boolean => matches!(whole(value), Some(0 | 1)),
+        DataType::Enumeration(choices) if settable => {
             let item = whole(value).and_then(|item| usize::try_from(item).ok());
             item.is_some_and(|item| (1..=choices.items.len()).contains(&item))
         }
-        Kind::Integer if settable => whole(value).is_some() && check_range(variable, value).is_ok(),
-        Kind::Integer | Kind::Enumeration(_) => whole(value).is_some(),
-        Kind::String => true,
+        DataType::Integer if settable => whole(value).is_some() && check_range(variable, value).is_ok(),
+        DataType::Integer | DataType::Enumeration(_) => whole(value).is_some(),
+        DataType::String => true,
     }
 }

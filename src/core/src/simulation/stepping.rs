@@ -1,7 +1,7 @@
 //! One communication step: begun, marched, ended.
 
 use super::drive::Input;
-use super::{Communication, MOST_STEPS, Phase, Progress, Simulation, TIME_TOLERANCE, same_step};
+use super::{Communication, MOST_STEPS, Simulation, SimulationPhase, StepProgress, TIME_TOLERANCE, same_step};
 use crate::laws::coating::Coating;
 use crate::system::StepFailure;
 use crate::warning::Topic;
@@ -29,9 +29,9 @@ impl Simulation {
 
     fn begin(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
         match self.phase {
-            Phase::Ready => {}
-            Phase::Failed => return Err(failed_before()),
-            Phase::Created | Phase::Stepping => {
+            SimulationPhase::Ready => {}
+            SimulationPhase::Failed => return Err(failed_before()),
+            SimulationPhase::Created | SimulationPhase::Stepping => {
                 return Err(Error::invalid(
                     "doStep",
                     "called outside a communication point",
@@ -81,7 +81,7 @@ impl Simulation {
         let tried = self.system.steps_tried();
         self.communication = Communication { start: current_time, length: step_size, count, done: 0, tried, most };
         self.window.open(self.system.structures());
-        self.phase = Phase::Stepping;
+        self.phase = SimulationPhase::Stepping;
         Ok(())
     }
 
@@ -228,8 +228,8 @@ impl Simulation {
     /// Non-finite state; the simulation must then be reset or restored. [`Error::Exhausted`] where the internal steps allowed are used
     /// up: the simulation is then as if the communication step had not begun, or, where it may end early, where the last internal step
     /// done has left it ([`Simulation::is_stepping`]).
-    pub fn advance(&mut self) -> Result<Progress> {
-        if self.phase != Phase::Stepping {
+    pub fn advance(&mut self) -> Result<StepProgress> {
+        if self.phase != SimulationPhase::Stepping {
             return Err(Error::invalid("doStep", "no communication step is under way", "Begin a step first"));
         }
         self.allow_steps()?;
@@ -265,7 +265,7 @@ impl Simulation {
         if finished {
             self.finish(offset, time)?;
         }
-        Ok(Progress { time, finished })
+        Ok(StepProgress { time, finished })
     }
 
     /// Loads beside contact and stiffening for the step that begins at `offset`: q⁺ = a q + b q⁻ + c f takes the force at the time
@@ -313,12 +313,12 @@ impl Simulation {
             angle.rebase(&rotor.speed, offset);
         }
         self.compute_outputs();
-        self.check_outputs(time).inspect_err(|_| self.phase = Phase::Failed)?;
+        self.check_outputs(time).inspect_err(|_| self.phase = SimulationPhase::Failed)?;
         self.check_energy(time)?;
         self.rotors.iter_mut().for_each(|rotor| rotor.shift(offset));
         self.inputs.shift(offset);
         self.time = time;
-        self.phase = Phase::Ready;
+        self.phase = SimulationPhase::Ready;
         Ok(())
     }
 
@@ -353,7 +353,7 @@ impl Simulation {
     /// # Errors
     /// No step under way, no internal step done yet, or a non-finite state.
     pub fn end_step_early(&mut self) -> Result<()> {
-        if self.phase != Phase::Stepping || self.communication.done == 0 {
+        if self.phase != SimulationPhase::Stepping || self.communication.done == 0 {
             return Err(Error::invalid("early return", "no internal step is done", "Return after an internal step"));
         }
         self.tangent.forget();

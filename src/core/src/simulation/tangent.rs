@@ -6,9 +6,9 @@
 //! would: there the step is marched in both directions, and impulses and gaps that do not change alike tell of a kink between. Inputs are then moved
 //! less. The quotient is the derivative with contacts and steps as they were in the accepted step, up to rounding.
 
-use super::{Phase, Simulation};
+use super::{Simulation, SimulationPhase};
 use crate::settings::Scheme;
-use crate::variables::{Causality, Kind, Quantity, Variability};
+use crate::variables::{Causality, DataType, Quantity, Variability};
 use crate::{Error, Result, shown, shown_time};
 
 /// By how much inputs are moved, as a share of what moves gaps by a clearance: 2⁻²⁰, so that sums with usual values are exact. Rounding in
@@ -30,7 +30,7 @@ const HEATING: f64 = 100.0;
 
 /// What marching the last communication step again takes.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Tangent {
+pub(super) struct StepReplay {
     /// State at its start; empty where nobody asks for derivatives.
     start: Vec<u8>,
     /// Whether `start` and the inputs in it are all that the step came from.
@@ -41,7 +41,7 @@ pub(super) struct Tangent {
     follows: bool,
 }
 
-impl Tangent {
+impl StepReplay {
     /// The step marched last cannot be marched again from its start.
     pub(super) fn forget(&mut self) {
         self.stands = false;
@@ -202,7 +202,7 @@ impl Simulation {
             twin.go_back_to(&self.tangent.start);
         } else {
             twin.restore_state(&self.tangent.start).map_err(lost)?;
-            twin.tangent = Tangent::default();
+            twin.tangent = StepReplay::default();
         }
         self.tangent.follows = true;
         // What was done once may be done again.
@@ -253,7 +253,7 @@ impl Simulation {
             let remedy = "Set the parameter step_derivatives to on before initialisation";
             return Err(Error::invalid(what, "derivatives are off", remedy));
         }
-        if self.phase != Phase::Ready || !self.tangent.stands {
+        if self.phase != SimulationPhase::Ready || !self.tangent.stands {
             return Err(Error::invalid(
                 what,
                 "there is no communication step that could be marched again: none is done, it was discarded, a state was restored after it, it \
@@ -267,7 +267,7 @@ impl Simulation {
         for (input, seed) in inputs.iter().zip(seed) {
             let (variable, element) = self.table.locate(*input)?;
             let what = || format!("derivative by `{}`", variable.element_name(element));
-            if variable.causality != Causality::Input || variable.kind != Kind::Real {
+            if variable.causality != Causality::Input || variable.kind != DataType::Real {
                 let remedy = "Ask for derivatives by real inputs only";
                 return Err(Error::invalid(what(), "the variable is not a real input", remedy));
             }
@@ -281,7 +281,7 @@ impl Simulation {
     fn check_differentiable(&self, output: u32) -> Result<()> {
         let (variable, element) = self.table.locate(output)?;
         let continuous = variable.causality == Causality::Output && variable.variability == Variability::Continuous;
-        if continuous && variable.kind == Kind::Real {
+        if continuous && variable.kind == DataType::Real {
             return Ok(());
         }
         let remedy = "Ask for derivatives of continuous real outputs only";

@@ -1,47 +1,51 @@
 //! Units and enumerations of the variables.
 
-use crate::variables::{Enumeration, Unit};
+use crate::variables::{Enumeration, VariableUnit};
 
 /// rad/s.
-pub static ANGULAR_SPEED: Unit = Unit {
+pub static ANGULAR_SPEED: VariableUnit = VariableUnit {
     name: "rad/s",
     quantity: "AngularVelocity",
     exponents: [0, 0, -1, 1, 0],
     display: &[("rpm", 9.549_296_585_513_72)],
 };
 /// rad.
-pub static ANGLE: Unit = Unit {
+pub static ANGLE: VariableUnit = VariableUnit {
     name: "rad",
     quantity: "Angle",
     exponents: [0, 0, 0, 1, 0],
     display: &[("deg", 57.295_779_513_082_32), ("rev", 0.159_154_943_091_895_35)],
 };
 /// m.
-pub static LENGTH: Unit =
-    Unit { name: "m", quantity: "Length", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("um", 1e6)] };
+pub static LENGTH: VariableUnit =
+    VariableUnit { name: "m", quantity: "Length", exponents: [0, 1, 0, 0, 0], display: &[("mm", 1e3), ("um", 1e6)] };
 /// m/s.
-pub static LINEAR_SPEED: Unit = Unit { name: "m/s", quantity: "Velocity", exponents: [0, 1, -1, 0, 0], display: &[] };
+pub static LINEAR_SPEED: VariableUnit =
+    VariableUnit { name: "m/s", quantity: "Velocity", exponents: [0, 1, -1, 0, 0], display: &[] };
 /// s.
-pub static TIME: Unit =
-    Unit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[("ms", 1e3), ("us", 1e6)] };
+pub static TIME: VariableUnit =
+    VariableUnit { name: "s", quantity: "Time", exponents: [0, 0, 1, 0, 0], display: &[("ms", 1e3), ("us", 1e6)] };
 /// Pa.
-pub static PRESSURE: Unit =
-    Unit { name: "Pa", quantity: "Pressure", exponents: [1, -1, -2, 0, 0], display: &[("MPa", 1e-6)] };
+pub static PRESSURE: VariableUnit =
+    VariableUnit { name: "Pa", quantity: "Pressure", exponents: [1, -1, -2, 0, 0], display: &[("MPa", 1e-6)] };
 /// Pa, of stresses.
-pub static STRESS: Unit =
-    Unit { name: "Pa", quantity: "Stress", exponents: [1, -1, -2, 0, 0], display: &[("MPa", 1e-6)] };
+pub static STRESS: VariableUnit =
+    VariableUnit { name: "Pa", quantity: "Stress", exponents: [1, -1, -2, 0, 0], display: &[("MPa", 1e-6)] };
 /// N.
-pub static FORCE: Unit = Unit { name: "N", quantity: "Force", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
+pub static FORCE: VariableUnit =
+    VariableUnit { name: "N", quantity: "Force", exponents: [1, 1, -2, 0, 0], display: &[("kN", 1e-3)] };
 /// N.m.
-pub static TORQUE: Unit =
-    Unit { name: "N.m", quantity: "Torque", exponents: [1, 2, -2, 0, 0], display: &[("kN.m", 1e-3)] };
+pub static TORQUE: VariableUnit =
+    VariableUnit { name: "N.m", quantity: "Torque", exponents: [1, 2, -2, 0, 0], display: &[("kN.m", 1e-3)] };
 /// N.s.
-pub static IMPULSE: Unit =
-    Unit { name: "N.s", quantity: "Impulse", exponents: [1, 1, -1, 0, 0], display: &[("mN.s", 1e3)] };
+pub static IMPULSE: VariableUnit =
+    VariableUnit { name: "N.s", quantity: "Impulse", exponents: [1, 1, -1, 0, 0], display: &[("mN.s", 1e3)] };
 /// W.
-pub static POWER: Unit = Unit { name: "W", quantity: "Power", exponents: [1, 2, -3, 0, 0], display: &[("kW", 1e-3)] };
+pub static POWER: VariableUnit =
+    VariableUnit { name: "W", quantity: "Power", exponents: [1, 2, -3, 0, 0], display: &[("kW", 1e-3)] };
 /// J.
-pub static ENERGY: Unit = Unit { name: "J", quantity: "Energy", exponents: [1, 2, -2, 0, 0], display: &[("mJ", 1e3)] };
+pub static ENERGY: VariableUnit =
+    VariableUnit { name: "J", quantity: "Energy", exponents: [1, 2, -2, 0, 0], display: &[("mJ", 1e3)] };
 
 pub static INPUT_INTERPOLATIONS: Enumeration = Enumeration {
     name: "InputInterpolation",
@@ -63,10 +67,15 @@ pub static STEP_DERIVATIVES: Enumeration = Enumeration {
 };
 
 /// K; temperatures are differences from the reference, so that there is no degC.
-pub static TEMPERATURE: Unit =
-    Unit { name: "K", quantity: "TemperatureDifference", exponents: [0, 0, 0, 0, 1], display: &[] };
+pub static TEMPERATURE: VariableUnit =
+    VariableUnit { name: "K", quantity: "TemperatureDifference", exponents: [0, 0, 0, 0, 1], display: &[] };
 /// N/m.
-pub static LINE_LOAD: Unit =
-    Unit { name: "N/m", quantity: "LinearForceDensity", exponents: [1, 0, -2, 0, 0], display: &[("kN/m", 1e-3)] };
+pub static LINE_LOAD: VariableUnit = VariableUnit {
+    name: "N/m",
+    quantity: "LinearForceDensity",
+    exponents: [1, 0, -2, 0, 0],
+    display: &[("kN/m", 1e-3)],
+};
 /// m³.
-pub static VOLUME: Unit = Unit { name: "m3", quantity: "Volume", exponents: [0, 3, 0, 0, 0], display: &[("mm3", 1e9)] };
+pub static VOLUME: VariableUnit =
+    VariableUnit { name: "m3", quantity: "Volume", exponents: [0, 3, 0, 0, 0], display: &[("mm3", 1e9)] };

@@ -7,8 +7,8 @@
 use crate::gaps::layout::Layout;
 use crate::gaps::wrench::At;
 use crate::gaps::{GapLaw, RevolutionGap};
-use crate::rom::{ContactNode, Watched};
-use crate::system::{Pair, System};
+use crate::rom::{ContactNode, WatchedPoints};
+use crate::system::{ContactPair, System};
 use crate::variables::NO_CLEARANCE;
 use crate::{Result, Rom};
 
@@ -20,7 +20,7 @@ type Raised = (f64, f64);
 
 /// Watched points of a structure that face one surface.
 #[derive(Debug, Clone)]
-struct Facing {
+struct WatchedPair {
     body: usize,
     pair: usize,
     /// Which of the watched points these are.
@@ -34,7 +34,7 @@ struct Facing {
 /// Clearances of the watched points of all structures in the watched sectors.
 #[derive(Debug, Clone, Default)]
 pub struct WatchedGaps {
-    facing: Vec<Facing>,
+    facing: Vec<WatchedPair>,
     /// Sectors that are watched (0-based).
     sectors: Vec<usize>,
     /// Of each structure (m), `[point · watched sectors + watched sector]`.
@@ -69,7 +69,7 @@ impl WatchedGaps {
                 continue;
             }
             if let Some((law, raised)) = of_points(compiled.gap(pair)?, rom, watched)? {
-                gaps.facing.push(Facing { body: plan.body, pair, points, law, raised });
+                gaps.facing.push(WatchedPair { body: plan.body, pair, points, law, raised });
             }
         }
         Ok(gaps)
@@ -99,9 +99,9 @@ impl WatchedGaps {
     }
 }
 
-impl Facing {
+impl WatchedPair {
     /// Take the surface to where it is now.
-    fn follow(&mut self, system: &System, pair: &Pair) {
+    fn follow(&mut self, system: &System, pair: &ContactPair) {
         let GapLaw::Spline(law) = &mut self.law else { return };
         let carried = pair.carrier().map_or(&[][..], |carrier| {
             let points = law.surface.control_points().len();
@@ -111,7 +111,7 @@ impl Facing {
     }
 
     /// Gap (m) of a point of a sector displaced by `moved` (m).
-    fn gap(&mut self, pair: &Pair, (point, sector): (usize, usize), moved: [f64; 3]) -> f64 {
+    fn gap(&mut self, pair: &ContactPair, (point, sector): (usize, usize), moved: [f64; 3]) -> f64 {
         let (drive, lanes) = (pair.drive_now(), self.law.layout().map_or(1, |layout| layout.lanes));
         let (outwards, longer) = self.raised[point];
         let at = At { node: point, index: point * lanes + sector, drive };
@@ -136,7 +136,7 @@ impl Simulation {
 }
 
 /// The gap function of watched points, and how they stand to it; `None` where there is no surface around an axis.
-fn of_points(law: GapLaw, rom: &Rom, watched: &Watched) -> Result<Option<(GapLaw, Vec<Raised>)>> {
+fn of_points(law: GapLaw, rom: &Rom, watched: &WatchedPoints) -> Result<Option<(GapLaw, Vec<Raised>)>> {
     let mut places: Vec<[f64; 3]> = watched.points.iter().map(|point| point.position).collect();
     let on_contour = |law: &RevolutionGap| -> Vec<(f64, f64)> {
         places.iter().map(|place| contour(&rom.contact_nodes, law.slopes(), law.members(), place[2])).collect()

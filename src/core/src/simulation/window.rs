@@ -1,6 +1,6 @@
 //! What is gathered over one communication step: impulses, extremes, friction heat.
 
-use super::patches::Patches;
+use super::patches::HeatPatches;
 use super::slave_surface::Lining;
 use crate::dynamics::bank::ModalBank;
 use crate::gaps::wrench::cross;
@@ -51,7 +51,7 @@ pub struct SupportWindow {
 
 /// Sums and extremes since the communication step began.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Window {
+pub struct StepWindow {
     /// Of the structures that touch.
     pub bodies: Vec<BodyWindow>,
     /// Of the pairs.
@@ -67,11 +67,11 @@ pub struct Window {
 persist_fields!(BodyWindow { lowest, normal_impulse, tangential_impulse, force_impulse, moment_impulse });
 persist_fields!(PairWindow { force_impulse, moment_impulse, friction_heat, patch_heat, casing_moment });
 persist_fields!(SupportWindow { moved, speeds, lining });
-persist_fields!(Window { bodies, pairs, supports, friction_heat, normal_peak });
+persist_fields!(StepWindow { bodies, pairs, supports, friction_heat, normal_peak });
 
-impl Window {
+impl StepWindow {
     /// Room for the contact nodes of all structures and the patches of all pairs.
-    pub fn new(structures: &[Structure], patches: &[Option<Patches>], outputs: &OutputSettings) -> Self {
+    pub fn new(structures: &[Structure], patches: &[Option<HeatPatches>], outputs: &OutputSettings) -> Self {
         let body = |structure: &Structure| {
             let len = structure.gaps().len();
             BodyWindow {
@@ -82,11 +82,11 @@ impl Window {
                 moment_impulse: [0.0; 3],
             }
         };
-        let pair = |patches: &Option<Patches>| PairWindow {
+        let pair = |patches: &Option<HeatPatches>| PairWindow {
             force_impulse: [0.0; 3],
             moment_impulse: [0.0; 3],
             friction_heat: 0.0,
-            patch_heat: vec![0.0; patches.as_ref().map_or(0, Patches::len)],
+            patch_heat: vec![0.0; patches.as_ref().map_or(0, HeatPatches::len)],
             casing_moment: vec![0.0; if outputs.casing_forces { 3 } else { 0 }],
         };
         let support = |structure: &Structure| {
@@ -129,7 +129,7 @@ impl Window {
     }
 
     /// Add the internal step just done, of length `step` (s).
-    pub fn add(&mut self, system: &System, (patches, linings): (&[Option<Patches>], &[Option<Lining>]), step: f64) {
+    pub fn add(&mut self, system: &System, (patches, linings): (&[Option<HeatPatches>], &[Option<Lining>]), step: f64) {
         for (body, structure) in self.bodies.iter_mut().zip(system.structures()) {
             for (lowest, gap) in body.lowest.iter_mut().zip(structure.lowest_gaps()) {
                 *lowest = if *gap < *lowest { *gap } else { *lowest };

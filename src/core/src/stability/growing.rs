@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::held::Held;
+use super::held::HeldContacts;
 use super::secular;
 use super::{ContactDirections, delassus, is_solvable};
 use crate::dynamics::modal::ModalModel;
@@ -24,7 +24,7 @@ pub struct Fastest {
 
 /// Growth rates of closed sliding contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Growth {
+pub struct GrowthRates {
     /// Of the constrained differential equations (1/s); positive means flutter.
     pub continuous: f64,
     /// Angular frequency of that motion (rad/s); 0: it grows without swinging.
@@ -37,7 +37,7 @@ pub struct Growth {
     pub noise: f64,
 }
 
-impl Growth {
+impl GrowthRates {
     /// Growth that the scheme adds to that of the equations (1/s), 0 where it adds none.
     pub fn added(&self) -> f64 {
         let added = self.stepped - self.continuous.max(0.0);
@@ -58,7 +58,7 @@ pub fn growth(
     step: f64,
     friction: f64,
     directions: &ContactDirections,
-) -> Option<Growth> {
+) -> Option<GrowthRates> {
     let continuous = continuous(model, scheme, step, friction, directions)?;
     stepped(model, scheme, step, friction, directions, continuous)
 }
@@ -74,7 +74,7 @@ pub fn continuous(
 ) -> Option<Fastest> {
     // Beyond ω_max h = 2 the matrix would lose its balance.
     let unit = step.min(2.0 / model.largest_frequency());
-    let held = || Held::continuous(model, scheme, unit, friction, directions);
+    let held = || HeldContacts::continuous(model, scheme, unit, friction, directions);
     let eigenvalues = eigenvalues(&is_looked_at(model, friction).then(held)?)?;
     let Fastest { rate, frequency } = fastest(&eigenvalues);
     Some(Fastest { rate: rate / unit, frequency: frequency / unit })
@@ -105,11 +105,11 @@ pub fn stepped(
     friction: f64,
     directions: &ContactDirections,
     continuous: Fastest,
-) -> Option<Growth> {
-    let held = || Held::stepped(model, scheme, step, friction, directions);
+) -> Option<GrowthRates> {
+    let held = || HeldContacts::stepped(model, scheme, step, friction, directions);
     let eigenvalues = eigenvalues(&is_looked_at(model, friction).then(held)?)?;
     let found = fastest_stepped(&eigenvalues);
-    Some(Growth {
+    Some(GrowthRates {
         continuous: continuous.rate,
         frequency: continuous.frequency,
         stepped: found.rate / step,
@@ -156,7 +156,7 @@ pub fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
 
 /// Of few contacts by [`secular`], else and where that proves nothing from the dense matrix. Of complex pairs at least one; `None` where
 /// the contacts are redundant.
-fn eigenvalues(held: &Held) -> Option<Vec<Complex<f64>>> {
+fn eigenvalues(held: &HeldContacts) -> Option<Vec<Complex<f64>>> {
     secular::eigenvalues(held).or_else(|| held.dense_eigenvalues())
 }
 
@@ -166,11 +166,11 @@ mod tests {
     use crate::stability::tests::{model, radial};
     use crate::stability::{delassus, directional_modes, secular};
     use nalgebra::{DMatrix, DVector};
-    use tiprub_test_models::Random;
+    use tiprub_test_models::SeededRandom;
 
     /// A structure of at least two modes more than `contacts`, with what makes eigenvalues hard to find: equal and rigid modes,
     /// modes that contact does not see or hardly, damping of all sizes.
-    fn anything(random: &mut Random, contacts: usize) -> ModalModel {
+    fn anything(random: &mut SeededRandom, contacts: usize) -> ModalModel {
         let modes = 3 * contacts + 2 + random.below(20) + if random.unit() < 0.05 { 40 } else { 0 };
         let mut frequencies: Vec<f64> = (0..modes).map(|_| random.scale(1e3, 1e6)).collect();
         frequencies.sort_by(f64::total_cmp);
@@ -199,7 +199,7 @@ mod tests {
     /// Zeros of the small determinant against eigenvalues of the dense matrix: growth, and what is concluded from it.
     #[test]
     fn growth_found_by_zeros_is_that_of_the_dense_matrix() {
-        let mut random = Random(37);
+        let mut random = SeededRandom(37);
         let (mut tried, mut proven, mut verdicts) = (0.0, 0.0, [0; 4]);
         for _ in 0..1200 {
             let contacts = 1 + random.below(3);
@@ -213,18 +213,18 @@ mod tests {
             let directions: ContactDirections =
                 (0..contacts).map(|_| ([-1.0, 0.0, 0.0], [0.0, random.of(&[1.0, -1.0]), 0.0])).collect();
             let held = [
-                Held::continuous(&model, scheme, step, friction, &directions),
-                Held::stepped(&model, scheme, step, friction, &directions),
+                HeldContacts::continuous(&model, scheme, step, friction, &directions),
+                HeldContacts::stepped(&model, scheme, step, friction, &directions),
             ];
             tried += 1.0;
             let [Some(continuous), Some(stepped)] = held.each_ref().map(secular::eigenvalues) else { continue };
             proven += 1.0;
-            let [Some(own), Some(own_stepped)] = held.each_ref().map(Held::dense_eigenvalues) else { continue };
+            let [Some(own), Some(own_stepped)] = held.each_ref().map(HeldContacts::dense_eigenvalues) else { continue };
             let noise = GROWTH_NOISE;
             let of = |continuous: &[Complex<f64>], stepped: &[Complex<f64>]| {
                 let (continuous, stepped) = (fastest(continuous), fastest_stepped(stepped));
                 let Fastest { rate, frequency } = continuous;
-                Growth { continuous: rate, frequency, stepped: stepped.rate, swing: stepped.frequency, noise }
+                GrowthRates { continuous: rate, frequency, stepped: stepped.rate, swing: stepped.frequency, noise }
             };
             let (found, dense) = (of(&continuous, &stepped), of(&own, &own_stepped));
             let near = |a: f64, b: f64| (a - b).abs() < 0.1 * GROWTH_NOISE + 1e-7 * b.abs();
@@ -232,7 +232,8 @@ mod tests {
                 near(found.continuous, dense.continuous) && near(found.stepped, dense.stepped),
                 "{found:?} for {dense:?}: {scheme:?}, µ = {friction}, h = {step:e}, {model:?}"
             );
-            let verdict = |growth: &Growth| (growth.added() > 0.05 * growth.continuous.max(0.0), growth.is_flutter());
+            let verdict =
+                |growth: &GrowthRates| (growth.added() > 0.05 * growth.continuous.max(0.0), growth.is_flutter());
             assert_eq!(verdict(&found), verdict(&dense));
             verdicts[2 * usize::from(verdict(&found).0) + usize::from(found.is_flutter())] += 1;
         }
@@ -271,7 +272,7 @@ mod tests {
 
     #[test]
     fn the_recurrence_grows_as_found() {
-        let mut random = Random(8);
+        let mut random = SeededRandom(8);
         for scheme in Scheme::RECURRENCES {
             let mut compared = 0;
             while compared < 8 {

@@ -8,7 +8,7 @@ use crate::settings::Scheme;
 
 /// (s² + a s + b) q = (1 + γs) c φ_fᵀF of each mode, where the contacts see no gap: Σ φ_n q + R F = 0.
 #[derive(Debug, Clone)]
-pub struct Held {
+pub struct HeldContacts {
     /// φ_n and φ_f, contacts × modes.
     pub normals: DMatrix<f64>,
     pub forces: DMatrix<f64>,
@@ -20,7 +20,7 @@ pub struct Held {
     pub late: f64,
 }
 
-impl Held {
+impl HeldContacts {
     /// The modes of a model under a scheme with all contacts of `directions` closed and sliding.
     fn new(
         model: &ModalModel,

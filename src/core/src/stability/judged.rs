@@ -6,7 +6,7 @@
 //! growth of bending moves the blade. What is smaller than [`TOLERANCE`] of the clearance does not matter: so growth at a rate σ
 //! is of interest for ln(1/tolerance)/σ, and shorter where contact opens sooner.
 
-use super::{ContactDirections, Growth, directional_modes};
+use super::{ContactDirections, GrowthRates, directional_modes};
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
 
@@ -21,9 +21,9 @@ const BELOW: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Growth of one set of closed contacts at one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Judged {
+pub struct SetGrowth {
     /// Its rates.
-    pub growth: Growth,
+    pub growth: GrowthRates,
     /// Share of the static flexibility that modes of the stepped motion's frequency and above have.
     pub share: f64,
 }
@@ -31,9 +31,15 @@ pub struct Judged {
 /// Samples that turn by more than this per step (rad) are of no motion of the equations.
 const ALTERNATES: f64 = 0.9 * std::f64::consts::PI;
 
-impl Judged {
+impl SetGrowth {
     /// The growth of a model under a scheme with a step (s), with all contacts of `directions` closed.
-    pub fn new(model: &ModalModel, scheme: Scheme, step: f64, directions: &ContactDirections, growth: Growth) -> Self {
+    pub fn new(
+        model: &ModalModel,
+        scheme: Scheme,
+        step: f64,
+        directions: &ContactDirections,
+        growth: GrowthRates,
+    ) -> Self {
         // Contact forces that act a step late make motions of their own, beyond the frequencies of all modes. So do those that
         // change sign from step to step. Samples of central differences swing faster than what they are of.
         let is_of_step = scheme.acts_later() || growth.swing * step > ALTERNATES;
@@ -90,10 +96,10 @@ mod tests {
     use crate::stability::tests::radial;
     use crate::stability::{delassus, growth};
     use nalgebra::{DMatrix, DVector};
-    use tiprub_test_models::Random;
+    use tiprub_test_models::SeededRandom;
 
     /// One contact node on modes of all frequencies, damped.
-    fn anything(random: &mut Random) -> ModalModel {
+    fn anything(random: &mut SeededRandom) -> ModalModel {
         let modes = 5 + random.below(12);
         let mut frequencies: Vec<f64> = (0..modes).map(|_| random.scale(1e3, 1e6)).collect();
         frequencies.sort_by(f64::total_cmp);
@@ -142,7 +148,7 @@ mod tests {
     /// Contact that the equations bring to rest: steps that are accepted leave it there, and those that are refused let it go.
     #[test]
     fn what_is_accepted_stays_closed_and_what_is_refused_does_not() {
-        let mut random = Random(11);
+        let mut random = SeededRandom(11);
         let (mut accepted, mut refused, mut farthest) = (0, 0, 0.0_f64);
         for _ in 0..4000 {
             let model = anything(&mut random);
@@ -154,7 +160,7 @@ mod tests {
             if growth.continuous > -1e-3 / step / 5e3 {
                 continue;
             }
-            let judged = Judged::new(&model, scheme, step, &radial(), growth);
+            let judged = SetGrowth::new(&model, scheme, step, &radial(), growth);
             let steps = 3000;
             let closed = step * f64::from(steps);
             if judged.allowed() > closed {
@@ -183,16 +189,16 @@ mod tests {
             assert!((share_of(&model, &radial(), frequency) - share).abs() < 1e-15, "{frequency}");
         }
         // A force that acts a step late makes motions of its own: no mode bounds them.
-        let growth = Growth { continuous: -1.0, frequency: 0.0, stepped: 1.0, swing: 1430.0, noise: 0.0 };
-        let share = |scheme: Scheme| Judged::new(&model, scheme, 1e-5, &radial(), growth).share;
+        let growth = GrowthRates { continuous: -1.0, frequency: 0.0, stepped: 1.0, swing: 1430.0, noise: 0.0 };
+        let share = |scheme: Scheme| SetGrowth::new(&model, scheme, 1e-5, &radial(), growth).share;
         let [exact, massless] = [Scheme::ModalExact, Scheme::MasslessBoundary].map(share);
         assert!((exact - 0.2).abs() < 1e-15 && (massless - 1.0).abs() < 1e-15, "{exact}, {massless}");
     }
 
     #[test]
     fn a_longer_time_and_more_growth_are_a_larger_error() {
-        let of = |continuous: f64, stepped: f64, share: f64| Judged {
-            growth: Growth { continuous, frequency: 1e4, stepped, swing: 1e4, noise: 0.0 },
+        let of = |continuous: f64, stepped: f64, share: f64| SetGrowth {
+            growth: GrowthRates { continuous, frequency: 1e4, stepped, swing: 1e4, noise: 0.0 },
             share,
         };
         // Small: share · a · T.

@@ -17,7 +17,7 @@ pub mod massless;
 mod secular;
 pub mod unresolved;
 
-pub use growing::{Fastest, GROWTH_UP_TO, Growth, continuous, growth, growth_steps, stepped, without_node_mass};
+pub use growing::{Fastest, GROWTH_UP_TO, GrowthRates, continuous, growth, growth_steps, stepped, without_node_mass};
 
 use nalgebra::DMatrix;
 
@@ -260,7 +260,7 @@ fn lowest_of_symmetric_part(scaled: &DMatrix<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tiprub_test_models::Random;
+    use tiprub_test_models::SeededRandom;
 
     /// Two modes whose contact node moves along both radial and tangential directions.
     pub fn model(frequencies: &[f64], shapes: &[[f64; 3]], damping: f64) -> ModalModel {
@@ -360,7 +360,7 @@ mod tests {
     /// A definite symmetric part spares the minors: what it lets pass they do, and they alone decide on the rest.
     #[test]
     fn what_is_definite_has_positive_minors() {
-        let mut random = Random(5);
+        let mut random = SeededRandom(5);
         let (mut definite, mut solvable, mut refused) = (0, 0, 0);
         for _ in 0..600 {
             let nodes = 1 + random.below(5);

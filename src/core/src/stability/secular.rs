@@ -9,7 +9,7 @@
 //! P (B. T. Smith, Journal of the ACM 17, 1970). Rounding of E counts as part of |P|. Where a disc is too large nothing is
 //! returned.
 
-use super::held::Held;
+use super::held::HeldContacts;
 use nalgebra::Complex;
 
 type Number = Complex<f64>;
@@ -27,7 +27,7 @@ const UNSEEN: f64 = 1e-18;
 const CANCELLED: f64 = 1e-6;
 
 /// Eigenvalues, of complex pairs one; `None` where they are not proven, or there are more than three contacts.
-pub fn eigenvalues(held: &Held) -> Option<Vec<Number>> {
+pub fn eigenvalues(held: &HeldContacts) -> Option<Vec<Number>> {
     match held.contacts() {
         1 => Secular::<1>::new(held)?.eigenvalues(),
         2 => Secular::<2>::new(held)?.eigenvalues(),
@@ -47,10 +47,10 @@ fn size(number: Number) -> f64 {
 }
 
 /// Two zeros, complex conjugates or both real.
-type Pair = [Number; 2];
+type ZeroPair = [Number; 2];
 
 /// Zeros of s² + a s + b.
-fn roots(a: f64, b: f64) -> Pair {
+fn roots(a: f64, b: f64) -> ZeroPair {
     let square = b - 0.25 * a * a;
     if square > 0.0 {
         let root = Complex::new(-0.5 * a, square.sqrt());
@@ -61,7 +61,7 @@ fn roots(a: f64, b: f64) -> Pair {
 }
 
 /// 1/(s − y) + 1/(s − z), and 1/((s − y)(s − z)).
-fn of_pair(s: Number, [y, z]: Pair) -> (Number, Number) {
+fn of_pair(s: Number, [y, z]: ZeroPair) -> (Number, Number) {
     let (down, up) = (s - y, s - z);
     let both = inverse(down * up);
     ((down + up) * both, both)
@@ -89,7 +89,7 @@ fn permanent<const K: usize>(matrix: &[[f64; K]; K]) -> f64 {
 /// The contact problem of K contacts.
 struct Secular<const K: usize> {
     /// Poles of the modes that contact sees, with c φ_n φ_fᵀ.
-    modes: Vec<(Pair, [[f64; K]; K])>,
+    modes: Vec<(ZeroPair, [[f64; K]; K])>,
     /// Poles of the others, which are eigenvalues.
     apart: Vec<Number>,
     residual: [[f64; K]; K],
@@ -102,7 +102,7 @@ struct Secular<const K: usize> {
 }
 
 impl<const K: usize> Secular<K> {
-    fn new(held: &Held) -> Option<Self> {
+    fn new(held: &HeldContacts) -> Option<Self> {
         let mut modes = Vec::with_capacity(held.modes.len());
         let mut largest = 0.0_f64;
         for (mode, [damping, stiffness, weight]) in held.modes.iter().enumerate() {
@@ -112,7 +112,7 @@ impl<const K: usize> Secular<K> {
             modes.push((roots(*damping, *stiffness), seen));
         }
         let is_seen =
-            |(_, seen): &(Pair, [[f64; K]; K])| seen.iter().flatten().any(|value| value.abs() > UNSEEN * largest);
+            |(_, seen): &(ZeroPair, [[f64; K]; K])| seen.iter().flatten().any(|value| value.abs() > UNSEEN * largest);
         let (mut modes, apart): (Vec<_>, Vec<_>) = modes.into_iter().partition(is_seen);
         modes.sort_by(|a, b| a.0[0].norm_sqr().total_cmp(&b.0[0].norm_sqr()));
         let residual =
@@ -147,7 +147,7 @@ impl<const K: usize> Secular<K> {
     }
 
     /// Between the poles, that of zero i so many apart as contacts take modes away; none alike.
-    fn guesses(&self) -> Vec<Pair> {
+    fn guesses(&self) -> Vec<ZeroPair> {
         let last = self.modes.len().saturating_sub(1);
         let beyond = self.modes.len().saturating_sub(self.pairs).max(1);
         let guess = |index: usize| {
@@ -194,7 +194,7 @@ impl<const K: usize> Secular<K> {
     }
 
     /// Ehrlich's and Aberth's iteration.
-    fn refine(&self, zeros: &mut [Pair]) {
+    fn refine(&self, zeros: &mut [ZeroPair]) {
         let mut moving = vec![true; zeros.len()];
         for sweep in 0..SWEEPS {
             for index in (0..zeros.len()).filter(|index| moving[*index]).collect::<Vec<_>>() {
@@ -221,7 +221,7 @@ impl<const K: usize> Secular<K> {
     }
 
     /// What is to be subtracted from a member of a pair; something small where it lies on a pole or on another zero.
-    fn correction(&self, zeros: &[Pair], index: usize, member: usize) -> Number {
+    fn correction(&self, zeros: &[ZeroPair], index: usize, member: usize) -> Number {
         let [zero, partner] = [zeros[index][member], zeros[index][1 - member]];
         let mut others = inverse(zero - partner);
         for (_, other) in zeros.iter().enumerate().filter(|(other, _)| *other != index) {
@@ -232,7 +232,7 @@ impl<const K: usize> Secular<K> {
     }
 
     /// Radius of the disc about a zero; not a number where there is none.
-    fn radius(&self, zeros: &[Pair], index: usize, member: usize) -> f64 {
+    fn radius(&self, zeros: &[ZeroPair], index: usize, member: usize) -> f64 {
         let s = zeros[index][member];
         let (mut value, mut sizes) = ([[Complex::new(0.0, 0.0); K]; K], [[0.0; K]; K]);
         let mut ratio = 1.0;

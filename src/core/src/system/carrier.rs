@@ -1,10 +1,10 @@
 //! What a group of contacts does to a structure that carries their surfaces: through its modes, contact by contact.
 
 use super::Structure;
-use super::pair::{Carrier, at_place};
+use super::pair::{SurfaceCarrier, at_place};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::sectors::Sectors;
-use crate::gaps::frame::Frame;
+use crate::gaps::frame::PolarFrame;
 use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use nalgebra::DMatrix;
 
@@ -12,11 +12,11 @@ use nalgebra::DMatrix;
 #[derive(Debug, Clone, Copy)]
 pub struct Spot<'a> {
     /// The surface, and where it is carried.
-    pub surface: (&'a SurfaceSpline, Carrier),
+    pub surface: (&'a SurfaceSpline, SurfaceCarrier),
     /// The place on it.
     pub place: ClosestPoint,
     /// Directions of the node that touches.
-    pub frame: Frame,
+    pub frame: PolarFrame,
 }
 
 /// Scratch of a group for one structure under it.

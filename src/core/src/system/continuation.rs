@@ -1,13 +1,13 @@
 //! What carries a running state on: another step size, saving and restoring, and ways over an edge.
 
 use super::pair::When;
-use super::posed::Member;
-use super::{Bodies, ContactEvent, Pair, StepFailure, Structure, System, sum_of};
+use super::posed::ContactMember;
+use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, System, sum_of};
 use crate::gaps::GapLaw;
 use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::At;
-use crate::history::History;
-use crate::persist::{Persist, Reader, Writer};
+use crate::history::ContactHistory;
+use crate::persist::{Persist, StateReader, StateWriter};
 
 /// A contact force is continued over steps at most this many times as long as the one it was found in.
 const FORCE_REACH: f64 = 4.0;
@@ -84,7 +84,7 @@ impl System {
             let (index, lanes) = (structure.index(event.node, event.sector), structure.lanes());
             // `film` closes gaps up to rounding.
             let closed = CLOSED * self.pairs[event.pair].gap().indifferent(event.node);
-            let History { gap, force, passing, .. } = &mut structure.history;
+            let ContactHistory { gap, force, passing, .. } = &mut structure.history;
             if gap.before[index] <= closed && gap.now[index] <= closed {
                 for component in 0..3 {
                     let row = (3 * event.node + component) * lanes + event.sector;
@@ -128,7 +128,7 @@ impl System {
             for &node in pair.nodes() {
                 let (gap, before) = (of.history.gap.now[node], of.history.gap.before[node]);
                 if gap < 0.0 && before.is_infinite() {
-                    let at = Member { structure, pair: number, node, sector: 0, index: node };
+                    let at = ContactMember { structure, pair: number, node, sector: 0, index: node };
                     let moved = bodies.pose(at).slip_of_deformation();
                     if open.was_behind(moved, of.history.geometry.now.normal_at(node), gap) {
                         return Err(StepFailure::BehindEdge { structure, node });
@@ -156,7 +156,7 @@ impl System {
     }
 
     /// Write everything that determines the future, the step size included.
-    pub fn save(&self, writer: &mut Writer) {
+    pub fn save(&self, writer: &mut StateWriter) {
         self.step_size().save(writer);
         self.structures.iter().for_each(|structure| structure.save(writer));
         self.pairs.iter().for_each(|pair| pair.state().save(writer));
@@ -166,7 +166,7 @@ impl System {
 
     /// Pass over a saved state and refuse what is none; returns its step size (s) and how many of its gaps are infinite. Before
     /// the start, gaps are not known.
-    pub fn check(&self, reader: &mut Reader, started: bool) -> (f64, usize) {
+    pub fn check(&self, reader: &mut StateReader, started: bool) -> (f64, usize) {
         let mut step = 0.0_f64;
         step.restore(reader);
         if !(0.0..=f64::MAX).contains(&step) {
@@ -222,7 +222,7 @@ impl System {
     }
 
     /// Restore a saved state; coefficients are recomputed from the saved step size.
-    pub fn restore(&mut self, reader: &mut Reader) {
+    pub fn restore(&mut self, reader: &mut StateReader) {
         let mut step = 0.0_f64;
         step.restore(reader);
         for structure in &mut self.structures {
@@ -253,7 +253,7 @@ impl System {
                         let point = structure.three(&history.points, node, sector);
                         let of = &self.pairs[pair];
                         let wrench = of.gap().wrench(At { node, index, drive: of.drive(When::Now) }, point, force);
-                        let at = Member { structure: number, pair, node, sector, index };
+                        let at = ContactMember { structure: number, pair, node, sector, index };
                         let coating = history.coating_force[index];
                         self.events.now.push(ContactEvent::new(at, normal, force, coating, (point, wrench)));
                     }
@@ -263,7 +263,7 @@ impl System {
     }
 }
 
-impl Pair {
+impl ContactPair {
     /// Contact forces that last act on the structure under their nodes, too.
     fn spread_lasting(&self, structures: &mut [Structure]) {
         let Some((surface, carrier)) = self.carried() else { return };

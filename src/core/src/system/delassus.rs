@@ -1,6 +1,6 @@
 //! The Delassus matrix W = C_Nᵀ A⁻¹ C_NT of the contact nodes of one structure, by its flexibility over one step.
 
-use super::posed::Member;
+use super::posed::ContactMember;
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::dispatch::Kernel;
@@ -9,9 +9,9 @@ use crate::gaps::dot;
 use nalgebra::DMatrix;
 
 /// Contacts of a structure within a group, with their directions: from which row and column on they stand in the matrix.
-pub struct Block<'a> {
+pub struct DelassusBlock<'a> {
     /// The contacts.
-    pub members: &'a [Member],
+    pub members: &'a [ContactMember],
     /// Directions along rows and columns, `per` each.
     pub rows: &'a [[f64; 3]],
     /// As `rows`.
@@ -23,7 +23,7 @@ pub struct Block<'a> {
 }
 
 /// Fill the block of contacts of a structure (m/N).
-pub fn fill(matrix: &mut DMatrix<f64>, modes: &Sectors, nodes: usize, block: &Block) {
+pub fn fill(matrix: &mut DMatrix<f64>, modes: &Sectors, nodes: usize, block: &DelassusBlock) {
     match modes {
         // One sector with all of its nodes.
         Sectors::Uncoupled(bank) if is_whole_sector(block, nodes) => {
@@ -40,23 +40,23 @@ pub fn fill(matrix: &mut DMatrix<f64>, modes: &Sectors, nodes: usize, block: &Bl
 
 /// W of nodes of a disk of coupled sectors.
 #[inline(never)]
-fn fill_disk(matrix: &mut DMatrix<f64>, disk: &CyclicBank, block: &Block) {
+fn fill_disk(matrix: &mut DMatrix<f64>, disk: &CyclicBank, block: &DelassusBlock) {
     match block.per {
         1 => disk.instruction_set().run(FillDisk::<1> { matrix, disk, block }),
         _ => disk.instruction_set().run(FillDisk::<3> { matrix, disk, block }),
     }
 }
 
-fn is_whole_sector(block: &Block, nodes: usize) -> bool {
+fn is_whole_sector(block: &DelassusBlock, nodes: usize) -> bool {
     let (members, first) = (block.members, block.members[0]);
     block.first == 0 && members.len() == nodes && members[members.len() - 1].sector == first.sector
 }
 
 /// W of nodes of uncoupled sectors.
 #[inline(never)]
-fn fill_sectors(matrix: &mut DMatrix<f64>, bank: &ModalBank, block: &Block) {
+fn fill_sectors(matrix: &mut DMatrix<f64>, bank: &ModalBank, block: &DelassusBlock) {
     let (height, per, start) = (bank.rows(), block.per, block.per * block.first);
-    for (member, &Member { node: column_node, sector, .. }) in block.members.iter().enumerate() {
+    for (member, &ContactMember { node: column_node, sector, .. }) in block.members.iter().enumerate() {
         let flexibility = bank.flexibility(sector).as_slice();
         let [first, second, third] = std::array::from_fn(|j| &flexibility[(3 * column_node + j) * height..][..height]);
         for along in per * member..per * (member + 1) {
@@ -81,7 +81,7 @@ fn fill_sectors(matrix: &mut DMatrix<f64>, bank: &ModalBank, block: &Block) {
 struct FillDisk<'a, const PER: usize> {
     matrix: &'a mut DMatrix<f64>,
     disk: &'a CyclicBank,
-    block: &'a Block<'a>,
+    block: &'a DelassusBlock<'a>,
 }
 
 impl<const PER: usize> Kernel for FillDisk<'_, PER> {

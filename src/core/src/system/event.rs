@@ -1,6 +1,6 @@
 //! What a contact did in a step.
 
-use super::posed::Member;
+use super::posed::ContactMember;
 use crate::gaps::dot;
 use crate::gaps::wrench::Wrench;
 
@@ -38,13 +38,13 @@ pub struct ContactEvent {
 
 impl ContactEvent {
     pub(super) fn new(
-        at: Member,
+        at: ContactMember,
         normal: f64,
         force: [f64; 3],
         coating: f64,
         (point, wrench): ([f64; 3], Wrench),
     ) -> Self {
-        let Member { structure, pair, node, sector, .. } = at;
+        let ContactMember { structure, pair, node, sector, .. } = at;
         let square = dot(force, force) - normal * normal;
         // What rounding leaves of a frictionless contact is no friction.
         let tangential = if square > 1e-14 * normal * normal { square.sqrt() } else { 0.0 };

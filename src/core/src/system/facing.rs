@@ -1,49 +1,54 @@
 //! One sector facing its surfaces over a span of time: gaps at any instant, and what contacts did.
 
 use super::carrier::Spot;
-use super::march::casing::Casing;
-use super::pair::Pair;
-use super::record::{Place, Record};
+use super::march::casing::CarrierIntegrator;
+use super::pair::ContactPair;
+use super::record::{SpanRecord, SurfacePlace};
 
-use crate::galerkin::basis::Basis;
+use crate::galerkin::basis::TimeBasis;
 use crate::galerkin::compliance::Lanes;
-use crate::galerkin::level::Level;
-use crate::galerkin::sector::{Taken, Witness};
-use crate::galerkin::trial::{Kind, Obstacle, Sliding, Trial, one_by_one, three};
+use crate::galerkin::level::StepTables;
+use crate::galerkin::sector::{AcceptedStep, Witness};
+use crate::galerkin::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, one_by_one, three};
 use crate::gaps::GapLaw;
-use crate::gaps::wrench::{At, Motion};
-use crate::gaps::{Drive, dot};
+use crate::gaps::wrench::{At, MotionIncrement};
+use crate::gaps::{PrescribedMotion, dot};
 
 /// Contacts of a trial are solved this often before their directions of sliding stay as they are: a node that next to does not slide would
 /// turn them from one time to the next.
 const LOOKS: usize = 3;
 
 /// Structures that carry the surfaces a sector faces, over a step of a level.
-pub struct Ground<'a> {
-    pub casings: &'a mut [Casing],
+pub struct CarriersInStep<'a> {
+    pub casings: &'a mut [CarrierIntegrator],
     /// Which of them carries the surface of each pair.
     pub casing_of: &'a [Option<usize>],
     pub level: usize,
-    pub kind: Kind,
+    pub kind: ForceInterpolation,
     pub lanes: Lanes,
 }
 
 /// A sector of a structure facing its surfaces.
-pub struct Facing<'a> {
+pub struct ObstacleView<'a> {
     /// What carries them, if anything does.
-    pub ground: Option<Ground<'a>>,
-    pub pairs: &'a mut [Pair],
+    pub ground: Option<CarriersInStep<'a>>,
+    pub pairs: &'a mut [ContactPair],
     /// Pair of each node.
     pub pair_of: &'a [Option<usize>],
     /// Lanes of a row, and that of the sector.
     pub lanes: usize,
     pub sector: usize,
-    pub record: &'a mut Record,
+    pub record: &'a mut SpanRecord,
 }
 
-impl Facing<'_> {
+impl ObstacleView<'_> {
     /// What a structure tells of the place where a node is on the surface that it carries, at a point of the step.
-    fn on_ground<T>(&self, (node, point): (usize, usize), when: Place, tell: impl Fn(&Casing, Spot) -> T) -> Option<T> {
+    fn on_ground<T>(
+        &self,
+        (node, point): (usize, usize),
+        when: SurfacePlace,
+        tell: impl Fn(&CarrierIntegrator, Spot) -> T,
+    ) -> Option<T> {
         let ground = self.ground.as_ref()?;
         let pair = self.pair_of[node]?;
         let casing = ground.casing_of[pair]?;
@@ -53,28 +58,28 @@ impl Facing<'_> {
     }
 
     /// The same, of what is told to it.
-    pub fn tell_ground(&mut self, node: usize, point: usize, tell: impl FnOnce(&mut Casing, Spot)) {
+    pub fn tell_ground(&mut self, node: usize, point: usize, tell: impl FnOnce(&mut CarrierIntegrator, Spot)) {
         let (Some(ground), Some(pair)) = (&mut self.ground, self.pair_of[node]) else { return };
         let Some(casing) = ground.casing_of[pair] else { return };
         let index = node * self.lanes + self.sector;
-        if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index, Place::Now) {
+        if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index, SurfacePlace::Now) {
             tell(&mut ground.casings[casing], spot);
         }
     }
 
     /// What a lane faces, and the step that is solved.
-    fn under(&mut self, lane: usize) -> Option<(&mut Casing, (usize, Kind), Lanes)> {
-        let Ground { casings, casing_of, level, kind, lanes } = self.ground.as_mut()?;
+    fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, (usize, ForceInterpolation), Lanes)> {
+        let CarriersInStep { casings, casing_of, level, kind, lanes } = self.ground.as_mut()?;
         let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair])?;
         Some((&mut casings[casing], (*level, *kind), *lanes))
     }
 
-    fn at<'b>(&self, node: usize, drive: &'b Drive) -> At<'b> {
+    fn at<'b>(&self, node: usize, drive: &'b PrescribedMotion) -> At<'b> {
         At { node, index: node * self.lanes + self.sector, drive }
     }
 }
 
-impl Facing<'_> {
+impl ObstacleView<'_> {
     /// All nodes at all points as lanes, where they face one surface of revolution and the shaft stays.
     fn enter_lanes(&mut self, lanes: Lanes) -> Option<usize> {
         let pair = (*self.pair_of.first()?)?;
@@ -95,7 +100,7 @@ impl Facing<'_> {
     }
 }
 
-impl Obstacle for Facing<'_> {
+impl Obstacle for ObstacleView<'_> {
     fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         let Some(pair) = self.pair_of[node] else { return (f64::INFINITY, [0.0; 3]) };
         let at = self.at(node, &self.record.drives[pair][point].0);
@@ -124,7 +129,7 @@ impl Obstacle for Facing<'_> {
         }
     }
 
-    fn direction(&mut self, node: usize, point: usize, sliding: &Sliding) -> [f64; 3] {
+    fn direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3] {
         let Some(pair) = self.pair_of[node] else { return sliding.normal };
         let friction = self.pairs[pair].friction();
         if friction == 0.0 {
@@ -134,7 +139,8 @@ impl Obstacle for Facing<'_> {
         let slip = if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.looks > LOOKS);
             let slip = known.unwrap_or_else(|| {
-                let ground = self.on_ground((node, point), Place::Now, |casing, spot| casing.way_at(spot, point));
+                let ground =
+                    self.on_ground((node, point), SurfacePlace::Now, |casing, spot| casing.way_at(spot, point));
                 let ground = ground.unwrap_or_default();
                 std::array::from_fn(|c| sliding.way[c] - ground[c])
             });
@@ -143,7 +149,7 @@ impl Obstacle for Facing<'_> {
         } else {
             let at = self.at(node, &self.record.drives[pair][point].0);
             let rigid = gap.sliding_velocity(node, at.index, at.drive, sliding.moved);
-            let ground = self.on_ground((node, point), Place::Begun, |casing, spot| casing.velocity_at(spot));
+            let ground = self.on_ground((node, point), SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
             let ground = ground.unwrap_or_default();
             std::array::from_fn(|i| rigid[i] + sliding.velocity[i] - ground[i])
         };
@@ -157,9 +163,9 @@ impl Obstacle for Facing<'_> {
 
     fn look(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
         self.record.looks += 1;
-        let Some(Ground { casings, lanes: of_ground, .. }) = &mut self.ground else { return false };
+        let Some(CarriersInStep { casings, lanes: of_ground, .. }) = &mut self.ground else { return false };
         *of_ground = lanes;
-        casings.iter_mut().for_each(Casing::look_away);
+        casings.iter_mut().for_each(CarrierIntegrator::look_away);
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
             let normal = lanes.three(normals, lane);
@@ -194,7 +200,7 @@ impl Obstacle for Facing<'_> {
         let at = self.at(node, drive);
         let point = gap.contact_point(at, moved, self.record.places[step_point][node]);
         let (spin, shaft) = (gap.spin_motion(at, point, &motion), gap.shaft_motion(at, point, &motion));
-        let ground = self.on_ground((node, step_point), Place::Now, |casing, spot| {
+        let ground = self.on_ground((node, step_point), SurfacePlace::Now, |casing, spot| {
             let [now, before] = [step_point, 0].map(|instant| casing.moved_at(spot, instant));
             std::array::from_fn(|c| now[c] - before[c])
         });
@@ -203,12 +209,13 @@ impl Obstacle for Facing<'_> {
     }
 }
 
-impl Witness for Facing<'_> {
-    fn go(&mut self, from: f64, length: f64, level: &Level, kind: Kind) {
-        let count = if kind == Kind::Constant { 2 } else { level.basis.count() };
+impl Witness for ObstacleView<'_> {
+    fn go(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
+        let count = if kind == ForceInterpolation::Constant { 2 } else { level.basis.count() };
         for (drives, course) in self.record.drives.iter_mut().zip(&self.record.courses) {
             for (point, drive) in drives[..count].iter_mut().enumerate() {
-                let theta = if kind == Kind::Constant { [0.0, 1.0][point] } else { level.basis.points[point] };
+                let theta =
+                    if kind == ForceInterpolation::Constant { [0.0, 1.0][point] } else { level.basis.points[point] };
                 *drive = course.at(from + length * theta);
             }
         }
@@ -241,7 +248,7 @@ impl Witness for Facing<'_> {
         })
     }
 
-    fn passed(&mut self, level: &Level, trial: &Trial) {
+    fn passed(&mut self, level: &StepTables, trial: &Trial) {
         for (node, pair) in self.pair_of.iter().enumerate() {
             if pair.is_some() {
                 let lowest = self.lowest((trial, &level.basis), node);
@@ -254,7 +261,7 @@ impl Witness for Facing<'_> {
         self.record.work.damping += damping_loss;
     }
 
-    fn took(&mut self, step: &Taken) {
+    fn took(&mut self, step: &AcceptedStep) {
         self.record.work.damping += step.damping_loss;
         self.record.work.dropped += step.dropped;
         self.weigh_motions(step);
@@ -282,9 +289,9 @@ const PARABOLAS: usize = 4;
 /// How much closer these are each time.
 const CLOSER: f64 = 0.25;
 
-impl Facing<'_> {
+impl ObstacleView<'_> {
     /// Smallest gap of a node (m) up to now and at the points of a step, and between them where it stays open.
-    fn lowest(&self, (trial, basis): (&Trial, &Basis), node: usize) -> f64 {
+    fn lowest(&self, (trial, basis): (&Trial, &TimeBasis), node: usize) -> f64 {
         let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
         let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
         match trial.minimum(node).filter(|_| !self.has_jumped(trial, node)) {
@@ -302,7 +309,7 @@ impl Facing<'_> {
     /// Smallest gap of a node (m) within a step, near `theta` if its motion is not known in parts.
     ///
     /// A surface of revolution and the displacements are not polynomials of time: gaps are evaluated. Those to other surfaces are a polynomial.
-    fn lowest_near(&self, (trial, basis): (&Trial, &Basis), node: usize, theta: f64) -> f64 {
+    fn lowest_near(&self, (trial, basis): (&Trial, &TimeBasis), node: usize, theta: f64) -> f64 {
         let mut lowest = f64::INFINITY;
         let mut look = |theta: f64| {
             let moved = trial.displacement_within(basis, node, theta);
@@ -339,7 +346,7 @@ impl Facing<'_> {
             return false;
         }
         let (now, before) = (trial.displacement(i, node), trial.displacement(i - 1, node));
-        let ground = self.on_ground((node, i), Place::Now, |casing, spot| {
+        let ground = self.on_ground((node, i), SurfacePlace::Now, |casing, spot| {
             let [now, before] = [i, i - 1].map(|point| casing.moved_at(spot, point));
             std::array::from_fn(|c| now[c] - before[c])
         });
@@ -352,19 +359,19 @@ impl Facing<'_> {
     }
 
     /// Σ_k S_ik of the prescribed motion of a pair at the points, for each point i of the step.
-    fn weigh_motions(&mut self, step: &Taken) {
+    fn weigh_motions(&mut self, step: &AcceptedStep) {
         let points = 0..=step.trial.points();
         for (motions, drives) in self.record.motions.iter_mut().zip(&self.record.drives) {
             for i in points.clone() {
                 let weights = step.kind.work_weights(&step.level.basis, i);
                 let terms = points.clone().map(|k| drives[k].1.less(&drives[0].1).over(weights[k]));
-                motions[i] = terms.fold(Motion::default(), |sum, term| sum.since(&term));
+                motions[i] = terms.fold(MotionIncrement::default(), |sum, term| sum.since(&term));
             }
         }
     }
 
     /// Enter what a node that pushes did over a step. All work is linear in displacements and motion, which are weighted first.
-    fn enter(&mut self, step: &Taken, node: usize, pair: usize) {
+    fn enter(&mut self, step: &AcceptedStep, node: usize, pair: usize) {
         let (trial, basis) = (step.trial, &step.level.basis);
         let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
         let (drives, motions) = (&self.record.drives[pair], &self.record.motions[pair]);
@@ -382,7 +389,11 @@ impl Facing<'_> {
             let tangential = if slides { trial.friction_force(i, node) } else { [0.0; 3] };
             let wrench = gap.wrench(at, point, force);
             let length = step.level.step
-                * if step.kind == Kind::Constant { f64::from(u8::from(i == 1)) } else { basis.weights[i] };
+                * if step.kind == ForceInterpolation::Constant {
+                    f64::from(u8::from(i == 1))
+                } else {
+                    basis.weights[i]
+                };
             tally.normal += length * normal_force;
             tally.tangential += length * dot(tangential, tangential).sqrt();
             for c in 0..3 {
@@ -399,8 +410,9 @@ impl Facing<'_> {
                 open += weights[k] * trial.met(k, node);
             }
             let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
-            let ground =
-                self.on_ground((node, i), Place::Acted, |casing, spot| casing.worked_at(spot, i)).unwrap_or_default();
+            let ground = self
+                .on_ground((node, i), SurfacePlace::Acted, |casing, spot| casing.worked_at(spot, i))
+                .unwrap_or_default();
             there = std::array::from_fn(|c| there[c] - ground[c]);
             let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
             let heat = -dot(tangential, slip);

@@ -1,22 +1,22 @@
 //! Groups of contacts that can push each other: their Delassus matrix, their forces, and what these do to the structures.
 
 use super::carrier::Reaction;
-use super::delassus::{Block, fill};
+use super::delassus::{DelassusBlock, fill};
 use super::pair::When;
-use super::posed::{Bodies, Member, Posed};
+use super::posed::{Bodies, ContactMember, ContactView};
 use super::{ContactEvent, StepFailure, Structure};
 use crate::dynamics::sectors::Sectors;
 use crate::gaps::dot;
 use crate::gaps::wrench::At;
 use crate::laws::coating::Coating;
-use crate::laws::{Law, Prediction, tangents};
+use crate::laws::{ContactPrediction, Law, tangents};
 use crate::settings::Solver;
 
 /// Nodes outside a group count as penetrating beyond this fraction of the largest gap of the group.
 const VIOLATED_FRACTION: f64 = 1e-13;
 
 /// What a group has found in a step.
-pub struct Found<'a> {
+pub struct GroupSolution<'a> {
     /// Active contacts, appended.
     pub events: &'a mut Vec<ContactEvent>,
     /// Small linear systems factorised, added to.
@@ -27,7 +27,7 @@ pub struct Found<'a> {
 
 /// Contact nodes of one structure in a group.
 #[derive(Debug, Clone)]
-struct Side {
+struct GroupSide {
     structure: usize,
     /// Which of its nodes are in the group that is being solved, `[node · lanes + lane]`.
     chosen: Vec<bool>,
@@ -48,14 +48,14 @@ pub enum Reach {
 
 /// Contacts that can push each other, at any time of a run.
 #[derive(Debug, Clone)]
-pub struct Group {
+pub struct ContactGroup {
     reach: Reach,
-    sides: Vec<Side>,
+    sides: Vec<GroupSide>,
     /// Structures under the contacts.
     reactions: Vec<Reaction>,
     law: Law,
     /// The contacts being solved, structure by structure and sector by sector.
-    members: Vec<Member>,
+    members: Vec<ContactMember>,
     rows: Vec<[f64; 3]>,
     columns: Vec<[f64; 3]>,
     /// Force on each member (N).
@@ -64,7 +64,7 @@ pub struct Group {
     sector_force: Vec<f64>,
 }
 
-impl Group {
+impl ContactGroup {
     /// Contacts of the structures `touching`, under which those of `carriers` move.
     pub fn new(
         (reach, touching, carriers): (Reach, &[usize], &[usize]),
@@ -81,7 +81,7 @@ impl Group {
         let per = law.directions();
         let side = |structure: &usize| {
             let len = if reach == Reach::Sector { 0 } else { structures[*structure].gaps().len() };
-            Side { structure: *structure, chosen: vec![false; len], response: vec![0.0; len], span: 0..0 }
+            GroupSide { structure: *structure, chosen: vec![false; len], response: vec![0.0; len], span: 0..0 }
         };
         let rows = touching.iter().map(|structure| structures[*structure].modes().rows()).max().unwrap_or(0);
         Self {
@@ -128,7 +128,7 @@ impl Group {
     ///
     /// # Errors
     /// Contacts that are no longer described; a problem without solution.
-    pub fn solve(&mut self, bodies: &mut Bodies, found: &mut Found) -> Result<(), StepFailure> {
+    pub fn solve(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         match self.reach {
             Reach::Sector => self.solve_sectors(bodies, found),
             Reach::All => self.solve_together(bodies, found),
@@ -136,14 +136,14 @@ impl Group {
     }
 
     /// All nodes of the sectors that touch, each sector by itself.
-    fn solve_sectors(&mut self, bodies: &mut Bodies, found: &mut Found) -> Result<(), StepFailure> {
+    fn solve_sectors(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         let (structure, mut next) = (self.sides[0].structure, 0);
         while let Some(sector) = bodies.structures[structure].touching_from(next) {
             self.members.clear();
             let of = &bodies.structures[structure];
             let nodes = of.pair_of.iter().enumerate();
             let nodes = nodes.filter_map(|(node, pair)| pair.map(|pair| (node, pair)));
-            let member = |(node, pair)| Member { structure, pair, node, sector, index: of.index(node, sector) };
+            let member = |(node, pair)| ContactMember { structure, pair, node, sector, index: of.index(node, sector) };
             self.members.extend(nodes.map(member));
             self.sides[0].span = 0..self.members.len();
             self.find_forces(bodies, found)?;
@@ -155,8 +155,8 @@ impl Group {
 
     /// Contacts that reach each other: the nodes that penetrate or touched last, then those that their solution makes
     /// penetrate, until there are none.
-    fn solve_together(&mut self, bodies: &mut Bodies, found: &mut Found) -> Result<(), StepFailure> {
-        let rests = |side: &Side| bodies.structures[side.structure].touching_from(0).is_none();
+    fn solve_together(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
+        let rests = |side: &GroupSide| bodies.structures[side.structure].touching_from(0).is_none();
         if self.sides.iter().all(rests) {
             return Ok(());
         }
@@ -210,7 +210,7 @@ impl Group {
                 for (node, pair) in of.pair_of.iter().enumerate() {
                     let index = of.index(node, sector);
                     if let (true, Some(pair)) = (side.chosen[index], *pair) {
-                        self.members.push(Member { structure, pair, node, sector, index });
+                        self.members.push(ContactMember { structure, pair, node, sector, index });
                     }
                 }
             }
@@ -219,7 +219,7 @@ impl Group {
     }
 
     fn add_violated(&mut self, bodies: &Bodies) -> bool {
-        let gap_of = |member: &Member| bodies.structures[member.structure].history.gap.now[member.index];
+        let gap_of = |member: &ContactMember| bodies.structures[member.structure].history.gap.now[member.index];
         let scale = self.members.iter().fold(0.0, |scale: f64, member| scale.max(gap_of(member).abs()));
         let mut found = false;
         for side in 0..self.sides.len() {
@@ -236,7 +236,7 @@ impl Group {
     }
 
     /// Fill and solve the problem of the members.
-    fn find_forces(&mut self, bodies: &Bodies, found: &mut Found) -> Result<(), StepFailure> {
+    fn find_forces(&mut self, bodies: &Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         let per = self.law.directions();
         for (contact, &member) in self.members.iter().enumerate() {
             let at = bodies.pose(member);
@@ -252,7 +252,7 @@ impl Group {
         if self.law.multipliers().iter().any(|value| !value.is_finite()) {
             return Err(StepFailure::NonFinite);
         }
-        let Member { structure, sector, .. } = self.members[0];
+        let ContactMember { structure, sector, .. } = self.members[0];
         if !outcome.solved {
             return Err(StepFailure::Unsolved { structure, sector });
         }
@@ -270,7 +270,8 @@ impl Group {
         for side in self.sides.iter().filter(|side| !side.span.is_empty()) {
             let directions = per * side.span.start..per * side.span.end;
             let (rows, columns) = (&self.rows[directions.clone()], &self.columns[directions]);
-            let block = Block { members: &self.members[side.span.clone()], rows, columns, per, first: side.span.start };
+            let block =
+                DelassusBlock { members: &self.members[side.span.clone()], rows, columns, per, first: side.span.start };
             let structure = &bodies.structures[side.structure];
             fill(matrix, structure.modes(), structure.nodes(), &block);
         }
@@ -338,7 +339,7 @@ impl Group {
                 let Some(pair) = pair.filter(|pair| bodies.pairs[*pair].carrier().is_some()) else { continue };
                 for sector in 0..sectors {
                     let index = structure.index(node, sector);
-                    let at = Member { structure: side.structure, pair, node, sector, index };
+                    let at = ContactMember { structure: side.structure, pair, node, sector, index };
                     let posed = bodies.pose(at);
                     let Some(spot) = posed.spot() else { continue };
                     let under = self.reactions.iter().find(|one| one.structure == spot.surface.1.structure);
@@ -351,7 +352,7 @@ impl Group {
 
     /// Let the solution act on all structures, and record it.
     #[inline(always)]
-    fn apply(&mut self, bodies: &mut Bodies, found: &mut Found) {
+    fn apply(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) {
         for side in &self.sides {
             let structure = &mut bodies.structures[side.structure];
             for (gap, response) in structure.history.gap.now.iter_mut().zip(&side.response) {
@@ -396,11 +397,11 @@ impl Group {
 
     /// Write corrected gaps and forces into the history, and one event per contact that carries a force.
     #[inline(always)]
-    fn record(&mut self, bodies: &mut Bodies, found: &mut Found) {
+    fn record(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) {
         let (per, values) = (self.law.directions(), self.law.multipliers());
         let (gaps, shares) = (self.law.gaps(), self.law.coating_shares());
         for (contact, &member) in self.members.iter().enumerate() {
-            let Member { structure, pair, node, sector, index } = member;
+            let ContactMember { structure, pair, node, sector, index } = member;
             let (normal, of) = (values[per * contact], &mut bodies.structures[structure]);
             of.history.gap.now[index] = gaps[contact];
             if normal == 0.0 {
@@ -427,7 +428,7 @@ impl Group {
 
 /// Row n and column n − µt of a contact; n, t₁, t₂ for both where it may stick.
 #[inline(always)]
-fn fill_directions(at: &Posed, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
+fn fill_directions(at: &ContactView, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
     let normal = at.normal();
     if rows.len() == 3 {
         let [first, second] = tangents(normal);
@@ -441,10 +442,10 @@ fn fill_directions(at: &Posed, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) 
     columns[0] = std::array::from_fn(|i| normal[i] - friction * slip[i]);
 }
 
-impl Side {
+impl GroupSide {
     /// Change of the gaps of this structure by forces on its own members.
     #[inline(never)]
-    fn respond(&mut self, structure: &mut Structure, members: &[Member], forces: &[[f64; 3]]) {
+    fn respond(&mut self, structure: &mut Structure, members: &[ContactMember], forces: &[[f64; 3]]) {
         let nodes = structure.nodes();
         if let Sectors::Coupled(disk) = structure.modes_mut() {
             disk.ask(members.iter().zip(forces).map(|(member, force)| (member.sector, member.node, *force)));
@@ -453,7 +454,7 @@ impl Side {
         match structure.modes() {
             Sectors::Uncoupled(bank) => {
                 let lanes = bank.lanes();
-                for (&Member { node: column, sector, .. }, force) in members.iter().zip(forces) {
+                for (&ContactMember { node: column, sector, .. }, force) in members.iter().zip(forces) {
                     let flexibility = bank.flexibility(sector);
                     for node in 0..nodes {
                         let index = node * lanes + sector;

@@ -2,7 +2,7 @@
 
 /// How the shape of a surface grows over a span: a factor that is linear in time, times ½(1 − cos(πt/T)) until T.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Growth {
+pub struct ShapeGrowth {
     /// Factor at the start and the end.
     pub factors: [f64; 2],
     /// Time since the growth began (s), at the start and the end.
@@ -11,7 +11,7 @@ pub struct Growth {
     pub length: f64,
 }
 
-impl Growth {
+impl ShapeGrowth {
     /// Share of a shape that has grown in after a time (s) of `length` (s). Before the start, where rounding may put the
     /// beginning of a first step, it is that of the start.
     pub fn share(elapsed: f64, length: f64) -> f64 {

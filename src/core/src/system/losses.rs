@@ -6,7 +6,7 @@
 //!
 //! At every communication point both are held against the most that they had taken before.
 
-use super::{Pair, StepFailure, System};
+use super::{ContactPair, StepFailure, System};
 use crate::ledger::Ledger;
 use crate::persist::persist_fields;
 use crate::settings::{Scheme, Solver};
@@ -35,16 +35,16 @@ const STOPPED: f64 = 0.01;
 
 /// Most that has been taken so far (J).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Taken {
+pub struct LargestLosses {
     friction: f64,
     impact: f64,
     /// What forces of cutting have given to tips that go back, which is not booked as cutting.
     pub(super) uncut: f64,
 }
 
-persist_fields!(Taken { friction, impact, uncut });
+persist_fields!(LargestLosses { friction, impact, uncut });
 
-impl Taken {
+impl LargestLosses {
     /// What is given back of the most that friction, and impacts, had taken (J). Steps by a tolerance pay impacts from those before: these
     /// are held against nothing taken at all.
     fn given(&mut self, ledger: &Ledger, pays: bool) -> [f64; 2] {
@@ -70,7 +70,7 @@ impl System {
             let [friction, impact] = taken.given(ledger, pays);
             let exchanged = ledger.scale();
             // What flies slides until it stops, at every impact: what that gives is an error of the step, as long as it is small.
-            let flies = |pair: &Pair| self.sets.of(pair.structure()) == set && pair.gap().layout().is_none();
+            let flies = |pair: &ContactPair| self.sets.of(pair.structure()) == set && pair.gap().layout().is_none();
             let stopped = if self.pairs.iter().any(flies) { STOPPED } else { ROUNDING };
             if friction > stopped * exchanged {
                 return Err(StepFailure::Gives { set, loss: Loss::Friction, given: friction, exchanged });
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn losses_are_held_against_the_most_that_was_taken() {
-        let (mut taken, mut ledger) = (Taken::default(), Ledger::default());
+        let (mut taken, mut ledger) = (LargestLosses::default(), Ledger::default());
         for (friction, impact, given, paid) in [
             (2.0, 1.0, [0.0, 0.0], 0.0),
             (-0.5, 0.5, [0.5, 0.0], 0.0),

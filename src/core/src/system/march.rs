@@ -5,24 +5,24 @@ mod disk;
 mod flight;
 pub(super) mod together;
 
-use super::facing::Facing;
-use super::growth::Growth;
-use super::posed::Member;
-use super::record::{Record, Tally, Worked};
-use super::{ContactEvent, Pair, StepFailure, Structure, System};
+use super::facing::ObstacleView;
+use super::growth::ShapeGrowth;
+use super::posed::ContactMember;
+use super::record::{NodeTally, SpanRecord, Worked};
+use super::{ContactEvent, ContactPair, StepFailure, Structure, System};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::sectors::Sectors;
-use crate::galerkin::flight::Flight;
-use crate::galerkin::level::Modes;
+use crate::galerkin::flight::FreeFlight;
+use crate::galerkin::level::ContactModes;
 use crate::galerkin::march::march;
-use crate::galerkin::sector::{Demand, Effort, Marcher, Stopped, Tables};
+use crate::galerkin::sector::{Effort, SectorIntegrator, StepGoal, Stopped, Tables};
 use crate::galerkin::state::SectorState;
-use crate::gaps::Drive;
+use crate::gaps::PrescribedMotion;
 use crate::gaps::wrench::Wrench;
 use crate::ledger::Ledger;
 use crate::settings::{Scheme, Solver};
 use nalgebra::DMatrix;
-use together::Together;
+use together::CoupledSet;
 
 /// Contacts count as closed within this share of the tolerance.
 const PRECISION: f64 = 1e-4;
@@ -32,11 +32,11 @@ const PRECISION: f64 = 1e-4;
 pub struct Galerkin {
     tables: Vec<Tables>,
     /// Of each table.
-    flights: Vec<Flight>,
-    marcher: Marcher,
+    flights: Vec<FreeFlight>,
+    marcher: SectorIntegrator,
     state: SectorState,
-    record: Record,
-    demand: Demand,
+    record: SpanRecord,
+    demand: StepGoal,
 }
 
 impl Galerkin {
@@ -48,11 +48,11 @@ impl Galerkin {
         [tolerance, rounding]: [f64; 2],
     ) -> Self {
         let modes = bank.model().dynamic_modes(Scheme::Galerkin);
-        let kinds: Vec<Modes> = (0..bank.sets()).map(|set| modes_of(bank, set, modes)).collect();
-        let (marcher, state) = (Marcher::new(modes, nodes), SectorState::new(modes, nodes));
-        let degree = |kind: &Modes| if sticks { 1 } else { kind.degree_up_to(longest) };
+        let kinds: Vec<ContactModes> = (0..bank.sets()).map(|set| modes_of(bank, set, modes)).collect();
+        let (marcher, state) = (SectorIntegrator::new(modes, nodes), SectorState::new(modes, nodes));
+        let degree = |kind: &ContactModes| if sticks { 1 } else { kind.degree_up_to(longest) };
         Self {
-            flights: kinds.iter().map(Flight::new).collect(),
+            flights: kinds.iter().map(FreeFlight::new).collect(),
             tables: kinds
                 .into_iter()
                 .map(|kind| {
@@ -63,8 +63,8 @@ impl Galerkin {
                 .collect(),
             marcher: if sticks { marcher.sticking() } else { marcher },
             state: if sticks { state.sticking() } else { state },
-            record: Record::new(nodes, pairs, tolerance),
-            demand: Demand { tolerance, precision: (PRECISION * tolerance).max(rounding), most: u64::MAX },
+            record: SpanRecord::new(nodes, pairs, tolerance),
+            demand: StepGoal { tolerance, precision: (PRECISION * tolerance).max(rounding), most: u64::MAX },
         }
     }
 
@@ -75,7 +75,7 @@ impl Galerkin {
 }
 
 /// Modes with inertia of a sector, and the flexibility of the others.
-fn modes_of(bank: &ModalBank, sector: usize, count: usize) -> Modes {
+fn modes_of(bank: &ModalBank, sector: usize, count: usize) -> ContactModes {
     let model = bank.model();
     let rows = model.contact_modes.nrows();
     let mut residual = DMatrix::zeros(rows, rows);
@@ -83,7 +83,7 @@ fn modes_of(bank: &ModalBank, sector: usize, count: usize) -> Modes {
         let shape = model.contact_modes.column(mode);
         residual.ger(bank.frequency_of(mode, sector).powi(-2), &shape, &shape, 1.0);
     }
-    Modes {
+    ContactModes {
         frequencies: (0..count).map(|mode| bank.frequency_of(mode, sector)).collect(),
         damping_ratios: model.damping_ratios[..count].to_vec(),
         shapes: model.contact_modes.columns(0, count).into_owned(),
@@ -105,15 +105,15 @@ impl System {
         let sticks = self.settings.solver == Solver::Coulomb;
         for set in 0..self.sets.count() {
             let members = self.sets.members(set).to_vec();
-            let own = |pair: &&Pair| members.contains(&pair.structure());
-            let clearance = |pairs: &mut dyn Iterator<Item = &Pair>| {
+            let own = |pair: &&ContactPair| members.contains(&pair.structure());
+            let clearance = |pairs: &mut dyn Iterator<Item = &ContactPair>| {
                 tolerance * pairs.map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
             };
             let moved_by_all = |one: &usize| self.structures[*one].modes().coupled().is_some();
             if members.iter().any(moved_by_all) || self.pairs.iter().filter(own).any(|pair| pair.carrier().is_some()) {
                 let tolerance = clearance(&mut self.pairs.iter().filter(own));
                 let parts = (&self.structures[..], &self.pairs[..]);
-                self.together.push(Together::new(set, &members, parts, (longest, sticks), tolerance));
+                self.together.push(CoupledSet::new(set, &members, parts, (longest, sticks), tolerance));
             } else {
                 for index in members {
                     let own = || self.pairs.iter().filter(|pair| pair.structure() == index);
@@ -132,7 +132,7 @@ impl System {
     }
 
     /// Prescribed motion of a pair in the middle of the span to come, and how its shape grows.
-    pub fn set_middle(&mut self, pair: usize, drive: &Drive, growth: Growth) {
+    pub fn set_middle(&mut self, pair: usize, drive: &PrescribedMotion, growth: ShapeGrowth) {
         self.pairs[pair].middle = (*drive, growth);
     }
 
@@ -146,7 +146,7 @@ impl System {
     }
 
     /// One span to the instant described by `drives`, one per pair.
-    pub(crate) fn march(&mut self, drives: &[Drive]) -> Result<(), StepFailure> {
+    pub(crate) fn march(&mut self, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
         let span = self.step_size();
         for (pair, drive) in self.pairs.iter_mut().zip(drives) {
             pair.go_to(drive, span);
@@ -198,11 +198,11 @@ impl System {
     }
 
     /// Sectors that step together.
-    fn march_together(&mut self, together: &mut Together, span: f64) -> Result<(), StepFailure> {
+    fn march_together(&mut self, together: &mut CoupledSet, span: f64) -> Result<(), StepFailure> {
         let Self { structures, pairs, events, counted, sets, .. } = self;
         sets.members(together.set).iter().for_each(|one| structures[*one].begin_span());
         together.sectors.iter_mut().for_each(|one| one.record.set_out(pairs, span));
-        let demand = Demand { most: self.most_tried, ..together.demand };
+        let demand = StepGoal { most: self.most_tried, ..together.demand };
         let factorisations = counted.effort.factorisations;
         let mut marching = together.begin(structures, pairs);
         let outcome = march(&mut marching, demand, &mut counted.effort);
@@ -253,21 +253,21 @@ fn enter_work(ledger: &mut Ledger, work: &Worked) {
 fn enter_events(
     structure: &Structure,
     (index, sector): (usize, usize),
-    record: &Record,
+    record: &SpanRecord,
     span: f64,
     events: &mut Vec<ContactEvent>,
 ) {
     for (node, pair) in structure.pair_of.iter().enumerate() {
         let (tally, Some(pair)) = (&record.tallies[node], *pair) else { continue };
         if tally.normal > 0.0 {
-            let member = Member { structure: index, pair, node, sector, index: structure.index(node, sector) };
+            let member = ContactMember { structure: index, pair, node, sector, index: structure.index(node, sector) };
             events.push(event(member, tally, span));
         }
     }
 }
 
 /// A contact of a span by its means over it.
-fn event(at: Member, tally: &Tally, span: f64) -> ContactEvent {
+fn event(at: ContactMember, tally: &NodeTally, span: f64) -> ContactEvent {
     let mean = |values: [f64; 3]| values.map(|value| value / span);
     let wrench = Wrench {
         point: tally.wrench.point.map(|value| value / tally.normal),
@@ -291,7 +291,7 @@ impl Structure {
         &mut self,
         (number, sector): (usize, usize),
         galerkin: &mut Galerkin,
-        pairs: &mut [Pair],
+        pairs: &mut [ContactPair],
         effort: &mut Effort,
     ) -> Result<(), StepFailure> {
         let lanes = self.lanes();
@@ -305,7 +305,7 @@ impl Structure {
         let places = &self.history.geometry.before;
         let gaps = &self.history.gap.before;
         record.begin(|node| places.place_at(node * lanes + sector), |node| gaps[node * lanes + sector]);
-        let mut facing = Facing { ground: None, pairs, pair_of: &self.pair_of, lanes, sector, record };
+        let mut facing = ObstacleView { ground: None, pairs, pair_of: &self.pair_of, lanes, sector, record };
         let outcome = marcher.march(tables, state, &mut facing, *demand, effort);
         record.check((number, sector))?;
         let entered = marcher.entered();

@@ -24,7 +24,7 @@ use crate::dynamics::bank::BankOptions;
 use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
 pub use crate::galerkin::sector::Effort;
-use crate::gaps::{Drive, GapLaw};
+use crate::gaps::{GapLaw, PrescribedMotion};
 use crate::history::Two;
 use crate::laws::coating::Coating;
 use crate::ledger::Ledger;
@@ -33,15 +33,15 @@ use crate::settings::{Scheme, Solver};
 pub use event::ContactEvent;
 pub use failure::StepFailure;
 use group::Reach;
-pub(crate) use group::{Found, Group};
-pub use growth::Growth;
+pub(crate) use group::{ContactGroup, GroupSolution};
+pub use growth::ShapeGrowth;
+use losses::LargestLosses;
 pub use losses::Loss;
-use losses::Taken;
-use march::together::Together;
-pub use pair::{Carrier, Pair, PairParts};
+use march::together::CoupledSet;
+pub use pair::{ContactPair, PairParts, SurfaceCarrier};
 pub(crate) use posed::Bodies;
-pub use posed::Member;
-pub use sets::Sets;
+pub use posed::ContactMember;
+pub use sets::StructureSets;
 pub(crate) use sets::joined;
 pub use small::Curved;
 pub use structure::Structure;
@@ -67,7 +67,7 @@ pub struct SystemSettings {
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Counted {
+pub(crate) struct RunTotals {
     /// Internal steps done.
     pub steps: u64,
     /// What marching sectors one by one has taken.
@@ -78,15 +78,15 @@ pub(crate) struct Counted {
     /// Of each set.
     pub ledgers: Vec<Ledger>,
     /// Most that contact of each set has taken so far.
-    taken: Vec<Taken>,
+    taken: Vec<LargestLosses>,
 }
 
-persist_fields!(Counted { steps, effort, factorisations, witnessed, ledgers, taken });
+persist_fields!(RunTotals { steps, effort, factorisations, witnessed, ledgers, taken });
 
-impl Counted {
+impl RunTotals {
     /// Nothing has been done yet.
     fn new(ledgers: Vec<Ledger>) -> Self {
-        Self { taken: vec![Taken::default(); ledgers.len()], ledgers, ..Self::default() }
+        Self { taken: vec![LargestLosses::default(); ledgers.len()], ledgers, ..Self::default() }
     }
 }
 
@@ -94,15 +94,15 @@ impl Counted {
 #[derive(Debug, Clone)]
 pub struct System {
     pub(crate) structures: Vec<Structure>,
-    pub(crate) pairs: Vec<Pair>,
+    pub(crate) pairs: Vec<ContactPair>,
     /// Those of the first sets, in their order.
-    pub(crate) groups: Vec<Group>,
-    sets: Sets,
+    pub(crate) groups: Vec<ContactGroup>,
+    sets: StructureSets,
     /// Sets whose sectors are marched together.
-    together: Vec<Together>,
+    together: Vec<CoupledSet>,
     pub(crate) settings: SystemSettings,
     pub(crate) events: Two<Vec<ContactEvent>>,
-    pub(crate) counted: Counted,
+    pub(crate) counted: RunTotals,
     /// Energy of each set before a change of the step (J).
     mechanical: Vec<f64>,
     /// No sector begins a step once so many have been tried.
@@ -137,26 +137,26 @@ impl System {
     ) -> Self {
         let structures: Vec<Structure> =
             parts.into_iter().enumerate().map(|(index, part)| made(part, index, &pairs)).collect();
-        let pairs: Vec<Pair> = pairs.into_iter().map(Pair::new).collect();
+        let pairs: Vec<ContactPair> = pairs.into_iter().map(ContactPair::new).collect();
         let group = |(reach, touching): (Reach, Vec<usize>)| {
-            let of_group = |pair: &&Pair| touching.contains(&pair.structure());
+            let of_group = |pair: &&ContactPair| touching.contains(&pair.structure());
             let mut carriers: Vec<usize> =
                 pairs.iter().filter(of_group).filter_map(|pair| Some(pair.carrier()?.structure)).collect();
             carriers.sort_unstable();
             carriers.dedup();
             let coated = coatings.iter().position(|(pair, _)| touching.contains(&pairs[*pair].structure()));
             let coating = coated.map(|index| coatings.swap_remove(index).1);
-            Group::new((reach, &touching, &carriers), &structures, (settings.solver, coating))
+            ContactGroup::new((reach, &touching, &carriers), &structures, (settings.solver, coating))
         };
-        let sets = Sets::new(&structures, &pairs);
-        let groups: Vec<Group> = reaches(&structures, &pairs, &sets).into_iter().map(group).collect();
+        let sets = StructureSets::new(&structures, &pairs);
+        let groups: Vec<ContactGroup> = reaches(&structures, &pairs, &sets).into_iter().map(group).collect();
         let contacts = structures.iter().map(|structure| structure.gaps().len()).sum();
         let room = || Vec::with_capacity(contacts);
         let mut system = Self {
             groups,
             settings,
             events: Two { now: room(), before: room() },
-            counted: Counted::new(vec![Ledger::default(); sets.count()]),
+            counted: RunTotals::new(vec![Ledger::default(); sets.count()]),
             mechanical: vec![0.0; sets.count()],
             together: Vec::new(),
             most_tried: u64::MAX,
@@ -184,7 +184,7 @@ impl System {
     }
 
     /// The contact pairs.
-    pub fn pairs(&self) -> &[Pair] {
+    pub fn pairs(&self) -> &[ContactPair] {
         &self.pairs
     }
 
@@ -284,7 +284,7 @@ impl System {
     }
 
     /// Which structures can feel each other.
-    pub fn sets(&self) -> &Sets {
+    pub fn sets(&self) -> &StructureSets {
         &self.sets
     }
 
@@ -307,7 +307,7 @@ impl System {
 
     /// Clear history and ledger, take the present modal state as initial, and evaluate the gaps with the prescribed motion
     /// `drives`, one per pair.
-    pub fn start(&mut self, drives: &[Drive]) {
+    pub fn start(&mut self, drives: &[PrescribedMotion]) {
         self.structures.iter_mut().for_each(Structure::start);
         self.groups.iter_mut().filter_map(|group| group.law_mut().coating_mut()).for_each(Coating::reset);
         self.events.now.clear();
@@ -318,7 +318,7 @@ impl System {
             structure.remember_start();
         }
         let initial = |set| Ledger { initial: self.mechanical_energy(set), ..Ledger::default() };
-        self.counted = Counted::new((0..self.sets.count()).map(initial).collect());
+        self.counted = RunTotals::new((0..self.sets.count()).map(initial).collect());
     }
 
     /// Kinetic plus strain energy of a set (J), in the quantity the scheme conserves.
@@ -382,7 +382,7 @@ fn made(part: StructureParts, index: usize, pairs: &[PairParts]) -> Structure {
 }
 
 /// Which structures push each other with their contact nodes, set by set, and how far their contacts reach.
-fn reaches(structures: &[Structure], pairs: &[Pair], sets: &Sets) -> Vec<(Reach, Vec<usize>)> {
+fn reaches(structures: &[Structure], pairs: &[ContactPair], sets: &StructureSets) -> Vec<(Reach, Vec<usize>)> {
     let touching = |set: usize| -> Vec<usize> {
         let members = sets.members(set).iter().copied();
         members.filter(|member| structures[*member].nodes() > 0).collect()

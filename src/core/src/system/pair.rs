@@ -1,17 +1,17 @@
 //! A contact pair: contact nodes of one structure against a surface, which another structure may carry.
 
 use super::Structure;
-use super::growth::Growth;
-use crate::gaps::frame::Frame;
+use super::growth::ShapeGrowth;
+use crate::gaps::frame::PolarFrame;
 use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
-use crate::gaps::wrench::Motion;
-use crate::gaps::{Drive, GapLaw};
+use crate::gaps::wrench::MotionIncrement;
+use crate::gaps::{GapLaw, PrescribedMotion};
 use crate::history::Two;
 use crate::persist::persist_fields;
 
 /// Where the surface of a pair is carried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Carrier {
+pub struct SurfaceCarrier {
     /// The structure.
     pub structure: usize,
     /// Its first row that moves a control point of this surface.
@@ -26,7 +26,7 @@ pub struct PairParts {
     /// The gap function of these nodes.
     pub gap: GapLaw,
     /// Which structure deforms the surface; `None` for a rigid one.
-    pub carrier: Option<Carrier>,
+    pub carrier: Option<SurfaceCarrier>,
     /// Coulomb coefficient µ.
     pub friction: f64,
     /// Tangential per normal force of a coating that is cut (-); 0 without one.
@@ -37,26 +37,26 @@ pub struct PairParts {
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Prescribed {
     /// At the last step, and before.
-    drive: Two<Drive>,
+    drive: Two<PrescribedMotion>,
     /// Over the last step, and over the one before.
-    motion: Two<Motion>,
+    motion: Two<MotionIncrement>,
 }
 
 persist_fields!(Prescribed { drive, motion });
 
 /// A pair with the prescribed motion of what touches.
 #[derive(Debug, Clone)]
-pub struct Pair {
+pub struct ContactPair {
     /// What it is made of.
     pub(super) parts: PairParts,
     /// Contact nodes that belong to it.
     nodes: Vec<usize>,
     prescribed: Prescribed,
     /// Prescribed motion in the middle of the span under way, and how the shape grows, where a scheme asks for it.
-    pub(super) middle: (Drive, Growth),
+    pub(super) middle: (PrescribedMotion, ShapeGrowth),
 }
 
-impl Pair {
+impl ContactPair {
     pub(super) fn new(parts: PairParts) -> Self {
         Self { nodes: parts.gap.members(), parts, prescribed: Prescribed::default(), middle: Default::default() }
     }
@@ -77,7 +77,7 @@ impl Pair {
     }
 
     /// Which structure deforms the surface.
-    pub fn carrier(&self) -> Option<Carrier> {
+    pub fn carrier(&self) -> Option<SurfaceCarrier> {
         self.parts.carrier
     }
 
@@ -97,18 +97,18 @@ impl Pair {
     }
 
     /// Prescribed motion one step before the last.
-    pub fn drive_before(&self) -> &Drive {
+    pub fn drive_before(&self) -> &PrescribedMotion {
         self.drive(When::Before)
     }
 
     /// Prescribed motion at the last step.
-    pub fn drive_now(&self) -> &Drive {
+    pub fn drive_now(&self) -> &PrescribedMotion {
         self.drive(When::Now)
     }
 
     /// Prescribed motion at the last step, or one earlier.
     #[inline(always)]
-    pub(super) fn drive(&self, when: When) -> &Drive {
+    pub(super) fn drive(&self, when: When) -> &PrescribedMotion {
         match when {
             When::Now => &self.prescribed.drive.now,
             When::Before => &self.prescribed.drive.before,
@@ -116,26 +116,26 @@ impl Pair {
     }
 
     /// Prescribed motion over the last step.
-    pub(super) fn motion(&self) -> &Motion {
+    pub(super) fn motion(&self) -> &MotionIncrement {
         &self.prescribed.motion.now
     }
 
     /// Over the step before.
-    pub(super) fn motion_before(&self) -> &Motion {
+    pub(super) fn motion_before(&self) -> &MotionIncrement {
         &self.prescribed.motion.before
     }
 
     /// Nothing has moved before `drive`.
-    pub(super) fn start(&mut self, drive: &Drive) {
+    pub(super) fn start(&mut self, drive: &PrescribedMotion) {
         self.prescribed = Prescribed { drive: Two::new(*drive), motion: Two::default() };
     }
 
     /// A step (s) to `drive` is under way.
-    pub(crate) fn go_to(&mut self, drive: &Drive, step: f64) {
+    pub(crate) fn go_to(&mut self, drive: &PrescribedMotion, step: f64) {
         let Prescribed { drive: drives, motion } = &mut self.prescribed;
         (drives.before, motion.before) = (drives.now, motion.now);
         drives.now = *drive;
-        motion.now = Motion::between(&drives.before, drive, step);
+        motion.now = MotionIncrement::between(&drives.before, drive, step);
         self.parts.gap.turn(motion.now.turn);
     }
 
@@ -156,13 +156,13 @@ impl Pair {
 
     /// Directions of a node's own frame at a rotor angle (rad); the fixed ones where nothing turns.
     #[inline(always)]
-    pub(super) fn frame(&self, index: usize, rotor_angle: f64) -> Frame {
-        self.parts.gap.layout().map_or(Frame::FIXED, |layout| Frame::new(layout.angles[index] + rotor_angle))
+    pub(super) fn frame(&self, index: usize, rotor_angle: f64) -> PolarFrame {
+        self.parts.gap.layout().map_or(PolarFrame::FIXED, |layout| PolarFrame::new(layout.angles[index] + rotor_angle))
     }
 
     /// The surface and what carries it; `None` for one that nothing deforms.
     #[inline(always)]
-    pub(super) fn carried(&self) -> Option<(&SurfaceSpline, Carrier)> {
+    pub(super) fn carried(&self) -> Option<(&SurfaceSpline, SurfaceCarrier)> {
         let carrier = self.parts.carrier?;
         Some((self.parts.gap.spline()?, carrier))
     }
@@ -199,9 +199,9 @@ pub enum When {
 
 /// Value of a place on a surface, of values per row of its carrier, in the directions of `frame`.
 pub(super) fn at_place(
-    (surface, carrier): (&SurfaceSpline, Carrier),
+    (surface, carrier): (&SurfaceSpline, SurfaceCarrier),
     place: ClosestPoint,
-    frame: Frame,
+    frame: PolarFrame,
     value: impl Fn(usize) -> f64,
 ) -> [f64; 3] {
     let mut sum = [0.0; 3];

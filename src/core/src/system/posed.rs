@@ -2,13 +2,13 @@
 
 use super::carrier::Spot;
 use super::pair::When;
-use super::{Pair, StepFailure, Structure};
+use super::{ContactPair, StepFailure, Structure};
 use crate::gaps::wrench::At;
-use crate::laws::Prediction;
+use crate::laws::ContactPrediction;
 
 /// A contact node of one sector of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Member {
+pub struct ContactMember {
     /// Structure.
     pub structure: usize,
     /// Pair that the node belongs to.
@@ -26,7 +26,7 @@ pub struct Bodies<'a> {
     /// All structures.
     pub structures: &'a mut [Structure],
     /// All pairs.
-    pub pairs: &'a [Pair],
+    pub pairs: &'a [ContactPair],
     /// Contact forces act one step after they are found.
     pub acts_later: bool,
     /// Losses are gathered.
@@ -34,22 +34,27 @@ pub struct Bodies<'a> {
 }
 
 /// A member with what it belongs to, as its law sees it.
-pub struct Posed<'a> {
+pub struct ContactView<'a> {
     bodies: &'a Bodies<'a>,
     structure: &'a Structure,
-    pair: &'a Pair,
-    member: Member,
+    pair: &'a ContactPair,
+    member: ContactMember,
 }
 
 impl Bodies<'_> {
     /// A member with what it belongs to.
     #[inline(always)]
-    pub fn pose(&self, member: Member) -> Posed<'_> {
-        Posed { bodies: self, structure: &self.structures[member.structure], pair: &self.pairs[member.pair], member }
+    pub fn pose(&self, member: ContactMember) -> ContactView<'_> {
+        ContactView {
+            bodies: self,
+            structure: &self.structures[member.structure],
+            pair: &self.pairs[member.pair],
+            member,
+        }
     }
 }
 
-impl Posed<'_> {
+impl ContactView<'_> {
     /// Displacement as predicted (m), in its own directions.
     #[inline(always)]
     fn displacement(&self) -> [f64; 3] {
@@ -72,7 +77,7 @@ impl Posed<'_> {
 
     #[inline(always)]
     fn slip_between(&self, now: &[f64], before: &[f64]) -> [f64; 3] {
-        let Member { node, sector, .. } = self.member;
+        let ContactMember { node, sector, .. } = self.member;
         let (now, before) = (self.structure.three(now, node, sector), self.structure.three(before, node, sector));
         let moved: [f64; 3] = std::array::from_fn(|i| now[i] - before[i]);
         if self.pair.carrier().is_none() { moved } else { self.less_of_carrier(moved) }
@@ -99,7 +104,7 @@ impl Posed<'_> {
     /// Prescribed velocity relative to the surface (m/s).
     #[inline(always)]
     fn sliding(&self) -> [f64; 3] {
-        let Member { node, index, .. } = self.member;
+        let ContactMember { node, index, .. } = self.member;
         self.pair.gap().sliding_velocity(node, index, self.pair.drive(When::Now), self.displacement())
     }
 
@@ -123,7 +128,7 @@ impl Posed<'_> {
     /// It must be one that small displacements can describe.
     #[inline(always)]
     pub fn check(&self) -> Result<(), StepFailure> {
-        let Member { structure, node, sector, .. } = self.member;
+        let ContactMember { structure, node, sector, .. } = self.member;
         let gap = self.gap();
         if !gap.is_finite() {
             return Err(StepFailure::NonFinite);
@@ -135,7 +140,7 @@ impl Posed<'_> {
     }
 }
 
-impl Prediction for Posed<'_> {
+impl ContactPrediction for ContactView<'_> {
     #[inline(always)]
     fn gap(&self) -> f64 {
         self.structure.history.gap.now[self.member.index]
@@ -156,13 +161,13 @@ impl Prediction for Posed<'_> {
         self.structure.three(&self.structure.history.force.before, self.member.node, self.member.sector)
     }
     fn slip_direction(&self) -> [f64; 3] {
-        Posed::slip_direction(self, self.normal())
+        ContactView::slip_direction(self, self.normal())
     }
     fn sector(&self) -> usize {
         self.member.sector
     }
     fn angle(&self) -> f64 {
-        let Member { node, index, .. } = self.member;
+        let ContactMember { node, index, .. } = self.member;
         self.pair.gap().angle_on_casing(At { node, index, drive: self.pair.drive(When::Now) }, self.displacement())
     }
 }

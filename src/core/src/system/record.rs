@@ -2,30 +2,35 @@
 
 use super::StepFailure;
 use super::carrier::Spot;
-use super::growth::Growth;
-use super::pair::Pair;
+use super::growth::ShapeGrowth;
+use super::pair::ContactPair;
 use crate::galerkin::basis::{MOST, POINTS};
 use crate::galerkin::compliance::Lanes;
-use crate::gaps::Drive;
+use crate::gaps::PrescribedMotion;
 use crate::gaps::revolution::Instants;
 use crate::gaps::surface_spline::ClosestPoint;
-use crate::gaps::wrench::{Motion, Wrench};
+use crate::gaps::wrench::{MotionIncrement, Wrench};
 
 /// How prescribed motion of a pair goes on over a span: from where it was, quadratic in time through the middle and the end. Inputs
 /// are linear in time and the angle of the rotor quadratic, so that this is exact; what grows in otherwise is the shape.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Course {
-    before: Drive,
+pub struct MotionCourse {
+    before: PrescribedMotion,
     /// Linear and quadratic part over the whole span.
-    parts: [Motion; 2],
-    growth: Growth,
+    parts: [MotionIncrement; 2],
+    growth: ShapeGrowth,
 }
 
-impl Course {
+impl MotionCourse {
     /// From `before` through `middle` to `end`, a span of length `span` (s).
-    pub fn new(before: &Drive, (middle, growth): (&Drive, Growth), end: &Drive, span: f64) -> Self {
-        let half = Motion::between(before, middle, 0.5 * span);
-        let whole = Motion::between(before, end, span);
+    pub fn new(
+        before: &PrescribedMotion,
+        (middle, growth): (&PrescribedMotion, ShapeGrowth),
+        end: &PrescribedMotion,
+        span: f64,
+    ) -> Self {
+        let half = MotionIncrement::between(before, middle, 0.5 * span);
+        let whole = MotionIncrement::between(before, end, span);
         let linear = half.over(4.0).less(&whole);
         let quadratic = whole.over(2.0).less(&half.over(4.0));
         Self { before: *before, parts: [linear, quadratic], growth }
@@ -37,18 +42,19 @@ impl Course {
     }
 
     /// Motion from the start of the span to `theta` of it.
-    fn motion(&self, theta: f64) -> Motion {
+    fn motion(&self, theta: f64) -> MotionIncrement {
         let motion = self.parts[0].over(theta).since(&self.parts[1].over(theta * theta));
-        Motion { shape_factor: self.growth.at(theta) - self.before.shape_factor, ..motion }
+        MotionIncrement { shape_factor: self.growth.at(theta) - self.before.shape_factor, ..motion }
     }
 
     /// Prescribed motion at `theta` of the span.
-    pub fn at(&self, theta: f64) -> (Drive, Motion) {
+    pub fn at(&self, theta: f64) -> (PrescribedMotion, MotionIncrement) {
         let motion = self.motion(theta);
-        let rate =
-            |part: fn(&Motion) -> f64| (part(&self.parts[0]) + 2.0 * theta * part(&self.parts[1])) / self.parts[0].step;
+        let rate = |part: fn(&MotionIncrement) -> f64| {
+            (part(&self.parts[0]) + 2.0 * theta * part(&self.parts[1])) / self.parts[0].step
+        };
         let before = &self.before;
-        let drive = Drive {
+        let drive = PrescribedMotion {
             rotor_angle: before.rotor_angle + motion.turn,
             speed: rate(|motion| motion.turn),
             gap_offset: before.gap_offset + before.radius_change + motion.opening,
@@ -64,7 +70,7 @@ impl Course {
 
 /// What a node did over a span.
 #[derive(Debug, Clone, Copy)]
-pub struct Tally {
+pub struct NodeTally {
     /// ∫λ dt (N·s).
     pub normal: f64,
     /// ∫|F_t| dt (N·s).
@@ -81,7 +87,7 @@ pub struct Tally {
     pub lowest: f64,
 }
 
-impl Tally {
+impl NodeTally {
     pub const NOTHING: Self = Self {
         normal: 0.0,
         tangential: 0.0,
@@ -119,7 +125,7 @@ pub struct Worked {
 
 /// Which place of a node on a surface that is carried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum SurfacePlace {
     /// That at the start of the step.
     Begun,
     /// The closest point of now.
@@ -130,21 +136,21 @@ pub enum Place {
 
 /// What is kept from span to span, and scratch: allocates only when made.
 #[derive(Debug, Clone)]
-pub struct Record {
+pub struct SpanRecord {
     /// Of each node.
-    pub tallies: Vec<Tally>,
+    pub tallies: Vec<NodeTally>,
     /// Of all nodes.
     pub work: Worked,
     /// Motion of each pair over the span.
-    pub courses: Vec<Course>,
+    pub courses: Vec<MotionCourse>,
     /// Start and length of the step being tried, as shares of the span.
     pub step: [f64; 2],
     /// Gaps within free flight are looked for where they may be smaller than at its ends by more than this (m).
     pub tolerance: f64,
     /// At the points of the step being tried, pair by pair.
-    pub drives: Vec<[(Drive, Motion); POINTS]>,
+    pub drives: Vec<[(PrescribedMotion, MotionIncrement); POINTS]>,
     /// Motion that forces at each point of the step taken work on, pair by pair.
-    pub motions: Vec<[Motion; POINTS]>,
+    pub motions: Vec<[MotionIncrement; POINTS]>,
     pub places: [Vec<ClosestPoint>; POINTS],
     /// Where forces have been handed to structures that carry surfaces: places of the pass before that in which gaps hold.
     pub acted: [Vec<ClosestPoint>; POINTS],
@@ -160,17 +166,17 @@ pub struct Record {
     pub behind_edge: Option<usize>,
 }
 
-impl Record {
+impl SpanRecord {
     /// Room for so many nodes and pairs, with errors of `tolerance` (m).
     pub fn new(nodes: usize, pairs: usize, tolerance: f64) -> Self {
         Self {
             step: [0.0; 2],
             tolerance,
-            tallies: vec![Tally::NOTHING; nodes],
+            tallies: vec![NodeTally::NOTHING; nodes],
             work: Worked::default(),
-            courses: vec![Course::default(); pairs],
-            drives: vec![[<(Drive, Motion)>::default(); POINTS]; pairs],
-            motions: vec![[Motion::default(); POINTS]; pairs],
+            courses: vec![MotionCourse::default(); pairs],
+            drives: vec![[<(PrescribedMotion, MotionIncrement)>::default(); POINTS]; pairs],
+            motions: vec![[MotionIncrement::default(); POINTS]; pairs],
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             slips: std::array::from_fn(|_| vec![None; nodes]),
@@ -186,15 +192,15 @@ impl Record {
     pub fn spot<'a>(
         &self,
         (node, point): (usize, usize),
-        (pair, of): (usize, &'a Pair),
+        (pair, of): (usize, &'a ContactPair),
         index: usize,
-        when: Place,
+        when: SurfacePlace,
     ) -> Option<Spot<'a>> {
         let frame = of.frame(index, self.drives[pair][point].0.rotor_angle);
         let place = match when {
-            Place::Begun => self.places[0][node],
-            Place::Now => self.places[point][node],
-            Place::Acted => self.acted[point][node],
+            SurfacePlace::Begun => self.places[0][node],
+            SurfacePlace::Now => self.places[point][node],
+            SurfacePlace::Acted => self.acted[point][node],
         };
         Some(Spot { surface: of.carried()?, place, frame })
     }
@@ -213,9 +219,9 @@ impl Record {
     }
 
     /// Prescribed motion of a span (s) that the pairs are at the end of.
-    pub fn set_out(&mut self, pairs: &[Pair], span: f64) {
+    pub fn set_out(&mut self, pairs: &[ContactPair], span: f64) {
         for (course, pair) in self.courses.iter_mut().zip(pairs) {
-            *course = Course::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
+            *course = MotionCourse::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
         }
     }
 
@@ -233,7 +239,7 @@ impl Record {
         }
         self.stay();
         for (node, tally) in self.tallies.iter_mut().enumerate() {
-            *tally = Tally { lowest: gap_of(node), ..Tally::NOTHING };
+            *tally = NodeTally { lowest: gap_of(node), ..NodeTally::NOTHING };
         }
         (self.work, self.implausible, self.behind_edge) = (Worked::default(), false, None);
     }
@@ -247,15 +253,15 @@ mod tests {
     #[test]
     fn a_course_moves_at_the_rates_that_it_tells() {
         let span = 4e-5;
-        let at = |time: f64| Drive {
+        let at = |time: f64| PrescribedMotion {
             rotor_angle: 0.3 + 1300.0 * time + 4e6 * time * time,
             speed: 1300.0 + 8e6 * time,
             gap_offset: 2e-4 - 3.0 * time,
             shaft: [0.2 * time, 1e-5 - 0.1 * time + 500.0 * time * time, -0.3 * time],
             shaft_velocity: [0.2, -0.1 + 1000.0 * time, -0.3],
-            ..Drive::default()
+            ..PrescribedMotion::default()
         };
-        let course = Course::new(&at(0.0), (&at(0.5 * span), Growth::default()), &at(span), span);
+        let course = MotionCourse::new(&at(0.0), (&at(0.5 * span), ShapeGrowth::default()), &at(span), span);
         for place in 0..=8 {
             let theta = 0.125 * f64::from(place);
             let (found, expected) = (course.at(theta).0, at(theta * span));

@@ -1,21 +1,21 @@
 //! Which structures can feel each other.
 
-use super::pair::Pair;
+use super::pair::ContactPair;
 use super::structure::Structure;
 
 /// Structures that feel each other through the surfaces they touch and carry, directly or through others. Nothing passes between
 /// two sets: each keeps a ledger of its own, so that what one exchanges does not hide what another gets out of nothing.
 #[derive(Debug, Clone)]
-pub struct Sets {
+pub struct StructureSets {
     /// Structures of each set, ascending.
     members: Vec<Vec<usize>>,
     /// Set of each structure.
     of: Vec<usize>,
 }
 
-impl Sets {
+impl StructureSets {
     /// Those whose contact nodes touch come first.
-    pub(super) fn new(structures: &[Structure], pairs: &[Pair]) -> Self {
+    pub(super) fn new(structures: &[Structure], pairs: &[ContactPair]) -> Self {
         let links = pairs.iter().filter_map(|pair| Some((pair.structure(), pair.carrier()?.structure)));
         let number = joined(structures.len(), links);
         let all = 0..structures.len();

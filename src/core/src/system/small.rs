@@ -1,6 +1,6 @@
 //! Whether the state is still what small displacements describe.
 
-use super::{Pair, StepFailure, System};
+use super::{ContactPair, StepFailure, System};
 use crate::gaps::GapLaw;
 
 /// Clearances below this share of the radius are those of a press fit, in which errors as small do not matter.
@@ -56,7 +56,7 @@ impl System {
         }
     }
 
-    fn check_small(&self, pair: &Pair) -> Result<(), StepFailure> {
+    fn check_small(&self, pair: &ContactPair) -> Result<(), StepFailure> {
         let structure = pair.structure();
         let modes = self.structures[structure].modes();
         if let GapLaw::Open(gap) = pair.gap() {

@@ -5,9 +5,9 @@ use crate::dynamics::modal::ModalModel;
 use crate::dynamics::sectors::{SectorModel, Sectors};
 use crate::galerkin::sector::HALVINGS;
 use crate::galerkin::state::SectorState;
-use crate::gaps::{Drive, GapLaw, Geometry, dot};
-use crate::history::History;
-use crate::persist::{Persist, Reader, Writer, persist_fields};
+use crate::gaps::{GapLaw, Geometry, PrescribedMotion, dot};
+use crate::history::ContactHistory;
+use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 use crate::settings::Scheme;
 use crate::system::march::Galerkin;
 use crate::system::pulling::Pulling;
@@ -25,7 +25,7 @@ pub struct Structure {
     /// Pair that each contact node belongs to.
     pub(super) pair_of: Vec<Option<usize>>,
     /// Past of the contact nodes.
-    pub(crate) history: History,
+    pub(crate) history: ContactHistory,
     /// Impulses on the contact nodes, where forces may pull.
     pub(super) pulling: Pulling,
     /// Smallest gap of each lane (m).
@@ -33,7 +33,7 @@ pub struct Structure {
     /// Modal contact force on its surfaces found in the last step (N·√kg⁻¹); empty where it carries none.
     pub(super) delayed: Vec<f64>,
     /// Of each sector, where sectors are marched one by one.
-    pub(super) pace: Pace,
+    pub(super) pace: StepControl,
     /// Tables and scratch of that scheme.
     pub(super) galerkin: Option<Box<Galerkin>>,
     /// Smallest gaps within the last span where a scheme looks within it (m), `[node · lanes + lane]`; else empty.
@@ -42,7 +42,7 @@ pub struct Structure {
 
 /// How sectors are marched by continuous Galerkin.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Pace {
+pub struct StepControl {
     /// Energy left by contacts that opened and closed (J).
     pub bank: Vec<f64>,
     /// Largest energy that this has been compared with (J).
@@ -55,9 +55,9 @@ pub struct Pace {
     pub normals: Vec<f64>,
 }
 
-persist_fields!(Pace { bank, largest, level, slopes, normals });
+persist_fields!(StepControl { bank, largest, level, slopes, normals });
 
-impl Pace {
+impl StepControl {
     fn new(sectors: usize, contacts: usize) -> Self {
         Self {
             bank: vec![0.0; sectors],
@@ -86,11 +86,11 @@ impl Structure {
         let contacts = pair_of.len() * modes.lanes();
         let rows = modes.rows() * modes.lanes();
         Self {
-            history: History::new(Geometry::new(contacts, has_places), contacts, rows),
+            history: ContactHistory::new(Geometry::new(contacts, has_places), contacts, rows),
             pulling: Pulling::new(pair_of.len()),
             lowest: vec![f64::INFINITY; modes.lanes()],
             delayed: Vec::new(),
-            pace: Pace::new(modes.sectors(), contacts),
+            pace: StepControl::new(modes.sectors(), contacts),
             galerkin: None,
             lowest_in_span: Vec::new(),
             pair_of,
@@ -105,12 +105,12 @@ impl Structure {
         let modes = Sectors::Uncoupled(ModalBank::with_options(model, 1, options));
         let rows = modes.rows() * modes.lanes();
         Self {
-            history: History::new(Geometry::new(0, false), 0, rows),
+            history: ContactHistory::new(Geometry::new(0, false), 0, rows),
             pair_of: Vec::new(),
             pulling: Pulling::default(),
             lowest: Vec::new(),
             delayed: vec![0.0; model.len()],
-            pace: Pace::default(),
+            pace: StepControl::default(),
             galerkin: None,
             lowest_in_span: Vec::new(),
             lanes: modes.lanes(),
@@ -247,7 +247,7 @@ impl Structure {
 
     /// There was no step before: gaps and predictions are those of the start.
     pub(super) fn remember_start(&mut self) {
-        let History { gap, predicted, .. } = &mut self.history;
+        let ContactHistory { gap, predicted, .. } = &mut self.history;
         gap.before.copy_from_slice(&gap.now);
         let rows = predicted.now.len();
         predicted.now.copy_from_slice(&self.modes.displacement()[..rows]);
@@ -280,8 +280,8 @@ impl Structure {
 
     /// Gaps of the nodes of a pair whose surface has moved.
     #[inline(always)]
-    pub(super) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &Drive, moved: &[f64], warm: bool) {
-        let History { gap: gaps, geometry, .. } = &mut self.history;
+    pub(super) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &PrescribedMotion, moved: &[f64], warm: bool) {
+        let ContactHistory { gap: gaps, geometry, .. } = &mut self.history;
         let before = warm.then_some(&geometry.before);
         gap.evaluate(drive, self.modes.displacement(), moved, before, &mut geometry.now, &mut gaps.now);
     }
@@ -351,7 +351,7 @@ impl Structure {
     }
 
     /// Write everything that determines the future, but the step size.
-    pub(super) fn save(&self, writer: &mut Writer) {
+    pub(super) fn save(&self, writer: &mut StateWriter) {
         self.modes.save(writer);
         self.delayed.save(writer);
         self.pace.save(writer);
@@ -360,7 +360,7 @@ impl Structure {
     }
 
     /// Pass over a saved state and refuse what is none; its history is left in `saved`.
-    pub(super) fn check(&self, reader: &mut Reader, saved: &mut History) {
+    pub(super) fn check(&self, reader: &mut StateReader, saved: &mut ContactHistory) {
         self.modes.check(reader);
         self.delayed.check(reader);
         self.pace.check(reader);
@@ -370,7 +370,7 @@ impl Structure {
     }
 
     /// Restore a saved state, after the step size is set.
-    pub(super) fn restore(&mut self, reader: &mut Reader) {
+    pub(super) fn restore(&mut self, reader: &mut StateReader) {
         self.modes.restore(reader);
         self.delayed.restore(reader);
         self.pace.restore(reader);

@@ -61,7 +61,7 @@ impl System {
 mod tests {
     use super::*;
     use crate::dynamics::modal::ModalModel;
-    use crate::gaps::{Drive, FixedGap, GapLaw};
+    use crate::gaps::{FixedGap, GapLaw, PrescribedMotion};
     use crate::settings::{Scheme, Solver};
     use crate::system::SystemSettings;
     use nalgebra::DMatrix;
@@ -81,7 +81,7 @@ mod tests {
         let mut system = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);
         system.set_step(1e-6);
         system.bank_mut().set_modal_state(0, 0, 0.0, 1.0);
-        system.start(&[Drive::default()]);
+        system.start(&[PrescribedMotion::default()]);
         system
     }
 
@@ -91,13 +91,13 @@ mod tests {
         let mut honest = system.clone();
         while system.events().is_empty() {
             honest = system.clone();
-            system.step(&[Drive::default()]).unwrap();
+            system.step(&[PrescribedMotion::default()]).unwrap();
         }
         // It came a micrometre closer; a metre, or ten micrometres, is not what it came.
         for (off, passes) in [(0.0, true), (1e-7, true), (1e-5, false), (1.0, false), (f64::NAN, false)] {
             let mut spoilt = honest.clone();
             spoilt.structures[0].history.gap.before[0] += off;
-            let outcome = spoilt.step(&[Drive::default()]);
+            let outcome = spoilt.step(&[PrescribedMotion::default()]);
             assert_eq!(outcome.is_ok(), passes, "{off}: {outcome:?}");
             if let (Err(failure), false) = (outcome, off.is_nan()) {
                 let StepFailure::Unexplained { structure: 0, node: 0, sector: 0, jump, explained } = failure else {

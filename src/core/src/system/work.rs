@@ -2,13 +2,13 @@
 
 use super::pair::{When, at_place};
 use super::{ContactEvent, StepFailure, System};
-use crate::gaps::wrench::{At, Motion};
+use crate::gaps::wrench::{At, MotionIncrement};
 use crate::gaps::{Geometry, dot};
 use crate::settings::Solver;
 
 /// What one contact did over a step (J).
 #[derive(Debug, Clone, Copy, Default)]
-struct Work {
+struct ContactWork {
     shaft: f64,
     whirl: f64,
     shift: f64,
@@ -33,7 +33,7 @@ struct Work {
     moved: f64,
 }
 
-impl Work {
+impl ContactWork {
     /// Sums over the contacts of one set in one step need no compensation: those over all steps have it.
     #[inline(always)]
     fn add(&mut self, other: &Self) {
@@ -90,16 +90,16 @@ impl System {
         events: &mut [ContactEvent],
         when: When,
     ) -> Result<(), StepFailure> {
-        let (mut of, mut motion, mut explained, mut outcome) = (usize::MAX, Motion::default(), 0.0, Ok(()));
+        let (mut of, mut motion, mut explained, mut outcome) = (usize::MAX, MotionIncrement::default(), 0.0, Ok(()));
         let mut set = 0;
-        let mut total = Work::default();
+        let mut total = ContactWork::default();
         for event in &mut *events {
             if event.pair != of {
                 of = event.pair;
                 let own = self.sets.of(event.structure);
                 if SEVERAL && own != set {
                     self.enter(set, total);
-                    (set, total) = (own, Work::default());
+                    (set, total) = (own, ContactWork::default());
                 }
                 motion = self.pairs[of].motion().centred(self.pairs[of].motion_before());
                 explained = self.explained_by_drive(of);
@@ -172,7 +172,7 @@ impl System {
     }
 
     /// Enter the work of all contacts of a set in a step into its ledger.
-    fn enter(&mut self, set: usize, mut work: Work) {
+    fn enter(&mut self, set: usize, mut work: ContactWork) {
         work.settle();
         let ledger = &mut self.counted.ledgers[set];
         ledger.wear_work.add(work.worn);
@@ -193,7 +193,7 @@ impl System {
     /// prescribed motion, less the friction heat, friction force times slip, and what the approach of the node costs, λ
     /// times half the change of gap, but for what turns and curves within the step. On a coating the approach is what its
     /// rods absorb.
-    fn work_of(&self, event: &ContactEvent, moved: [f64; 3], motion: &Motion, when: When) -> Work {
+    fn work_of(&self, event: &ContactEvent, moved: [f64; 3], motion: &MotionIncrement, when: When) -> ContactWork {
         let (structure, pair) = (&self.structures[event.structure], &self.pairs[event.pair]);
         let (node, index) = (event.node, structure.index(event.node, event.sector));
         let (geometry, gaps) = (self.geometry_of(event, when), &structure.history.gap);
@@ -214,7 +214,7 @@ impl System {
         let (heat, exact) = (opposed - cut, dot(event.force, moved));
         let turned = if self.settings.solver == Solver::Coulomb { heat.min(0.0) } else { 0.0 };
         let uncut = cut.min(0.0);
-        Work {
+        ContactWork {
             shaft,
             whirl,
             shift,

@@ -3,8 +3,8 @@
 //! D. Doyen, A. Ern, S. Piperno, SIAM J. Sci. Comput. 33 (2011): period 16/3 s, contacts on [1, 5/3] and [11/3, 13/3].
 
 use crate::guide::told;
-use crate::rods::{NEARLY_NONE, Rod, SCHEMES, SOLVERS, against_plane, orders, quiet_step, set_samples};
-use tiprub_core::gaps::Drive;
+use crate::rods::{NEARLY_NONE, SCHEMES, SOLVERS, StraightRod, against_plane, orders, quiet_step, set_samples};
+use tiprub_core::gaps::PrescribedMotion;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_reference::closed::bouncing_bar::{
     CONTACTS, DENSITY, GRAVITY, HEIGHT, LENGTH, PERIOD, YOUNG, displacement, energy, pressure,
@@ -16,7 +16,7 @@ const PERIODS: usize = 3;
 const APART: f64 = 0.1;
 
 #[derive(Debug, Default)]
-struct Outcome {
+struct BouncingRun {
     step: f64,
     /// Error of the bottom over the first period, largest and relative L2, and relative L2 over the last.
     bottom: [f64; 3],
@@ -46,9 +46,9 @@ impl Squares {
 }
 
 /// `fraction` is the Courant number; massless-boundary takes less where closed contact asks for it.
-fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Outcome {
+fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> BouncingRun {
     let kept = if scheme == Scheme::MasslessBoundary { NEARLY_NONE } else { 1.0 };
-    let rod = Rod { young: YOUNG, density: DENSITY, area: 1.0, length: LENGTH, elements, end: 0, kept };
+    let rod = StraightRod { young: YOUNG, density: DENSITY, area: 1.0, length: LENGTH, elements, end: 0, kept };
     let model = rod.model();
     let mut step = fraction * rod.wave_time();
     if scheme == Scheme::MasslessBoundary {
@@ -60,14 +60,14 @@ fn bounce(elements: usize, scheme: Scheme, solver: Solver, fraction: f64) -> Out
     let mass = DENSITY * LENGTH;
     let weight = -GRAVITY * mass.sqrt();
     set_samples(&mut system, &model, 0, 0.0, 0.5 * weight * step * step);
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     let delay = if scheme == Scheme::MasslessBoundary { step } else { 0.0 };
-    let mut outcome = Outcome { step, ..Outcome::default() };
+    let mut outcome = BouncingRun { step, ..BouncingRun::default() };
     let (mut squares, mut squares_force, mut impulses) = ([Squares::default(); PERIODS], Squares::default(), [0.0; 2]);
     while (system.steps() as f64) * step < PERIODS as f64 * PERIOD {
         let acting = system.steps() as f64 * step + delay;
         system.bank_mut().loads_mut()[0] = weight;
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
         let (time, force) = (system.steps() as f64 * step, system.multiplier(0, 0));
         // The series is long: as many samples for every mesh.
         if system.steps().is_multiple_of((elements / 25) as u64) {
@@ -115,8 +115,8 @@ fn note_contact(contacts: &mut Vec<[f64; 2]>, time: f64, force: f64) {
     }
 }
 
-fn print(scheme: Scheme, solver: Solver, elements: usize, outcome: &Outcome) {
-    let Outcome { step, bottom, force, contacts, losses, residual } = outcome;
+fn print(scheme: Scheme, solver: Solver, elements: usize, outcome: &BouncingRun) {
+    let BouncingRun { step, bottom, force, contacts, losses, residual } = outcome;
     let times = contacts[..2].iter().flatten().map(|time| format!("{time:.4}")).collect::<Vec<_>>().join(", ");
     let losses = losses.iter().map(|loss| format!("{:.3}", 100.0 * loss)).collect::<Vec<_>>().join(", ");
     told!(
@@ -161,7 +161,7 @@ fn the_bar_bounces_as_the_series_says() {
     crate::guide::hold("cargo test -p tiprub-core --test closed_forms bouncing_bar");
 }
 
-fn check(scheme: Scheme, elements: usize, found: &Outcome) {
+fn check(scheme: Scheme, elements: usize, found: &BouncingRun) {
     let size = 1.0 / elements as f64;
     assert!(found.residual.abs() < 1e-12, "ledger {:e}", found.residual);
     // 25 elements lose so much that the third period is not one any more.

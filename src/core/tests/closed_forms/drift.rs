@@ -4,10 +4,10 @@
 //! 1e5 steps here; 1e7 by `cargo test --release -p tiprub-core --test closed_forms drift -- --ignored --nocapture`.
 
 use crate::guide::told;
-use crate::rods::{NEARLY_NONE, Rod, SCHEMES, against_plane, quiet_step, set_samples, single};
+use crate::rods::{NEARLY_NONE, SCHEMES, StraightRod, against_plane, quiet_step, set_samples, single};
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::gaps::Drive;
-use tiprub_core::persist::{Persist, Reader, Writer};
+use tiprub_core::gaps::PrescribedMotion;
+use tiprub_core::persist::{Persist, StateReader, StateWriter};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::System;
 use tiprub_core::{Ledger, Sum};
@@ -15,7 +15,7 @@ use tiprub_core::{Ledger, Sum};
 /// A rod of 12 elements; its contact node has mass or none, as the scheme wants.
 fn rod(scheme: Scheme) -> ModalModel {
     let kept = if scheme == Scheme::MasslessBoundary { NEARLY_NONE } else { 1.0 };
-    Rod { young: 2e11, density: 7800.0, area: 1e-4, length: 0.1, elements: 12, end: 0, kept }.model()
+    StraightRod { young: 2e11, density: 7800.0, area: 1e-4, length: 0.1, elements: 12, end: 0, kept }.model()
 }
 
 /// Elastic modes ringing with 1 mJ each.
@@ -44,7 +44,7 @@ fn march(system: &mut System, steps: u64, load: Option<f64>) -> [f64; 2] {
         if let Some(load) = load {
             system.bank_mut().loads_mut()[0] = load;
         }
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
     };
     // The first steps find the contact that is closed from the start.
     for _ in 0..4 {
@@ -67,7 +67,7 @@ fn free(scheme: Scheme, steps: u64) -> [f64; 2] {
     let mut system = against_plane(&model, (scheme, Solver::Lcp), 1.0, 1.0, false);
     system.set_step(quiet_step(&model, 1e-6));
     ring(&mut system, &model, 0.03);
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     march(&mut system, steps, None)
 }
 
@@ -76,13 +76,13 @@ fn closed(scheme: Scheme, steps: u64) -> [f64; 2] {
     let model = rod(scheme);
     let mut system = against_plane(&model, (scheme, Solver::Lcp), 1.0, 0.0, true);
     system.set_step(quiet_step(&model, 1e-6));
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     let load = -2e4;
     // Half of the load comes in slowly, the other half at once: the rod rings between half and one and a half times its rest.
     for index in 0..20_000 {
         let share = f64::from(index) / 20_000.0;
         system.bank_mut().loads_mut()[0] = 0.5 * load * share * share * (3.0 - 2.0 * share);
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
     }
     let losses = system.ledger().impact_loss.value();
     let found = march(&mut system, steps, Some(load));
@@ -99,7 +99,7 @@ fn impacts(steps: u64, step: f64) -> [f64; 2] {
     let mut system = against_plane(&model, (Scheme::MasslessBoundary, Solver::Lcp), -1.0, 1e-3, false);
     system.set_step(step);
     set_samples(&mut system, &model, 0, -2e-3, -2e-3 * (omega * step).cos());
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     march(&mut system, steps, None)
 }
 
@@ -143,9 +143,9 @@ fn sums_keep_what_rounding_would_drop() {
         sum.add(term);
         if index == 500_000 {
             let mut bytes = [0; 64];
-            sum.save(&mut Writer::new(&mut bytes));
+            sum.save(&mut StateWriter::new(&mut bytes));
             sum = Sum::default();
-            sum.restore(&mut Reader::new(&bytes));
+            sum.restore(&mut StateReader::new(&bytes));
         }
     }
     assert!(((sum.value() - 1.0) / (1e6 * term) - 1.0).abs() < 1e-3, "{:e}", sum.value() - 1.0);

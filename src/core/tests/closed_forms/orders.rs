@@ -5,7 +5,7 @@ use crate::guide::told;
 use crate::rods::{SCHEMES, SOLVERS, against_plane, orders, set_samples, single};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::gaps::Drive;
+use tiprub_core::gaps::PrescribedMotion;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_reference::closed::oscillator::{Bilinear, DeadStop};
 
@@ -63,14 +63,14 @@ fn smooth_error(scheme: Scheme, solver: Solver, step: f64, force: Option<(f64, f
     for mode in 0..MODES.len() {
         set_samples(&mut system, &model, mode, exact(mode, 0.0), exact(mode, -step));
     }
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
     while system.steps() as f64 * step < 0.2 {
         if let Some((size, omega)) = force {
             let load = size * (omega * system.steps() as f64 * step).cos();
             system.bank_mut().loads_mut()[..MODES.len()].fill(load);
         }
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
         let time = system.steps() as f64 * step;
         let place: f64 = (0..MODES.len()).map(|mode| MODES[mode].1 * exact(mode, time)).sum();
         worst = worst.max((system.bank().row(0, 0) - place).abs());
@@ -100,7 +100,7 @@ fn free_flight_and_forced_vibration() {
 }
 
 /// A chain of masses between two walls; the node of the last presses on the plane of the contact and never leaves it.
-struct Pressed {
+struct PressedChain {
     model: ModalModel,
     /// ψ of the closed system in the coordinates of `model`'s reduced ones, and its frequencies.
     shapes: DMatrix<f64>,
@@ -112,7 +112,7 @@ struct Pressed {
 
 const MASSES: usize = 5;
 
-impl Pressed {
+impl PressedChain {
     /// With mass at the contact node: K and M of the chain, the last displacement held at 0.
     fn new() -> Self {
         let mut stiffness = DMatrix::<f64>::zeros(MASSES, MASSES);
@@ -179,13 +179,13 @@ impl Pressed {
         for mode in 0..MASSES {
             set_samples(&mut system, &self.model, mode, now[mode], before[mode]);
         }
-        system.start(&[Drive::default()]);
+        system.start(&[PrescribedMotion::default()]);
         let push = self.model.shapes.transpose() * &self.preload;
         let (mut worst, mut largest) = ([0.0_f64; 2], [0.0_f64; 2]);
         while system.steps() as f64 * step < 0.1 {
             let time = system.steps() as f64 * step;
             system.bank_mut().loads_mut().copy_from_slice(push.as_slice());
-            system.step(&[Drive::default()]).unwrap();
+            system.step(&[PrescribedMotion::default()]).unwrap();
             let first: f64 =
                 (0..MASSES).map(|mode| self.model.shapes[(0, mode)] * system.bank().modal_state(mode, 0).0).sum();
             let (place, force) = (self.exact(time + step)[0], self.multiplier(time));
@@ -240,7 +240,7 @@ impl PressedMassless {
         for mode in 0..3 {
             set_samples(&mut system, &self.model, mode, now[mode], before[mode]);
         }
-        system.start(&[Drive::default()]);
+        system.start(&[PrescribedMotion::default()]);
         let seen = |place: &DVector<f64>| -> f64 {
             (0..3).map(|mode| self.model.contact_modes[(0, mode)] * place[mode]).sum()
         };
@@ -255,7 +255,7 @@ impl PressedMassless {
                     system.bank_mut().loads_mut()[mode] -= shape * acting;
                 }
             }
-            system.step(&[Drive::default()]).unwrap();
+            system.step(&[PrescribedMotion::default()]).unwrap();
             let time = system.steps() as f64 * step;
             let place = self.exact(time);
             acting = seen(&place) / 1e-5;
@@ -271,7 +271,7 @@ impl PressedMassless {
 fn contact_that_stays_closed() {
     head();
     let steps = [4e-4, 2e-4, 1e-4, 5e-5];
-    let (pressed, massless) = (Pressed::new(), PressedMassless::new());
+    let (pressed, massless) = (PressedChain::new(), PressedMassless::new());
     for scheme in SCHEMES {
         for solver in solvers(scheme) {
             let errors = steps.map(|step| match scheme {
@@ -310,9 +310,9 @@ fn dead_error(scheme: Scheme, solver: Solver, step: f64, shift: f64, factor: f64
     system.set_step(step);
     let swing = |time: f64| case.amplitude * (case.omega * (time + shift)).cos();
     set_samples(&mut system, &model, 0, swing(0.0), swing(-step));
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     while system.steps() as f64 * step < 0.085 {
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
     }
     let time = system.steps() as f64 * step + shift;
     (system.bank().row(0, 0) - case.position(time)) / case.amplitude
@@ -326,10 +326,10 @@ fn elastic_error(solver: Solver, step: f64, shift: f64, factor: f64) -> [f64; 2]
     system.set_step(step);
     let swing = |time: f64| -case.amplitude * (case.omega * (time + shift)).cos();
     set_samples(&mut system, &model, 0, swing(0.0), swing(-step));
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     let before = system.ledger().initial;
     while system.steps() as f64 * step < 4.0 * case.period() {
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
     }
     let (time, (kinetic, strain)) = (system.steps() as f64 * step + shift, system.energies());
     let place = system.bank().modal_state(0, 0).0;

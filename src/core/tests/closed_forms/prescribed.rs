@@ -8,10 +8,10 @@ use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::dynamics::sectors::SectorModel;
 use tiprub_core::gaps::open::{OpenGap, OpenSurface};
 use tiprub_core::gaps::surface_spline::SurfaceSpline;
-use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
-use tiprub_core::rom::Watched;
+use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
+use tiprub_core::rom::WatchedPoints;
 use tiprub_core::settings::{Interpolation, LoadSettings, Scheme, Shape, Solver, SplineSettings};
-use tiprub_core::system::{Carrier, PairParts, StructureParts, System, SystemSettings};
+use tiprub_core::system::{PairParts, StructureParts, SurfaceCarrier, System, SystemSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, lattice, move_on, real, reference, set, started};
 
@@ -30,7 +30,7 @@ fn movable() -> Scene {
     }
     let place = |[inside, theta, z]: [f64; 3]| models::node("point", [0.25 + SLOPE * z - inside, theta, z], 0.0);
     let map = DMatrix::zeros(3 * WATCHED.len(), scene.roms[0].order());
-    scene.roms[0].extras.watched = Some(Watched { map, points: WATCHED.map(place).to_vec() });
+    scene.roms[0].extras.watched = Some(WatchedPoints { map, points: WATCHED.map(place).to_vec() });
     (scene.settings.structures[0].whirl, scene.settings.structures[0].axial_shift) = (true, true);
     let (amplitude, order, phase) = LOBES;
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude, order, phase };
@@ -128,7 +128,7 @@ fn a_point_at_a_contact_node_has_its_clearance_in_a_rub() {
         let mut scene = models::rub(SECTORS);
         let rom = &mut scene.roms[0];
         rom.contact_nodes.iter_mut().for_each(|node| node.position[0] += SLOPE * node.position[2]);
-        rom.extras.watched = Some(Watched { map: rom.contact_map.clone(), points: rom.contact_nodes.clone() });
+        rom.extras.watched = Some(WatchedPoints { map: rom.contact_map.clone(), points: rom.contact_nodes.clone() });
         change(&mut scene);
         let mut simulation = started(&scene);
         let (mut off, mut moved, mut touched) = (0.0_f64, 0.0_f64, false);
@@ -339,7 +339,7 @@ fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
     let positions = vec![[0.0, 0.0, -DEPTH], [0.1, 0.0, 0.0]];
     let gap = GapLaw::Open(Box::new(OpenGap::new(positions, vec![0], OpenSurface::new(surface))));
     let touching = StructureParts::Touching(SectorModel::Uncoupled(&model, 1), Box::default());
-    let carrier = Some(Carrier { structure: 1, first_row: 0 });
+    let carrier = Some(SurfaceCarrier { structure: 1, first_row: 0 });
     let pair = PairParts { structure: 0, gap, carrier, friction, cutting: 0.0 };
     System::of(vec![touching, StructureParts::Carrying(&plane, false)], vec![pair], Vec::new(), settings)
 }
@@ -368,11 +368,11 @@ fn a_mass_that_swings_on_a_plane_loses_the_same_amplitude_every_half_turn() {
                     system.bank_mut().set_modal_state(0, 0, amplitude, 0.0);
                     system.bank_mut().set_modal_state(1, 0, pressed, 0.0);
                 }
-                system.start(&[Drive::default()]);
+                system.start(&[PrescribedMotion::default()]);
                 let normal = PRESS * PRESS * pressed;
                 let (mut turns, mut last) = (Vec::new(), amplitude);
                 while turns.len() < 6 {
-                    system.step(&[Drive::default()]).unwrap();
+                    system.step(&[PrescribedMotion::default()]).unwrap();
                     let bank = system.structures()[usize::from(plane)].modes();
                     let (now, increment) = bank.modal_state(0, 0);
                     let towards = if turns.len() % 2 == 0 { -1.0 } else { 1.0 };

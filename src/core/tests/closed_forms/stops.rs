@@ -3,7 +3,7 @@
 use crate::guide::told;
 use crate::rods::{SOLVERS, against_plane, set_samples, single};
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::gaps::Drive;
+use tiprub_core::gaps::PrescribedMotion;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::System;
 use tiprub_reference::closed::oscillator::{Ball, Bilinear, DeadStop};
@@ -15,7 +15,7 @@ const RIGID: [Scheme; 2] = [Scheme::CentralDifference, Scheme::ModalExact];
 fn march(system: &mut System, end: f64, mut each: impl FnMut(&System, f64)) {
     let step = system.bank().step();
     while system.steps() as f64 * step < end {
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
         each(system, system.steps() as f64 * step);
     }
     system.close_ledger();
@@ -32,7 +32,7 @@ fn dead_stop(case: DeadStop, methods: (Scheme, Solver), step: f64, turns: f64) -
     let mut system = against_plane(&model, methods, 1.0, case.distance, false);
     system.set_step(step);
     set_samples(&mut system, &model, 0, case.amplitude, case.position(0.0) * (case.omega * step).cos());
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     let before = system.ledger().initial;
     let (mut worst, mut touch) = (0.0_f64, f64::NAN);
     let end = case.touch() + turns * std::f64::consts::TAU / case.omega;
@@ -103,7 +103,7 @@ fn a_preloaded_mass_stays_on_its_stop() {
             system.set_step(1e-4);
             // Let go above the stop at x = 2e-4, on its way to x = 0.
             set_samples(&mut system, &model, 0, 1e-3, 1e-3 * (OMEGA * 1e-4).cos());
-            system.start(&[Drive::default()]);
+            system.start(&[PrescribedMotion::default()]);
             let mut force = 0.0;
             march(&mut system, 10.0, |system, _| force = system.multiplier(0, 0));
             let (expected, place) = (OMEGA * OMEGA * 2e-4, system.bank().row(0, 0));
@@ -126,8 +126,8 @@ fn an_impact_after_a_change_of_step_is_booked_as_an_impact() {
             let mut system = against_plane(&model, methods, 1.0, speed * step * (5.0 + 0.5 * ratio), false);
             system.set_step(step);
             system.bank_mut().set_modal_state(0, 0, 0.0, -speed);
-            system.start(&[Drive::default()]);
-            (0..5).for_each(|_| system.step(&[Drive::default()]).unwrap());
+            system.start(&[PrescribedMotion::default()]);
+            (0..5).for_each(|_| system.step(&[PrescribedMotion::default()]).unwrap());
             assert!(system.events().is_empty());
             system.set_step(ratio * step);
             assert!(
@@ -135,9 +135,9 @@ fn an_impact_after_a_change_of_step_is_booked_as_an_impact() {
                 "{} m/s",
                 system.structures()[0].gap_rate(0, 0)
             );
-            system.step(&[Drive::default()]).unwrap();
+            system.step(&[PrescribedMotion::default()]).unwrap();
             assert_eq!(system.events().len(), 1);
-            (0..20).for_each(|_| system.step(&[Drive::default()]).unwrap());
+            (0..20).for_each(|_| system.step(&[PrescribedMotion::default()]).unwrap());
             let ledger = system.ledger();
             let (lost, curved) = (ledger.impact_loss.value(), ledger.curvature_work.value());
             let exact = 0.5 * speed * speed;
@@ -166,11 +166,11 @@ fn a_ball_bounces_on_a_spring_for_ever() {
             let mut system = against_plane(&model, (Scheme::MasslessBoundary, solver), 1.0, ball.height, true);
             system.set_step(step);
             set_samples(&mut system, &model, 0, 0.0, -0.5 * ball.gravity * step * step);
-            system.start(&[Drive::default()]);
+            system.start(&[PrescribedMotion::default()]);
             let (mut worst, mut touches, mut open, mut force) = (0.0_f64, Vec::new(), true, 0.0_f64);
             while system.steps() as f64 * step < 20.0 * ball.period() {
                 system.bank_mut().loads_mut()[0] = -ball.gravity;
-                system.step(&[Drive::default()]).unwrap();
+                system.step(&[PrescribedMotion::default()]).unwrap();
                 let time = system.steps() as f64 * step;
                 let height = ball.height + system.bank().modal_state(0, 0).0;
                 worst = worst.max((height - ball.position(time)).abs());
@@ -211,7 +211,7 @@ fn bilinear(case: Bilinear, solver: Solver, step: f64, turns: u32) -> [f64; 3] {
     let mut system = against_plane(&model, (Scheme::MasslessBoundary, solver), -1.0, case.distance, false);
     system.set_step(step);
     set_samples(&mut system, &model, 0, -case.amplitude, -case.amplitude * (case.omega * step).cos());
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     let before = system.ledger().initial;
     let (mut crossings, mut force) = (Vec::new(), 0.0_f64);
     march(&mut system, case.period() * (f64::from(turns) + 0.9), |system, time| {

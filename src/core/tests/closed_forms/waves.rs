@@ -9,7 +9,7 @@ use tiprub_core::{Scene, Simulation};
 use tiprub_reference::closed::chain::Chain;
 use tiprub_test_models::{
     self as models,
-    disk::{Disk, with_rotor},
+    disk::{TestDisk, with_rotor},
     started,
 };
 
@@ -26,7 +26,7 @@ fn set(simulation: &mut Simulation, name: &str, value: f64, rate: f64) {
 /// One radial degree of freedom per sector in a casing whose normal is radial; nothing turns.
 fn chain(chain: Chain, scheme: Scheme, solver: Solver, step: f64) -> Scene {
     let one = |value: f64| DMatrix::from_element(1, 1, value);
-    let disk = Disk {
+    let disk = TestDisk {
         sectors: chain.sectors,
         nodes: 1,
         mass: [one(chain.mass), one(0.0)],

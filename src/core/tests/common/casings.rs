@@ -7,13 +7,13 @@ use std::f64::consts::TAU;
 use tiprub_core::gaps::dot;
 use tiprub_core::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
-pub use tiprub_test_models::Random;
+pub use tiprub_test_models::SeededRandom;
 
 pub const RADIUS: f64 = 0.25;
 pub const EPS: f64 = f64::EPSILON;
 
 /// Somewhere on a surface.
-pub fn anywhere(random: &mut Random, surface: &SurfaceSpline) -> ClosestPoint {
+pub fn anywhere(random: &mut SeededRandom, surface: &SurfaceSpline) -> ClosestPoint {
     ClosestPoint {
         patch: [random.below(surface.around()), random.below(surface.along() - 1)],
         s: random.unit(),
@@ -36,7 +36,7 @@ pub fn data(around: usize, along: usize, radius: impl Fn(f64, f64) -> f64) -> Ve
         .collect()
 }
 
-pub type Casing = fn(f64, f64) -> f64;
+pub type CasingShape = fn(f64, f64) -> f64;
 
 pub fn round(_angle: f64, _z: f64) -> f64 {
     RADIUS
@@ -52,7 +52,7 @@ pub fn lobed(angle: f64, z: f64) -> f64 {
 
 /// A casing with random dents of 20 µm.
 pub fn rough(around: usize, along: usize, seed: u64) -> Vec<[f64; 3]> {
-    let mut random = Random(seed);
+    let mut random = SeededRandom(seed);
     let mut points = data(around, along, lobed);
     points.iter_mut().for_each(|point| {
         let dent = random.vector(2e-5);

@@ -22,7 +22,7 @@ pub const NEARLY_NONE: f64 = 1e-4;
 
 /// A straight rod along x.
 #[derive(Debug, Clone, Copy)]
-pub struct Rod {
+pub struct StraightRod {
     pub young: f64,
     pub density: f64,
     pub area: f64,
@@ -34,7 +34,7 @@ pub struct Rod {
     pub kept: f64,
 }
 
-impl Rod {
+impl StraightRod {
     pub fn wave_time(&self) -> f64 {
         self.length / self.elements as f64 / (self.young / self.density).sqrt()
     }

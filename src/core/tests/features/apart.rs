@@ -1,6 +1,6 @@
 //! Structures that do not feel each other: what concerns one is judged and told without the others.
 
-use tiprub_core::settings::{LoadSettings, Motion, PatchSettings, Scheme, Shape, Solver, StructureSettings};
+use tiprub_core::settings::{BodyMotion, LoadSettings, PatchSettings, Scheme, Shape, Solver, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation, Warning};
 use tiprub_test_models::{
     RADIUS, coating_of, disk, go, lattice, modal, node, real, rich_blade, ring, ring_of, round, rub, saved, set,
@@ -164,7 +164,7 @@ fn massless_boundary_looks_at_every_structure_under_a_blade() {
         scene.settings.time.scheme = Scheme::MasslessBoundary;
         for (surface, (name, size)) in [("tip_ring", 1.0), ("seal_ring", light)].into_iter().enumerate() {
             scene.settings.surfaces[surface].structure = Some(name.into());
-            let (name, motion) = (name.to_owned(), Motion::Still);
+            let (name, motion) = (name.to_owned(), BodyMotion::Still);
             let structure = StructureSettings { name, motion, damping_ratio: Some(0.01), ..Default::default() };
             scene.settings.structures.push(structure);
             let mut ring = ring(36, 3);
@@ -304,7 +304,7 @@ fn an_output_that_no_pair_has_is_refused() {
     assert!(told.starts_with("outputs.slave_displacement: needs"), "{told}");
     let place = scene.settings.surfaces.len() - 1;
     scene.settings.surfaces[place].structure = Some("ring".into());
-    let (name, motion) = ("ring".into(), Motion::Still);
+    let (name, motion) = ("ring".into(), BodyMotion::Still);
     scene.settings.structures.push(StructureSettings { name, motion, ..Default::default() });
     scene.roms.push(ring_of(36, 3, 4));
     let simulation = Simulation::new(&scene).unwrap();
@@ -366,7 +366,7 @@ fn messages_say_which_contact_surface_or_structure_is_meant() {
 /// A disk with one node per blade: that node alone is all of them.
 #[test]
 fn flutter_of_a_disk_with_one_node_per_blade_is_told_once() {
-    let mut scene = disk::with_rotor(disk::Disk::random(6, 1, 9, 0.25, 6).cyclic());
+    let mut scene = disk::with_rotor(disk::TestDisk::random(6, 1, 9, 0.25, 6).cyclic());
     scene.settings.contacts[0].friction = 0.5;
     let warnings = started(&scene).warnings().to_vec();
     assert_eq!(warnings.iter().filter(|text| text.contains("flutter")).count(), 1, "{warnings:?}");

@@ -1,7 +1,7 @@
 //! Everything that is off unless a scene asks for it: a ledger that closes, states that continue, laws of mechanics.
 
 use crate::checks::{allocates_nothing, disturb, ledger_closes, state_continues};
-use tiprub_core::gaps::Drive;
+use tiprub_core::gaps::PrescribedMotion;
 use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, coating, element, flexible, go, real, saved, set, started, try_started};
@@ -187,11 +187,11 @@ fn complementarity_holds_over_a_long_rub_of_the_whole_casing() {
             let system = simulation.system();
             let lanes = system.bank().lanes();
             let largest = system.events().iter().fold(0.0, |a: f64, event| a.max(event.normal));
-            let drive = Drive {
+            let drive = PrescribedMotion {
                 rotor_angle: real(&simulation, "rotor_angle"),
                 radius_change: closing,
                 shape_factor: 1.0,
-                ..Drive::default()
+                ..PrescribedMotion::default()
             };
             let (mut law, mut gaps) = (system.pairs()[0].gap().clone(), system.structures()[0].gaps().to_vec());
             let mut geometry = law.geometry(lanes);

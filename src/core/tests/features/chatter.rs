@@ -66,13 +66,13 @@ fn rotor(blades: usize) -> Rom {
 
 /// What cuts, and how finely: blades, cells and steps from one pass to the next.
 #[derive(Clone, Copy)]
-struct Case {
+struct ChatterCase {
     blades: usize,
     cells: usize,
     steps: usize,
 }
 
-impl Case {
+impl ChatterCase {
     fn scene(self, cutting: f64, delay: f64) -> Scene {
         let mut scene = models::round(rotor(self.blades));
         let settings = &mut scene.settings;
@@ -139,7 +139,7 @@ fn chatter_grows_beyond_the_limit_of_its_lobe_and_dies_out_below() {
         let (limit, delay) = limit(chatter * OMEGA);
         let mut off = Vec::new();
         for steps in [500, 1000] {
-            let case = Case { blades: 1, cells: 200, steps };
+            let case = ChatterCase { blades: 1, cells: 200, steps };
             let [below, above] = [0.9 * limit, 1.1 * limit].map(|cutting| {
                 let [found, exact, ahead] =
                     [case.measured(cutting, delay), fastest(cutting, delay), case.with_lead(cutting, delay)];
@@ -173,7 +173,7 @@ fn waves_do_not_know_the_width_of_cells() {
     let (limit, delay) = limit(1.03 * OMEGA);
     let cutting = 1.1 * limit;
     let off = |blades: usize, cells: usize, steps: usize| {
-        let case = Case { blades, cells, steps };
+        let case = ChatterCase { blades, cells, steps };
         let (found, ahead) = (case.measured(cutting, delay), case.with_lead(cutting, delay));
         println!("{blades} blades, {cells} cells, {steps} steps a pass: {found:.3}, {ahead:.3} without cells");
         (found - ahead).modulus()
@@ -192,7 +192,7 @@ fn below_the_least_limit_every_speed_is_stable() {
     let least = 2.0 * STIFFNESS * DAMPING * (1.0 + DAMPING);
     let at = OMEGA * (1.0 + 2.0 * DAMPING).sqrt();
     assert!((limit(at).0 / least - 1.0).abs() < 1e-12);
-    let (mut largest, case) = (f64::NEG_INFINITY, Case { blades: 1, cells: 100, steps: 500 });
+    let (mut largest, case) = (f64::NEG_INFINITY, ChatterCase { blades: 1, cells: 100, steps: 500 });
     for share in 0..8 {
         let delay = limit(at).1 * (0.9 + 0.05 * f64::from(share));
         let (found, ahead) = (case.measured(0.95 * least, delay), case.with_lead(0.95 * least, delay));

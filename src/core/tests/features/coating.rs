@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_core::laws::coating::{CoatedProblem, Coating, Tip};
+use tiprub_core::laws::coating::{BladeTip, CoatedProblem, Coating};
 use tiprub_core::settings::CoatingSettings;
 use tiprub_test_models::{self as models, go, real, started};
 
@@ -48,7 +48,7 @@ fn rub(coating: &mut Coating, problem: &mut CoatedProblem, angle: f64, gap: f64)
 #[test]
 fn what_is_worn_off_a_cone_has_the_volume_of_the_cone() {
     let radii = AXIAL.map(|z| 0.1 + 4.0 * z);
-    let mut coating = Coating::new(&settings(), &Tip::new(&AXIAL, &radii, 1e-4), 1).unwrap();
+    let mut coating = Coating::new(&settings(), &BladeTip::new(&AXIAL, &radii, 1e-4), 1).unwrap();
     let (mut problem, mut work) = (coating.problem(1), 0.0);
     for cell in 0..360 {
         problem.clear();
@@ -70,7 +70,7 @@ fn what_is_worn_off_a_cone_has_the_volume_of_the_cone() {
 
 #[test]
 fn a_blade_cuts_a_groove_and_then_runs_free_in_it() {
-    let mut coating = Coating::new(&settings(), &Tip::new(&AXIAL, &[RADIUS; 3], WIDTH), 1).unwrap();
+    let mut coating = Coating::new(&settings(), &BladeTip::new(&AXIAL, &[RADIUS; 3], WIDTH), 1).unwrap();
     let mut problem = coating.problem(1);
     let depth = |angle: f64| 4e-4 * angle.cos(); // an eccentric rotor
     let mut works = [0.0; 3];
@@ -134,7 +134,7 @@ fn force_and_volume_converge_as_cells_become_narrow() {
     println!("| cells | force | volume |");
     for cells_around in [90, 180, 360, 720, 1440] {
         let settings = CoatingSettings { cells_around, cells_along: 3, ..settings() };
-        let mut coating = Coating::new(&settings, &Tip::new(&AXIAL, &[RADIUS; 3], WIDTH), 1).unwrap();
+        let mut coating = Coating::new(&settings, &BladeTip::new(&AXIAL, &[RADIUS; 3], WIDTH), 1).unwrap();
         let (mut problem, mut force, mut work) = (coating.problem(1), 0.0, 0.0);
         let steps = 23_040;
         for step in 0..steps {

@@ -4,7 +4,7 @@ use tiprub_core::Simulation;
 use tiprub_core::dynamics::cyclic::CyclicModel;
 use tiprub_core::settings::{InputInterpolation, Scheme, Solver};
 use tiprub_test_models::{
-    disk::{Disk, with_rotor},
+    disk::{TestDisk, with_rotor},
     real, started,
 };
 
@@ -12,7 +12,7 @@ const SCHEMES: [Scheme; 3] = Scheme::RECURRENCES;
 const SOLVERS: [Solver; 3] = Solver::ALL;
 
 /// Both forms of one disk with the same settings.
-fn pair(disk: &Disk, scheme: Scheme, solver: Solver, friction: f64) -> [Simulation; 2] {
+fn pair(disk: &TestDisk, scheme: Scheme, solver: Solver, friction: f64) -> [Simulation; 2] {
     [disk.cyclic(), disk.whole()].map(|rom| {
         let mut scene = with_rotor(rom);
         scene.settings.time.scheme = scheme;
@@ -46,7 +46,7 @@ impl Differences {
 /// Step both until `contact_steps` internal steps had contact; the casing closes by up to `closing`, with `nudge` added on
 /// the second. Returns the differences and the most contacts at once.
 fn compare(
-    disk: &Disk,
+    disk: &TestDisk,
     [one, two]: &mut [Simulation; 2],
     contact_steps: usize,
     closing: f64,
@@ -99,13 +99,13 @@ fn compare(
 }
 
 /// All disks with every scheme and solver, without and with friction.
-fn every_pair(mut check: impl FnMut(&Disk, [Simulation; 2], String)) {
+fn every_pair(mut check: impl FnMut(&TestDisk, [Simulation; 2], String)) {
     for (sectors, nodes, order) in [(5, 1, 5), (6, 1, 5), (8, 1, 5), (6, 2, 8), (3, 1, 5), (2, 2, 8)] {
         for scheme in SCHEMES {
             let excluded = |solver: &Solver| scheme == Scheme::MasslessBoundary && *solver == Solver::Film;
             for solver in SOLVERS.into_iter().filter(|solver| !excluded(solver)) {
                 for friction in [0.0, 0.15] {
-                    let disk = Disk::random(sectors, nodes, order, 0.2, 3 + sectors as u64);
+                    let disk = TestDisk::random(sectors, nodes, order, 0.2, 3 + sectors as u64);
                     let both = pair(&disk, scheme, solver, friction);
                     check(&disk, both, format!("{sectors} x {nodes} x {order} | {scheme:?} | {solver:?} | {friction}"));
                 }
@@ -151,7 +151,7 @@ fn frequencies_of_a_chain_are_the_closed_form() {
     for sectors in [2, 3, 5, 8, 56] {
         let (mass, ground, between) = (0.3, 2e6, 7e5);
         let diagonal = |value: f64| nalgebra::DMatrix::from_element(1, 1, value);
-        let mut disk = Disk::random(sectors, 1, 1, 0.0, 1);
+        let mut disk = TestDisk::random(sectors, 1, 1, 0.0, 1);
         disk.mass = [diagonal(mass), diagonal(0.0)];
         disk.stiffness = [diagonal(ground + 2.0 * between), diagonal(-between)];
         let model = CyclicModel::from_rom(&disk.cyclic(), 0.0).unwrap();

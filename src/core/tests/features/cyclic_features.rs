@@ -8,7 +8,7 @@ use tiprub_core::settings::{LoadSettings, PatchSettings, Scheme, Shape, Solver, 
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{
     self as models, coating,
-    disk::{Disk, with_rotor},
+    disk::{TestDisk, with_rotor},
     flexible, go, real, started, try_started,
 };
 
@@ -149,7 +149,7 @@ fn without_coupling_a_disk_has_the_steps_of_its_sectors() {
 
 /// Every combination that is not refused, by its name.
 fn every_combination(mut check: impl FnMut(&str, Scene)) {
-    let disk = Disk::random(7, 2, 9, 0.25, 5);
+    let disk = TestDisk::random(7, 2, 9, 0.25, 5);
     for feature in FEATURES {
         for (scheme, solver) in SCHEMES.into_iter().flat_map(|scheme| SOLVERS.map(|solver| (scheme, solver))) {
             let name = format!("{} | {scheme:?} | {solver:?}", feature.0);
@@ -190,7 +190,7 @@ fn a_step_allocates_nothing() {
 #[test]
 fn a_casing_turned_by_sectors_turns_the_answer() {
     for (sectors, shift) in [(5, 2), (8, 3), (2, 1), (56, 11)] {
-        let disk = Disk::random(sectors, 1, 5, 0.2, 11);
+        let disk = TestDisk::random(sectors, 1, 5, 0.2, 11);
         let run = |shift: usize| {
             let mut scene = scene_with(disk.cyclic(), ("plain", |_| {}), Scheme::ModalExact, Solver::Lcp);
             let phase = std::f64::consts::TAU * shift as f64 / sectors as f64;
@@ -221,7 +221,7 @@ fn a_casing_turned_by_sectors_turns_the_answer() {
 
 #[test]
 fn looking_at_outputs_inside_a_step_changes_no_bit() {
-    let disk = Disk::random(6, 1, 5, 0.25, 5);
+    let disk = TestDisk::random(6, 1, 5, 0.25, 5);
     let run = |look: bool| {
         let mut simulation = started(&scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp));
         for _ in 0..60 {
@@ -240,7 +240,7 @@ fn looking_at_outputs_inside_a_step_changes_no_bit() {
 #[test]
 fn a_change_of_step_keeps_the_order_of_the_scheme() {
     // Free vibration of all nodal diameters after the casing has gone: modal-exact is exact at every step size.
-    let disk = Disk::random(7, 1, 5, 0.25, 5);
+    let disk = TestDisk::random(7, 1, 5, 0.25, 5);
     let run = |steps: &[f64]| {
         let mut scene = scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
         scene.settings.contacts[0].gap = 5e-3;
@@ -256,7 +256,7 @@ fn a_change_of_step_keeps_the_order_of_the_scheme() {
                 bank.set_modal_state(n, mode, [amplitude, -0.5 * amplitude], [0.1 * amplitude, 0.0]);
             }
         }
-        let drive = tiprub_core::gaps::Drive { speed: 1300.0, ..Default::default() };
+        let drive = tiprub_core::gaps::PrescribedMotion { speed: 1300.0, ..Default::default() };
         system.start(&[drive]);
         for step in steps {
             system.set_step(*step);
@@ -277,7 +277,7 @@ fn a_change_of_step_keeps_the_order_of_the_scheme() {
 
 #[test]
 fn what_coupled_sectors_do_not_take_is_refused() {
-    let disk = Disk::random(6, 1, 5, 0.2, 3);
+    let disk = TestDisk::random(6, 1, 5, 0.2, 3);
     let refusal = |change: fn(&mut Scene)| {
         let mut scene = scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
         change(&mut scene);
@@ -322,7 +322,7 @@ type Damage = (&'static str, fn(&mut Rom));
 
 #[test]
 fn bad_harmonics_are_refused_by_name() {
-    let disk = Disk::random(6, 1, 5, 0.2, 3);
+    let disk = TestDisk::random(6, 1, 5, 0.2, 3);
     let refusal = |change: fn(&mut Rom)| {
         let mut rom = disk.cyclic();
         change(&mut rom);
@@ -358,7 +358,7 @@ proptest! {
         coupling in 0.0..0.3_f64,
         seed in any::<u64>(),
     ) {
-        let disk = Disk::random(sectors, nodes, 3 * nodes + more, coupling, seed);
+        let disk = TestDisk::random(sectors, nodes, 3 * nodes + more, coupling, seed);
         let mut scene = scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
         scene.settings.contacts[0].friction = 0.0;
         scene.settings.structures[0].damping_ratio = Some(0.0);

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::settings::{Direction, ExcitationSettings, InputInterpolation, Scheme, Solver};
+use tiprub_core::settings::{ExcitationSettings, ForceDirection, InputInterpolation, Scheme, Solver};
 use tiprub_core::{Rom, Scene, Simulation};
-use tiprub_test_models::{self as models, bits, disk::Disk, go, real, saved, set, started};
+use tiprub_test_models::{self as models, bits, disk::TestDisk, go, real, saved, set, started};
 
 const AMPLITUDE: f64 = 0.4;
 const PHASE: f64 = 0.7;
@@ -27,7 +27,8 @@ fn scene(rom: Rom, scheme: Scheme, order: u32, speed: f64) -> Scene {
 /// A force at a node in place of a modal load.
 fn at_node(scene: &mut Scene, node: &str) {
     let excitation = scene.settings.structures[0].excitation.as_mut().unwrap();
-    (excitation.mode, excitation.node, excitation.direction) = (None, Some(node.into()), Some(Direction::Tangential));
+    (excitation.mode, excitation.node, excitation.direction) =
+        (None, Some(node.into()), Some(ForceDirection::Tangential));
 }
 
 /// Largest difference of the contact displacements from `expected` (sector, row: complex amplitude of e^(i order θ_r)), as a share of the
@@ -171,7 +172,7 @@ fn a_force_at_a_node_answers_by_the_frequency_response_of_all_modes() {
 fn every_engine_order_travels_around_a_disk_as_on_the_whole_structure() {
     let mut worst = 0.0_f64;
     for (sectors, orders) in [(5, 0..11_u32), (6, 0..13)] {
-        let disk = Disk::random(sectors, 1, 6, 0.2, 11);
+        let disk = TestDisk::random(sectors, 1, 6, 0.2, 11);
         let whole = ModalModel::from_rom(&disk.whole(), 0.05).unwrap();
         for order in orders {
             let speed = if order == 0 { 100.0 } else { 5000.0 / f64::from(order) };
@@ -213,7 +214,7 @@ fn every_engine_order_travels_around_a_disk_as_on_the_whole_structure() {
 /// One mode family of a disk that is not coupled answers as that of uncoupled sectors.
 #[test]
 fn a_family_of_a_disk_without_coupling_answers_as_that_of_one_blade() {
-    let mut disk = Disk::random(6, 1, 6, 0.2, 5);
+    let mut disk = TestDisk::random(6, 1, 6, 0.2, 5);
     disk.mass[1].fill(0.0);
     disk.stiffness[1].fill(0.0);
     let mut alone = disk.cyclic();
@@ -235,7 +236,7 @@ fn a_family_of_a_disk_without_coupling_answers_as_that_of_one_blade() {
 /// While blades rub too: F cos(…) at a node times its own displacement, which knows no modes, is what the ledger has.
 #[test]
 fn the_work_of_an_excitation_is_force_times_displacement_while_blades_rub() {
-    let disk = Disk::random(6, 2, 10, 0.2, 3);
+    let disk = TestDisk::random(6, 2, 10, 0.2, 3);
     for (rom, node, loaded) in [(models::rich_blade(6), "mid_chord", 4), (disk.cyclic(), "node_0_1", 4)] {
         for scheme in Scheme::RECURRENCES {
             let mut scene = models::bumps(rom.clone());
@@ -243,7 +244,7 @@ fn the_work_of_an_excitation_is_force_times_displacement_while_blades_rub() {
             (scene.settings.time.scheme, scene.settings.time.step) = (scheme, 5e-7);
             scene.settings.contacts[0].solver = Solver::Lcp;
             scene.settings.structures[0].damping_ratio = Some(0.02);
-            let (mode, node, direction) = (None, Some(node.into()), Some(Direction::Tangential));
+            let (mode, node, direction) = (None, Some(node.into()), Some(ForceDirection::Tangential));
             let excitation = ExcitationSettings { order: 5, mode, node, direction, amplitude: 3.0, phase: PHASE };
             scene.settings.structures[0].excitation = Some(excitation);
             let mut run = started(&scene);
@@ -287,7 +288,7 @@ fn the_work_of_an_excitation_is_force_times_displacement_while_blades_rub() {
 
 #[test]
 fn a_state_keeps_the_excitation_and_steps_of_other_lengths_carry_it() {
-    for rom in [models::blade(5), Disk::random(5, 1, 6, 0.2, 3).cyclic()] {
+    for rom in [models::blade(5), TestDisk::random(5, 1, 6, 0.2, 3).cyclic()] {
         let scene = scene(rom, Scheme::ModalExact, 6, 800.0);
         let mut run = started(&scene);
         for length in [5e-5, 3.1e-5, 5e-5] {
@@ -330,7 +331,7 @@ fn an_excitation_that_cannot_be_is_refused() {
         ("structure[1].excitation.mode: neither", |it| it.mode = None),
         ("structure[1].excitation.node: without", |it| it.node = Some("mid_chord".into())),
         ("structure[1].excitation.node: `tip` is no contact node", |it| {
-            (it.node, it.direction) = (Some("tip".into()), Some(Direction::Axial));
+            (it.node, it.direction) = (Some("tip".into()), Some(ForceDirection::Axial));
         }),
         ("structure[1].excitation.amplitude", |it| it.amplitude = f64::NAN),
         ("structure[1].excitation.order", |it| it.order = 2_000_000),

@@ -7,10 +7,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{Patch, STRESSES, SUPPORT_ROWS, Support, Thermal, Watched};
+use tiprub_core::rom::{STRESSES, SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints};
 use tiprub_core::settings::{CuttingSettings, ExcitationSettings, Scheme, Solver};
 use tiprub_core::{Scene, Simulation};
-use tiprub_test_models::{self as models, bits, disk::Disk, go, lattice, real, saved, set, started};
+use tiprub_test_models::{self as models, bits, disk::TestDisk, go, lattice, real, saved, set, started};
 
 use crate::checks::disturb;
 
@@ -64,7 +64,7 @@ const FEATURES: [Feature; 15] = [
     }),
     ("coupled sectors", |scene| {
         let extras = std::mem::take(&mut scene.roms[0].extras);
-        scene.roms[0] = Disk::random(4, 3, 18, 0.1, 7).cyclic();
+        scene.roms[0] = TestDisk::random(4, 3, 18, 0.1, 7).cyclic();
         let rom = &mut scene.roms[0];
         let size = rom.mass[(0, 0)];
         (rom.extras.spin, rom.extras.thermal) = (extras.spin, extras.thermal);
@@ -82,7 +82,7 @@ fn flexible(scene: &mut Scene) {
     let rows =
         |size: f64| DMatrix::from_fn(SUPPORT_ROWS, rom.order(), |row, mode| size * ((row + 2 * mode) as f64).sin());
     let thermal = DMatrix::zeros(SUPPORT_ROWS, rom.extras.thermal.as_ref().map_or(0, |thermal| thermal.patches.len()));
-    rom.extras.support = Some(Support { stiffness: rows(1e6), mass: rows(0.1), thermal });
+    rom.extras.support = Some(SupportRows { stiffness: rows(1e6), mass: rows(0.1), thermal });
 }
 
 /// Four blades that rub, whose ROM has what any feature needs.
@@ -90,10 +90,10 @@ fn rubbing() -> Scene {
     let mut rom = models::rich_blade(4);
     let order = rom.order();
     let loads = DMatrix::from_fn(order, 1, |row, _| 2.0 + 1.5 * (row as f64).sin());
-    rom.extras.thermal = Some(Thermal { loads, patches: vec![Patch { angle: [0.0, TAU], axial: [-1.0, 1.0] }] });
+    rom.extras.thermal = Some(Thermal { loads, patches: vec![ThermalPatch { angle: [0.0, TAU], axial: [-1.0, 1.0] }] });
     rom.extras.spin = Some(models::spin(order));
     let map = DMatrix::from_fn(STRESSES, order, |row, mode| 1e11 * ((row + mode) as f64).sin());
-    rom.extras.stress = Some(Watched { map, points: vec![rom.contact_nodes[0].clone()] });
+    rom.extras.stress = Some(WatchedPoints { map, points: vec![rom.contact_nodes[0].clone()] });
     rom.extras.stress_thermal = Some(DMatrix::from_element(STRESSES, 1, 1e5));
     rom.extras.stress_centrifugal = Some(DMatrix::from_element(STRESSES, 1, 10.0));
     models::bumps(rom)

@@ -4,17 +4,17 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::rom::{Patch, Thermal};
+use tiprub_core::rom::{Thermal, ThermalPatch};
 use tiprub_core::settings::{InitialSettings, InputInterpolation, Scheme};
 use tiprub_core::{Rom, Scene, Simulation};
-use tiprub_test_models::{self as models, bits, disk::Disk, go, real, saved, set, started};
+use tiprub_test_models::{self as models, bits, disk::TestDisk, go, real, saved, set, started};
 
 const SOFTENING: f64 = 4e-4;
 
 /// With a load per kelvin.
 fn heated(mut rom: Rom) -> Rom {
     let load = DMatrix::from_fn(rom.order(), 1, |row, _| 2.0 + 1.5 * (row as f64).sin());
-    let patches = vec![Patch { angle: [0.0, TAU], axial: [-1.0, 1.0] }];
+    let patches = vec![ThermalPatch { angle: [0.0, TAU], axial: [-1.0, 1.0] }];
     rom.extras.thermal = Some(Thermal { loads: load, patches });
     rom
 }
@@ -45,7 +45,7 @@ fn apart(found: &[f64], expected: &[f64]) -> f64 {
 /// CΦω⁻²Φᵀf T, the free expansion: at the start, and once warmed up slowly; of coupled sectors all alike. Softening leaves it.
 #[test]
 fn warm_blades_rest_where_their_free_expansion_is() {
-    for rom in [models::blade(3), Disk::random(3, 1, 6, 0.2, 3).cyclic()] {
+    for rom in [models::blade(3), TestDisk::random(3, 1, 6, 0.2, 3).cyclic()] {
         let stiffness = rom.stiffness.clone().cholesky().unwrap();
         let load = heated(rom.clone()).extras.thermal.unwrap().loads;
         let free = &rom.contact_map * stiffness.solve(&load) * 250.0;

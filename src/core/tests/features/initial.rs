@@ -6,7 +6,7 @@ use tiprub_core::dynamics::cyclic::CyclicModel;
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::settings::{InitialSettings, Scheme};
 use tiprub_core::{Rom, Scene, Simulation};
-use tiprub_test_models::{self as models, disk::Disk, go, real, set_element, started};
+use tiprub_test_models::{self as models, disk::TestDisk, go, real, set_element, started};
 
 const NONE: InitialSettings =
     InitialSettings { mode: 1, sector: None, nodal_diameter: None, phase: 0.0, displacement: 0.0, velocity: 0.0 };
@@ -85,7 +85,7 @@ fn blades_go_on_from_where_they_start_as_free_vibration() {
 #[test]
 fn a_nodal_diameter_of_a_disk_starts_as_told_and_rings_down_alone() {
     for scheme in [Scheme::ModalExact, Scheme::Galerkin] {
-        let rom = Disk::random(6, 1, 7, 0.2, 3).cyclic();
+        let rom = TestDisk::random(6, 1, 7, 0.2, 3).cyclic();
         let model = CyclicModel::from_rom(&rom, 0.02).unwrap();
         for (n, phase) in [(0, 0.0), (1, 1.1), (2, 0.3), (3, 0.0)] {
             let one =
@@ -115,7 +115,7 @@ fn a_nodal_diameter_of_a_disk_starts_as_told_and_rings_down_alone() {
 #[test]
 fn every_mode_decays_by_its_own_ratio() {
     let ratios = [0.003, 0.05];
-    for rom in [models::blade(4), Disk::random(4, 1, 5, 0.2, 3).cyclic()] {
+    for rom in [models::blade(4), TestDisk::random(4, 1, 5, 0.2, 3).cyclic()] {
         for (mode, ratio) in [(1, ratios[0]), (2, ratios[1]), (3, 0.02)] {
             let one = InitialSettings { mode, displacement: 1e-6, ..NONE };
             let mut scene = scene(rom.clone(), Scheme::ModalExact, vec![one]);

@@ -1,7 +1,7 @@
 //! Scenes of several structures and pairs: each is what it is alone, and together they keep the books.
 
-use tiprub_core::settings::{Motion, Scheme, Shape, Solver, StructureSettings};
-use tiprub_core::variables::{Causality, Kind};
+use tiprub_core::settings::{BodyMotion, Scheme, Shape, Solver, StructureSettings};
+use tiprub_core::variables::{Causality, DataType};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{lattice, real, rich_blade, rub, several, spin};
 
@@ -21,7 +21,7 @@ fn set_all(simulation: &mut Simulation, name: &str, value: f64) {
 /// Real outputs, by name.
 fn outputs(simulation: &Simulation) -> Vec<(String, f64)> {
     let rows = simulation.table().variables().iter();
-    let rows = rows.filter(|row| row.causality == Causality::Output && row.kind == Kind::Real);
+    let rows = rows.filter(|row| row.causality == Causality::Output && row.kind == DataType::Real);
     let elements = rows.flat_map(|row| (0..row.len()).map(move |element| (row, element)));
     let value = |row: &tiprub_core::variables::Variable, element: usize| {
         simulation.real(row.reference + u32::try_from(element).unwrap()).unwrap()
@@ -229,7 +229,7 @@ fn free_bodies_are_each_what_they_are_alone() {
     for (structure, rom) in one.settings.structures.iter().zip(&one.roms) {
         let mut structure = structure.clone();
         structure.name = renamed(&structure.name);
-        structure.velocity[1] += if structure.motion == Motion::Free { 0.4 } else { 0.0 };
+        structure.velocity[1] += if structure.motion == BodyMotion::Free { 0.4 } else { 0.0 };
         both.settings.structures.push(structure);
         both.roms.push(rom.clone());
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{Patch, STRESSES, Thermal, Watched};
+use tiprub_core::rom::{STRESSES, Thermal, ThermalPatch, WatchedPoints};
 use tiprub_core::settings::Shape;
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, set, started};
@@ -14,14 +14,14 @@ fn scene() -> Scene {
     let rom = &mut scene.roms[0];
     let (order, nodes) = (rom.order(), rom.contact_nodes.len());
     // As many watched points as contact nodes, so that their displacements are told beside.
-    rom.extras.watched = Some(Watched { map: rom.contact_map.clone(), points: rom.contact_nodes.clone() });
+    rom.extras.watched = Some(WatchedPoints { map: rom.contact_map.clone(), points: rom.contact_nodes.clone() });
     let factor =
         |row: usize, column: usize| 1e11 * (1.0 + row as f64) * if column.is_multiple_of(2) { 1.0 } else { -0.3 };
     let of_moved = DMatrix::from_fn(2 * STRESSES, 3 * nodes, factor);
     let map = of_moved * &rom.contact_map;
     assert_eq!(map.shape(), (2 * STRESSES, order));
     let places = ["root", "middle"].map(|name| models::node(name, rom.contact_nodes[0].position, 0.0)).to_vec();
-    rom.extras.stress = Some(Watched { map, points: places });
+    rom.extras.stress = Some(WatchedPoints { map, points: places });
     scene.settings.outputs.watched_sectors = vec![2];
     scene.settings.outputs.stress = true;
     scene
@@ -104,7 +104,7 @@ fn heated(thermal: fn(usize) -> f64) -> Scene {
     (scene.settings.surfaces[0].shape, scene.settings.contacts[0].gap) = (Shape::Circular {}, 5e-3);
     let rom = &mut scene.roms[0];
     let loads = DMatrix::from_fn(rom.order(), 1, |row, _| 2.0 + 1.5 * (row as f64).sin());
-    rom.extras.thermal = Some(Thermal { loads, patches: vec![Patch { angle: [0.0, TAU], axial: [-1.0, 1.0] }] });
+    rom.extras.thermal = Some(Thermal { loads, patches: vec![ThermalPatch { angle: [0.0, TAU], axial: [-1.0, 1.0] }] });
     rom.extras.stress_thermal = Some(DMatrix::from_fn(2 * STRESSES, 1, |row, _| thermal(row)));
     rom.extras.spin = Some(models::spin(rom.order()));
     scene.settings.structures[0].thermal = true;

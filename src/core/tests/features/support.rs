@@ -1,7 +1,7 @@
 //! Forces on casings and of their supports, amplitudes of modes, displacements of tips: against momentum and each other.
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{SUPPORT_ROWS, Support};
+use tiprub_core::rom::{SUPPORT_ROWS, SupportRows};
 use tiprub_core::settings::{Scheme, Shape};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, element, go, move_on, real, set, started};
@@ -39,7 +39,8 @@ fn scene(scheme: Scheme) -> Scene {
         }
     }
     let thermal = DMatrix::zeros(SUPPORT_ROWS, 4);
-    rom.extras.support = Some(Support { mass: DMatrix::zeros(SUPPORT_ROWS, rom.order()), stiffness: rows, thermal });
+    rom.extras.support =
+        Some(SupportRows { mass: DMatrix::zeros(SUPPORT_ROWS, rom.order()), stiffness: rows, thermal });
     scene
 }
 

@@ -18,8 +18,10 @@ fn size(v: [f64; 3]) -> f64 {
 
 /// Scenes in which something happens: (name, scene, communication steps of 1e-5 s).
 fn events() -> Vec<(&'static str, Scene, usize)> {
-    let thrown = |velocity| scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203), (Side::Right, 0.021)], false, velocity);
-    let mut corner = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203)], false, [-15.0, 3.0, 2.0]);
+    let thrown = |velocity| {
+        scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.0203), (BlockSide::Right, 0.021)], false, velocity)
+    };
+    let mut corner = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.0203)], false, [-15.0, 3.0, 2.0]);
     corner.settings.contacts[0].nodes = Some("left_00".into());
     let mut facets = squeezed();
     let mut rigid = squeezed_by(1e-4, [0.0, -40.0, 1.0]);
@@ -39,7 +41,7 @@ fn events() -> Vec<(&'static str, Scene, usize)> {
 /// What counts as a small displacement is so beside the smallest surface that the body meets, for both of its pairs.
 #[test]
 fn displacements_are_small_beside_the_smallest_surface() {
-    let mut both = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.06), (Side::Right, 0.06)], false, [0.0; 3]);
+    let mut both = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.06), (BlockSide::Right, 0.06)], false, [0.0; 3]);
     let wide = largest_of_pairs(&both);
     assert!(wide[0] > 0.0 && wide[0].to_bits() == wide[1].to_bits(), "{wide:?}");
     let plate = both.roms.last_mut().unwrap();
@@ -51,7 +53,7 @@ fn displacements_are_small_beside_the_smallest_surface() {
 }
 
 fn largest_of_pairs(scene: &Scene) -> Vec<f64> {
-    let largest = |pair: &tiprub_core::system::Pair| match pair.gap() {
+    let largest = |pair: &tiprub_core::system::ContactPair| match pair.gap() {
         tiprub_core::gaps::GapLaw::Open(gap) => gap.largest(),
         other => panic!("{other:?}"),
     };
@@ -180,7 +182,7 @@ fn film_with_central_differences_is_the_papers_form() {
     use nalgebra::{DMatrix, DVector};
     let (h, friction, velocity) = (1e-6, 0.2, [-12.0, 6.0, 1.0]);
     let distances = [0.0203, 0.0205];
-    let plates = [(Side::Left, distances[0]), (Side::Right, distances[1])];
+    let plates = [(BlockSide::Left, distances[0]), (BlockSide::Right, distances[1])];
     let mut scene =
         with(scene(block([0.0; 3], 3e6), &plates, false, velocity), friction, Solver::Film, Scheme::CentralDifference);
     scene.settings.surfaces.iter_mut().for_each(|surface| surface.rigid = true);
@@ -225,8 +227,8 @@ fn film_with_central_differences_is_the_papers_form() {
 #[test]
 fn a_pair_far_away_changes_nothing() {
     let (body, velocity) = (|| block([0.0; 3], 3e6), [-12.0, 6.0, 1.0]);
-    let one = scene(body(), &[(Side::Left, 0.0203)], true, velocity);
-    let two = scene(body(), &[(Side::Left, 0.0203), (Side::Right, 5.0)], true, velocity);
+    let one = scene(body(), &[(BlockSide::Left, 0.0203)], true, velocity);
+    let two = scene(body(), &[(BlockSide::Left, 0.0203), (BlockSide::Right, 5.0)], true, velocity);
     for solver in SOLVERS {
         let mut runs = [&one, &two].map(|scene| started(&with(scene.clone(), 0.2, solver, Scheme::ModalExact)));
         let mut touched = false;
@@ -340,7 +342,7 @@ fn the_first_step_may_have_any_length() {
     let velocity = [-12.0, 6.0, 1.0];
     for scheme in SCHEMES {
         let scene = with(
-            scene(block([0.0; 3], 3e6), &[(Side::Left, 0.1), (Side::Right, 0.1)], false, velocity),
+            scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.1), (BlockSide::Right, 0.1)], false, velocity),
             0.2,
             Solver::Lcp,
             scheme,
@@ -433,7 +435,7 @@ fn the_chapter_on_variables_lists_every_variable() {
 
 #[test]
 fn gaps_at_the_start_are_distances_to_the_surfaces() {
-    let flat = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.0203), (Side::Right, 0.021)], false, [0.0; 3]);
+    let flat = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.0203), (BlockSide::Right, 0.021)], false, [0.0; 3]);
     let simulation = started(&flat);
     for (node, place) in places().enumerate() {
         let expected = match place[0] {

@@ -44,7 +44,7 @@ fn sprung() -> Rom {
 
 /// A body in front of the left wall (m, m/s). Springs as stiff as these are rarely meant; here they are.
 fn thrown_at_wall(body: Rom, distance: f64, velocity: [f64; 3]) -> Scene {
-    let mut scene = scene(body, &[(Side::Left, distance)], false, velocity);
+    let mut scene = scene(body, &[(BlockSide::Left, distance)], false, velocity);
     scene.settings.accept_implausible = true;
     scene
 }
@@ -95,9 +95,10 @@ fn a_mass_on_springs_leaves_a_wall_after_half_a_period() {
 
 /// Scenes in which something happens, and for how many steps.
 fn events() -> Vec<(&'static str, Scene, usize)> {
-    let thrown = scene(faces([0.0; 3]), &[(Side::Left, 0.0203), (Side::Right, 0.021)], false, [-6.0, 30.0, 4.0]);
+    let thrown =
+        scene(faces([0.0; 3]), &[(BlockSide::Left, 0.0203), (BlockSide::Right, 0.021)], false, [-6.0, 30.0, 4.0]);
     let distance = 0.5 * SIDE - 3e-4;
-    let plates = [(Side::Left, distance), (Side::Right, distance)];
+    let plates = [(BlockSide::Left, distance), (BlockSide::Right, distance)];
     let squeezed = scene(faces([0.0, 0.045, 0.0]), &plates, true, [0.0, -40.0, 0.0]);
     let mut rigid = squeezed.clone();
     rigid.settings.surfaces[1].rigid = true;
@@ -224,7 +225,7 @@ fn goes_on(scene: &Scene, steps: usize) {
 #[test]
 fn what_comes_over_an_edge_behind_the_surface_ends_the_run() {
     let distance = 0.5 * SIDE - 3e-3;
-    let plates = [(Side::Left, distance), (Side::Right, distance)];
+    let plates = [(BlockSide::Left, distance), (BlockSide::Right, distance)];
     let scene = marched(scene(faces([0.0, 0.12, 0.0]), &plates, false, [0.0, -40.0, 0.0]), 1e-3, 0.0);
     let mut simulation = started(&scene);
     let error = (0..200).find_map(|_| simulation.do_step(simulation.time(), H).err()).unwrap().to_string();
@@ -235,7 +236,7 @@ fn what_comes_over_an_edge_behind_the_surface_ends_the_run() {
 #[test]
 fn what_slides_off_an_edge_goes_on() {
     for friction in [0.0, 0.2] {
-        let thrown = scene(faces([0.0, 0.0, 0.0295]), &[(Side::Left, 0.0201)], false, [-4.0, 0.0, 20.0]);
+        let thrown = scene(faces([0.0, 0.0, 0.0295]), &[(BlockSide::Left, 0.0201)], false, [-4.0, 0.0, 20.0]);
         let mut simulation = started(&marched(thrown, 1e-3, friction));
         let (mut touched, mut both) = (0, 0);
         for step in 0..60 {
@@ -257,7 +258,7 @@ fn what_slides_off_an_edge_goes_on() {
 #[test]
 fn friction_that_puts_energy_in_ends_the_run() {
     for (rigid, tolerance) in [(false, 1e-1), (false, 1e-3), (true, 1e-1), (true, 1e-3)] {
-        let mut thrown = scene(faces([0.0; 3]), &[(Side::Left, 0.0201)], false, [-20.0, 3.0, 1.0]);
+        let mut thrown = scene(faces([0.0; 3]), &[(BlockSide::Left, 0.0201)], false, [-20.0, 3.0, 1.0]);
         thrown.settings.surfaces[0].rigid = rigid;
         let mut simulation = started(&marched(thrown, tolerance, 0.2));
         let start = real(&simulation, "kinetic_energy");
@@ -276,7 +277,7 @@ fn friction_that_puts_energy_in_ends_the_run() {
 fn with_sticking_friction_takes_energy_alone() {
     for rigid in [true, false] {
         let of = |tolerance: f64| {
-            let mut thrown = scene(faces([0.0; 3]), &[(Side::Left, 0.0201)], false, [-20.0, 3.0, 1.0]);
+            let mut thrown = scene(faces([0.0; 3]), &[(BlockSide::Left, 0.0201)], false, [-20.0, 3.0, 1.0]);
             thrown.settings.surfaces[0].rigid = rigid;
             let mut scene = marched(thrown, tolerance, 0.2);
             scene.settings.contacts[0].solver = Solver::Coulomb;

@@ -7,7 +7,7 @@ use tiprub_test_models::{go, lattice, real, started};
 
 #[test]
 fn what_flies_into_a_surface_too_deep_ends_with_the_reason() {
-    let fast = scene(block([0.0; 3], 1e3), &[(Side::Left, 0.0203)], false, [-400.0, 0.0, 0.0]);
+    let fast = scene(block([0.0; 3], 1e3), &[(BlockSide::Left, 0.0203)], false, [-400.0, 0.0, 0.0]);
     let mut simulation = started(&fast);
     let error = (0..200).find_map(|_| simulation.do_step(simulation.time(), 1e-5).err()).unwrap().to_string();
     assert!(error.contains("a tenth of the extent"), "{error}");
@@ -81,7 +81,7 @@ fn with_mode(mut rom: Rom, shape: impl IntoIterator<Item = (usize, [f64; 3])>) -
 
 /// The block flies at a plate a distance (m) away.
 fn at_plate(distance: f64) -> Scene {
-    let scene = scene(block([0.0; 3], 3e6), &[(Side::Left, distance)], false, [-15.0, 3.0, 0.0]);
+    let scene = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, distance)], false, [-15.0, 3.0, 0.0]);
     with(scene, 1.5, Solver::Lcp, Scheme::ModalExact)
 }
 
@@ -137,14 +137,14 @@ fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
 fn a_body_too_fast_for_the_step_is_refused_and_passes_nothing_unseen() {
     // Obliquely through the plate within one step: beyond its edge before and after.
     for velocity in [[-1e5, 1e5, 0.0], [-1e5, 0.0, 0.0], [0.0, 0.0, -5e4], [5000.0, 0.0, 0.0]] {
-        let mut scene = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.06)], false, velocity);
+        let mut scene = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.06)], false, velocity);
         scene.settings.accept_implausible = true;
         let mut simulation = started(&with(scene, 0.0, Solver::Lcp, Scheme::ModalExact));
         let error = simulation.do_step(0.0, 1e-5).unwrap_err().to_string();
         assert!(error.contains("could pass a surface unseen") && error.contains("smaller internal step"), "{error}");
     }
     // A tenth of the block in one step is the limit.
-    let mut slow = scene(block([0.0; 3], 3e6), &[(Side::Left, 0.5)], false, [3900.0, 0.0, 0.0]);
+    let mut slow = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.5)], false, [3900.0, 0.0, 0.0]);
     slow.settings.accept_implausible = true;
     let mut slow = started(&slow);
     go(&mut slow, 1e-5);
@@ -153,7 +153,7 @@ fn a_body_too_fast_for_the_step_is_refused_and_passes_nothing_unseen() {
 #[test]
 fn a_node_that_comes_over_an_edge_from_behind_is_refused() {
     let thrown = |distance, velocity, steps: u32| {
-        let scene = scene(block([0.0, 0.1101, 0.0], 3e6), &[(Side::Left, distance)], false, velocity);
+        let scene = scene(block([0.0, 0.1101, 0.0], 3e6), &[(BlockSide::Left, distance)], false, velocity);
         let mut simulation = started(&with(scene, 0.15, Solver::Lcp, Scheme::ModalExact));
         (0..steps).try_for_each(|_| simulation.do_step(simulation.time(), 1e-5)).map(|()| simulation)
     };

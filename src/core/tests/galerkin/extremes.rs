@@ -3,7 +3,7 @@
 use super::{H, SECTORS, run, scene};
 use tiprub_core::settings::{Scheme, Shape};
 use tiprub_core::{Scene, Simulation};
-use tiprub_test_models::disk::Disk;
+use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{GAP, element, go, real, set, started};
 
 /// Communication step (s), of ten longest steps.
@@ -32,9 +32,9 @@ fn apart(found: &[(Vec<f64>, f64)], others: &[(Vec<f64>, f64)]) -> (f64, f64) {
 }
 
 /// A change of the scene, and what the importer sets before a communication step.
-type Case = (&'static str, fn(&mut Scene), fn(&mut Simulation, u32));
+type ExtremesCase = (&'static str, fn(&mut Scene), fn(&mut Simulation, u32));
 
-const CASES: [Case; 5] = [
+const CASES: [ExtremesCase; 5] = [
     ("rub", |_| (), |_, _| ()),
     // Blades touch at first, then they swing freely past lobes that come close.
     (
@@ -42,7 +42,7 @@ const CASES: [Case; 5] = [
         |_| (),
         |simulation, n| set(simulation, "casing_radius_change", if n < 3 { 0.0 } else { 1.2e-4 }),
     ),
-    ("coupled", |scene| scene.roms[0] = Disk::random(SECTORS, 1, 9, 0.25, 3).cyclic(), wide),
+    ("coupled", |scene| scene.roms[0] = TestDisk::random(SECTORS, 1, 9, 0.25, 3).cyclic(), wide),
     ("at rest past two lobes", |_| (), wide),
     (
         "at rest past a table",

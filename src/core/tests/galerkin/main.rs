@@ -13,7 +13,7 @@ use counting::allocations_of;
 use guide::told;
 use tiprub_core::settings::{LoadSettings, OutputSettings, Scheme, Shape, SplineSettings, TimeSettings};
 use tiprub_core::{Rom, Scene, Simulation};
-use tiprub_test_models::disk::Disk;
+use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{
     bits, blade, bumps, element, flexible, go, real, rich_blade, saved, set, several, started, try_started,
 };
@@ -42,7 +42,7 @@ fn scene(scheme: Scheme, step: f64, tolerance: f64) -> Scene {
 }
 
 /// What a run shows.
-struct Found {
+struct GalerkinRun {
     /// Displacements of all contact rows at communication points (m).
     displacements: Vec<f64>,
     impulse: f64,
@@ -55,7 +55,7 @@ struct Found {
     steps: u64,
 }
 
-fn run(scene: &Scene, drive: impl Fn(&mut Simulation, f64)) -> Found {
+fn run(scene: &Scene, drive: impl Fn(&mut Simulation, f64)) -> GalerkinRun {
     let mut simulation = started(scene);
     let (mut impulse, mut by_torque, mut lowest) = (0.0, 0.0, f64::INFINITY);
     let mut displacements = Vec::new();
@@ -77,7 +77,7 @@ fn run(scene: &Scene, drive: impl Fn(&mut Simulation, f64)) -> Found {
     let (kinetic, strain) = simulation.system().energies();
     let steps = simulation.system().effort().steps / SECTORS as u64;
     let residual = ledger.residual(kinetic + strain).abs() / ledger.scale();
-    Found { displacements, impulse, by_torque, shaft: ledger.shaft_work.value(), residual, lowest, steps }
+    GalerkinRun { displacements, impulse, by_torque, shaft: ledger.shaft_work.value(), residual, lowest, steps }
 }
 
 fn still(_: &mut Simulation, _: f64) {}
@@ -113,11 +113,11 @@ fn it_is_what_massless_boundary_tends_to_and_errors_are_those_asked_for() {
 }
 
 /// What the scheme may be combined with: a change of the scene, and what the importer sets on the way.
-type Change = fn(&mut Scene);
+type Combination = fn(&mut Scene);
 
-type Feature = (&'static str, f64, Change, fn(&mut Simulation, f64));
+type CombinedFeature = (&'static str, f64, Combination, fn(&mut Simulation, f64));
 
-const FEATURES: [Feature; 8] = [
+const FEATURES: [CombinedFeature; 8] = [
     ("flexible casing", 1e-3, flexible, still),
     (
         "flexible casing under a load that turns",
@@ -195,7 +195,7 @@ fn every_combination_keeps_its_books_and_agrees_with_massless_boundary() {
 #[test]
 fn a_disk_of_coupled_sectors_is_what_it_is_as_one_structure() {
     for (sectors, nodes, friction) in [(5, 2, 0.0), (6, 1, 0.15)] {
-        let disk = Disk::random(sectors, nodes, 3 * nodes + 5, 0.25, 3);
+        let disk = TestDisk::random(sectors, nodes, 3 * nodes + 5, 0.25, 3);
         let of = |rom: Rom, tolerance: f64| {
             let mut scene = bumps(rom);
             scene.settings.contacts[0].friction = friction;
@@ -302,7 +302,7 @@ fn sectors_that_step_together_keep_the_bound_on_steps() {
 
 #[test]
 fn what_is_not_sound_is_refused_by_name() {
-    let cases: [(&str, Change); 3] = [
+    let cases: [(&str, Combination); 3] = [
         ("coating", tiprub_test_models::coating),
         ("more than three modes", |scene| scene.roms[0] = blade(SECTORS)),
         ("clearance above 0", |scene| scene.settings.contacts[0].gap = 0.0),
@@ -320,7 +320,7 @@ fn a_saved_state_goes_on_with_the_same_bits_and_no_step_asks_for_memory() {
     let alone = scene(Scheme::Galerkin, H, 1e-4);
     let (mut carried, mut coupled) = (alone.clone(), alone.clone());
     flexible(&mut carried);
-    coupled.roms[0] = Disk::random(SECTORS, 1, 9, 0.25, 3).cyclic();
+    coupled.roms[0] = TestDisk::random(SECTORS, 1, 9, 0.25, 3).cyclic();
     [alone, carried, coupled].iter().for_each(goes_on_with_the_same_bits);
 }
 

@@ -1,17 +1,17 @@
 //! Contacts that may stick, by a tolerance, on whole scenes: blades by themselves, in elastic casings, coupled.
 
-use super::{Change, H, apart, disk_displacements, goes_on_with_the_same_bits, run, scene, scene_time, still};
+use super::{Combination, H, apart, disk_displacements, goes_on_with_the_same_bits, run, scene, scene_time, still};
 use crate::guide::{self, told};
 use tiprub_core::settings::{Scheme, Shape, Solver, TimeSettings};
 use tiprub_core::{Rom, Scene};
-use tiprub_test_models::disk::Disk;
+use tiprub_test_models::disk::TestDisk;
 use tiprub_test_models::{GAP, RADIUS, bumps, flexible, go, modal, node, real, started};
 
 /// The solver that knows sticking, on a rub where all slides: it tends to what massless-boundary tends to with it, and errors are those
 /// asked for.
 #[test]
 fn errors_of_friction_that_may_stick_are_those_asked_for() {
-    for (name, change) in [("rigid", (|_: &mut Scene| {}) as Change), ("flexible", flexible)] {
+    for (name, change) in [("rigid", (|_: &mut Scene| {}) as Combination), ("flexible", flexible)] {
         let of = |scheme: Scheme, step: f64, tolerance: f64| {
             let mut scene = scene(scheme, step, tolerance);
             change(&mut scene);
@@ -38,7 +38,7 @@ fn errors_of_friction_that_may_stick_are_those_asked_for() {
 /// Sectors that step together are what they are as one structure, where they slide and where they are slow enough to stick.
 #[test]
 fn coupled_sectors_stick_as_one_structure_does() {
-    let disk = Disk::random(6, 1, 8, 0.25, 3);
+    let disk = TestDisk::random(6, 1, 8, 0.25, 3);
     for speed in [1300.0, 300.0] {
         let of = |rom: Rom, tolerance: f64| {
             let mut scene = bumps(rom);
@@ -64,7 +64,7 @@ fn what_sticks_is_saved_and_asks_for_no_memory() {
     alone.settings.contacts[0].solver = Solver::Coulomb;
     let (mut carried, mut coupled) = (alone.clone(), alone.clone());
     flexible(&mut carried);
-    coupled.roms[0] = Disk::random(4, 1, 9, 0.25, 3).cyclic();
+    coupled.roms[0] = TestDisk::random(4, 1, 9, 0.25, 3).cyclic();
     [alone, carried, coupled].iter().for_each(goes_on_with_the_same_bits);
 }
 

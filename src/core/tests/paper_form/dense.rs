@@ -2,19 +2,19 @@
 
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::gaps::{Drive, FixedGap, GapLaw, dot};
+use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion, dot};
 use tiprub_core::rom::Rom;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_reference::paper::DenseFilm;
-use tiprub_test_models::{Random, node, structure};
+use tiprub_test_models::{SeededRandom, node, structure};
 
 const CONTACTS: usize = 3;
 const ORDER: usize = 14;
 const FRICTION: f64 = 0.3;
 const DAMPING: f64 = 0.02;
 
-fn rom(numbers: &mut Random) -> Rom {
+fn rom(numbers: &mut SeededRandom) -> Rom {
     let [a, b] = [(); 2].map(|()| numbers.matrix(ORDER, ORDER));
     let mass = &a * a.transpose() * 0.1 + DMatrix::identity(ORDER, ORDER);
     let stiffness = (&b * b.transpose() + DMatrix::identity(ORDER, ORDER) * 0.3) * 1e6;
@@ -27,7 +27,7 @@ fn rom(numbers: &mut Random) -> Rom {
 
 #[test]
 fn a_thousand_contact_steps_agree_to_rounding() {
-    let mut numbers = Random(2010);
+    let mut numbers = SeededRandom(2010);
     let rom = rom(&mut numbers);
     let model = ModalModel::from_rom(&rom, DAMPING).unwrap();
     let step = 0.2 / model.largest_frequency();
@@ -46,7 +46,7 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     for mode in 0..ORDER {
         system.bank_mut().set_modal_state(mode, 0, modal[mode], 0.0);
     }
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     let physical = |system: &System, before: bool| {
         let coordinates = DVector::from_fn(ORDER, |mode, _| {
             let (position, increment) = system.bank().modal_state(mode, 0);
@@ -76,7 +76,7 @@ fn a_thousand_contact_steps_agree_to_rounding() {
     let gaps = DVector::from_row_slice(&gaps);
     let (mut contact_steps, mut steps, mut worst, mut scale) = (0, 0, 0.0_f64, 0.0_f64);
     while contact_steps < 1000 {
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
         let multipliers = paper.step(&normal, &slip, &gaps);
         let ours = physical(&system, false);
         worst = worst.max((&ours - &paper.now).amax());

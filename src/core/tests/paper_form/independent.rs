@@ -31,13 +31,13 @@ fn basis(x: f64) -> [f64; 2] {
 }
 
 /// Surface over a grid: control points = interpolation · data points.
-struct Surface {
+struct PaperSurface {
     around: usize,
     along: usize,
     interpolation: DMatrix<f64>,
 }
 
-impl Surface {
+impl PaperSurface {
     fn new(around: usize, along: usize) -> Self {
         let ring = DMatrix::from_fn(around, around, |i, j| match (i + around - j) % around {
             0 => 4.0 / 6.0,
@@ -101,7 +101,7 @@ fn recurrence(frequency: f64, ratio: f64) -> [f64; 3] {
     [a, b, (1.0 - a + b) / (frequency * frequency)]
 }
 
-struct Body {
+struct PaperBody {
     rom: Rom,
     coefficients: Vec<[f64; 3]>,
     now: DVector<f64>,
@@ -109,7 +109,7 @@ struct Body {
     load: DVector<f64>,
 }
 
-impl Body {
+impl PaperBody {
     fn new(rom: &Rom, factor: f64, ratio: f64, load: DVector<f64>) -> Self {
         let frequency = |mode: usize| factor * rom.stiffness[(mode, mode)].sqrt();
         let rest = DVector::from_fn(rom.order(), |mode, _| load[mode] / frequency(mode).powi(2));
@@ -143,12 +143,12 @@ fn fixed_modes(rom: &Rom, node: usize, angle: f64) -> DMatrix<f64> {
 }
 
 struct Second {
-    surface: Surface,
+    surface: PaperSurface,
     data: Vec<Vector3<f64>>,
-    casing: Body,
+    casing: PaperBody,
     /// Modes of every data point along fixed directions.
     seen: Vec<DMatrix<f64>>,
-    blades: Vec<Body>,
+    blades: Vec<PaperBody>,
     places: Vec<[f64; 2]>,
     multipliers: Vec<f64>,
     gaps: Vec<f64>,
@@ -156,7 +156,7 @@ struct Second {
 
 /// Per contact node: modes of blade and casing at it, normal, force per multiplier.
 #[derive(Default)]
-struct Met {
+struct PaperContact {
     blade_rows: Vec<DMatrix<f64>>,
     casing_rows: Vec<DMatrix<f64>>,
     normals: Vec<Vector3<f64>>,
@@ -169,15 +169,15 @@ impl Second {
         let nodes = &ring.contact_nodes;
         let none = DVector::zeros(rotor.order());
         Self {
-            surface: Surface::new(36, 3),
+            surface: PaperSurface::new(36, 3),
             // The tip contour of the synthetic blade is straight, at 0.25 m.
             data: nodes
                 .iter()
                 .map(|n| (0.25 + GAP) * directions(n.position[1])[0] + Vector3::z() * n.position[2])
                 .collect(),
-            casing: Body::new(ring, 1.0, 0.01, load.clone()),
+            casing: PaperBody::new(ring, 1.0, 0.01, load.clone()),
             seen: (0..nodes.len()).map(|node| fixed_modes(ring, node, nodes[node].position[1])).collect(),
-            blades: factors.iter().map(|factor| Body::new(rotor, *factor, 0.005, none.clone())).collect(),
+            blades: factors.iter().map(|factor| PaperBody::new(rotor, *factor, 0.005, none.clone())).collect(),
             places: vec![[f64::NAN, 1.0]; 3 * SECTORS],
             multipliers: vec![0.0; 3 * SECTORS],
             gaps: vec![0.0; 3 * SECTORS],
@@ -222,9 +222,9 @@ impl Second {
     }
 
     /// Gaps of the predicted places at the given angle, and what the forces on them act on.
-    fn meet(&mut self, angle: f64, closing: f64, shaft: Vector3<f64>, friction: f64) -> Met {
+    fn meet(&mut self, angle: f64, closing: f64, shaft: Vector3<f64>, friction: f64) -> PaperContact {
         let points = self.points();
-        let mut met = Met::default();
+        let mut met = PaperContact::default();
         for sector in 0..SECTORS {
             for node in 0..3 {
                 let contact = &self.blades[sector].rom.contact_nodes[node];
@@ -278,12 +278,13 @@ impl Second {
     /// One step to the given angle; `shaft` is the displacement of its centre, `closing` reduces the casing's radius.
     fn step(&mut self, angle: f64, closing: f64, shaft: Vector3<f64>, friction: f64) {
         self.casing.predict();
-        self.blades.iter_mut().for_each(Body::predict);
-        let Met { blade_rows, casing_rows, normals, forces } = self.meet(angle, closing, shaft, friction);
+        self.blades.iter_mut().for_each(PaperBody::predict);
+        let PaperContact { blade_rows, casing_rows, normals, forces } = self.meet(angle, closing, shaft, friction);
         let size = 3 * SECTORS;
         let project =
             |rows: &DMatrix<f64>, v: &Vector3<f64>| rows.transpose() * DVector::from_column_slice(v.as_slice());
-        let (soft, ring) = (self.blades.iter().map(Body::compliance).collect::<Vec<_>>(), self.casing.compliance());
+        let (soft, ring) =
+            (self.blades.iter().map(PaperBody::compliance).collect::<Vec<_>>(), self.casing.compliance());
         let delassus = DMatrix::from_fn(size, size, |i, j| {
             let casing =
                 project(&casing_rows[i], &normals[i]).dot(&project(&casing_rows[j], &forces[j]).component_mul(&ring));

@@ -31,7 +31,7 @@ pub fn energy(simulation: &Simulation) -> f64 {
 
 /// A blade of contact nodes whose shapes are random, but for a mode that takes all of them out of the casing.
 pub fn crowded(nodes: usize, modes: usize, seed: u64) -> Scene {
-    let mut random = models::Random(seed);
+    let mut random = models::SeededRandom(seed);
     let shapes = random.matrix(3 * nodes, modes);
     let shape =
         |row: usize, mode: usize| if mode == 0 && row.is_multiple_of(3) { -1.0 } else { 3.0 * shapes[(row, mode)] };

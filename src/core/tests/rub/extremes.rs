@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use tiprub_core::settings::{LoadSettings, Scheme, Shape, SplineSettings};
-use tiprub_core::variables::{Causality, Kind, Variability};
+use tiprub_core::variables::{Causality, DataType, Variability};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, disk, go, lattice, real, reference, started};
 
@@ -208,7 +208,7 @@ fn kinds() -> Vec<Scene> {
     let mut scene = models::rub(3);
     models::coating(&mut scene);
     scenes.push(scene);
-    scenes.push(disk::with_rotor(disk::Disk::random(6, 2, 5, 0.2, 7).cyclic()));
+    scenes.push(disk::with_rotor(disk::TestDisk::random(6, 2, 5, 0.2, 7).cyclic()));
     scenes.push(lattice::squeezed_by(-1e-3, [-10.0, 1.0, 0.0]));
     scenes
 }
@@ -217,7 +217,7 @@ fn kinds() -> Vec<Scene> {
 fn unbounded(simulation: &Simulation) -> Vec<String> {
     let outputs = simulation.table().variables().iter().filter(|row| row.causality == Causality::Output);
     let mut found = Vec::new();
-    for row in outputs.filter(|row| row.kind == Kind::Real) {
+    for row in outputs.filter(|row| row.kind == DataType::Real) {
         for (element, reference) in (0..row.len()).zip(row.reference..) {
             let continuous = row.variability == Variability::Continuous;
             let derivative = if continuous { simulation.output_derivative(reference, 1).unwrap_or(0.0) } else { 0.0 };

@@ -1,6 +1,6 @@
 //! Inputs between communication points: nothing that moves or loads something jumps, unless the scene asks for it.
 
-use tiprub_core::settings::{InputInterpolation, LoadSettings, Motion, Shape, StructureSettings};
+use tiprub_core::settings::{BodyMotion, InputInterpolation, LoadSettings, Shape, StructureSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{self as models, go, real, reference, saved, set, slope, started, started_at};
 
@@ -54,7 +54,7 @@ fn rich() -> Scene {
     scene.settings.structures.push(StructureSettings {
         name: "ring".into(),
         rom: "ring.safetensors".into(),
-        motion: Motion::Still,
+        motion: BodyMotion::Still,
         damping_ratio: Some(0.03),
         thermal: true,
         load: Some(LoadSettings { order: 2, amplitude: 100.0, phase: 0.1 }),

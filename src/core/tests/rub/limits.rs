@@ -179,7 +179,7 @@ fn fast_rotors_with_the_stiffness_of_rest_are_warned_of() {
     assert!(remedy(&scene).is_some(), "growth alone leaves the stiffness of rest");
     scene.settings.structures[0].spin.stiffening = true;
     assert_eq!(remedy(&scene), None);
-    let mut coupled = disk::with_rotor(disk::Disk::random(4, 2, 6, 0.3, 5).cyclic());
+    let mut coupled = disk::with_rotor(disk::TestDisk::random(4, 2, 6, 0.3, 5).cyclic());
     coupled.settings.structures[0].speed = 2e3;
     assert!(remedy(&coupled).unwrap().starts_with("Coupled sectors"));
 }
@@ -432,7 +432,7 @@ fn massless_boundary_tells_how_many_blades_may_press_at_once() {
 /// Of coupled sectors the sense of the start alone is looked at: the other takes as long again.
 #[test]
 fn the_other_sense_of_a_disk_is_told_to_be_unknown() {
-    let mut simulation = models::started(&disk::with_rotor(disk::Disk::random(6, 1, 9, 0.25, 6).cyclic()));
+    let mut simulation = models::started(&disk::with_rotor(disk::TestDisk::random(6, 1, 9, 0.25, 6).cyclic()));
     assert!(simulation.if_reversed().is_empty(), "{:?}", simulation.if_reversed());
     for (speed, expected) in [(1300.0, 0), (-1300.0, 1), (1300.0, 0), (-1300.0, 0)] {
         set(&mut simulation, "speed", speed);

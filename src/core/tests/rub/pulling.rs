@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use tiprub_core::dynamics::modal::ModalModel;
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 use tiprub_core::settings::{Preset, Scheme, Solver};
 use tiprub_core::{Result, Scene, Simulation, Warning};
 use tiprub_test_models::{self as models, reference, saved, set, try_started};
@@ -24,7 +24,7 @@ fn scene(coupling: f64, whole: bool, scheme: Scheme, product: f64) -> Scene {
     let map = DMatrix::from_fn(6, 2, |row, column| f64::from(u8::from(row == 3 * column)));
     let place = |name: &str, axial: f64| models::node(name, [models::RADIUS, 0.0, axial], 0.0);
     let mut rom = models::structure("pair", mass, stiffness, map, vec![place("front", 0.0), place("rear", 0.01)]);
-    (rom.frame, rom.sectors, rom.damping_ratio) = (Frame::Cylindrical, 2, 0.3);
+    (rom.frame, rom.sectors, rom.damping_ratio) = (DisplacementFrame::Cylindrical, 2, 0.3);
     let fastest = ModalModel::from_rom(&rom, 0.3).unwrap().largest_frequency();
     let mut scene = models::round(rom);
     scene.settings.contacts[0].solver = Solver::Film;

@@ -19,7 +19,7 @@ fn scenes() -> Vec<(&'static str, Scene)> {
         change(&mut scene);
         scene
     };
-    let disk = disk::Disk::random(6, 2, 9, 0.25, 5).cyclic();
+    let disk = disk::TestDisk::random(6, 2, 9, 0.25, 5).cyclic();
     let mut coupled = disk::with_rotor(disk);
     flexible(&mut coupled);
     coupled.settings.contacts[0].solver = Solver::Coulomb;
@@ -316,7 +316,7 @@ fn a_thousand_resets_give_identical_bits() {
 fn adaptive_steps_continue_from_states_with_the_same_bits() {
     const LENGTH: f64 = 2e-5;
     let side = 0.5 * lattice::SIDE;
-    let plates = [(lattice::Side::Left, side + 2e-5), (lattice::Side::Right, side + 4e-5)];
+    let plates = [(lattice::BlockSide::Left, side + 2e-5), (lattice::BlockSide::Right, side + 4e-5)];
     let mut scene = lattice::scene(lattice::faces([0.0, 0.01, 0.0]), &plates, true, [-6.0, 1.0, 2.0]);
     scene = lattice::with(scene, 0.2, Solver::Coulomb, Scheme::Galerkin);
     scene.settings.time.step = LENGTH;
@@ -345,7 +345,7 @@ fn the_ledger_of_a_free_body_closes_from_the_first_step_on() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
         for share in [1.0, 0.6, 0.41] {
             let side = 0.5 * lattice::SIDE;
-            let plates = [(lattice::Side::Left, side + 1e-6)];
+            let plates = [(lattice::BlockSide::Left, side + 1e-6)];
             let mut scene = lattice::scene(lattice::faces([0.0, 0.0, 0.0]), &plates, false, [-8.0, 1.0, 0.5]);
             scene = lattice::with(scene, 0.2, Solver::Lcp, scheme);
             scene.settings.outputs.energies = true;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::guide;
 use crate::guide::told;
 use tiprub_core::settings::{LoadSettings, Scheme, Solver, SplineSettings, TimeSettings};
-use tiprub_core::variables::{Causality, Kind, Variability};
+use tiprub_core::variables::{Causality, DataType, Variability};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, bits, coating, disk, flexible, go, real, reference, saved, set};
 
@@ -25,7 +25,7 @@ fn references(simulation: &Simulation, causality: Causality) -> Vec<u32> {
     let continuous = |row: &&tiprub_core::variables::Variable| {
         row.name != "energy_residual_relative"
             && row.causality == causality
-            && row.kind == Kind::Real
+            && row.kind == DataType::Real
             && row.variability == Variability::Continuous
     };
     let rows = simulation.table().variables().iter().filter(continuous);
@@ -49,7 +49,7 @@ fn scenes() -> Vec<(&'static str, Scene)> {
     galerkin(&mut alone);
     let mut shared = rotor(flexible);
     galerkin(&mut shared);
-    let mut coupled = disk::with_rotor(disk::Disk::random(6, 2, 9, 0.25, 5).cyclic());
+    let mut coupled = disk::with_rotor(disk::TestDisk::random(6, 2, 9, 0.25, 5).cyclic());
     coupled.settings.structures[0].whirl = true;
     vec![
         ("galerkin", alone),

@@ -1,8 +1,8 @@
 //! Forces, moments and work agree: the normal is the gradient of the gap, the torque is conjugate to the rotor angle, every
 //! input has its work, and what acts on the master acts on the slave.
 
-use tiprub_core::gaps::wrench::{At, Motion};
-use tiprub_core::gaps::{Drive, GapLaw};
+use tiprub_core::gaps::wrench::{At, MotionIncrement};
+use tiprub_core::gaps::{GapLaw, PrescribedMotion};
 use tiprub_core::settings::{PatchSettings, Scheme, Shape, Solver, SplineSettings};
 use tiprub_core::{Scene, Simulation};
 use tiprub_test_models::{self as models, coating, disk, flexible, real, started};
@@ -42,7 +42,7 @@ const FEATURES: [Feature; 8] = [
         whirl(scene);
     }),
     ("disk, whirl", |scene| {
-        scene.roms[0] = disk::Disk::random(12, 3, 12, 0.1, 7).cyclic();
+        scene.roms[0] = disk::TestDisk::random(12, 3, 12, 0.1, 7).cyclic();
         whirl(scene);
     }),
 ];
@@ -106,7 +106,7 @@ fn whirl_turns_the_shaft_and_its_work_is_one_of_all_inputs() {
 fn looked(
     law: &mut GapLaw,
     lanes: usize,
-    drive: &Drive,
+    drive: &PrescribedMotion,
     displacement: &[f64],
 ) -> (f64, [f64; 3], Vec<tiprub_core::gaps::surface_spline::ClosestPoint>) {
     let mut geometry = law.geometry(lanes);
@@ -123,16 +123,16 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         let (mut law, lanes) = (simulation.system().pairs()[0].gap().clone(), simulation.system().bank().lanes());
         let mut displacement = vec![0.0; 9 * lanes];
         (displacement[0], displacement[lanes], displacement[2 * lanes]) = (8e-4, -1.2e-3, 5e-4);
-        let drive = Drive {
+        let drive = PrescribedMotion {
             rotor_angle: 1.4,
             shape_factor: 1.3,
             shape_rotation: 0.05,
             shaft: [4e-4, -3e-4, 2e-4],
-            ..Drive::default()
+            ..PrescribedMotion::default()
         };
         // A gap of zero: there the length of the gradient does not matter.
         let (gap, normal, _) = looked(&mut law, lanes, &drive, &displacement);
-        let drive = Drive { radius_change: gap / normal[0], ..drive };
+        let drive = PrescribedMotion { radius_change: gap / normal[0], ..drive };
         let (gap, normal, places) = looked(&mut law, lanes, &drive, &displacement);
         let at = At { node: 0, index: 0, drive: &drive };
         let moved = [0, 1, 2].map(|component| displacement[component * lanes]);
@@ -140,7 +140,7 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         // Any force: its work on a shaft that moves is the same in both coordinates.
         let (force, shaft) = ([0.3, -0.7, 0.4], [2e-4, 5e-4, -3e-4]);
         let work = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let own = law.shaft_motion(at, point, &Motion { shaft, ..Motion::default() });
+        let own = law.shaft_motion(at, point, &MotionIncrement { shaft, ..MotionIncrement::default() });
         let acting = law.wrench(at, point, force);
         let (own, fixed) = (work(force, own), work(acting.force, shaft));
         assert!((own / fixed - 1.0).abs() < 1e-12, "{}: {own:e} {fixed:e}", feature.0);
@@ -150,17 +150,17 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
             assert!((told - found).abs() < 1e-12, "{}: {:?}, {found}", feature.0, acting.moment);
         }
         let wrench = law.wrench(at, point, normal);
-        let surface = |motion: Motion| {
+        let surface = |motion: MotionIncrement| {
             -law.surface_motion(at, point, normal, places.get(at.index).copied().unwrap_or_default(), &motion)
         };
         let [opening, factor, rotation] = [
-            Motion { opening: 1.0, ..Motion::default() },
-            Motion { shape_factor: 1.0, ..Motion::default() },
-            Motion { shape_rotation: 1.0, ..Motion::default() },
+            MotionIncrement { opening: 1.0, ..MotionIncrement::default() },
+            MotionIncrement { shape_factor: 1.0, ..MotionIncrement::default() },
+            MotionIncrement { shape_rotation: 1.0, ..MotionIncrement::default() },
         ]
         .map(surface);
         let size = 1e-7;
-        let mut check = |what: &str, told: f64, change: &dyn Fn(f64, &mut Drive, &mut [f64])| {
+        let mut check = |what: &str, told: f64, change: &dyn Fn(f64, &mut PrescribedMotion, &mut [f64])| {
             let ends = [size, -size].map(|by| {
                 let (mut drive, mut displacement) = (drive, displacement.clone());
                 change(by, &mut drive, &mut displacement);
@@ -171,9 +171,9 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
             assert!((found - told).abs() < 1e-6, "{}, {what}: {found} told {told}", feature.0);
         };
         for component in 0..3 {
-            let change = |by, _: &mut Drive, moved: &mut [f64]| moved[component * lanes] += by;
+            let change = |by, _: &mut PrescribedMotion, moved: &mut [f64]| moved[component * lanes] += by;
             check("displacement", normal[component], &change);
-            let change = |by, drive: &mut Drive, _: &mut [f64]| drive.shaft[component] += by;
+            let change = |by, drive: &mut PrescribedMotion, _: &mut [f64]| drive.shaft[component] += by;
             check("shaft", wrench.force[component], &change);
         }
         check("rotor angle", wrench.moment[2], &|by, drive, _| drive.rotor_angle += by);

@@ -2,18 +2,18 @@
 
 #![allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
-use crate::casings::{Random, assert_below, distance};
+use crate::casings::{SeededRandom, assert_below, distance};
 use tiprub_core::gaps::dot;
 use tiprub_core::gaps::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use tiprub_core::settings::Interpolation;
-use tiprub_reference::surface::{Surface, SurfaceKind};
+use tiprub_reference::surface::{SplineSurface, SurfaceKind};
 
 const KINDS: [Interpolation; 2] = [Interpolation::Spline, Interpolation::Facets];
 const GRIDS: [(usize, usize); 6] = [(2, 2), (2, 5), (3, 3), (4, 2), (9, 41), (12, 7)];
 
 /// A bent and twisted sheet with random dents, far from the origin.
 fn sheet(around: usize, along: usize) -> Vec<[f64; 3]> {
-    let mut random = Random(5 + (around * along) as u64);
+    let mut random = SeededRandom(5 + (around * along) as u64);
     let share = |index: usize, count: usize| index as f64 / (count - 1) as f64 - 0.5;
     (0..around * along)
         .map(|index| {
@@ -51,7 +51,7 @@ fn data_points_are_interpolated_and_forces_go_back_with_the_same_work() {
             for (index, point) in points.iter().enumerate() {
                 off = off.max(distance(surface.evaluate(at(index, around, along)).point, *point));
             }
-            let mut random = Random(3);
+            let mut random = SeededRandom(3);
             for _ in 0..200 {
                 let place = place(random.below(around - 1), random.below(along - 1), random.unit(), random.unit());
                 let weights = surface.weights(place);
@@ -136,10 +136,10 @@ fn closest_points_and_gaps_are_those_of_the_reference() {
         let (around, along) = (9, 41);
         let (surface, points) = open(around, along, kind);
         // Rows of the reference are those of the core, S_s × S_t its own; its s runs from row to row.
-        let other = Surface::new(reference, along, around, 1.0);
+        let other = SplineSurface::new(reference, along, around, 1.0);
         let carriers = other.carriers(&points);
         let (mut gaps, mut normals, mut found) = (0.0_f64, 0.0_f64, 0);
-        let mut random = Random(11);
+        let mut random = SeededRandom(11);
         for _ in 0..3000 {
             let start = place(random.below(around - 1), random.below(along - 1), random.unit(), random.unit());
             let foot = surface.evaluate(start);
@@ -233,7 +233,7 @@ fn warm_starts_follow_a_node_across_the_surface_and_off_it() {
 fn surfaces_far_away_are_projected_to_as_well() {
     for kind in KINDS {
         let (surface, _) = open(9, 41, kind);
-        let mut random = Random(23);
+        let mut random = SeededRandom(23);
         let mut off = 0.0_f64;
         for _ in 0..2000 {
             let x = random.vector(30.0);

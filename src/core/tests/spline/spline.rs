@@ -12,7 +12,7 @@ use tiprub_core::settings::{Closure, Interpolation};
 
 #[test]
 fn weights_sum_to_one_and_are_the_derivative_of_the_point() {
-    let mut random = Random(1);
+    let mut random = SeededRandom(1);
     let (mut unity, mut derivative): (f64, f64) = (0.0, 0.0);
     for (surface, _) in every_surface() {
         for _ in 0..500 {
@@ -56,7 +56,7 @@ fn a_patch_is_the_matrix_form_of_equation_7() {
         let powers = [s * s * s, s * s, s, 1.0];
         [0, 1, 2, 3].map(|column| (0..4).map(|row| powers[row] * h[row][column] / 6.0).sum::<f64>())
     };
-    let mut random = Random(2);
+    let mut random = SeededRandom(2);
     let mut error: f64 = 0.0;
     for _ in 0..2000 {
         let (p, q, s, t) = (random.below(around), 1 + random.below(along - 3), random.unit(), random.unit());
@@ -190,7 +190,7 @@ fn beyond_the_edges() -> ([f64; 3], f64) {
 
 #[test]
 fn derivatives_are_those_of_the_point() {
-    let mut random = Random(3);
+    let mut random = SeededRandom(3);
     for (surface, _) in every_surface() {
         let step = 1e-3;
         let mut worst: f64 = 0.0;
@@ -234,7 +234,7 @@ fn derivatives_are_those_of_the_point() {
 
 #[test]
 fn virtual_work_is_the_same_on_the_surface_and_on_the_data() {
-    let mut random = Random(4);
+    let mut random = SeededRandom(4);
     let mut worst: f64 = 0.0;
     for (surface, _) in every_surface() {
         let count = surface.around() * surface.along();
@@ -269,7 +269,7 @@ fn virtual_work_is_the_same_on_the_surface_and_on_the_data() {
 #[test]
 fn control_points_are_linear_in_the_data() {
     for (mut surface, points) in every_surface() {
-        let mut random = Random(5);
+        let mut random = SeededRandom(5);
         let modes: Vec<Vec<[f64; 3]>> = (0..3).map(|_| points.iter().map(|_| random.vector(1e-3)).collect()).collect();
         let amplitudes = [0.7, -1.1, 0.4];
         let mut control = surface.control_points().to_vec();

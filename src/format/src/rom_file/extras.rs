@@ -3,10 +3,11 @@
 
 use nalgebra::DMatrix;
 use tiprub_core::rom::{
-    Basis, ContactGrid, ContactNode, Patch, RomExtras, STRESSES, SUPPORT_ROWS, Spin, Support, Thermal, Watched,
+    ContactGrid, ContactNode, ReductionBasis, RomExtras, STRESSES, SUPPORT_ROWS, Spin, SupportRows, Thermal,
+    ThermalPatch, WatchedPoints,
 };
 
-use super::{Array, Arrays, Metadata, Reader, WRITE_AGAIN, list, matrix, names};
+use super::{Array, Arrays, Metadata, RomReader, WRITE_AGAIN, list, matrix, names};
 use crate::rom_layout::{
     SPIN_ARRAYS, STRESS_ARRAYS, STRESS_CENTRIFUGAL, STRESS_THERMAL, SUPPORT_ARRAYS, SUPPORT_THERMAL, THERMAL_ARRAYS,
     WATCHED_ARRAYS,
@@ -20,14 +21,15 @@ const OPEN: &str = "open";
 const ROWS: &str = "contact_rows";
 
 /// Values of the metadata entry `basis`.
-const BASES: [(&str, Basis); 2] = [("craig-bampton", Basis::FixedInterface), ("free-interface", Basis::FreeInterface)];
+const BASES: [(&str, ReductionBasis); 2] =
+    [("craig-bampton", ReductionBasis::FixedInterface), ("free-interface", ReductionBasis::FreeInterface)];
 
 /// Metadata entry of the names of points with this array of positions.
 fn names_of(positions: &str) -> String {
     positions.replace("positions", "names")
 }
 
-impl Reader<'_> {
+impl RomReader<'_> {
     pub(super) fn extras(&self, arrays: &Arrays, metadata: &Metadata, order: usize) -> Result<RomExtras> {
         Ok(RomExtras {
             spin: self.spin(arrays, metadata, order)?,
@@ -54,8 +56,8 @@ impl Reader<'_> {
         }
     }
 
-    fn basis(&self, metadata: &Metadata) -> Result<Basis> {
-        let Some(text) = metadata.get("basis") else { return Ok(Basis::default()) };
+    fn basis(&self, metadata: &Metadata) -> Result<ReductionBasis> {
+        let Some(text) = metadata.get("basis") else { return Ok(ReductionBasis::default()) };
         match BASES.iter().find(|(name, _)| name == text) {
             Some((_, basis)) => Ok(*basis),
             None => {
@@ -71,7 +73,7 @@ impl Reader<'_> {
         (arrays, metadata): (&Arrays, &Metadata),
         (names, components): (&[&str; 2], usize),
         order: usize,
-    ) -> Result<Option<Watched>> {
+    ) -> Result<Option<WatchedPoints>> {
         let [map_name, positions_name] = *names;
         let entry = names_of(positions_name);
         if !self.group(arrays, names)? {
@@ -92,7 +94,7 @@ impl Reader<'_> {
         let points = names.into_iter().zip(triples);
         let points = points.map(|(name, position)| ContactNode { name, position: *position, ..ContactNode::default() });
         let map = DMatrix::from_row_slice(components * count, order, &map.values);
-        Ok(Some(Watched { map, points: points.collect() }))
+        Ok(Some(WatchedPoints { map, points: points.collect() }))
     }
 
     /// Whether the arrays of a group are there: all or none.
@@ -148,7 +150,7 @@ impl Reader<'_> {
         let reason = "coordinates as in `mass`, patches as in `thermal_patches`";
         self.shape("thermal_loads", loads, &[order, count], reason)?;
         let (places, _) = places.values.as_chunks::<4>();
-        let patch = |&[from, to, low, high]: &[f64; 4]| Patch { angle: [from, to], axial: [low, high] };
+        let patch = |&[from, to, low, high]: &[f64; 4]| ThermalPatch { angle: [from, to], axial: [low, high] };
         let loads = DMatrix::from_row_slice(order, count, &loads.values);
         Ok(Some(Thermal { loads, patches: places.iter().map(patch).collect() }))
     }
@@ -165,7 +167,7 @@ impl Reader<'_> {
         Ok(Some(DMatrix::from_row_slice(STRESSES * places, loads.unwrap_or(1), &array.values)))
     }
 
-    fn support(&self, arrays: &Arrays, order: usize) -> Result<Option<Support>> {
+    fn support(&self, arrays: &Arrays, order: usize) -> Result<Option<SupportRows>> {
         if !self.group(arrays, &SUPPORT_ARRAYS)? {
             if arrays.contains_key(SUPPORT_THERMAL) {
                 let problem = format!("given without the array `{}`", SUPPORT_ARRAYS[0]);
@@ -180,7 +182,7 @@ impl Reader<'_> {
         };
         let patches = arrays.get("thermal_patches").map_or(0, |patches| patches.shape[0]);
         let reason = "three forces and three moments, coordinates as in `mass`";
-        Ok(Some(Support {
+        Ok(Some(SupportRows {
             stiffness: rows(SUPPORT_ARRAYS[0], order, reason)?,
             mass: rows(SUPPORT_ARRAYS[1], order, reason)?,
             thermal: match arrays.get(SUPPORT_THERMAL) {
@@ -261,7 +263,7 @@ pub(super) fn metadata(extras: &RomExtras) -> Vec<(&'static str, String)> {
         ("contact_grid", format!("{around},{along}{edges}"))
     });
     let watched = extras.watched.as_ref().map(|watched| ("watched_names", names(&watched.points)));
-    let told = BASES.iter().find(|(_, basis)| *basis == extras.basis && extras.basis != Basis::default());
+    let told = BASES.iter().find(|(_, basis)| *basis == extras.basis && extras.basis != ReductionBasis::default());
     let basis = told.map(|(name, _)| ("basis", (*name).to_owned()));
     let rows = extras.rows.map(|rows| (ROWS, rows.to_string()));
     let stress = extras.stress.as_ref().map(|stress| ("stress_names", names(&stress.points)));

@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
 use tiprub_core::rom::Harmonic;
 
-use super::{Array, Arrays, Reader, WRITE_AGAIN, list};
+use super::{Array, Arrays, RomReader, WRITE_AGAIN, list};
 use crate::Result;
 use crate::rom_layout::{HARMONIC_ARRAYS, NUMBER};
 
@@ -24,7 +24,7 @@ fn array_name(kind: &str, number: usize) -> String {
     kind.replace(NUMBER, &number.to_string())
 }
 
-impl Reader<'_> {
+impl RomReader<'_> {
     /// All nodal diameters 1 ..= sectors/2, or none.
     pub(super) fn harmonics(&self, arrays: &Arrays, sectors: usize, nodes: usize) -> Result<Vec<Harmonic>> {
         let numbers: BTreeSet<usize> = arrays.keys().filter_map(|name| Some(parts(name)?.1)).collect();

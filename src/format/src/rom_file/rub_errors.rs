@@ -2,7 +2,7 @@
 
 use tiprub_core::rom::RubErrors;
 
-use super::{Metadata, Reader};
+use super::{Metadata, RomReader};
 use crate::{Result, suggestion};
 
 /// Entries of the metadata.
@@ -11,7 +11,7 @@ const FOUND_ON: &str = "rub_errors_found_on";
 /// What leaves an error.
 const DIRECTIONS: [&str; 4] = ["modes", "patches", "rows", "mesh"];
 
-impl Reader<'_> {
+impl RomReader<'_> {
     pub(super) fn rub_errors(&self, metadata: &Metadata) -> Result<Option<RubErrors>> {
         let Some(text) = metadata.get(ERRORS) else {
             if metadata.contains_key(FOUND_ON) {

@@ -15,7 +15,7 @@ pub fn scene_with_every_feature() -> SceneSettings {
         order: 7,
         mode: Some(2),
         node: Some("tip".into()),
-        direction: Some(Direction::Tangential),
+        direction: Some(ForceDirection::Tangential),
         amplitude: 1.5,
         phase: 0.3,
     });
@@ -26,7 +26,7 @@ pub fn scene_with_every_feature() -> SceneSettings {
     scene.structures.push(StructureSettings {
         name: "ring".into(),
         rom: "ring.rom.safetensors".into(),
-        motion: Motion::Still,
+        motion: BodyMotion::Still,
         thermal: true,
         load: Some(LoadSettings { order: 2, amplitude: 100.0, phase: -0.0 }),
         ..StructureSettings::default()
@@ -67,7 +67,7 @@ pub fn scene_with_a_free_master() -> SceneSettings {
     let still = |name: &str| StructureSettings {
         name: name.into(),
         rom: format!("{name}.rom.safetensors"),
-        motion: Motion::Still,
+        motion: BodyMotion::Still,
         ..StructureSettings::default()
     };
     let surface = |name: &str, structure: &str, rigid| SurfaceSettings {
@@ -83,7 +83,7 @@ pub fn scene_with_a_free_master() -> SceneSettings {
         friction: 0.15,
         ..ContactSettings::default()
     };
-    let cube = StructureSettings { motion: Motion::Free, velocity: [0.0, -100.0, 0.5], ..still("cube") };
+    let cube = StructureSettings { motion: BodyMotion::Free, velocity: [0.0, -100.0, 0.5], ..still("cube") };
     SceneSettings {
         structures: vec![cube, still("left"), still("right")],
         surfaces: vec![surface("left_side", "left", false), surface("right_side", "right", true)],

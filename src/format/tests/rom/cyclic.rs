@@ -6,7 +6,7 @@ use crate::loose::{Loose, numbers};
 use nalgebra::{Complex, DMatrix};
 use proptest::prelude::*;
 use tiprub_core::Rom;
-use tiprub_core::rom::{Frame, Harmonic, RomChecks, RomExtras};
+use tiprub_core::rom::{DisplacementFrame, Harmonic, RomChecks, RomExtras};
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
 
@@ -46,7 +46,7 @@ fn disk(seed: u64, sectors: usize, nodes: usize, order: impl Fn(usize) -> usize)
         ..RomChecks::default()
     };
     let extras = RomExtras { harmonics, ..RomExtras::default() };
-    Rom { sectors, frame: Frame::Cylindrical, damping_ratio: 0.005, checks, extras, ..rom }
+    Rom { sectors, frame: DisplacementFrame::Cylindrical, damping_ratio: 0.005, checks, extras, ..rom }
 }
 
 /// Disks of all sizes, with any orders.

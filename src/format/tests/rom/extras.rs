@@ -5,7 +5,10 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use tiprub_core::Rom;
-use tiprub_core::rom::{Basis, ContactGrid, ContactNode, Frame, Patch, RubErrors, Spin, Support, Thermal, Watched};
+use tiprub_core::rom::{
+    ContactGrid, ContactNode, DisplacementFrame, ReductionBasis, RubErrors, Spin, SupportRows, Thermal, ThermalPatch,
+    WatchedPoints,
+};
 use tiprub_format::{read_rom, write_rom};
 use tiprub_test_models::{node, structure};
 
@@ -22,7 +25,7 @@ fn ring(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
     let map = DMatrix::from_fn(3 * nodes, order, |_, _| value());
     let (mass, stiffness) = (DMatrix::identity(order, order), DMatrix::identity(order, order) * 1e6);
     let ring = structure("ring", mass, stiffness, map, contact_nodes);
-    Rom { frame: Frame::Cylindrical, damping_ratio: 0.001, origin: "by hand".into(), ..ring }
+    Rom { frame: DisplacementFrame::Cylindrical, damping_ratio: 0.001, origin: "by hand".into(), ..ring }
 }
 
 fn spin(order: usize, value: &mut dyn FnMut() -> f64) -> Spin {
@@ -43,7 +46,7 @@ fn spin(order: usize, value: &mut dyn FnMut() -> f64) -> Spin {
 fn thermal(order: usize, patches: usize, value: &mut dyn FnMut() -> f64) -> Thermal {
     let patch = |value: &mut dyn FnMut() -> f64| {
         let (angle, axial) = (value(), value());
-        Patch { angle: [angle, angle + 1.0 + value()], axial: [axial, axial + 1.0 + value().abs()] }
+        ThermalPatch { angle: [angle, angle + 1.0 + value()], axial: [axial, axial + 1.0 + value().abs()] }
     };
     Thermal {
         loads: DMatrix::from_fn(order, patches, |_, _| value()),
@@ -63,16 +66,17 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
         ..ContactNode::default()
     };
     let points: Vec<ContactNode> = ["leading_edge", "mid_chord"].into_iter().enumerate().map(point).collect();
-    rom.extras.watched = Some(Watched { map: DMatrix::from_fn(6, order, |_, _| value()), points: points.clone() });
-    rom.extras.stress = Some(Watched { map: DMatrix::from_fn(12, order, |_, _| value()), points });
+    rom.extras.watched =
+        Some(WatchedPoints { map: DMatrix::from_fn(6, order, |_, _| value()), points: points.clone() });
+    rom.extras.stress = Some(WatchedPoints { map: DMatrix::from_fn(12, order, |_, _| value()), points });
     rom.extras.stress_thermal = Some(DMatrix::from_fn(12, patches, |_, _| value()));
     rom.extras.stress_centrifugal = Some(DMatrix::from_fn(12, 1, |_, _| value()));
-    rom.extras.support = Some(Support {
+    rom.extras.support = Some(SupportRows {
         stiffness: DMatrix::from_fn(6, order, |_, _| value()),
         mass: DMatrix::from_fn(6, order, |_, _| value()),
         thermal: DMatrix::from_fn(6, patches, |_, _| value()),
     });
-    rom.extras.basis = Basis::FreeInterface;
+    rom.extras.basis = ReductionBasis::FreeInterface;
     (rom.checks.response_frequencies, rom.checks.response_deviation) = (vec![100.0, 2e3], vec![0.1, value()]);
     rom.checks.flexibility_deviation = vec![1e-9; rom.contact_nodes.len()];
     for node in &mut rom.contact_nodes {
@@ -84,7 +88,7 @@ fn complete(seed: u64, order: usize, patches: usize) -> Rom {
 /// What format 1 has no place for, left out.
 fn of_the_first_format(rom: &Rom) -> Rom {
     let mut rom = rom.clone();
-    (rom.extras.watched, rom.extras.stress, rom.extras.basis) = (None, None, Basis::default());
+    (rom.extras.watched, rom.extras.stress, rom.extras.basis) = (None, None, ReductionBasis::default());
     (rom.extras.stress_thermal, rom.extras.stress_centrifugal, rom.extras.support) = (None, None, None);
     rom.checks.response_frequencies.clear();
     rom.checks.response_deviation.clear();
@@ -242,7 +246,7 @@ fn rows_of_patches_fit_the_patches() {
 /// A rectangle of 4 x 3 nodes with free edges, in a Cartesian frame.
 fn panel(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
     let mut rom = ring(order, value);
-    rom.frame = Frame::Cartesian;
+    rom.frame = DisplacementFrame::Cartesian;
     for (index, node) in rom.contact_nodes.iter_mut().enumerate() {
         node.position = [(index % 4) as f64 * 0.01, (index / 4) as f64 * 0.02, 0.001 * value()];
     }

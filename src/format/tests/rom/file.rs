@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks};
+use tiprub_core::rom::{ContactNode, DisplacementFrame, RomChecks};
 use tiprub_format::{Error, read_rom, write_rom};
 
 use crate::cyclic::disks;
@@ -30,7 +30,7 @@ fn random_rom(seed: u64, order: usize, nodes: usize, modes: usize, text: String)
         name: "blade".into(),
         origin: text,
         sectors: 1 + order,
-        frame: if seed.is_multiple_of(2) { Frame::Cylindrical } else { Frame::Cartesian },
+        frame: if seed.is_multiple_of(2) { DisplacementFrame::Cylindrical } else { DisplacementFrame::Cartesian },
         mass: positive(seed + 1),
         stiffness: positive(seed + 2) * 1e9,
         damping_ratio: numbers(seed + 3, 1)[0].abs(),
@@ -195,7 +195,7 @@ impl ByHand {
 fn a_file_written_by_hand_needs_only_the_required_parts() {
     let rom = read_rom(&ByHand::example().bytes(), "my.rom").unwrap();
     assert_eq!((rom.name.as_str(), rom.origin.as_str(), rom.sectors), ("pendulum", "", 12));
-    assert_eq!(rom.frame, Frame::Cylindrical);
+    assert_eq!(rom.frame, DisplacementFrame::Cylindrical);
     assert_eq!(rom.stiffness, DMatrix::from_row_slice(2, 2, &[3e6, -1e6, -1e6, 4e6]));
     // Rows are (node, component), columns coordinates.
     assert_eq!(rom.contact_map, DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));

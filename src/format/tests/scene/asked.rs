@@ -127,7 +127,7 @@ fn a_structure_that_stands_still_does_not_spin() {
         move |scene: &mut SceneSettings| {
             let structure = &mut scene.structures[0];
             let name = structure.name.clone();
-            *structure = StructureSettings { name, rom: "a".into(), motion: Motion::Still, ..Default::default() };
+            *structure = StructureSettings { name, rom: "a".into(), motion: BodyMotion::Still, ..Default::default() };
             change(structure);
         }
     };
@@ -146,7 +146,7 @@ fn a_structure_that_stands_still_does_not_spin() {
 fn a_rotating_structure_carries_no_load_or_surface() {
     let rotate = |scene: &mut SceneSettings| {
         scene.surfaces[0].structure = None;
-        scene.structures[1].motion = Motion::Rotating;
+        scene.structures[1].motion = BodyMotion::Rotating;
     };
     let remedy = "set motion = \"still\"";
     refused(rotate, &["structure[2].load: needs `motion = \"still\"`", remedy]);

@@ -3,7 +3,7 @@
 use tiprub_core::Rom;
 use tiprub_core::settings::{ADAPTIVE_STEP, SceneSettings, Scheme};
 use tiprub_format::{Error, parse_scene, read_scene, write_scene};
-use tiprub_test_models::{blade, disk::Disk, rich_blade};
+use tiprub_test_models::{blade, disk::TestDisk, rich_blade};
 
 /// Without a table `[time]`.
 const SCENE: &str = r#"name = "demo"
@@ -99,7 +99,7 @@ fn the_rom_decides_too() {
     assert_eq!(choice(rich_blade(4)).0, Scheme::Galerkin);
     let (scheme, reason) = choice(blade(4));
     assert!(scheme == Scheme::ModalExact && reason.contains("more than three modes per contact node"), "{reason}");
-    let (scheme, reason) = choice(Disk::random(6, 1, 4, 0.1, 1).cyclic());
+    let (scheme, reason) = choice(TestDisk::random(6, 1, 4, 0.1, 1).cyclic());
     assert!(scheme == Scheme::ModalExact && reason.contains("the sectors of `rotor` are coupled"), "{reason}");
     // Without a step it is only known with the ROM that one is missing.
     let refusal = read_scene::<Error>(SCENE, "demo.toml", |_, _| Ok(blade(4))).unwrap_err().to_string();

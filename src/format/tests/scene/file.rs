@@ -40,7 +40,7 @@ fn refused(from: &str, to: &str, place: &str, parts: &[&str]) {
 #[test]
 fn defaults_are_as_documented() {
     let scene = parse_scene(GOOD, "demo.toml").unwrap();
-    assert_eq!(scene.structures[0].motion, Motion::Rotating);
+    assert_eq!(scene.structures[0].motion, BodyMotion::Rotating);
     assert_eq!(scene.structures[0].damping_ratio, None);
     assert_eq!(scene.contacts[0].solver, Solver::Lcp);
     assert_eq!(scene.contacts[0].meridian, Meridian::Contour);

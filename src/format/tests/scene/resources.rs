@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use tiprub_core::rom::{ContactGrid, ContactNode, Frame, Patch, RomExtras, Spin, Thermal};
-use tiprub_core::settings::{LoadSettings, Motion, SpinSettings, StructureSettings};
+use tiprub_core::rom::{ContactGrid, ContactNode, DisplacementFrame, RomExtras, Spin, Thermal, ThermalPatch};
+use tiprub_core::settings::{BodyMotion, LoadSettings, SpinSettings, StructureSettings};
 use tiprub_core::{Rom, Scene};
 use tiprub_format::{
     instantiation_token, load_resources, load_scene, read_rom, resource_files, write_rom, write_scene,
@@ -19,7 +19,7 @@ fn rom() -> Rom {
     let map = DMatrix::from_row_slice(3, 2, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
     let nodes = vec![node("leading_edge", [0.25, 0.0, 0.01], -0.1)];
     let rom = structure("blade", DMatrix::identity(2, 2), stiffness, map, nodes);
-    Rom { sectors: 2, frame: Frame::Cylindrical, damping_ratio: 0.001, ..rom }
+    Rom { sectors: 2, frame: DisplacementFrame::Cylindrical, damping_ratio: 0.001, ..rom }
 }
 
 fn scene() -> Scene {
@@ -180,13 +180,13 @@ fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
         }),
         thermal: Some(Thermal {
             loads: DMatrix::from_element(2, 1, 3.0),
-            patches: vec![Patch { angle: [0.0, 1.0], axial: [0.0, 0.01] }],
+            patches: vec![ThermalPatch { angle: [0.0, 1.0], axial: [0.0, 0.01] }],
         }),
         grid: Some(ContactGrid { around: 4, along: 2, closed: true }),
         ..RomExtras::default()
     };
     full.validate().unwrap();
-    let still = StructureSettings { name: "ring".into(), motion: Motion::Still, ..StructureSettings::default() };
+    let still = StructureSettings { name: "ring".into(), motion: BodyMotion::Still, ..StructureSettings::default() };
     scene.settings.structures.push(still);
     scene.roms = vec![full.clone(), full.clone()];
     let read = |scene: &Scene| -> Vec<Rom> {

@@ -8,7 +8,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{CasingOptions, ContactRings, Contour, Flange, RingCounts, RingGeometry, Support};
+use super::{CasingOptions, ContactRings, Flange, InnerContour, RingCounts, RingGeometry, RingSupport};
 use crate::element::ElementKind;
 use crate::material::Material;
 use crate::rotor37::{MeshCounts, TIP_GAP, blade_mesh};
@@ -35,7 +35,7 @@ impl Default for CasingOptions {
             counts: RingCounts { around: 72, through: 1, along: 12, flange: 1 },
             kind: ElementKind::Hex20,
             material: Material::steel(),
-            support: Support::Low,
+            support: RingSupport::Low,
             rings: ContactRings { around: 24, along: 3, axial: RINGS },
             patches: [12, 1],
             fixed_interface_modes: 156,
@@ -47,7 +47,7 @@ impl Default for CasingOptions {
 }
 
 /// Inner contour of casing37.
-pub fn casing37_contour() -> Contour {
+pub fn casing37_contour() -> InnerContour {
     let blade = blade_mesh(MeshCounts::default()).expect("the blade that ships has a mesh");
     let contact = blade.contact_points(3).expect("the tip has three nodes");
     let tip: Vec<[f64; 3]> = contact.iter().map(|point| blade.mesh.nodes[point.node]).collect();
@@ -64,7 +64,7 @@ pub fn casing37_contour() -> Contour {
     let mut points: Vec<[f64; 2]> = inner.map(|z| [z, radius(z)]).collect();
     points.insert(0, [AXIAL[0], radius(AXIAL[0])]);
     points.push([AXIAL[1], radius(AXIAL[1])]);
-    Contour::new(&points).expect("the tip of the blade that ships is a contour")
+    InnerContour::new(&points).expect("the tip of the blade that ships is a contour")
 }
 
 /// Natural cubic spline through `values` at the three rings, straight beyond them.

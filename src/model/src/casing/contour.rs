@@ -9,12 +9,12 @@ use crate::{Error, Result};
 
 /// The contour of an inner surface.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Contour {
+pub struct InnerContour {
     points: Vec<[f64; 2]>,
     slopes: Vec<f64>,
 }
 
-impl Contour {
+impl InnerContour {
     /// Through the points (z, r) in m, by growing z.
     ///
     /// # Errors

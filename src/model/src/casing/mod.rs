@@ -14,7 +14,7 @@ mod support;
 
 pub use casing37::{CASING37, casing37_contour};
 pub use condense::condense;
-pub use contour::Contour;
+pub use contour::InnerContour;
 pub use grid::GridNodes;
 pub use modal_form::{ModalForm, modal_form};
 pub use reduction::{CasingReductionOptions, reduce_casing};
@@ -24,13 +24,13 @@ pub use ring_mesh::{ContactRings, Flange, RingCounts, RingGeometry, RingMesh, ri
 use crate::Result;
 use crate::element::{ElementKind, Formulation};
 use crate::material::Material;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::Reduction;
 use crate::thermal::equal_patches;
 
 /// Where a ring is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Support {
+pub enum RingSupport {
     /// The end face at low z, flange included.
     Low,
     /// The end face at high z, flange included.
@@ -55,7 +55,7 @@ pub struct CasingOptions {
     /// Material.
     pub material: Material,
     /// Where it is held.
-    pub support: Support,
+    pub support: RingSupport,
     /// The contact nodes.
     pub rings: ContactRings,
     /// Thermal patches around and along; none where either is zero.
@@ -75,12 +75,12 @@ pub struct CasingOptions {
 /// # Errors
 /// [`Error::Invalid`](crate::Error::Invalid) for lengths, counts and contact rings that do not fit each other, and those of [`reduce_casing`].
 pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Reduction> {
-    report(listener, Stage::Mesh, 0, 1);
+    report(listener, ReductionStage::Mesh, 0, 1);
     let ring = supported_ring(options)?;
-    let clamped = if options.support == Support::Free { Vec::new() } else { ring.mesh.set(CLAMPED)?.to_vec() };
+    let clamped = if options.support == RingSupport::Free { Vec::new() } else { ring.mesh.set(CLAMPED)?.to_vec() };
     let [around, along] = options.patches;
     let patches = equal_patches(around, along, options.geometry.contour.axial());
-    report(listener, Stage::Mesh, 1, 1);
+    report(listener, ReductionStage::Mesh, 1, 1);
     let reduction_options = CasingReductionOptions {
         name: options.name.clone(),
         formulation: Formulation::Displacement,
@@ -105,10 +105,10 @@ pub const CLAMPED: &str = "clamped";
 pub fn supported_ring(options: &CasingOptions) -> Result<RingMesh> {
     let mut ring = ring_mesh(&options.geometry, options.counts, options.rings, options.kind)?;
     let faces: &[&str] = match options.support {
-        Support::Low => &["low_face"],
-        Support::High => &["high_face"],
-        Support::Both => &["low_face", "high_face"],
-        Support::Free => &[],
+        RingSupport::Low => &["low_face"],
+        RingSupport::High => &["high_face"],
+        RingSupport::Both => &["low_face", "high_face"],
+        RingSupport::Free => &[],
     };
     let mut clamped = Vec::new();
     for face in faces {
@@ -125,10 +125,10 @@ fn describe(options: &CasingOptions) -> String {
     let [low, high] = options.geometry.contour.axial();
     let around = if options.name == CASING37 { " around NASA rotor 37" } else { "" };
     let support = match options.support {
-        Support::Low => "held at its low end face",
-        Support::High => "held at its high end face",
-        Support::Both => "held at both end faces",
-        Support::Free => "free",
+        RingSupport::Low => "held at its low end face",
+        RingSupport::High => "held at its high end face",
+        RingSupport::Both => "held at both end faces",
+        RingSupport::Free => "free",
     };
     let millimetres = |metres: f64| 1e3 * metres;
     format!(

@@ -7,7 +7,7 @@
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Rom;
-use tiprub_core::rom::{Frame, Patch, RomChecks, RomExtras, Thermal};
+use tiprub_core::rom::{DisplacementFrame, RomChecks, RomExtras, Thermal, ThermalPatch};
 
 use super::condense::condense;
 use super::grid::GridNodes;
@@ -19,7 +19,7 @@ use crate::element::Formulation;
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::patches::PatchCoordinates;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{ContactPoint, Reduction, check_nodes, compare, element_names, full_modes};
 use crate::sparse::{principal_pair, tall_product};
 use crate::thermal::patch_loads;
@@ -60,7 +60,7 @@ pub fn reduce_casing(
     material: &Material,
     clamped: &[usize],
     grid: &GridNodes,
-    patches: &[Patch],
+    patches: &[ThermalPatch],
     options: &CasingReductionOptions,
     listener: Listener<'_>,
 ) -> Result<Reduction> {
@@ -68,11 +68,11 @@ pub fn reduce_casing(
     faer::set_global_parallelism(faer::Par::Seq);
     grid.validate()?;
     let contact = grid.contact_points();
-    check_nodes(&mesh.nodes, clamped, &contact, Frame::Cylindrical)?;
+    check_nodes(&mesh.nodes, clamped, &contact, DisplacementFrame::Cylindrical)?;
     let free = free_dofs(mesh.nodes.len(), clamped);
     // Points between nodes become degrees of freedom of their own, in the directions of the mesh.
-    let coordinates =
-        PatchCoordinates::new(&free, &mesh.nodes, &contact, Frame::Cartesian).map_err(|_| too_fine(grid))?;
+    let coordinates = PatchCoordinates::new(&free, &mesh.nodes, &contact, DisplacementFrame::Cartesian)
+        .map_err(|_| too_fine(grid))?;
     let all_loads = patch_loads(&mesh, material, patches)?;
     let loads = Mat::from_fn(free.len(), patches.len(), |i, k| all_loads[(free[i], k)]);
     let assembled = assemble_with(&mesh, material, options.formulation, listener)?;
@@ -102,15 +102,15 @@ pub fn reduce_casing(
     let modes = modal_form(&reduced.stiffness, &reduced.mass, &rigid)?;
     let reduced_loads = reduced_loads(grid, &reduced, &loads);
     let modes = condense(&modes, options.modes, &reduced_loads);
-    report(listener, Stage::Checks, 0, 1);
+    report(listener, ReductionStage::Checks, 0, 1);
     let checks = compare(&full, &mass, &reduced, &modes.squares, &modes.shapes);
-    report(listener, Stage::Checks, 1, 1);
+    report(listener, ReductionStage::Checks, 1, 1);
     let checks = if clamped.is_empty() { without_rigid_motions(checks) } else { checks };
     let rom = Rom {
         name: options.name.clone(),
         origin: origin(&mesh, (material, options.formulation), clamped.len(), grid, &reduced, &modes),
         sectors: 1,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         mass: DMatrix::identity(modes.squares.len(), modes.squares.len()),
         stiffness: DMatrix::from_diagonal(&DVector::from_column_slice(&modes.squares)),
         damping_ratio: options.damping_ratio,
@@ -199,7 +199,7 @@ fn reduced_loads(grid: &GridNodes, reduced: &CraigBampton, thermal: &Mat<f64>) -
 }
 
 /// Thermal loads on the modes; none on rigid-body motions, which strain nothing.
-fn thermal(loads: &DMatrix<f64>, patches: &[Patch], modes: &ModalForm) -> Option<Thermal> {
+fn thermal(loads: &DMatrix<f64>, patches: &[ThermalPatch], modes: &ModalForm) -> Option<Thermal> {
     if patches.is_empty() {
         return None;
     }

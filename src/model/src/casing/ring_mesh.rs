@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use tiprub_core::shown;
 
-use super::contour::Contour;
+use super::contour::InnerContour;
 use super::grid::GridNodes;
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
@@ -30,7 +30,7 @@ pub struct Flange {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RingGeometry {
     /// Inner contour over the whole length.
-    pub contour: Contour,
+    pub contour: InnerContour,
     /// Radial thickness of the shell (m).
     pub thickness: f64,
     /// Flanges at the low and the high end of z.
@@ -115,7 +115,7 @@ pub fn ring_mesh(
     geometry.validate()?;
     check_counts(counts, rings, kind)?;
     let contact = contact_positions(geometry, rings)?;
-    let lattice = Lattice::new(geometry, counts, &contact);
+    let lattice = StationGrid::new(geometry, counts, &contact);
     let mut mesh = Mesh::default();
     let mut numbers = BTreeMap::new();
     for cell in lattice.cells() {
@@ -185,7 +185,7 @@ fn contact_positions(geometry: &RingGeometry, rings: ContactRings) -> Result<Vec
 }
 
 /// The grid of stations.
-struct Lattice {
+struct StationGrid {
     /// Offsets from the inner contour (m), two per element.
     radial: Vec<f64>,
     /// Elements through the shell.
@@ -200,7 +200,7 @@ struct Lattice {
     flange_radial: [Vec<f64>; 2],
 }
 
-impl Lattice {
+impl StationGrid {
     fn new(geometry: &RingGeometry, counts: RingCounts, contact: &[f64]) -> Self {
         let [low, high] = geometry.contour.axial();
         let inner = [

@@ -2,7 +2,7 @@
 
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::rom::{SUPPORT_ROWS, Support};
+use tiprub_core::rom::{SUPPORT_ROWS, SupportRows};
 
 use super::modal_form::ModalForm;
 use crate::assembly::Assembled;
@@ -34,12 +34,12 @@ impl HeldRows {
     }
 
     /// In the coordinates of the reduced model.
-    pub(super) fn reduced(&self, reduced: &CraigBampton, modes: &ModalForm) -> Support {
+    pub(super) fn reduced(&self, reduced: &CraigBampton, modes: &ModalForm) -> SupportRows {
         let seen = |rows: &Mat<f64>| {
             let rows = tall_product(reduced.transformation.as_ref(), rows.as_ref());
             DMatrix::from_fn(SUPPORT_ROWS, rows.nrows(), |k, i| rows[(i, k)]) * &modes.shapes
         };
-        Support {
+        SupportRows {
             stiffness: seen(&self.stiffness),
             mass: seen(&self.mass),
             thermal: DMatrix::from_fn(SUPPORT_ROWS, self.thermal.nrows(), |k, patch| self.thermal[(patch, k)]),

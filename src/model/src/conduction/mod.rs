@@ -8,7 +8,9 @@
 mod reduction;
 mod surfaces;
 
-pub use reduction::{Conduction, SteadyCheck, reduce_conduction, reduce_mesh_conduction, reduce_ring_conduction};
+pub use reduction::{
+    ConductionReduction, SteadyCheck, reduce_conduction, reduce_mesh_conduction, reduce_ring_conduction,
+};
 pub use surfaces::Surfaces;
 
 use std::sync::Arc;
@@ -16,7 +18,7 @@ use std::sync::Arc;
 use faer::Mat;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use tiprub_core::rom::Patch;
+use tiprub_core::rom::ThermalPatch;
 use tiprub_core::shown;
 
 use crate::assembly::neighbours;
@@ -133,7 +135,7 @@ impl FullConduction {
     ///
     /// # Errors
     /// Options that mean nothing, an unsound mesh, patches without elements or without a heated face.
-    pub fn new(mesh: &Mesh, patches: &[Patch], options: &ConductionOptions) -> Result<Self> {
+    pub fn new(mesh: &Mesh, patches: &[ThermalPatch], options: &ConductionOptions) -> Result<Self> {
         options.validate()?;
         mesh.validate()?;
         if patches.is_empty() {
@@ -219,7 +221,7 @@ fn volumes(mesh: &Mesh, options: &ConductionOptions, pattern: &Arc<Pattern>) -> 
 }
 
 /// ∫ N dV / V of each patch; elements across its borders belong to it with the points of their mass matrix that lie in it.
-fn patch_means(mesh: &Mesh, patches: &[Patch]) -> Result<Mat<f64>> {
+fn patch_means(mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Mat<f64>> {
     let mut means = Mat::<f64>::zeros(mesh.nodes.len(), patches.len());
     let mut volumes = vec![0.0; patches.len()];
     for (number, (element, share)) in mesh.elements.iter().zip(shares_of_elements(mesh, patches)?).enumerate() {

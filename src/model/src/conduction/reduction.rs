@@ -8,15 +8,15 @@
 
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::rom::Patch;
-use tiprub_thermal::Model;
+use tiprub_core::rom::ThermalPatch;
+use tiprub_thermal::ConductionModel;
 
 use super::{ConductionOptions, FullConduction};
 use crate::casing::{CasingOptions, supported_ring};
-use crate::eigen::{Modes, lowest_modes, positive_factor};
+use crate::eigen::{EigenModes, lowest_modes, positive_factor};
 use crate::inner_surface::InnerSurface;
 use crate::mesh::Mesh;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::read::bounding_box;
 use crate::sparse::{SparseMatrix, tall_product};
 use crate::thermal::equal_patches;
@@ -46,9 +46,9 @@ pub struct SteadyCheck {
 
 /// What a reduction gives.
 #[derive(Debug, Clone)]
-pub struct Conduction {
+pub struct ConductionReduction {
     /// The model.
-    pub model: Model,
+    pub model: ConductionModel,
     /// Nodes and elements of the mesh.
     pub counts: [usize; 2],
     /// Areas in the gas, in the air, and heated (m²).
@@ -67,12 +67,12 @@ pub fn reduce_ring_conduction(
     casing: &CasingOptions,
     options: &ConductionOptions,
     listener: Listener<'_>,
-) -> Result<Conduction> {
-    report(listener, Stage::Mesh, 0, 1);
+) -> Result<ConductionReduction> {
+    report(listener, ReductionStage::Mesh, 0, 1);
     let ring = supported_ring(casing)?;
     let [around, along] = casing.patches;
     let patches = equal_patches(around, along, casing.geometry.contour.axial());
-    report(listener, Stage::Mesh, 1, 1);
+    report(listener, ReductionStage::Mesh, 1, 1);
     reduce_conduction(&ring.mesh, &patches, options, listener)
 }
 
@@ -87,7 +87,7 @@ pub fn reduce_mesh_conduction(
     [around, along]: [usize; 2],
     options: &ConductionOptions,
     listener: Listener<'_>,
-) -> Result<Conduction> {
+) -> Result<ConductionReduction> {
     let surface = InnerSurface::find(mesh, set, heated)?;
     let [low, high] = bounding_box(&mesh.nodes);
     let patches = equal_patches(around, along, [low[2], high[2]]);
@@ -99,22 +99,22 @@ pub fn reduce_mesh_conduction(
 /// Reduce the conduction of a mesh around the z axis.
 ///
 /// # Errors
-/// Those of [`FullConduction::new`], of the eigenvalue iteration, and of [`Model::validate`].
+/// Those of [`FullConduction::new`], of the eigenvalue iteration, and of [`ConductionModel::validate`].
 pub fn reduce_conduction(
     mesh: &Mesh,
-    patches: &[Patch],
+    patches: &[ThermalPatch],
     options: &ConductionOptions,
     listener: Listener<'_>,
-) -> Result<Conduction> {
+) -> Result<ConductionReduction> {
     // As for blades: the library's own threads would split sums by their number, and with it the bits of the model.
     faer::set_global_parallelism(faer::Par::Seq);
-    report(listener, Stage::Assembly, 0, 1);
+    report(listener, ReductionStage::Assembly, 0, 1);
     let full = FullConduction::new(mesh, patches, options)?;
-    report(listener, Stage::Assembly, 1, 1);
+    report(listener, ReductionStage::Assembly, 1, 1);
     let nominal = full.operator([1.0; 2]);
     let modes = slowest_modes(&full.capacity, &nominal, options.modes, listener)?;
     let basis = basis(&full, &modes, options.films)?;
-    report(listener, Stage::Checks, 0, 1);
+    report(listener, ReductionStage::Checks, 0, 1);
     let model = project(mesh, &full, &basis, (patches, options))?;
     model.validate()?;
     let mut checks = Vec::new();
@@ -124,8 +124,8 @@ pub fn reduce_conduction(
             checks.push(check(&full, &model, factors)?);
         }
     }
-    report(listener, Stage::Checks, 1, 1);
-    Ok(Conduction {
+    report(listener, ReductionStage::Checks, 1, 1);
+    Ok(ConductionReduction {
         model,
         counts: [mesh.nodes.len(), mesh.elements.len()],
         areas: full.areas,
@@ -141,9 +141,9 @@ fn slowest_modes(
     operator: &SparseMatrix,
     count: usize,
     listener: Listener<'_>,
-) -> Result<Modes> {
+) -> Result<EigenModes> {
     let held = positive_factor(operator, capacity, OPERATOR, NO_HOLD)?;
-    let found = lowest_modes(capacity, &held, 0.0, count, Stage::FullModes, listener);
+    let found = lowest_modes(capacity, &held, 0.0, count, ReductionStage::FullModes, listener);
     if !matches!(found, Err(Error::NotConverged { .. })) {
         return found;
     }
@@ -155,7 +155,7 @@ fn slowest_modes(
     let shift = BELOW * product(operator) / product(capacity);
     // Refused where that is not below the slowest rate after all.
     match operator.plus_scaled(-shift, capacity).factor(OPERATOR, NO_HOLD) {
-        Ok(near) => lowest_modes(capacity, &near, shift, count, Stage::FullModes, listener),
+        Ok(near) => lowest_modes(capacity, &near, shift, count, ReductionStage::FullModes, listener),
         Err(_) => found,
     }
 }
@@ -164,7 +164,7 @@ const OPERATOR: &str = "K + H (conduction and films)";
 const NO_HOLD: &str = "Check the mesh for parts that hang together with nothing";
 
 /// C-orthonormal vectors, the uniform temperature first; nodes × coordinates.
-fn basis(full: &FullConduction, modes: &Modes, films: [f64; 2]) -> Result<Mat<f64>> {
+fn basis(full: &FullConduction, modes: &EigenModes, films: [f64; 2]) -> Result<Mat<f64>> {
     let nodes = full.capacity.order();
     let mut vectors: Vec<Mat<f64>> = vec![Mat::from_fn(nodes, 1, |_, _| 1.0), modes.shapes.clone()];
     // With the gas standing still, air alone must carry the heat away.
@@ -217,8 +217,8 @@ fn project(
     mesh: &Mesh,
     full: &FullConduction,
     basis: &Mat<f64>,
-    (patches, options): (&[Patch], &ConductionOptions),
-) -> Result<Model> {
+    (patches, options): (&[ThermalPatch], &ConductionOptions),
+) -> Result<ConductionModel> {
     let order = basis.ncols();
     let product = |matrix: &SparseMatrix| {
         let product = tall_product(basis.as_ref(), matrix.times(basis.as_ref()).as_ref());
@@ -249,7 +249,7 @@ fn project(
     for rows in [&mut wetted_means, &mut patch_means, &mut places] {
         rows.column_mut(0).fill(1.0 / heat_capacity.sqrt());
     }
-    Ok(Model {
+    Ok(ConductionModel {
         name: options.name.clone(),
         origin: origin(mesh, full, order, options),
         heat_capacity,
@@ -286,7 +286,7 @@ fn origin(mesh: &Mesh, full: &FullConduction, order: usize, options: &Conduction
 }
 
 /// Steady states under a watt of each patch.
-fn check(full: &FullConduction, model: &Model, factors: [f64; 2]) -> Result<SteadyCheck> {
+fn check(full: &FullConduction, model: &ConductionModel, factors: [f64; 2]) -> Result<SteadyCheck> {
     let patches = full.heat.ncols();
     let exact = response(full, factors, 0.0)?;
     let exact = exact.get(.., ..patches);

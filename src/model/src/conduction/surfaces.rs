@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use faer::Mat;
-use tiprub_core::rom::Patch;
+use tiprub_core::rom::ThermalPatch;
 
 use super::add;
 use crate::element::{ElementKind, consistent_mass};
-use crate::inner_surface::{Face, outer_faces};
+use crate::inner_surface::{InnerFace, outer_faces};
 use crate::mesh::Mesh;
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, Result};
@@ -21,9 +21,9 @@ const SAME: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct Surfaces {
     /// In the gas, in the air.
-    sides: [Vec<Face>; 2],
+    sides: [Vec<InnerFace>; 2],
     /// Faces in the gas of which some is heated.
-    heated: Vec<Face>,
+    heated: Vec<InnerFace>,
     /// Axial positions between which these are heated (m).
     axial: [f64; 2],
 }
@@ -92,12 +92,12 @@ impl Surfaces {
     ///
     /// # Errors
     /// A patch without one.
-    pub(super) fn heat(&self, mesh: &Mesh, patches: &[Patch]) -> Result<Mat<f64>> {
+    pub(super) fn heat(&self, mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Mat<f64>> {
         let mut means = Mat::zeros(mesh.nodes.len(), patches.len());
         let [from, to] = self.axial;
         for (column, patch) in patches.iter().enumerate() {
             let [low, high] = patch.axial;
-            let within = Patch { angle: patch.angle, axial: [low.max(from), high.min(to)] };
+            let within = ThermalPatch { angle: patch.angle, axial: [low.max(from), high.min(to)] };
             for face in &self.heated {
                 let nodes = &mesh.elements[face.element].nodes;
                 face.integrate_within(mesh, &within, |shape, area| {
@@ -153,7 +153,7 @@ impl Surfaces {
     /// In the gas, in the air, heated (m²).
     pub(super) fn areas(&self, mesh: &Mesh) -> [f64; 3] {
         let part = all_round(self.axial);
-        let area = |faces: &[Face], part: Option<&Patch>| {
+        let area = |faces: &[InnerFace], part: Option<&ThermalPatch>| {
             let mut total = 0.0;
             for face in faces {
                 match part {
@@ -168,12 +168,12 @@ impl Surfaces {
 }
 
 /// The patch all the way round between two axial positions.
-fn all_round(axial: [f64; 2]) -> Patch {
-    Patch { angle: [0.0, TAU], axial }
+fn all_round(axial: [f64; 2]) -> ThermalPatch {
+    ThermalPatch { angle: [0.0, TAU], axial }
 }
 
 /// Add ∫ N dA of faces to columns.
-fn add_means<'a>(mesh: &Mesh, faces: impl Iterator<Item = (&'a Face, usize)>, means: &mut Mat<f64>) {
+fn add_means<'a>(mesh: &Mesh, faces: impl Iterator<Item = (&'a InnerFace, usize)>, means: &mut Mat<f64>) {
     for (face, column) in faces {
         let nodes = &mesh.elements[face.element].nodes;
         face.integrate(mesh, |shape, area| {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{CENTRE, CUBE_ELEMENTS, HALF_ARC, INNER_RADIUS, RING_ELEMENTS, SIDE, START, Side, THICKNESS, WIDTH};
+use super::{CENTRE, CUBE_ELEMENTS, HALF_ARC, INNER_RADIUS, RING_ELEMENTS, RingSide, SIDE, START, THICKNESS, WIDTH};
 use crate::Mesh;
 use crate::element::ElementKind;
 use crate::mesh::Element;
@@ -13,7 +13,7 @@ pub fn cube_mesh() -> Mesh {
 }
 
 /// The paper's ring of one side, 5 × 8 × 40 bricks; see [`ring_of`].
-pub fn ring_mesh(side: Side) -> Mesh {
+pub fn ring_mesh(side: RingSide) -> Mesh {
     ring_of(side, RING_ELEMENTS)
 }
 
@@ -74,7 +74,7 @@ fn centred(index: usize, n: usize) -> f64 {
 ///
 /// Node ((i (w + 1)) + j) (r + 1) + k with i along the arc (from y < 0 to y > 0), j along z and k along the radius.
 /// Sets: `SLAVE` (outer face; ascending numbers run through j first, then i) and `CLAMPED` (both ends).
-pub fn ring_of(side: Side, [radial, wide, arc]: [usize; 3]) -> Mesh {
+pub fn ring_of(side: RingSide, [radial, wide, arc]: [usize; 3]) -> Mesh {
     let node = |i: usize, j: usize, k: usize| (i * (wide + 1) + j) * (radial + 1) + k;
     let mut nodes = Vec::with_capacity((radial + 1) * (wide + 1) * (arc + 1));
     for i in 0..=arc {
@@ -92,7 +92,7 @@ pub fn ring_of(side: Side, [radial, wide, arc]: [usize; 3]) -> Mesh {
         for j in 0..wide {
             for k in 0..radial {
                 let mut quad = [(i, k), (i, k + 1), (i + 1, k + 1), (i + 1, k)];
-                if side == Side::Right {
+                if side == RingSide::Right {
                     quad.swap(1, 3);
                 }
                 let face = |j: usize| quad.map(|(i, k)| node(i, j, k));

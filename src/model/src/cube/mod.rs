@@ -37,14 +37,14 @@ pub const FRICTION: f64 = 0.15;
 
 /// Left (x < 0) or right (x > 0).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub enum RingSide {
     /// x < 0.
     Left,
     /// x > 0.
     Right,
 }
 
-impl Side {
+impl RingSide {
     /// Both, left first.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 

@@ -1,12 +1,12 @@
 //! The three bodies as reduced-order models.
 
-use super::{CUBE_ELEMENTS, RING_ELEMENTS, Side, cube_material, cube_of, ring_material, ring_of};
+use super::{CUBE_ELEMENTS, RING_ELEMENTS, RingSide, cube_material, cube_of, ring_material, ring_of};
 use crate::fe_model::FeModel;
 use crate::free_body::{FreeBodyOptions, reduce_free_body};
 use crate::mesh::Mesh;
 use crate::panel::{PanelGrid, PanelOptions, reduce_panel};
 use crate::patches::face_patches;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{ContactPoint, Reduction, ReductionKind};
 use crate::{Material, Result};
 
@@ -60,7 +60,7 @@ pub struct RingOptions {
     /// Name of the structure.
     pub name: String,
     /// Which ring.
-    pub side: Side,
+    pub side: RingSide,
     /// Elements along radius, width and arc.
     pub elements: [usize; 3],
     /// Mass matrix.
@@ -75,11 +75,11 @@ pub struct RingOptions {
 
 impl RingOptions {
     /// The ring of one side, as it ships.
-    pub fn new(side: Side) -> Self {
+    pub fn new(side: RingSide) -> Self {
         Self {
             name: match side {
-                Side::Left => "ring_left".into(),
-                Side::Right => "ring_right".into(),
+                RingSide::Left => "ring_left".into(),
+                RingSide::Right => "ring_right".into(),
             },
             side,
             elements: RING_ELEMENTS,
@@ -133,7 +133,7 @@ pub fn reduce_cube_ring(options: &RingOptions, listener: Listener<'_>) -> Result
 }
 
 fn model(mesh: Mesh, material: &Material, mass: MassMatrix, origin: &str, listener: Listener<'_>) -> Result<FeModel> {
-    report(listener, Stage::Mesh, 1, 1);
+    report(listener, ReductionStage::Mesh, 1, 1);
     let kind = if mass == MassMatrix::Lumped { "lumped" } else { "consistent" };
     let model = FeModel::assembled(mesh, material, format!("{origin}, {kind} mass"), listener)?;
     if mass == MassMatrix::Lumped { model.lumped() } else { Ok(model) }
@@ -169,8 +169,8 @@ fn master_patches(mesh: &Mesh, [along, across]: [usize; 2]) -> Result<Vec<Contac
 
 /// Outer nodes of a ring's mesh as a grid, rows along the arc, in growing z; the arc runs so that the normal points to the
 /// cube.
-pub fn ring_grid(side: Side, [radial, wide, arc]: [usize; 3]) -> PanelGrid {
-    let place = |i: usize| if side == Side::Left { arc - i } else { i };
+pub fn ring_grid(side: RingSide, [radial, wide, arc]: [usize; 3]) -> PanelGrid {
+    let place = |i: usize| if side == RingSide::Left { arc - i } else { i };
     let node = |i: usize, j: usize| (place(i) * (wide + 1) + j) * (radial + 1) + radial;
     PanelGrid { around: arc + 1, nodes: (0..=wide).flat_map(|j| (0..=arc).map(move |i| node(i, j))).collect() }
 }

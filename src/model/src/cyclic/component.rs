@@ -13,7 +13,7 @@ use faer::{Mat, MatRef, Par, Side, c64};
 
 use super::free_interface::{Inner, free_interface, hermitian};
 use super::lanczos::{ComplexModes, hermitian_eigen, lowest_modes};
-use super::operator::Operator;
+use super::operator::CyclicPencil;
 use crate::reduce::ReductionKind;
 use crate::{Error, Result};
 
@@ -40,7 +40,7 @@ pub(super) struct Component {
 }
 
 /// What is kept of a nodal diameter.
-pub(super) struct Kept {
+pub(super) struct ComponentModes {
     /// M̂.
     pub mass: Mat<c64>,
     /// K̂ = blkdiag(K̂_cc, Ω²).
@@ -51,7 +51,7 @@ pub(super) struct Kept {
 
 /// Quality of the lowest modes of a reduced nodal diameter.
 #[derive(Debug, Clone)]
-pub(super) struct Quality {
+pub(super) struct ModeQuality {
     /// ω², ascending.
     pub squares: Vec<f64>,
     /// Eq. 12 (%).
@@ -60,7 +60,7 @@ pub(super) struct Quality {
 
 /// Which modes are computed.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Wanted {
+pub(super) enum DiameterModes {
     Count(usize),
     /// All with ω² up to this, and the next one.
     UpTo(f64),
@@ -71,7 +71,11 @@ impl Component {
     ///
     /// # Errors
     /// Those of [`lowest_modes`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
-    pub(super) fn fixed_interface(at_rest: &Operator<'_>, full: &Operator<'_>, wanted: Wanted) -> Result<Self> {
+    pub(super) fn fixed_interface(
+        at_rest: &CyclicPencil<'_>,
+        full: &CyclicPencil<'_>,
+        wanted: DiameterModes,
+    ) -> Result<Self> {
         let parts = at_rest.parts();
         let ComplexModes { eigenvalues, shapes } = modes(at_rest, parts.order() - parts.contact, wanted)?;
         let mut stiffness = Mat::zeros(eigenvalues.len(), eigenvalues.len());
@@ -84,14 +88,18 @@ impl Component {
     ///
     /// # Errors
     /// Those of [`free_interface`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
-    pub(super) fn free_interface(at_rest: &Operator<'_>, full: &Operator<'_>, found: &ComplexModes) -> Result<Self> {
+    pub(super) fn free_interface(
+        at_rest: &CyclicPencil<'_>,
+        full: &CyclicPencil<'_>,
+        found: &ComplexModes,
+    ) -> Result<Self> {
         let constraint = at_rest.constraint_modes();
         let inner = free_interface(at_rest, full, &constraint.1, found)?;
         Self::new((at_rest, full), constraint, inner, ReductionKind::FreeInterface)
     }
 
     fn new(
-        (at_rest, full): (&Operator<'_>, &Operator<'_>),
+        (at_rest, full): (&CyclicPencil<'_>, &CyclicPencil<'_>),
         (constraint, static_stiffness): (Mat<c64>, Mat<c64>),
         basis: Inner,
         kind: ReductionKind,
@@ -121,12 +129,12 @@ impl Component {
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`] when the reduced mass is not.
-    pub(super) fn kept(&self, modes: usize) -> Result<Kept> {
+    pub(super) fn kept(&self, modes: usize) -> Result<ComponentModes> {
         let (contact, size) = (self.contact, self.contact + modes);
         let mut mass = self.mass.get(..size, ..size).to_owned();
         let mut stiffness = self.stiffness.get(..size, ..size).to_owned();
         if self.kind == ReductionKind::FixedInterface || modes == 0 {
-            return Ok(Kept { mass, stiffness, squares: self.squares[..modes].to_vec() });
+            return Ok(ComponentModes { mass, stiffness, squares: self.squares[..modes].to_vec() });
         }
         // What is left of free-interface modes is described by its own modes.
         let (squares, own) =
@@ -139,14 +147,14 @@ impl Component {
             .iter()
             .enumerate()
             .for_each(|(k, &square)| stiffness[(contact + k, contact + k)] = c64::new(square, 0.0));
-        Ok(Kept { mass, stiffness, squares })
+        Ok(ComponentModes { mass, stiffness, squares })
     }
 
     /// Modes of the reduced model with the first `modes` fixed-interface modes, the lowest `count` of them, and their residuals.
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`] when the reduced mass is not.
-    pub(super) fn quality(&self, modes: usize, count: usize) -> Result<Quality> {
+    pub(super) fn quality(&self, modes: usize, count: usize) -> Result<ModeQuality> {
         let size = self.contact + modes;
         let (mass, stiffness) = (self.mass.get(..size, ..size), self.stiffness.get(..size, ..size));
         let (squares, vectors) = dense_modes(stiffness, mass, self.real)?;
@@ -165,7 +173,7 @@ impl Component {
             (inside[k] + factor * factor * outside[k]) / strain[k] * 100.0
         };
         let residual_criterion = (0..count).map(criterion).collect();
-        Ok(Quality { squares: squares[..count].to_vec(), residual_criterion })
+        Ok(ModeQuality { squares: squares[..count].to_vec(), residual_criterion })
     }
 }
 
@@ -173,10 +181,10 @@ impl Component {
 ///
 /// # Errors
 /// Those of [`lowest_modes`].
-pub(super) fn modes(operator: &Operator<'_>, order: usize, wanted: Wanted) -> Result<ComplexModes> {
+pub(super) fn modes(operator: &CyclicPencil<'_>, order: usize, wanted: DiameterModes) -> Result<ComplexModes> {
     match wanted {
-        Wanted::Count(count) => lowest_modes(operator, order, count),
-        Wanted::UpTo(square) => {
+        DiameterModes::Count(count) => lowest_modes(operator, order, count),
+        DiameterModes::UpTo(square) => {
             let mut count = 12.min(order);
             loop {
                 let modes = lowest_modes(operator, order, count)?;

@@ -7,10 +7,10 @@
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
-use super::sector::{Parts, Sector};
+use super::sector::{DofCounts, Sector};
 use crate::Result;
 use crate::eigen::positive_factor;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::sparse::{Factor, SparseMatrix, principal_pair};
 
 /// Columns of A_IB solved together: wide enough for matrix products, narrow enough for memory.
@@ -63,7 +63,7 @@ impl<'a> Condensed<'a> {
         let mut schur = self.shifted.block(&boundary, &boundary);
         let panels: Vec<&[usize]> = boundary.chunks(PANEL).collect();
         for (wave, group) in panels.chunks(WAVE).enumerate() {
-            report(listener, Stage::ConstraintModes, wave * WAVE, panels.len());
+            report(listener, ReductionStage::ConstraintModes, wave * WAVE, panels.len());
             let parts: Vec<Mat<f64>> = group.par_iter().map(|columns| self.panel(columns)).collect();
             for (columns, part) in group.iter().zip(&parts) {
                 for (j, &column) in columns.iter().enumerate() {
@@ -73,7 +73,7 @@ impl<'a> Condensed<'a> {
                 }
             }
         }
-        report(listener, Stage::ConstraintModes, 1, 1);
+        report(listener, ReductionStage::ConstraintModes, 1, 1);
         Mat::from_fn(boundary.len(), boundary.len(), |i, j| 0.5 * (schur[(i, j)] + schur[(j, i)]))
     }
 
@@ -142,7 +142,7 @@ impl<'a> Condensed<'a> {
     }
 
     /// Numbers of dofs.
-    pub(super) fn parts(&self) -> Parts {
+    pub(super) fn parts(&self) -> DofCounts {
         self.sector.parts
     }
 }

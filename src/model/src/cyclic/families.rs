@@ -12,7 +12,7 @@
 //! when it is at least [`SMALLEST_GAP`].
 
 use super::ModeSelection;
-use super::component::Wanted;
+use super::component::DiameterModes;
 
 /// Gaps narrower than this share of their frequency tell no families apart.
 pub const SMALLEST_GAP: f64 = 0.005;
@@ -26,13 +26,13 @@ pub(super) struct Choice {
 }
 
 /// What has to be computed for a selection, of `available` modes.
-pub(super) fn wanted(selection: ModeSelection, available: usize) -> Wanted {
+pub(super) fn wanted(selection: ModeSelection, available: usize) -> DiameterModes {
     match selection {
-        ModeSelection::Families(modes) => Wanted::Count((modes + (modes / 4).max(4)).min(available)),
-        ModeSelection::Count(modes) => Wanted::Count(modes),
+        ModeSelection::Families(modes) => DiameterModes::Count((modes + (modes / 4).max(4)).min(available)),
+        ModeSelection::Count(modes) => DiameterModes::Count(modes),
         ModeSelection::UpTo(frequency) => {
             let angular = core::f64::consts::TAU * frequency;
-            Wanted::UpTo(angular * angular)
+            DiameterModes::UpTo(angular * angular)
         }
     }
 }

@@ -9,7 +9,7 @@
 use faer::{Mat, MatRef, Side, c64};
 
 use super::lanczos::ComplexModes;
-use super::operator::Operator;
+use super::operator::CyclicPencil;
 use crate::free_interface::LEAST_RESIDUAL;
 use crate::{Error, Result};
 
@@ -31,8 +31,8 @@ pub(super) struct Inner {
 /// # Errors
 /// [`Error::Invalid`] for so many modes that no residual flexibility is left.
 pub(super) fn free_interface(
-    at_rest: &Operator<'_>,
-    full: &Operator<'_>,
+    at_rest: &CyclicPencil<'_>,
+    full: &CyclicPencil<'_>,
     static_stiffness: &Mat<c64>,
     found: &ComplexModes,
 ) -> Result<Inner> {

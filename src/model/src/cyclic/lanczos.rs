@@ -9,7 +9,7 @@ use faer::linalg::solvers::Llt;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Mat, MatRef, Par, Side, c64};
 
-use super::operator::Operator;
+use super::operator::CyclicPencil;
 use crate::eigen::TOLERANCE;
 use crate::{Error, Result};
 
@@ -39,16 +39,16 @@ impl ComplexModes {
 }
 
 /// A growing M-orthonormal basis Q with M Q beside it.
-struct Basis<'a> {
-    operator: &'a Operator<'a>,
+struct LanczosBasis<'a> {
+    operator: &'a CyclicPencil<'a>,
     vectors: Mat<c64>,
     mass_vectors: Mat<c64>,
     size: usize,
     capacity: usize,
 }
 
-impl<'a> Basis<'a> {
-    fn new(operator: &'a Operator<'a>, order: usize, capacity: usize) -> Self {
+impl<'a> LanczosBasis<'a> {
+    fn new(operator: &'a CyclicPencil<'a>, order: usize, capacity: usize) -> Self {
         Self { operator, vectors: Mat::zeros(order, 0), mass_vectors: Mat::zeros(order, 0), size: 0, capacity }
     }
 
@@ -166,7 +166,7 @@ fn column_norms(block: MatRef<'_, c64>, mass_block: MatRef<'_, c64>) -> Vec<f64>
 /// # Errors
 /// [`Error::Invalid`] when more modes are asked for than there are dofs, [`Error::NotConverged`], and
 /// [`Error::NotPositiveDefinite`] for a mechanism that only round-off holds.
-pub(super) fn lowest_modes(operator: &Operator<'_>, order: usize, count: usize) -> Result<ComplexModes> {
+pub(super) fn lowest_modes(operator: &CyclicPencil<'_>, order: usize, count: usize) -> Result<ComplexModes> {
     if count > order {
         return Err(Error::invalid(
             "number of modes",
@@ -175,7 +175,7 @@ pub(super) fn lowest_modes(operator: &Operator<'_>, order: usize, count: usize) 
         ));
     }
     let capacity = (6 * count + 20 * BLOCK).min(order);
-    let mut basis = Basis::new(operator, order, capacity);
+    let mut basis = LanczosBasis::new(operator, order, capacity);
     let mut projected = Mat::<c64>::zeros(0, 0);
     let mut seed = 0;
     let mut random = |columns: usize| random_block(order, columns, operator.real, &mut seed);
@@ -212,7 +212,7 @@ pub(super) fn lowest_modes(operator: &Operator<'_>, order: usize, count: usize) 
     }
 }
 
-struct Ritz {
+struct ComplexRitz {
     values: Vec<f64>,
     vectors: Mat<c64>,
     bounds: Vec<f64>,
@@ -225,7 +225,7 @@ fn ritz_pairs(
     count: usize,
     complete: bool,
     real: bool,
-) -> Result<Ritz> {
+) -> Result<ComplexRitz> {
     let size = projected.nrows();
     let scale = projected.norm_max();
     // The block columns are filled from the left, so of a pair of entries the later column's is the complete one.
@@ -244,7 +244,7 @@ fn ritz_pairs(
     let residuals = coupling * vectors.get(size - coupling.ncols().., ..);
     let bounds =
         (0..count).map(|k| if complete { 0.0 } else { residuals.col(k).norm_l2() / values[k].abs() }).collect();
-    Ok(Ritz { values, vectors, bounds })
+    Ok(ComplexRitz { values, vectors, bounds })
 }
 
 /// Eigenvalues (ascending) and vectors of a small Hermitian matrix given by its entries; exactly real for a real one.
@@ -269,7 +269,7 @@ pub(super) fn hermitian_eigen(
 
 /// Form the residual of every pair explicitly and refuse what does not hold: of a basis that has reached its capacity the bounds know
 /// nothing. `basis` is its size.
-fn checked(operator: &Operator<'_>, thetas: &[f64], mut shapes: Mat<c64>, basis: usize) -> Result<ComplexModes> {
+fn checked(operator: &CyclicPencil<'_>, thetas: &[f64], mut shapes: Mat<c64>, basis: usize) -> Result<ComplexModes> {
     let sector = operator.condensed.sector;
     // A NaN compares as false and is refused, too.
     let supported = 1.0 / thetas[0] > MECHANISM * operator.condensed.shifted.trace() / sector.mass.trace();

@@ -8,13 +8,13 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::{Mat, MatRef, Par, Side, c64};
 
 use super::condense::Condensed;
-use super::sector::Parts;
+use super::sector::DofCounts;
 use crate::sparse::SparseMatrix;
 use crate::{Error, Result};
 
 /// The pencil of one nodal diameter.
 #[derive(Debug)]
-pub(super) struct Operator<'a> {
+pub(super) struct CyclicPencil<'a> {
     pub condensed: &'a Condensed<'a>,
     /// n.
     pub nodal_diameter: usize,
@@ -44,7 +44,7 @@ pub(super) fn phase(nodal_diameter: usize, sectors: usize) -> c64 {
     c64::new(angle.cos(), angle.sin())
 }
 
-impl<'a> Operator<'a> {
+impl<'a> CyclicPencil<'a> {
     /// Factor the boundary of nodal diameter `nodal_diameter`; with `held` for problems with held contact only.
     ///
     /// # Errors
@@ -66,7 +66,7 @@ impl<'a> Operator<'a> {
         Ok(operator)
     }
 
-    pub(super) fn parts(&self) -> Parts {
+    pub(super) fn parts(&self) -> DofCounts {
         self.condensed.parts()
     }
 
@@ -195,7 +195,7 @@ impl<'a> Operator<'a> {
 }
 
 /// S_n = WᴴSW over (face, contact).
-fn boundary_pencil(schur: &Mat<f64>, parts: Parts, phase: c64) -> Mat<c64> {
+fn boundary_pencil(schur: &Mat<f64>, parts: DofCounts, phase: c64) -> Mat<c64> {
     let (face, size) = (parts.face, parts.face + parts.contact);
     let back = phase.conj();
     Mat::from_fn(size, size, |i, j| {

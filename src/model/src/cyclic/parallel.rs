@@ -8,7 +8,7 @@ use std::time::Duration;
 use rayon::Yield;
 
 use crate::Result;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 
 /// `work` for 0 .. `count` on all threads of the pool. Each is given a function to call at the end of each of its `steps` steps.
 ///
@@ -17,7 +17,7 @@ use crate::progress::{Listener, Stage, report};
 pub(super) fn for_each<T: Send>(
     count: usize,
     steps: usize,
-    (stage, listener): (Stage, Listener<'_>),
+    (stage, listener): (ReductionStage, Listener<'_>),
     work: impl Fn(usize, &dyn Fn()) -> Result<T> + Sync,
 ) -> Result<Vec<T>> {
     let (sender, receiver) = channel();

@@ -3,20 +3,20 @@
 use faer::{Mat, MatRef, c64};
 use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, Harmonic, RomExtras};
+use tiprub_core::rom::{ContactNode, DisplacementFrame, Harmonic, RomExtras};
 
-use super::component::{self, Component, Kept, Wanted};
+use super::component::{self, Component, ComponentModes, DiameterModes};
 use super::condense::Condensed;
-use super::operator::Operator;
+use super::operator::CyclicPencil;
 use super::sector::Sector;
 use super::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, NodalDiameter};
 use super::{families, lanczos, parallel, quality};
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{ContactPoint, ReductionKind, check_nodes, interface, responses};
 use crate::{Error, FeModel, Result};
 
 /// What is found of one nodal diameter in parallel.
-struct Found {
+struct DiameterReduction {
     component: Component,
     full_squares: Vec<f64>,
     shapes: Vec<Vec<[Complex<f64>; 3]>>,
@@ -44,20 +44,20 @@ pub fn reduce_cyclic(
     faer::set_global_parallelism(faer::Par::Seq);
     check_options(contact, options)?;
     boundary.validate(model.nodes.len())?;
-    check_nodes(&model.nodes, clamped, contact, Frame::Cylindrical)?;
+    check_nodes(&model.nodes, clamped, contact, DisplacementFrame::Cylindrical)?;
     let sector = Sector::new(model, clamped, contact, boundary)?;
     let at_rest = Condensed::new(&sector, 0.0, listener)?;
     // As in `reduce`: a millionth of the order of the highest ω² lies among the lowest elastic ones.
     let shift = -1e-6 * sector.stiffness.trace() / sector.mass.trace();
     let shifted = if clamped.is_empty() { Some(Condensed::new(&sector, shift, listener)?) } else { None };
     let diameters = boundary.largest_nodal_diameter() + 1;
-    let found = parallel::for_each(diameters, 2, (Stage::FixedInterfaceModes, listener), |number, step| {
+    let found = parallel::for_each(diameters, 2, (ReductionStage::FixedInterfaceModes, listener), |number, step| {
         find(&at_rest, shifted.as_ref(), (number, boundary.sectors, model.nodes.len()), options, step)
     })?;
-    report(listener, Stage::FullModes, 1, 1);
-    report(listener, Stage::Checks, 0, 1);
+    report(listener, ReductionStage::FullModes, 1, 1);
+    report(listener, ReductionStage::Checks, 0, 1);
     let result = assembled((model, clamped.len(), contact, boundary), &sector, found, options)?;
-    report(listener, Stage::Checks, 1, 1);
+    report(listener, ReductionStage::Checks, 1, 1);
     Ok(result)
 }
 
@@ -85,37 +85,37 @@ fn find(
     (number, sectors, nodes): (usize, usize, usize),
     options: &CyclicOptions,
     step: &dyn Fn(),
-) -> Result<Found> {
+) -> Result<DiameterReduction> {
     let parts = at_rest.parts();
-    let held = Operator::new(at_rest, number, sectors, shifted.is_some())?;
-    let moving = shifted.map(|condensed| Operator::new(condensed, number, sectors, false)).transpose()?;
+    let held = CyclicPencil::new(at_rest, number, sectors, shifted.is_some())?;
+    let moving = shifted.map(|condensed| CyclicPencil::new(condensed, number, sectors, false)).transpose()?;
     let full = moving.as_ref().unwrap_or(&held);
     let checked = options.checked_modes.min(parts.order());
     let wanted = families::wanted(options.modes, parts.order() - parts.contact);
     // The first mode in any case: it tells a mechanism from a structure.
     let mut modes = match (options.kind, wanted) {
         (ReductionKind::FixedInterface, _) => lanczos::lowest_modes(full, parts.order(), checked.max(1))?,
-        (ReductionKind::FreeInterface, Wanted::Count(count)) => {
+        (ReductionKind::FreeInterface, DiameterModes::Count(count)) => {
             lanczos::lowest_modes(full, parts.order(), count.max(checked).max(1))?
         }
-        (ReductionKind::FreeInterface, Wanted::UpTo(_)) => component::modes(full, parts.order(), wanted)?,
+        (ReductionKind::FreeInterface, DiameterModes::UpTo(_)) => component::modes(full, parts.order(), wanted)?,
     };
     step();
     let component = match (options.kind, wanted) {
         (ReductionKind::FixedInterface, _) => Component::fixed_interface(&held, full, wanted)?,
-        (ReductionKind::FreeInterface, Wanted::Count(count)) => {
+        (ReductionKind::FreeInterface, DiameterModes::Count(count)) => {
             Component::free_interface(&held, full, &modes.lowest(count))?
         }
-        (ReductionKind::FreeInterface, Wanted::UpTo(_)) => Component::free_interface(&held, full, &modes)?,
+        (ReductionKind::FreeInterface, DiameterModes::UpTo(_)) => Component::free_interface(&held, full, &modes)?,
     };
     modes = modes.lowest(checked);
     let shapes = node_shapes(full, modes.shapes.as_ref(), nodes);
     step();
-    Ok(Found { component, full_squares: modes.eigenvalues, shapes })
+    Ok(DiameterReduction { component, full_squares: modes.eigenvalues, shapes })
 }
 
 /// Displacements (x, y, z) of every node of the model; zero where clamped.
-fn node_shapes(operator: &Operator<'_>, shapes: MatRef<'_, c64>, nodes: usize) -> Vec<Vec<[Complex<f64>; 3]>> {
+fn node_shapes(operator: &CyclicPencil<'_>, shapes: MatRef<'_, c64>, nodes: usize) -> Vec<Vec<[Complex<f64>; 3]>> {
     let sector = operator.condensed.sector;
     let displacements = operator.expand(shapes);
     let width = shapes.ncols();
@@ -142,7 +142,7 @@ fn node_shapes(operator: &Operator<'_>, shapes: MatRef<'_, c64>, nodes: usize) -
 fn assembled(
     (model, clamped, contact, boundary): (&FeModel, usize, &[ContactPoint], &CyclicBoundary),
     sector: &Sector,
-    found: Vec<Found>,
+    found: Vec<DiameterReduction>,
     options: &CyclicOptions,
 ) -> Result<CyclicReduction> {
     let squares: Vec<&[f64]> = found.iter().map(|one| one.component.squares.as_slice()).collect();
@@ -179,7 +179,7 @@ fn assembled(
         name: options.name.clone(),
         origin,
         sectors: boundary.sectors,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         mass: first.mass.map(|value| value.re),
         stiffness: first.stiffness.map(|value| value.re),
         damping_ratio: options.damping_ratio,
@@ -225,7 +225,7 @@ fn contact_node(model: &FeModel, point: &ContactPoint) -> ContactNode {
     ContactNode { name: point.name.clone(), position, meridional_slope, area, length }
 }
 
-fn harmonic(component: &Component, kept: &Kept) -> Harmonic {
+fn harmonic(component: &Component, kept: &ComponentModes) -> Harmonic {
     let order = kept.mass.nrows();
     // Of a real nodal diameter every imaginary part is a zero of either sign.
     let entry = |value: c64| Complex::new(value.re, if component.real { 0.0 } else { value.im });
@@ -241,7 +241,12 @@ fn hertz(square: f64) -> f64 {
     square.max(0.0).sqrt() / core::f64::consts::TAU
 }
 
-fn nodal_diameter(number: usize, found: &Found, kept: &Kept, quality: &super::component::Quality) -> NodalDiameter {
+fn nodal_diameter(
+    number: usize,
+    found: &DiameterReduction,
+    kept: &ComponentModes,
+    quality: &super::component::ModeQuality,
+) -> NodalDiameter {
     let count = found.full_squares.len().min(quality.squares.len());
     let full_frequencies: Vec<f64> = found.full_squares[..count].iter().map(|&square| hertz(square)).collect();
     let reduced_frequencies: Vec<f64> = quality.squares[..count].iter().map(|&square| hertz(square)).collect();

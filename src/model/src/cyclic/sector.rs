@@ -11,7 +11,7 @@
 use std::sync::Arc;
 
 use nalgebra::Matrix3;
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 
 use super::{CyclicBoundary, boundary::turned};
 use crate::assembly::free_dofs;
@@ -22,14 +22,14 @@ use crate::{Error, FeModel, Result};
 
 /// Numbers of dofs of the four parts of a sector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Parts {
+pub(super) struct DofCounts {
     pub interior: usize,
     /// Of one face.
     pub face: usize,
     pub contact: usize,
 }
 
-impl Parts {
+impl DofCounts {
     /// Dofs of one nodal diameter.
     pub(super) fn order(self) -> usize {
         self.interior + self.face + self.contact
@@ -39,7 +39,7 @@ impl Parts {
 /// One sector, ordered.
 #[derive(Debug)]
 pub(super) struct Sector {
-    pub parts: Parts,
+    pub parts: DofCounts,
     /// Turned stiffness, both faces.
     pub stiffness: SparseMatrix,
     /// Turned mass, with the pattern of the stiffness.
@@ -83,11 +83,11 @@ impl Sector {
             }
         }
         let free = free_dofs(count, &[]);
-        let patches = PatchCoordinates::new(&free, &model.nodes, contact, Frame::Cylindrical)?;
+        let patches = PatchCoordinates::new(&free, &model.nodes, contact, DisplacementFrame::Cylindrical)?;
         let contact = patches.as_ref().map_or(contact, PatchCoordinates::points);
         contact.iter().for_each(|point| inner[point.node] = false);
         let mut nodes: Vec<usize> = (0..count).filter(|&node| inner[node] && !held[node]).collect();
-        let parts = Parts { interior: 3 * nodes.len(), face: 3 * pairs.len(), contact: 3 * contact.len() };
+        let parts = DofCounts { interior: 3 * nodes.len(), face: 3 * pairs.len(), contact: 3 * contact.len() };
         nodes.extend(pairs.iter().map(|pair| pair[0]));
         nodes.extend(pairs.iter().map(|pair| pair[1]));
         nodes.extend(contact.iter().map(|point| point.node));
@@ -118,7 +118,7 @@ fn held_nodes(count: usize, clamped: &[usize], boundary: &CyclicBoundary) -> Vec
     held
 }
 
-fn directions(model: &FeModel, parts: Parts, nodes: &[usize], pitch: f64) -> Vec<Matrix3<f64>> {
+fn directions(model: &FeModel, parts: DofCounts, nodes: &[usize], pitch: f64) -> Vec<Matrix3<f64>> {
     let about_z = |x: f64, y: f64| Matrix3::new(x, -y, 0.0, y, x, 0.0, 0.0, 0.0, 1.0);
     let (interior, face) = (parts.interior / 3, parts.face / 3);
     let place = |(place, &node): (usize, &usize)| {

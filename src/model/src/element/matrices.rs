@@ -2,18 +2,18 @@
 
 use nalgebra::{DMatrix, Matrix3, SMatrix};
 
-use super::{ElementKind, QuadraturePoint, Shape};
+use super::{ElementKind, QuadraturePoint, ShapeFunctions};
 use crate::{Error, Result, material::Material};
 
 /// Shape functions at an integration point with gradients turned to physical space.
 pub(super) struct Mapped {
-    pub(super) shape: Shape,
+    pub(super) shape: ShapeFunctions,
     /// Quadrature weight times Jacobian determinant (m³).
     pub(super) volume: f64,
 }
 
 /// Jacobian matrix ∂x_i/∂ξ_j.
-pub(super) fn jacobian(shape: &Shape, coordinates: &[[f64; 3]]) -> Matrix3<f64> {
+pub(super) fn jacobian(shape: &ShapeFunctions, coordinates: &[[f64; 3]]) -> Matrix3<f64> {
     let mut matrix = Matrix3::zeros();
     for (x, gradient) in coordinates.iter().zip(&shape.gradients) {
         for i in 0..3 {

@@ -23,10 +23,10 @@ pub use incompatible::{Formulation, incompatible_stiffness};
 pub use matrices::thermal_load;
 pub use matrices::{conduction, consistent_mass, stiffness, strain, stress};
 pub(crate) use matrices::{lumped_mass, shape_integrals, thermal_load_of};
-pub use nonlinear::{Tangent, geometric_stiffness, second_stresses, tangent};
+pub use nonlinear::{ElementTangent, geometric_stiffness, second_stresses, tangent};
 pub use quadrature::QuadraturePoint;
 pub use recovery::nodal_stress;
-pub use shape::Shape;
+pub use shape::ShapeFunctions;
 
 /// Largest number of nodes of any element.
 pub(crate) const MAX_NODES: usize = 20;

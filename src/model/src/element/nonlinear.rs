@@ -11,7 +11,7 @@ use crate::{Result, material::Material};
 
 /// Forces and stiffness of a deformed element.
 #[derive(Debug, Clone)]
-pub struct Tangent {
+pub struct ElementTangent {
     /// ∂(internal force)/∂u, 3n × 3n in N/m, dofs ordered (node, component), symmetric.
     pub stiffness: DMatrix<f64>,
     /// Internal force on every node (N).
@@ -109,7 +109,7 @@ pub fn tangent(
     displacements: &[[f64; 3]],
     material: &Material,
     element: usize,
-) -> Result<Tangent> {
+) -> Result<ElementTangent> {
     let nodes = kind.node_count();
     let mut stiffness = DMatrix::zeros(3 * nodes, 3 * nodes);
     let mut geometric = DMatrix::zeros(nodes, nodes);
@@ -135,7 +135,7 @@ pub fn tangent(
         }
     }
     stiffness.fill_lower_triangle_with_upper_triangle();
-    Ok(Tangent { stiffness, force, largest_strain })
+    Ok(ElementTangent { stiffness, force, largest_strain })
 }
 
 /// Add a point's part of the material stiffness to the blocks on and above the diagonal.

@@ -4,7 +4,7 @@ use super::{ElementKind, HEX_NODES, MAX_NODES, PENTA_EDGES, TET_EDGES};
 
 /// Shape functions at one point; entries beyond the element's node count are zero.
 #[derive(Debug, Clone, Copy)]
-pub struct Shape {
+pub struct ShapeFunctions {
     /// N_i.
     pub values: [f64; MAX_NODES],
     /// ∂N_i/∂(natural coordinate).
@@ -13,7 +13,7 @@ pub struct Shape {
 
 impl ElementKind {
     /// Shape functions at a natural point.
-    pub fn shape(self, point: [f64; 3]) -> Shape {
+    pub fn shape(self, point: [f64; 3]) -> ShapeFunctions {
         match self {
             Self::Hex8 => hex8(point),
             Self::Hex20 => hex20(point),
@@ -25,7 +25,7 @@ impl ElementKind {
     }
 }
 
-const ZERO: Shape = Shape { values: [0.0; MAX_NODES], gradients: [[0.0; 3]; MAX_NODES] };
+const ZERO: ShapeFunctions = ShapeFunctions { values: [0.0; MAX_NODES], gradients: [[0.0; 3]; MAX_NODES] };
 
 /// One direction's factor of a brick function and its derivative: 1 + aξ at ends (a = ±1), 1 - ξ² mid-side (a = 0).
 fn brick_factor(node: f64, x: f64) -> (f64, f64) {
@@ -37,7 +37,7 @@ fn brick_product(node: [f64; 3], point: [f64; 3]) -> (f64, [f64; 3]) {
     (a * b * c, [da * b * c, a * db * c, a * b * dc])
 }
 
-fn hex8(point: [f64; 3]) -> Shape {
+fn hex8(point: [f64; 3]) -> ShapeFunctions {
     let mut shape = ZERO;
     for (i, node) in HEX_NODES[..8].iter().enumerate() {
         let (product, derivative) = brick_product(*node, point);
@@ -47,7 +47,7 @@ fn hex8(point: [f64; 3]) -> Shape {
     shape
 }
 
-fn hex20(point: [f64; 3]) -> Shape {
+fn hex20(point: [f64; 3]) -> ShapeFunctions {
     let mut shape = ZERO;
     for (i, node) in HEX_NODES.iter().enumerate() {
         let (product, derivative) = brick_product(*node, point);
@@ -65,7 +65,7 @@ fn hex20(point: [f64; 3]) -> Shape {
 
 const TRIANGLE_GRADIENTS: [[f64; 2]; 3] = [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]];
 
-fn penta6([r, s, z]: [f64; 3]) -> Shape {
+fn penta6([r, s, z]: [f64; 3]) -> ShapeFunctions {
     let area = [1.0 - r - s, r, s];
     let mut shape = ZERO;
     for i in 0..6 {
@@ -78,7 +78,7 @@ fn penta6([r, s, z]: [f64; 3]) -> Shape {
     shape
 }
 
-fn penta15([r, s, z]: [f64; 3]) -> Shape {
+fn penta15([r, s, z]: [f64; 3]) -> ShapeFunctions {
     let area = [1.0 - r - s, r, s];
     let mut shape = ZERO;
     for i in 0..6 {
@@ -107,14 +107,14 @@ fn penta15([r, s, z]: [f64; 3]) -> Shape {
 
 const TET_GRADIENTS: [[f64; 3]; 4] = [[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-fn tet4([r, s, t]: [f64; 3]) -> Shape {
+fn tet4([r, s, t]: [f64; 3]) -> ShapeFunctions {
     let mut shape = ZERO;
     shape.values[..4].copy_from_slice(&[1.0 - r - s - t, r, s, t]);
     shape.gradients[..4].copy_from_slice(&TET_GRADIENTS);
     shape
 }
 
-fn tet10([r, s, t]: [f64; 3]) -> Shape {
+fn tet10([r, s, t]: [f64; 3]) -> ShapeFunctions {
     let volume = [1.0 - r - s - t, r, s, t];
     let mut shape = ZERO;
     for i in 0..4 {

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use faer::Mat;
 use nalgebra::{DMatrix, Matrix3};
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 
 use crate::contact_point::{ContactPoint, clamped_point};
 use crate::sparse::{Pattern, SparseMatrix};
@@ -50,7 +50,7 @@ impl PatchCoordinates {
         free: &[usize],
         nodes: &[[f64; 3]],
         contact: &[ContactPoint],
-        frame: Frame,
+        frame: DisplacementFrame,
     ) -> Result<Option<Self>> {
         if contact.iter().all(|point| point.patch.is_empty()) {
             return Ok(None);
@@ -288,10 +288,10 @@ fn weights(contact: &[ContactPoint], nodes: &[usize]) -> DMatrix<f64> {
 }
 
 /// Columns: the unit vectors of the components of contact displacements at a node.
-fn directions([x, y, _]: [f64; 3], frame: Frame) -> Matrix3<f64> {
+fn directions([x, y, _]: [f64; 3], frame: DisplacementFrame) -> Matrix3<f64> {
     match frame {
-        Frame::Cartesian => Matrix3::identity(),
-        Frame::Cylindrical => {
+        DisplacementFrame::Cartesian => Matrix3::identity(),
+        DisplacementFrame::Cylindrical => {
             let radius = x.hypot(y);
             let (cos, sin) = (x / radius, y / radius);
             Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0)
@@ -369,7 +369,7 @@ mod tests {
         ];
         // The first node is clamped.
         let free: Vec<usize> = (3..21).collect();
-        let own = PatchCoordinates::new(&free, &nodes, &contact, Frame::Cylindrical).unwrap().unwrap();
+        let own = PatchCoordinates::new(&free, &nodes, &contact, DisplacementFrame::Cylindrical).unwrap().unwrap();
         let whole = matrix(18, 4, |i, j| if i == j { 9.0 } else { ((7 * i + 3 * j) as f64).sin() });
         let (found, same) = own.transformed(&whole, &whole).unwrap();
         assert!(found.values == same.values && found.pattern == same.pattern);
@@ -388,7 +388,9 @@ mod tests {
         for (index, point) in contact.iter().enumerate() {
             let pivot = own.points()[index].node;
             for (component, v) in (0..3).flat_map(|component| (0..18).map(move |v| (component, v))) {
-                let axis = |node: usize| directions(nodes[node], Frame::Cylindrical).column(component).into_owned();
+                let axis = |node: usize| {
+                    directions(nodes[node], DisplacementFrame::Cylindrical).column(component).into_owned()
+                };
                 let at = |node: usize, k: usize| turned[(3 * node + k - 3, v)];
                 let mean: f64 = point
                     .weights()
@@ -406,7 +408,8 @@ mod tests {
         let nodes: Vec<[f64; 3]> = (0..count).map(|i| [1.0, 0.0, i as f64]).collect();
         let all: Vec<(usize, f64)> = (0..count).map(|node| (node, 1.0 / count as f64)).collect();
         let free: Vec<usize> = (0..3 * count).collect();
-        let own = PatchCoordinates::new(&free, &nodes, &[patch("a", &all)], Frame::Cylindrical).unwrap().unwrap();
+        let own =
+            PatchCoordinates::new(&free, &nodes, &[patch("a", &all)], DisplacementFrame::Cylindrical).unwrap().unwrap();
         let whole = matrix(3 * count, 0, |_, _| 1.0);
         let error = own.transformed(&whole, &whole).unwrap_err().to_string();
         assert!(error.contains("2400 nodes would all be coupled"), "{error}");

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::Faces;
+use super::ElementFaces;
 use crate::mesh::Mesh;
 use crate::places::Places;
 
@@ -23,7 +23,7 @@ fn curved([first, last]: [[f64; 2]; 2], middle: [f64; 2]) -> Vec<[[f64; 2]; 2]> 
 pub(super) struct Outline(Vec<[[f64; 2]; 2]>);
 
 impl Outline {
-    pub(super) fn new(mesh: &Mesh, faces: &Faces<'_>, places: &Places) -> Self {
+    pub(super) fn new(mesh: &Mesh, faces: &ElementFaces<'_>, places: &Places) -> Self {
         let mut count: HashMap<[usize; 2], (usize, Option<usize>)> = HashMap::new();
         for (element, corners) in faces {
             for (index, &corner) in corners.iter().enumerate() {

@@ -50,7 +50,7 @@ impl FoundTip {
 }
 
 /// An outer face that faces away from the axis, or towards it.
-struct Face<'a> {
+struct TipFace<'a> {
     element: &'a Element,
     corners: &'static [usize],
     /// Means of its corners (m).
@@ -58,7 +58,7 @@ struct Face<'a> {
     axial: f64,
 }
 
-impl Face<'_> {
+impl TipFace<'_> {
     fn corner_nodes(&self) -> Vec<usize> {
         self.corners.iter().map(|&corner| self.element.nodes[corner]).collect()
     }
@@ -70,14 +70,14 @@ impl Face<'_> {
 /// # Errors
 /// [`Error::Invalid`] for a mesh without such faces, and where they reach fixed nodes.
 pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
-    let faces = radial_faces(mesh, Side::Outer);
+    let faces = radial_faces(mesh, NormalDirection::Outer);
     let first = (0..faces.len()).max_by(|&a, &b| faces[a].radius.total_cmp(&faces[b].radius).then(b.cmp(&a)));
     let Some(first) = first else {
         let problem = "no outer face of the mesh faces outward, within 45 degrees of the radial direction";
         return Err(not_found(problem.to_owned(), "Check the axis of rotation (--axis)"));
     };
     let chosen = connected(&faces, first);
-    let own: Vec<&Face> = faces.iter().zip(&chosen).filter(|(_, chosen)| **chosen).map(|(face, _)| face).collect();
+    let own: Vec<&TipFace> = faces.iter().zip(&chosen).filter(|(_, chosen)| **chosen).map(|(face, _)| face).collect();
     let others = faces.iter().zip(&chosen).filter(|(_, chosen)| !**chosen).map(|(face, _)| face);
     let elsewhere = others.filter(|face| as_far_out(face, &own)).count();
     let nodes = nodes_of(&own);
@@ -101,7 +101,7 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
 /// Returns the nodes of the root, mid-side ones too, ascending: of the innermost of all outer faces whose normals are within 45 degrees of the
 /// inward radial direction, and of all of these that are connected with it over edges. Empty for a mesh without such faces.
 pub fn find_root(mesh: &Mesh) -> Vec<usize> {
-    let faces = radial_faces(mesh, Side::Inner);
+    let faces = radial_faces(mesh, NormalDirection::Inner);
     let first = (0..faces.len()).min_by(|&a, &b| faces[a].radius.total_cmp(&faces[b].radius).then(a.cmp(&b)));
     let Some(first) = first else { return Vec::new() };
     let chosen = connected(&faces, first);
@@ -109,26 +109,26 @@ pub fn find_root(mesh: &Mesh) -> Vec<usize> {
 }
 
 /// Faces that a line across the chord meets in its middle; of triangles two in a layer.
-fn elements_across(mesh: &Mesh, faces: &[&Face], places: &Places) -> usize {
+fn elements_across(mesh: &Mesh, faces: &[&TipFace], places: &Places) -> usize {
     let along = |node: usize| places.share_along(mesh.nodes[node]);
-    let meets = |face: &Face| {
+    let meets = |face: &TipFace| {
         let ends = face.corner_nodes().into_iter().map(along);
         let [low, high] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
         (low..high).contains(&MIDDLE)
     };
-    let halves = |face: &&&Face| if face.corners.len() == 3 { 1 } else { 2 };
+    let halves = |face: &&&TipFace| if face.corners.len() == 3 { 1 } else { 2 };
     let met = faces.iter().filter(|face| meets(face)).map(|face| halves(&face)).sum::<usize>();
     met.div_ceil(2).max(1)
 }
 
 /// Corners and mid-side nodes of faces, ascending.
-fn nodes_of(faces: &[&Face]) -> Vec<usize> {
-    let of_face = |face: &&Face| middles(face.element, face.corners).chain(face.corner_nodes()).collect::<Vec<_>>();
+fn nodes_of(faces: &[&TipFace]) -> Vec<usize> {
+    let of_face = |face: &&TipFace| middles(face.element, face.corners).chain(face.corner_nodes()).collect::<Vec<_>>();
     faces.iter().flat_map(of_face).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 /// Median length of the edges of faces (m).
-fn median_edge(mesh: &Mesh, faces: &[&Face]) -> f64 {
+fn median_edge(mesh: &Mesh, faces: &[&TipFace]) -> f64 {
     let mut lengths: Vec<f64> = faces.iter().flat_map(|face| edges(face)).map(|edge| length(mesh, edge)).collect();
     lengths.sort_by(f64::total_cmp);
     lengths[lengths.len() / 2]
@@ -140,7 +140,7 @@ fn length(mesh: &Mesh, [a, b]: [usize; 2]) -> f64 {
 }
 
 /// Corners at the ends of a face's edges, ascending.
-fn edges(face: &Face) -> Vec<[usize; 2]> {
+fn edges(face: &TipFace) -> Vec<[usize; 2]> {
     let nodes = face.corner_nodes();
     let ends = (0..nodes.len()).map(|i| (nodes[i], nodes[(i + 1) % nodes.len()]));
     ends.map(|(a, b)| [a.min(b), a.max(b)]).collect()
@@ -157,12 +157,12 @@ fn extent(mesh: &Mesh, nodes: &[usize], of: fn([f64; 3]) -> f64) -> [f64; 2] {
 
 /// Which faces are looked for: those whose normals point away from the axis, or towards it.
 #[derive(Clone, Copy)]
-enum Side {
+enum NormalDirection {
     Outer,
     Inner,
 }
 
-impl Side {
+impl NormalDirection {
     fn sign(self) -> f64 {
         match self {
             Self::Outer => 1.0,
@@ -171,7 +171,7 @@ impl Side {
     }
 }
 
-fn radial_faces(mesh: &Mesh, side: Side) -> Vec<Face<'_>> {
+fn radial_faces(mesh: &Mesh, side: NormalDirection) -> Vec<TipFace<'_>> {
     let mut count: HashMap<Vec<usize>, usize> = HashMap::new();
     let key = |element: &Element, corners: &[usize]| {
         let mut key: Vec<usize> = corners.iter().map(|&corner| element.nodes[corner]).collect();
@@ -187,7 +187,12 @@ fn radial_faces(mesh: &Mesh, side: Side) -> Vec<Face<'_>> {
 }
 
 /// The face, where it faces this side. Corners run counter-clockwise seen from outside.
-fn radial_face<'a>(mesh: &Mesh, element: &'a Element, corners: &'static [usize], side: Side) -> Option<Face<'a>> {
+fn radial_face<'a>(
+    mesh: &Mesh,
+    element: &'a Element,
+    corners: &'static [usize],
+    side: NormalDirection,
+) -> Option<TipFace<'a>> {
     let at: Vec<[f64; 3]> = corners.iter().map(|&corner| mesh.nodes[element.nodes[corner]]).collect();
     let mean = |pick: &dyn Fn([f64; 3]) -> f64| at.iter().map(|&point| pick(point)).sum::<f64>() / at.len() as f64;
     let [x, y] = [mean(&|[x, ..]| x), mean(&|[_, y, _]| y)];
@@ -201,11 +206,11 @@ fn radial_face<'a>(mesh: &Mesh, element: &'a Element, corners: &'static [usize],
     let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
     let radial = (normal[0] * x + normal[1] * y) / x.hypot(y);
     let radius = mean(&|[x, y, _]| x.hypot(y));
-    (side.sign() * radial >= OUTWARD * size).then(|| Face { element, corners, radius, axial: mean(&|[_, _, z]| z) })
+    (side.sign() * radial >= OUTWARD * size).then(|| TipFace { element, corners, radius, axial: mean(&|[_, _, z]| z) })
 }
 
 /// Which faces are connected with the first one over edges.
-fn connected(faces: &[Face], first: usize) -> Vec<bool> {
+fn connected(faces: &[TipFace], first: usize) -> Vec<bool> {
     let mut beside: HashMap<[usize; 2], Vec<usize>> = HashMap::new();
     for (index, face) in faces.iter().enumerate() {
         edges(face).into_iter().for_each(|edge| beside.entry(edge).or_default().push(index));
@@ -221,8 +226,8 @@ fn connected(faces: &[Face], first: usize) -> Vec<bool> {
 }
 
 /// Whether a face is as far out as that of the tip which is nearest along the axis.
-fn as_far_out(face: &Face, tip: &[&Face]) -> bool {
-    let apart = |own: &Face| (own.axial - face.axial).abs();
+fn as_far_out(face: &TipFace, tip: &[&TipFace]) -> bool {
+    let apart = |own: &TipFace| (own.axial - face.axial).abs();
     let nearest = tip.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
     nearest.is_some_and(|own| face.radius >= (1.0 - AS_FAR_OUT) * own.radius)
 }

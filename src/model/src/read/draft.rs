@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::Axis;
+use super::EngineAxis;
 use super::source::SourceLine;
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
@@ -25,7 +25,7 @@ pub(super) struct DraftElement {
 
 /// A mesh as read.
 #[derive(Debug, Default)]
-pub(super) struct Draft {
+pub(super) struct MeshDraft {
     /// Node numbers in the order of the file.
     pub numbers: Vec<u64>,
     /// Their coordinates, in the file's unit.
@@ -57,7 +57,7 @@ pub(super) struct Numbered {
     pub materials: Vec<Option<usize>>,
 }
 
-impl Draft {
+impl MeshDraft {
     /// Add a node. The same number may come again with the same coordinates.
     pub(crate) fn add_node(&mut self, number: u64, position: [f64; 3], place: &dyn Fn() -> SourceLine) -> Result<()> {
         if let Some(&index) = self.index.get(&number) {
@@ -103,7 +103,7 @@ impl Draft {
     pub(crate) fn into_mesh(
         mut self,
         scale: f64,
-        axis: Axis,
+        axis: EngineAxis,
         what: &str,
     ) -> Result<(Numbered, Vec<String>, Vec<String>)> {
         let mut used = vec![false; self.numbers.len()];

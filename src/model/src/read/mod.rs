@@ -25,7 +25,7 @@ pub use contact_nodes::{ContactChoice, choose_contact_nodes};
 pub use matrices::{MatrixFiles, read_matrices};
 pub use plausibility::{Plausibility, bounding_box, plausibility, total_mass};
 
-use draft::Draft;
+use draft::MeshDraft;
 
 /// Units of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -70,7 +70,7 @@ impl Units {
 /// Which axis of a file is the engine axis, which is z here. The others follow in turn: x, y, z becomes y, z, x with x as
 /// the engine axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Axis {
+pub enum EngineAxis {
     /// x.
     X,
     /// y.
@@ -80,7 +80,7 @@ pub enum Axis {
     Z,
 }
 
-impl Axis {
+impl EngineAxis {
     /// Where a component of the file stands here: 0, 1, 2 for x, y, z.
     fn place(self, component: usize) -> usize {
         match self {
@@ -104,7 +104,7 @@ pub struct MeshOptions {
     /// Units of coordinates and material in the file.
     pub units: Units,
     /// The engine axis in the file.
-    pub axis: Axis,
+    pub axis: EngineAxis,
     /// Material of all elements (SI), instead of those in the file.
     pub material: Option<Material>,
     /// Temperature at which tables of properties are read, in the file's unit.
@@ -164,7 +164,7 @@ pub fn read_mesh(path: &Path, options: &MeshOptions, listener: Listener<'_>) -> 
 
 /// A mesh of either format before assembly.
 struct MeshFile {
-    draft: Draft,
+    draft: MeshDraft,
     materials: Vec<Material>,
     held: Vec<String>,
 }
@@ -187,6 +187,6 @@ fn mesh_file(path: &Path, bytes: &[u8], temperature: Option<f64>, open: source::
 pub fn parse_mesh(name: &str, bytes: &[u8]) -> Result<crate::Mesh> {
     let path = Path::new(name);
     let none = |path: &Path| Err(Error::File { path: path.to_path_buf(), source: std::io::ErrorKind::NotFound.into() });
-    let (numbered, _, _) = mesh_file(path, bytes, Some(0.0), &none)?.draft.into_mesh(1.0, Axis::Z, name)?;
+    let (numbered, _, _) = mesh_file(path, bytes, Some(0.0), &none)?.draft.into_mesh(1.0, EngineAxis::Z, name)?;
     Ok(numbered.mesh)
 }

@@ -13,7 +13,7 @@ pub struct Plausibility {
 }
 
 /// A range that things are in, and a wider one beyond which nothing is.
-struct Range {
+struct PlausibleRange {
     what: &'static str,
     unit: &'static str,
     usual: [f64; 2],
@@ -21,15 +21,19 @@ struct Range {
 }
 
 /// From a small turbocharger's blade to a large water turbine's casing.
-const SIZE: Range = Range { what: "largest dimension", unit: "m", usual: [2e-3, 8.0], possible: [1e-4, 20.0] };
+const SIZE: PlausibleRange =
+    PlausibleRange { what: "largest dimension", unit: "m", usual: [2e-3, 8.0], possible: [1e-4, 20.0] };
 /// From rubber (1 MPa) to beyond diamond (1.2 TPa); metals and composites within.
-const MODULUS: Range = Range { what: "Young's modulus", unit: "Pa", usual: [1e8, 2e12], possible: [1e6, 1e13] };
+const MODULUS: PlausibleRange =
+    PlausibleRange { what: "Young's modulus", unit: "Pa", usual: [1e8, 2e12], possible: [1e6, 1e13] };
 /// From foams to osmium (22600 kg/m³).
-const DENSITY: Range = Range { what: "density", unit: "kg/m³", usual: [100.0, 23_000.0], possible: [1.0, 1e5] };
+const DENSITY: PlausibleRange =
+    PlausibleRange { what: "density", unit: "kg/m³", usual: [100.0, 23_000.0], possible: [1.0, 1e5] };
 /// √(E/ρ): about 5000 m/s for steel, titanium, nickel and aluminium.
-const WAVE: Range = Range { what: "√(E/ρ)", unit: "m/s", usual: [500.0, 20_000.0], possible: [1.0, 1e6] };
+const WAVE: PlausibleRange =
+    PlausibleRange { what: "√(E/ρ)", unit: "m/s", usual: [500.0, 20_000.0], possible: [1.0, 1e6] };
 /// Mass over the volume of the box around the model; thin structures fill little of it.
-const FILLING: Range = Range {
+const FILLING: PlausibleRange = PlausibleRange {
     what: "mass per volume of the box around it",
     unit: "kg/m³",
     usual: [0.1, 23_000.0],
@@ -37,8 +41,8 @@ const FILLING: Range = Range {
 };
 
 impl Plausibility {
-    fn check(&mut self, range: &Range, value: f64, whose: &str) {
-        let Range { what, unit, usual, possible } = range;
+    fn check(&mut self, range: &PlausibleRange, value: f64, whose: &str) {
+        let PlausibleRange { what, unit, usual, possible } = range;
         let outside = |[low, high]: &[f64; 2]| !(value >= *low && value <= *high);
         let text = format!("{whose}{what} {value:.3e} {unit}");
         if outside(possible) {

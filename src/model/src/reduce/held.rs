@@ -2,30 +2,30 @@
 
 use core::f64::consts::TAU;
 
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 
 use super::outcome::rotated;
 use crate::Result;
 use crate::contact_point::{ContactPoint, clamped_point};
 use crate::craig_bampton::{CraigBampton, InnerBasis, craig_bampton_with};
-use crate::eigen::Modes;
+use crate::eigen::EigenModes;
 use crate::patches::PatchCoordinates;
 use crate::progress::Listener;
 use crate::sparse::SparseMatrix;
 
 /// The contact as degrees of freedom that can be held.
 #[derive(Debug)]
-pub(crate) struct Held<'a> {
+pub(crate) struct HeldContact<'a> {
     nodes: &'a [[f64; 3]],
     contact: &'a [ContactPoint],
-    frame: Frame,
+    frame: DisplacementFrame,
     /// Where there are patches.
     patches: Option<PatchCoordinates>,
     /// Rows of the contact's dofs among the free ones, point by point.
     pub interface: Vec<usize>,
 }
 
-impl<'a> Held<'a> {
+impl<'a> HeldContact<'a> {
     /// Of the free dofs (3·node + component, ascending) of a model.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ impl<'a> Held<'a> {
         free: &[usize],
         nodes: &'a [[f64; 3]],
         contact: &'a [ContactPoint],
-        frame: Frame,
+        frame: DisplacementFrame,
     ) -> Result<Self> {
         let patches = PatchCoordinates::new(free, nodes, contact, frame)?;
         let points = patches.as_ref().map_or(contact, PatchCoordinates::points);
@@ -69,7 +69,7 @@ impl<'a> Held<'a> {
         &self,
         stiffness: &SparseMatrix,
         mass: &SparseMatrix,
-        modes: &Modes,
+        modes: &EigenModes,
         listener: Listener<'_>,
     ) -> Result<CraigBampton> {
         let mut inertia = mass.times(modes.shapes.as_ref());

@@ -3,12 +3,12 @@
 use faer::Mat;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{ContactNode, Frame, RomChecks, RomExtras};
+use tiprub_core::rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras};
 
 use super::{ContactPoint, Mode, Reduction, ReductionKind, ReductionOptions};
 use crate::Result;
 use crate::craig_bampton::CraigBampton;
-use crate::eigen::Modes;
+use crate::eigen::EigenModes;
 use crate::fe_model::FeModel;
 use crate::material::Material;
 use crate::mesh::Mesh;
@@ -24,9 +24,9 @@ pub(super) fn rotated(
     mut model: CraigBampton,
     nodes: &[[f64; 3]],
     contact: &[ContactPoint],
-    frame: Frame,
+    frame: DisplacementFrame,
 ) -> CraigBampton {
-    if frame == Frame::Cartesian {
+    if frame == DisplacementFrame::Cartesian {
         return model;
     }
     let order = model.mass.nrows();
@@ -47,10 +47,10 @@ pub(super) fn rotated(
     model
 }
 
-pub(crate) fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Frame) -> ContactNode {
+pub(crate) fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: DisplacementFrame) -> ContactNode {
     let position = match frame {
-        Frame::Cartesian => point.cartesian(nodes),
-        Frame::Cylindrical => point.cylindrical(nodes),
+        DisplacementFrame::Cartesian => point.cartesian(nodes),
+        DisplacementFrame::Cylindrical => point.cylindrical(nodes),
     };
     let ContactPoint { meridional_slope, area, length, .. } = *point;
     ContactNode { name: point.name.clone(), position, meridional_slope, area, length }
@@ -97,7 +97,7 @@ impl Reduction {
     /// The ROM's own validation refuses.
     pub(crate) fn new(
         rom: Rom,
-        full: &Modes,
+        full: &EigenModes,
         free: &[usize],
         squares: &[f64],
         (nodes, mesh): (usize, Option<(Mesh, Material)>),
@@ -160,7 +160,7 @@ pub(crate) fn element_names(mesh: &Mesh) -> String {
     names.join(", ")
 }
 
-fn node_modes(modes: &Modes, free: &[usize], nodes: usize) -> Vec<Mode> {
+fn node_modes(modes: &EigenModes, free: &[usize], nodes: usize) -> Vec<Mode> {
     let mode = |(k, frequency)| {
         let mut shape = vec![[0.0; 3]; nodes];
         for (row, dof) in free.iter().enumerate() {

@@ -7,7 +7,7 @@
 
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::rom::{Frame, RomChecks};
+use tiprub_core::rom::{DisplacementFrame, RomChecks};
 
 use super::FullModes;
 use crate::sparse::{SparseMatrix, add_tall, tall_product};
@@ -18,7 +18,7 @@ const TERMS: usize = 12;
 const REACH: f64 = 0.5;
 
 /// A reduced model as it is seen at the contact nodes.
-pub(super) struct Seen<'a> {
+pub(super) struct ContactResponse<'a> {
     /// ω² of all of its modes.
     pub squares: &'a [f64],
     /// Its modes at the contact coordinates, 3·nodes × modes.
@@ -31,13 +31,14 @@ pub(super) fn with_responses(
     full: &FullModes,
     mass: &SparseMatrix,
     loads: &Mat<f64>,
-    seen: &Seen<'_>,
-    frame: Frame,
+    seen: &ContactResponse<'_>,
+    frame: DisplacementFrame,
 ) -> RomChecks {
     if full.shift != 0.0 {
         return checks;
     }
-    let rows: Vec<usize> = (0..loads.ncols()).filter(|row| frame == Frame::Cartesian || row % 3 == 0).collect();
+    let rows: Vec<usize> =
+        (0..loads.ncols()).filter(|row| frame == DisplacementFrame::Cartesian || row % 3 == 0).collect();
     let loads = Mat::from_fn(loads.nrows(), rows.len(), |i, k| loads[(i, rows[k])]);
     let moments = Moments::of(full, mass, &loads);
     let reduced = |square: f64| response(&seen.shapes.select_rows(&rows), seen.squares, square);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Section, SurfacePoint, sections};
+use super::{AerofoilSection, CylindricalPoint, sections};
 use crate::element::ElementKind;
 use crate::mesh::{Element, Mesh};
 use crate::patches::{contact_patches, row_name, tip_patches};
@@ -58,7 +58,7 @@ pub fn blade_mesh(counts: MeshCounts) -> Result<BladeMesh> {
     let mut mesh = Mesh::default();
     for i in 0..=fine[0] {
         for j in 0..=fine[1] {
-            let line: Vec<SurfacePoint> =
+            let line: Vec<CylindricalPoint> =
                 sections().iter().map(|section| grid_point(section, ratio(i, fine[0]), ratio(j, fine[1]))).collect();
             // A serendipity brick has nodes on its edges only: at most one index is odd.
             for k in (0..=fine[2]).filter(|k| i % 2 + j % 2 + k % 2 < 2) {
@@ -139,7 +139,7 @@ fn ratio(index: usize, count: usize) -> f64 {
 }
 
 /// Plane coordinates of a grid point: `along` the chord and `across` the thickness, both 0 to 1.
-fn plane_point(section: &Section, along: f64, across: f64) -> [f64; 2] {
+fn plane_point(section: &AerofoilSection, along: f64, across: f64) -> [f64; 2] {
     let [leading, trailing] =
         section.edge_radii().map(|radius| core::f64::consts::FRAC_PI_4 * radius / section.chord());
     let u = -leading + along * (1.0 + leading + trailing);
@@ -147,7 +147,7 @@ fn plane_point(section: &Section, along: f64, across: f64) -> [f64; 2] {
     section.plane(u, camber + (2.0 * across - 1.0) * half)
 }
 
-fn grid_point(section: &Section, along: f64, across: f64) -> SurfacePoint {
+fn grid_point(section: &AerofoilSection, along: f64, across: f64) -> CylindricalPoint {
     section.on_surface(plane_point(section, along, across))
 }
 
@@ -159,7 +159,7 @@ struct SpanInterpolation {
 
 impl SpanInterpolation {
     fn new(fine: usize) -> Self {
-        let radii: Vec<f64> = sections().iter().map(Section::mean_radius).collect();
+        let radii: Vec<f64> = sections().iter().map(AerofoilSection::mean_radius).collect();
         let (first, last) = (radii[0], radii[radii.len() - 1]);
         // The spline of each unit vector gives the weights, since interpolation is linear in the data.
         let columns: Vec<Vec<f64>> = (0..radii.len())
@@ -175,8 +175,8 @@ impl SpanInterpolation {
     }
 
     /// Cartesian coordinates at a station, mirrored in θ.
-    fn cartesian(&self, line: &[SurfacePoint], station: usize) -> [f64; 3] {
-        let mix = |pick: fn(&SurfacePoint) -> f64| -> f64 {
+    fn cartesian(&self, line: &[CylindricalPoint], station: usize) -> [f64; 3] {
+        let mix = |pick: fn(&CylindricalPoint) -> f64| -> f64 {
             line.iter().zip(&self.weights[station]).map(|(point, weight)| weight * pick(point)).sum()
         };
         let (r, theta) = (mix(|point| point.r), -mix(|point| point.theta));

@@ -3,7 +3,7 @@
 //! **Origin.** Moore and Reid, *Performance of single-stage axial-flow transonic compressor with rotor and stator aspect
 //! ratios of 1.19 and 1.26, respectively, and with design pressure ratio of 2.05*, NASA TP-1659 (1980), table IV: 12
 //! surfaces of revolution from the hub intersection to the blade tip, 100 stations each. What is embedded is a fit,
-//! [`Section`], not the table. Over all 2400 points of the table, round edges included, it is off by at most
+//! [`AerofoilSection`], not the table. Over all 2400 points of the table, round edges included, it is off by at most
 //! [`FIT_DISTANCE`] (0.0094 mm) from the surface, and on the sides by [`FIT_ALONG_THETA`] (0.0165 mm) along rθ at equal z.
 //! Between the sections the table says nothing; lines of equal chord and thickness share are natural cubic splines.
 //!
@@ -20,12 +20,12 @@ mod sections;
 
 pub use blade_mesh::{BladeMesh, MeshCounts, blade_mesh};
 pub(crate) use blade_mesh::{place_name, spread_contact};
-pub use section::{Section, SurfacePoint};
+pub use section::{AerofoilSection, CylindricalPoint};
 
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 
 use crate::material::Material;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{Reduction, ReductionKind, ReductionOptions, reduce_model};
 use crate::stress::StressPlaces;
 use crate::{FeModel, Result};
@@ -43,7 +43,7 @@ pub const FIT_DISTANCE: f64 = 9.4e-6;
 pub const FIT_ALONG_THETA: f64 = 16.5e-6;
 
 /// The twelve sections, hub to tip.
-pub fn sections() -> &'static [Section] {
+pub fn sections() -> &'static [AerofoilSection] {
     &sections::SECTIONS
 }
 
@@ -54,7 +54,7 @@ const STRESSED: usize = 6;
 
 /// What of the tip touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tip {
+pub enum TipContact {
     /// So many nodes along the mid-thickness line, ends included (at least 2).
     Nodes(usize),
     /// So many patches along the chord, over the whole thickness.
@@ -63,7 +63,7 @@ pub enum Tip {
     Rows([usize; 2]),
 }
 
-impl Tip {
+impl TipContact {
     /// So many patches along the chord, in so many rows; one row is over the whole thickness.
     pub fn patches(counts: [usize; 2]) -> Self {
         match counts {
@@ -87,7 +87,7 @@ pub struct Rotor37Options {
     /// Number of elements along chord, thickness and span.
     pub mesh: MeshCounts,
     /// What touches.
-    pub tip: Tip,
+    pub tip: TipContact,
     /// Which modes are kept.
     pub kind: ReductionKind,
     /// How many.
@@ -108,7 +108,7 @@ impl Default for Rotor37Options {
     fn default() -> Self {
         Self {
             mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
-            tip: Tip::Rows([9, 2]),
+            tip: TipContact::Rows([9, 2]),
             kind: ReductionKind::FreeInterface,
             modes: 80,
             ..Self::paper()
@@ -120,14 +120,14 @@ impl Rotor37Options {
     /// The recommended model with its patches in one row: contact is averaged over the thickness of the tip.
     pub fn one_row() -> Self {
         let [patches, _] = Self::default().tip.counts();
-        Self { tip: Tip::Patches(patches), ..Self::default() }
+        Self { tip: TipContact::Patches(patches), ..Self::default() }
     }
 
     /// The paper's kind of model: Craig and Bampton's modes, three contact nodes.
     pub fn paper() -> Self {
         Self {
             mesh: MeshCounts::default(),
-            tip: Tip::Nodes(3),
+            tip: TipContact::Nodes(3),
             kind: ReductionKind::FixedInterface,
             modes: 20,
             checked_modes: 10,
@@ -144,15 +144,15 @@ impl Rotor37Options {
 /// [`Error::Invalid`](crate::Error::Invalid) for counts that are too small or more contact nodes than the mesh has, and
 /// those of [`reduce_model`].
 pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Result<Reduction> {
-    report(listener, Stage::Mesh, 0, 1);
+    report(listener, ReductionStage::Mesh, 0, 1);
     let blade = blade_mesh(options.mesh)?;
-    let stressed = if let Tip::Nodes(_) = options.tip { 0 } else { STRESSED.min(options.checked_modes) };
+    let stressed = if let TipContact::Nodes(_) = options.tip { 0 } else { STRESSED.min(options.checked_modes) };
     let (contact, watched) = match options.tip {
-        Tip::Nodes(count) => (blade.contact_points(count)?, Vec::new()),
-        Tip::Patches(count) => (blade.contact_patches(count)?, blade.contact_points(WATCHED)?),
-        Tip::Rows(counts) => (blade.contact_rows(counts)?, blade.contact_points(WATCHED)?),
+        TipContact::Nodes(count) => (blade.contact_points(count)?, Vec::new()),
+        TipContact::Patches(count) => (blade.contact_patches(count)?, blade.contact_points(WATCHED)?),
+        TipContact::Rows(counts) => (blade.contact_rows(counts)?, blade.contact_points(WATCHED)?),
     };
-    report(listener, Stage::Mesh, 1, 1);
+    report(listener, ReductionStage::Mesh, 1, 1);
     let clamped = blade.mesh.set("hub")?.to_vec();
     let reduction_options = ReductionOptions {
         name: "rotor37".into(),
@@ -160,7 +160,7 @@ pub fn reduce_rotor37(options: &Rotor37Options, listener: Listener<'_>) -> Resul
         modes: options.modes,
         checked_modes: options.checked_modes,
         sectors: BLADES,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         watched,
         stress: StressPlaces { nodes: Vec::new(), modes: stressed },
         damping_ratio: options.damping_ratio,

@@ -14,7 +14,7 @@ const SPLINE_END: f64 = 0.005;
 
 /// Compact description of a section; lengths in m, signs of θ as in the table of NASA TP-1659.
 #[derive(Debug)]
-pub struct Section {
+pub struct AerofoilSection {
     /// R₀.
     pub(super) mean_radius: f64,
     /// Range of X on which the Chebyshev series are defined.
@@ -37,7 +37,7 @@ pub struct Section {
 
 /// A point in cylindrical coordinates (m, rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurfacePoint {
+pub struct CylindricalPoint {
     /// Radius r.
     pub r: f64,
     /// Angle θ.
@@ -46,7 +46,7 @@ pub struct SurfacePoint {
     pub z: f64,
 }
 
-impl Section {
+impl AerofoilSection {
     /// Distance between the centres of the edge circles in the plane.
     pub fn chord(&self) -> f64 {
         let [a, b] = [self.leading_edge, self.trailing_edge];
@@ -72,10 +72,10 @@ impl Section {
     }
 
     /// Point of the surface of revolution at plane coordinates.
-    pub fn on_surface(&self, [x, y]: [f64; 2]) -> SurfacePoint {
+    pub fn on_surface(&self, [x, y]: [f64; 2]) -> CylindricalPoint {
         let [low, high] = self.meridional_range;
         let t = (2.0 * x - low - high) / (high - low);
-        SurfacePoint { r: chebyshev(&self.r, t), theta: y / self.mean_radius, z: chebyshev(&self.z, t) }
+        CylindricalPoint { r: chebyshev(&self.r, t), theta: y / self.mean_radius, z: chebyshev(&self.z, t) }
     }
 
     /// Plane abscissa X of the parallel circle at axial coordinate z (bisection; z grows with X).

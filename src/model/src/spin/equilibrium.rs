@@ -6,7 +6,7 @@ use faer::Mat;
 use rayon::prelude::*;
 
 use crate::assembly::{Assembled, for_each_block};
-use crate::element::{Tangent, tangent};
+use crate::element::{ElementTangent, tangent};
 use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::sparse::{Pattern, SparseMatrix};
@@ -191,7 +191,7 @@ impl<'a> Rotating<'a> {
         let (mut values, mut forces) = (vec![0.0; pattern.rows.len()], vec![0.0; 3 * moved.len()]);
         let mut largest_strain = 0.0_f64;
         for (chunk_index, chunk) in self.mesh.elements.chunks(CHUNK).enumerate() {
-            let tangents: Vec<Result<Tangent>> = chunk
+            let tangents: Vec<Result<ElementTangent>> = chunk
                 .par_iter()
                 .enumerate()
                 .map(|(offset, element)| {
@@ -201,7 +201,7 @@ impl<'a> Rotating<'a> {
                 })
                 .collect();
             for (element, tangent) in chunk.iter().zip(tangents) {
-                let Tangent { stiffness, force, largest_strain: strain } = tangent?;
+                let ElementTangent { stiffness, force, largest_strain: strain } = tangent?;
                 largest_strain = largest_strain.max(strain);
                 for_each_block(pattern, &element.nodes, |a, b, starts| {
                     for (j, start) in starts.into_iter().enumerate() {

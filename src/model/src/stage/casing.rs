@@ -13,7 +13,7 @@ use crate::casing::{CLAMPED, CasingReductionOptions, GridNodes, RingMesh, reduce
 use crate::element::{ElementKind, Formulation};
 use crate::material::Material;
 use crate::mesh::{Element, Mesh};
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::Reduction;
 use crate::thermal::equal_patches;
 use crate::{Error, Result};
@@ -96,7 +96,7 @@ impl Default for StageCasingOptions {
 /// [`Error::Invalid`] for counts that do not fit each other.
 pub fn stage_casing_mesh(options: &StageCasingOptions) -> Result<RingMesh> {
     check(options)?;
-    let section = Section::new();
+    let section = MeridionalSection::new();
     let mut mesh = Mesh::default();
     let mut numbers = BTreeMap::new();
     // Slice by slice, as the bandwidth of some solvers likes it.
@@ -141,12 +141,12 @@ pub fn stage_casing_mesh(options: &StageCasingOptions) -> Result<RingMesh> {
 /// # Errors
 /// Those of [`stage_casing_mesh`] and [`reduce_casing`].
 pub fn reduce_stage_casing(options: &StageCasingOptions, listener: Listener<'_>) -> Result<Reduction> {
-    report(listener, Stage::Mesh, 0, 1);
+    report(listener, ReductionStage::Mesh, 0, 1);
     let ring = stage_casing_mesh(options)?;
     let clamped = ring.mesh.set(CLAMPED)?.to_vec();
     let [around, along] = options.patches;
     let patches = equal_patches(around, along, AXIAL);
-    report(listener, Stage::Mesh, 1, 1);
+    report(listener, ReductionStage::Mesh, 1, 1);
     let reduction_options = CasingReductionOptions {
         name: options.name.clone(),
         formulation: options.formulation,
@@ -191,7 +191,7 @@ fn check(options: &StageCasingOptions) -> Result<()> {
 }
 
 /// The meridional section.
-struct Section {
+struct MeridionalSection {
     /// (axial, radial) index of every cell.
     cells: Vec<[usize; 2]>,
     /// Axial positions (m), two per cell.
@@ -200,7 +200,7 @@ struct Section {
     radial: [Vec<f64>; 2],
 }
 
-impl Section {
+impl MeridionalSection {
     fn new() -> Self {
         let [low, high] = [TIP_AXIAL[0] - BEYOND, TIP_AXIAL[1] + BEYOND];
         let ends = [AXIAL[0] + FLANGE, low, high, AXIAL[1] - FLANGE, AXIAL[1]];
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn the_section_has_the_papers_counts() {
-        let section = Section::new();
+        let section = MeridionalSection::new();
         let mut corners: Vec<[usize; 2]> =
             section.cells.iter().flat_map(|&[i, j]| [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]]).collect();
         corners.sort_unstable();

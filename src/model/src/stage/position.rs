@@ -1,7 +1,7 @@
 //! Where the places of a sector's lattice lie.
 
 use super::geometry::CamberPoint;
-use super::lattice::{LatticeIndex, Lattice};
+use super::lattice::{Lattice, LatticeIndex};
 
 /// Linear between two values.
 fn mix(from: f64, to: f64, share: f64) -> f64 {

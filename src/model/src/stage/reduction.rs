@@ -4,9 +4,9 @@ use super::lattice::sector_mesh;
 use super::sector::{SectorMesh, SectorOptions};
 use crate::cyclic::{CyclicBoundary, CyclicOptions, CyclicReduction, ModeSelection, PairingReport, reduce_cyclic};
 use crate::material::Material;
-use crate::progress::{Listener, Stage, report};
+use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{ContactPoint, ReductionKind};
-use crate::rotor37::Tip;
+use crate::rotor37::TipContact;
 use crate::{FeModel, Result};
 
 /// What to build.
@@ -17,7 +17,7 @@ pub struct StageOptions {
     /// Material.
     pub material: Material,
     /// What touches.
-    pub tip: Tip,
+    pub tip: TipContact,
     /// Which modes are kept.
     pub kind: ReductionKind,
     /// How many.
@@ -33,7 +33,7 @@ impl Default for StageOptions {
         Self {
             sector: SectorOptions::default(),
             material: Material::titanium(),
-            tip: Tip::Nodes(3),
+            tip: TipContact::Nodes(3),
             kind: ReductionKind::FixedInterface,
             modes: ModeSelection::Families(25),
             checked_modes: 10,
@@ -83,14 +83,14 @@ const TOLERANCE: f64 = 1e-9;
 /// # Errors
 /// Those of [`sector_mesh`] and of the assembly; more contact nodes or patches than the tip has places for.
 pub fn stage_model(options: &StageOptions, listener: Listener<'_>) -> Result<StageModel> {
-    report(listener, Stage::Mesh, 0, 1);
+    report(listener, ReductionStage::Mesh, 0, 1);
     let sector: SectorMesh = sector_mesh(&options.sector)?;
     let contact = match options.tip {
-        Tip::Nodes(count) => sector.contact_points(count)?,
-        Tip::Patches(count) => sector.contact_patches(count)?,
-        Tip::Rows(counts) => sector.contact_rows(counts)?,
+        TipContact::Nodes(count) => sector.contact_points(count)?,
+        TipContact::Patches(count) => sector.contact_patches(count)?,
+        TipContact::Rows(counts) => sector.contact_rows(counts)?,
     };
-    report(listener, Stage::Mesh, 1, 1);
+    report(listener, ReductionStage::Mesh, 1, 1);
     let origin = format!("Parametric stage of {} sectors, bore clamped", options.sector.geometry.sectors);
     let model = FeModel::assembled(sector.mesh, &options.material, origin, listener)?;
     let [low, high] = ["CYCLIC_LOW", "CYCLIC_HIGH"].map(|face| model.set(face));

@@ -6,10 +6,10 @@ use crate::common::casing::{at_rest, coarse, heated};
 use crate::common::{distorted_box, nodes_at, wobble};
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
-use tiprub_core::rom::Patch;
+use tiprub_core::rom::ThermalPatch;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::casing::{
-    CLAMPED, CasingReductionOptions, GridNodes, ModalForm, Support, condense, modal_form, supported_ring,
+    CLAMPED, CasingReductionOptions, GridNodes, ModalForm, RingSupport, condense, modal_form, supported_ring,
 };
 use tiprub_model::craig_bampton::{InnerBasis, craig_bampton, craig_bampton_with, dense_modes};
 use tiprub_model::element::{ElementKind, Formulation, stiffness, thermal_load};
@@ -36,9 +36,11 @@ pub(super) fn full_at_rest(mesh: &Mesh, material: &Material, clamped: &[usize], 
 }
 
 /// The coarse casing, reduced once for all tests of this file.
-fn reduced(support: Support) -> &'static Reduction {
+fn reduced(support: RingSupport) -> &'static Reduction {
     static REDUCTIONS: [OnceLock<Reduction>; 4] = [const { OnceLock::new() }; 4];
-    let place = [Support::Free, Support::Low, Support::High, Support::Both].iter().position(|known| *known == support);
+    let place = [RingSupport::Free, RingSupport::Low, RingSupport::High, RingSupport::Both]
+        .iter()
+        .position(|known| *known == support);
     REDUCTIONS[place.unwrap()].get_or_init(|| reduce_ring(&coarse(support), &silent).unwrap())
 }
 
@@ -74,7 +76,7 @@ fn thermal_loads_of_every_element_are_its_stiffness_times_free_growth() {
 
 #[test]
 fn patch_loads_are_in_equilibrium_and_sum_to_uniform_heating() {
-    let options = coarse(Support::Free);
+    let options = coarse(RingSupport::Free);
     let ring = supported_ring(&options).unwrap();
     let axial = options.geometry.contour.axial();
     let loads = patch_loads(&ring.mesh, &options.material, &equal_patches(12, 2, axial)).unwrap();
@@ -104,8 +106,8 @@ fn patch_loads_are_in_equilibrium_and_sum_to_uniform_heating() {
 
 #[test]
 fn uniform_temperature_grows_a_free_ring_without_stress() {
-    let options = coarse(Support::Free);
-    let (rom, rise) = (&reduced(Support::Free).rom, 100.0);
+    let options = coarse(RingSupport::Free);
+    let (rom, rise) = (&reduced(RingSupport::Free).rom, 100.0);
     let displacement = heated(rom, &[rise; 24]);
     let strain = options.material.expansion * rise;
     // Elastic modes carry no momentum: the centre of mass stays.
@@ -139,7 +141,7 @@ fn uniform_temperature_grows_a_free_ring_without_stress() {
 
 #[test]
 fn a_free_ring_has_six_rigid_modes() {
-    let reduction = reduced(Support::Free);
+    let reduction = reduced(RingSupport::Free);
     let found: Vec<f64> = reduction.modes.iter().map(|mode| mode.frequency).collect();
     println!(
         "rigid modes of the full model below {:.1e} Hz, first elastic one {:.2} Hz",
@@ -167,7 +169,7 @@ fn a_free_ring_has_six_rigid_modes() {
 /// A uniform temperature is answered to rounding also where the casing is held, and so is every patch alone.
 #[test]
 fn heat_and_contact_forces_are_answered_at_rest_as_by_the_full_model() {
-    for support in [Support::Low, Support::High, Support::Both] {
+    for support in [RingSupport::Low, RingSupport::High, RingSupport::Both] {
         let options = coarse(support);
         let ring = supported_ring(&options).unwrap();
         let patches = equal_patches(12, 2, options.geometry.contour.axial());
@@ -206,7 +208,7 @@ fn heat_and_contact_forces_are_answered_at_rest_as_by_the_full_model() {
 /// The support of a casing at rest takes forces and moments of its contact nodes, and those alone: heat has none.
 #[test]
 fn a_support_takes_what_acts_on_its_casing() {
-    for support in [Support::Low, Support::Both] {
+    for support in [RingSupport::Low, RingSupport::Both] {
         let rom = &reduced(support).rom;
         let rows = rom.extras.support.as_ref().unwrap();
         let felt = |forces: &DVector<f64>| {
@@ -242,12 +244,12 @@ fn a_support_takes_what_acts_on_its_casing() {
         );
         assert!(worst[0] < 1e-8 && worst[1] < 1e-8, "{support:?}: {worst:?}");
     }
-    assert!(reduced(Support::Free).rom.extras.support.is_none());
+    assert!(reduced(RingSupport::Free).rom.extras.support.is_none());
 }
 
 /// Sum of the magnitudes of the nodal forces of a patch of the coarse casing (N/K).
 fn thermal_size(patch: usize) -> f64 {
-    let options = coarse(Support::Low);
+    let options = coarse(RingSupport::Low);
     let ring = supported_ring(&options).unwrap();
     let patches = equal_patches(12, 2, options.geometry.contour.axial());
     let loads = patch_loads(&ring.mesh, &options.material, &patches).unwrap();
@@ -358,7 +360,7 @@ fn condensing_is_the_free_interface_reduction_of_what_it_condenses() {
 /// A mesh from elsewhere: other node numbers, contact nodes as an unordered set, prisms.
 #[test]
 fn a_mesh_of_ones_own_is_reduced_alike() {
-    let options = coarse(Support::Low);
+    let options = coarse(RingSupport::Low);
     let ring = supported_ring(&options).unwrap();
     let count = ring.mesh.nodes.len();
     // 7919 is a prime and does not divide the count: a permutation.
@@ -386,7 +388,7 @@ fn a_mesh_of_ones_own_is_reduced_alike() {
     let patches = equal_patches(12, 2, options.geometry.contour.axial());
     let own =
         reduce_casing(mesh.clone(), &options.material, &clamped, &grid, &patches, &settings, &silent).unwrap().rom;
-    let parametric = &reduced(Support::Low).rom;
+    let parametric = &reduced(RingSupport::Low).rom;
     for (a, b) in own.checks.reduced_frequencies.iter().zip(&parametric.checks.reduced_frequencies) {
         assert!((a / b - 1.0).abs() < 1e-8);
     }
@@ -397,7 +399,7 @@ fn a_mesh_of_ones_own_is_reduced_alike() {
     let cold = reduce_casing(mesh.clone(), &options.material, &clamped, &grid, &[], &settings, &silent).unwrap().rom;
     assert!(cold.extras.thermal.is_none() && cold.order() < own.order());
 
-    let refused = |grid: &GridNodes, patches: &[Patch], hint: &str| {
+    let refused = |grid: &GridNodes, patches: &[ThermalPatch], hint: &str| {
         let result = reduce_casing(mesh.clone(), &options.material, &clamped, grid, patches, &settings, &silent);
         let error = result.unwrap_err().to_string();
         assert!(error.contains(hint), "{error}");
@@ -410,7 +412,7 @@ fn a_mesh_of_ones_own_is_reduced_alike() {
     refused(&shifted, &patches, "not at its place of the grid");
     refused(&GridNodes { around: 0, ..grid.clone() }, &patches, "72 nodes and 3 slopes for rings of 0");
     refused(&GridNodes { slopes: vec![0.0; 2], ..grid.clone() }, &patches, "72 nodes and 2 slopes for rings of 24");
-    let outside = Patch { angle: [0.0, 1.0], axial: [1.0, 2.0] };
+    let outside = ThermalPatch { angle: [0.0, 1.0], axial: [1.0, 2.0] };
     refused(&grid, &[patches[0], outside], "thermal patch 2: no element");
     refused(&grid, &[patches[0], patches[0]], "thermal patches 1 and 2: both hold element");
     let error = GridNodes::sorted(&mesh, &contact[1..], 3).unwrap_err().to_string();
@@ -420,8 +422,8 @@ fn a_mesh_of_ones_own_is_reduced_alike() {
 /// With no mode at all the static response is still that of the full model, and rigid-body modes stay.
 #[test]
 fn a_casing_without_modes_is_still_exact_at_rest() {
-    let full = &reduced(Support::Free).rom;
-    let options = CasingOptions { fixed_interface_modes: 0, modes: 0, ..coarse(Support::Free) };
+    let full = &reduced(RingSupport::Free).rom;
+    let options = CasingOptions { fixed_interface_modes: 0, modes: 0, ..coarse(RingSupport::Free) };
     let rom = reduce_ring(&options, &silent).unwrap().rom;
     let rigid = rom.stiffness.diagonal().iter().filter(|square| **square == 0.0).count();
     assert_eq!((rigid, rom.order()), (6, 216 + 24));
@@ -435,9 +437,9 @@ fn a_casing_without_modes_is_still_exact_at_rest() {
 fn the_rom_has_the_same_bits_on_any_number_of_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| reduce_ring(&coarse(Support::Low), &silent)).unwrap().rom
+        pool.install(|| reduce_ring(&coarse(RingSupport::Low), &silent)).unwrap().rom
     };
     for threads in [1, 5] {
-        assert!(on(threads) == reduced(Support::Low).rom, "{threads} threads");
+        assert!(on(threads) == reduced(RingSupport::Low).rom, "{threads} threads");
     }
 }

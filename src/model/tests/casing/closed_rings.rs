@@ -4,7 +4,7 @@ use crate::guide::told;
 use std::f64::consts::TAU;
 
 use tiprub_core::Rom;
-use tiprub_model::casing::{ContactRings, Contour, RingCounts, RingGeometry, Support};
+use tiprub_model::casing::{ContactRings, InnerContour, RingCounts, RingGeometry, RingSupport};
 use tiprub_model::progress::silent;
 use tiprub_model::{CasingOptions, Material, reduce_ring};
 use tiprub_reference::closed::frequencies::{free_ring, free_ring_out_of_plane};
@@ -20,7 +20,7 @@ fn ring(side: f64) -> Rom {
     let options = CasingOptions {
         name: "thin".into(),
         geometry: RingGeometry {
-            contour: Contour::new(&[[0.0, inner], [side, inner]]).unwrap(),
+            contour: InnerContour::new(&[[0.0, inner], [side, inner]]).unwrap(),
             thickness: side,
             flanges: [None, None],
         },
@@ -31,7 +31,7 @@ fn ring(side: f64) -> Rom {
         modes: 30,
         // Rigid ones: what follows looks at the ROM alone.
         checked_modes: 6,
-        support: Support::Free,
+        support: RingSupport::Free,
         ..CasingOptions::default()
     };
     reduce_ring(&options, &silent).unwrap().rom

@@ -2,12 +2,12 @@
 //! matrices of all nodes, under the contact force that the core tells. No basis, no reduced row is shared.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use tiprub_core::rom::Support as Rows;
+use tiprub_core::rom::SupportRows as Rows;
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::casing::{
-    CLAMPED, ContactRings, Contour, RingCounts, RingGeometry, RingMesh, Support, supported_ring,
+    CLAMPED, ContactRings, InnerContour, RingCounts, RingGeometry, RingMesh, RingSupport, supported_ring,
 };
 use tiprub_model::element::ElementKind;
 use tiprub_model::progress::silent;
@@ -28,14 +28,14 @@ const PATCHES: usize = 3;
 fn ring(fixed_interface_modes: usize, modes: usize) -> CasingOptions {
     CasingOptions {
         geometry: RingGeometry {
-            contour: Contour::new(&[[0.0, models::RADIUS], [0.06, models::RADIUS]]).unwrap(),
+            contour: InnerContour::new(&[[0.0, models::RADIUS], [0.06, models::RADIUS]]).unwrap(),
             thickness: 1e-2,
             flanges: [None, None],
         },
         counts: RingCounts { around: AROUND, through: 1, along: 3, flange: 1 },
         kind: ElementKind::Hex8,
         rings: ContactRings { around: AROUND, along: ALONG, axial: [0.02, 0.04] },
-        support: Support::Low,
+        support: RingSupport::Low,
         patches: [PATCHES, 1],
         fixed_interface_modes,
         modes,
@@ -46,7 +46,7 @@ fn ring(fixed_interface_modes: usize, modes: usize) -> CasingOptions {
 }
 
 /// The whole mesh, and how its free nodes move.
-struct Mesh {
+struct MovingMesh {
     ring: RingMesh,
     /// Of the free nodes.
     stiffness: DMatrix<f64>,
@@ -61,7 +61,7 @@ struct Mesh {
     before: DVector<f64>,
 }
 
-impl Mesh {
+impl MovingMesh {
     fn new(options: &CasingOptions) -> Self {
         let ring = supported_ring(options).unwrap();
         let nodes = &ring.mesh.nodes;
@@ -126,7 +126,7 @@ fn rigid([x, y, z]: [f64; 3], axis: usize) -> [f64; 6] {
 
 /// What moves the casing.
 #[derive(Clone, Copy)]
-struct Drive {
+struct CasingDrive {
     /// Amplitude (m) and frequency (Hz) of the shaft, which presses a pin against the casing.
     push: [f64; 2],
     /// Frequency of the pin on its spring (Hz).
@@ -138,12 +138,12 @@ struct Drive {
 }
 
 /// Blows that ring in all modes, on a casing that is warm.
-const BLOWS: Drive = Drive { push: [3e-8, 1e4], pin: 2000.0, speed: 1e-5, heat: [0.02, 0.0, -0.01] };
+const BLOWS: CasingDrive = CasingDrive { push: [3e-8, 1e4], pin: 2000.0, speed: 1e-5, heat: [0.02, 0.0, -0.01] };
 /// One soft push.
-const PUSH: Drive = Drive { push: [3e-8, 2e3], pin: 2e4, speed: 0.05, heat: [0.0; PATCHES] };
+const PUSH: CasingDrive = CasingDrive { push: [3e-8, 2e3], pin: 2e4, speed: 0.05, heat: [0.0; PATCHES] };
 
 /// A pin on a spring that stands before the first node of the second ring, and is pressed against it by the shaft.
-fn scene(casing: Rom, drive: Drive, scheme: Scheme, step: f64) -> Scene {
+fn scene(casing: Rom, drive: CasingDrive, scheme: Scheme, step: f64) -> Scene {
     let pin = vec![models::node("pin", [models::RADIUS, 0.0, 0.04], 0.0)];
     let shape = |row: usize, _: usize| if row == 0 { 3.0 } else { 0.0 };
     let mut scene = models::round(models::modal("pin", &[drive.pin], shape, pin));
@@ -200,8 +200,8 @@ impl std::fmt::Display for Off {
 
 /// Of a run of the core beside the mesh; `change` the rows of the support.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most thousands of steps")]
-fn compare(options: &CasingOptions, drive: Drive, scheme: Scheme, step: f64, change: impl Fn(&mut Rows)) -> Off {
-    let (mut mesh, mut casing) = (Mesh::new(options), reduce_ring(options, &silent).unwrap().rom);
+fn compare(options: &CasingOptions, drive: CasingDrive, scheme: Scheme, step: f64, change: impl Fn(&mut Rows)) -> Off {
+    let (mut mesh, mut casing) = (MovingMesh::new(options), reduce_ring(options, &silent).unwrap().rom);
     change(casing.extras.support.as_mut().unwrap());
     let mut run = start(&scene(casing, drive, scheme, step), &drive.heat);
     mesh.rest(&drive.heat);
@@ -254,8 +254,11 @@ fn compare(options: &CasingOptions, drive: Drive, scheme: Scheme, step: f64, cha
 fn a_support_in_motion_takes_what_changes_the_momentum_of_the_mesh() {
     let options = ring(144, 1000);
     let off = |size: f64, change: &dyn Fn(&mut Rows)| {
-        let drive =
-            Drive { push: [size * BLOWS.push[0], BLOWS.push[1]], heat: BLOWS.heat.map(|one| size * one), ..BLOWS };
+        let drive = CasingDrive {
+            push: [size * BLOWS.push[0], BLOWS.push[1]],
+            heat: BLOWS.heat.map(|one| size * one),
+            ..BLOWS
+        };
         compare(&options, drive, Scheme::CentralDifference, 2e-7, change)
     };
     let [found, smaller] = [1.0, 0.1].map(|size| off(size, &|_| ()));

@@ -6,7 +6,8 @@ use std::sync::OnceLock;
 use crate::common::casing::{coarse, heated};
 use tiprub_core::rom::ContactGrid;
 use tiprub_model::casing::{
-    CLAMPED, ContactRings, Contour, Flange, RingCounts, RingGeometry, Support, casing37_contour, supported_ring,
+    CLAMPED, ContactRings, Flange, InnerContour, RingCounts, RingGeometry, RingSupport, casing37_contour,
+    supported_ring,
 };
 use tiprub_model::element::ElementKind;
 use tiprub_model::progress::silent;
@@ -24,7 +25,7 @@ fn a_thin_free_ring_bends_as_in_the_books() {
         let options = CasingOptions {
             name: "thin".into(),
             geometry: RingGeometry {
-                contour: Contour::new(&[[0.0, inner], [length, inner]]).unwrap(),
+                contour: InnerContour::new(&[[0.0, inner], [length, inner]]).unwrap(),
                 thickness,
                 flanges: [None, None],
             },
@@ -34,7 +35,7 @@ fn a_thin_free_ring_bends_as_in_the_books() {
             fixed_interface_modes: 24,
             modes: 30,
             checked_modes: 20,
-            support: Support::Free,
+            support: RingSupport::Free,
             ..CasingOptions::default()
         };
         let reduction = reduce_ring(&options, &silent).unwrap();
@@ -166,10 +167,10 @@ fn casing37_follows_the_tip() {
 
 #[test]
 fn contours_run_through_their_points_without_overshoot() {
-    let cone = Contour::new(&[[0.1, 0.3], [0.2, 0.25]]).unwrap();
+    let cone = InnerContour::new(&[[0.1, 0.3], [0.2, 0.25]]).unwrap();
     assert!((cone.radius(0.15) - 0.275).abs() < 1e-15 && (cone.slope(0.13) + 0.5).abs() < 1e-14);
     let points = [[0.0, 0.30], [0.01, 0.30], [0.02, 0.29], [0.05, 0.288], [0.06, 0.295]];
-    let contour = Contour::new(&points).unwrap();
+    let contour = InnerContour::new(&points).unwrap();
     for [z, r] in points {
         assert!((contour.radius(z) - r).abs() < 1e-15);
     }
@@ -190,7 +191,7 @@ fn contours_run_through_their_points_without_overshoot() {
 fn rings_have_exact_sets_and_the_volume_of_their_parts() {
     let flange = Flange { thickness: 5e-3, height: 10e-3 };
     let geometry = RingGeometry {
-        contour: Contour::new(&[[0.0, 0.25], [0.06, 0.25]]).unwrap(),
+        contour: InnerContour::new(&[[0.0, 0.25], [0.06, 0.25]]).unwrap(),
         thickness: 4e-3,
         flanges: [Some(flange), None],
     };
@@ -202,7 +203,7 @@ fn rings_have_exact_sets_and_the_volume_of_their_parts() {
             kind,
             counts: RingCounts { around: 72, through: 2, along: 12, flange: 2 },
             rings: ContactRings { around: 24, along: 3, axial: [0.005, 0.055] },
-            support: Support::Both,
+            support: RingSupport::Both,
             ..CasingOptions::default()
         };
         let ring = supported_ring(&options).unwrap();
@@ -233,7 +234,7 @@ fn rings_have_exact_sets_and_the_volume_of_their_parts() {
 
 #[test]
 fn centroids_on_an_edge_belong_to_the_patch_that_begins_there() {
-    let options = coarse(Support::Free);
+    let options = coarse(RingSupport::Free);
     let mesh = supported_ring(&options).unwrap().mesh;
     // 24 elements and 16 patches around: every second edge halves an element.
     let found = patch_of_elements(&mesh, &equal_patches(16, 1, options.geometry.contour.axial())).unwrap();
@@ -246,7 +247,7 @@ fn centroids_on_an_edge_belong_to_the_patch_that_begins_there() {
 #[test]
 fn what_does_not_fit_is_refused_by_name() {
     let refused = |change: &dyn Fn(&mut CasingOptions), hint: &str| {
-        let mut options = coarse(Support::Low);
+        let mut options = coarse(RingSupport::Low);
         change(&mut options);
         let error = reduce_ring(&options, &silent).unwrap_err().to_string();
         assert!(error.contains(hint), "{error}");
@@ -263,6 +264,6 @@ fn what_does_not_fit_is_refused_by_name() {
     refused(&|o| o.patches = [48, 1], "no element has its centroid");
     refused(&|o| o.fixed_interface_modes = 1_000_000, "number of fixed-interface modes");
     for points in [vec![[0.0, 0.25]], vec![[0.0, 0.25], [0.0, 0.26]], vec![[0.0, 0.25], [0.1, -0.2]]] {
-        assert!(Contour::new(&points).unwrap_err().to_string().starts_with("contour of the casing"));
+        assert!(InnerContour::new(&points).unwrap_err().to_string().starts_with("contour of the casing"));
     }
 }

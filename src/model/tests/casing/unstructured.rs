@@ -7,7 +7,7 @@ use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::settings::StructureSettings;
 use tiprub_core::{Rom, Simulation};
-use tiprub_model::casing::{CasingReductionOptions, ContactRings, GridNodes, Support};
+use tiprub_model::casing::{CasingReductionOptions, ContactRings, GridNodes, RingSupport};
 use tiprub_model::element::{Formulation, consistent_mass};
 use tiprub_model::inner_surface::InnerSurface;
 use tiprub_model::mesh::Mesh;
@@ -18,10 +18,11 @@ use tiprub_test_models as models;
 
 use super::casing::full_at_rest;
 use crate::common::casing::{at_rest, heated};
-use crate::common::tetrahedra::Ring;
+use crate::common::tetrahedra::TetrahedralRing;
 
 /// Round the blade of the tests.
-const RING: Ring = Ring { radius: models::RADIUS + models::GAP, thickness: 15e-3, axial: [-0.022, 0.046] };
+const RING: TetrahedralRing =
+    TetrahedralRing { radius: models::RADIUS + models::GAP, thickness: 15e-3, axial: [-0.022, 0.046] };
 const RINGS: ContactRings = ContactRings { around: 12, along: 3, axial: [-0.003, 0.033] };
 const PATCHES: [usize; 2] = [8, 1];
 const MODES: usize = 40;
@@ -31,9 +32,9 @@ fn grid(mesh: &Mesh, clamped: &[usize], rings: ContactRings) -> tiprub_model::Re
     GridNodes::chosen(mesh, (set, clamped), [rings.around, rings.along], Some(rings.axial))
 }
 
-fn tetrahedra(counts: [usize; 3], support: Support) -> Reduction {
+fn tetrahedra(counts: [usize; 3], support: RingSupport) -> Reduction {
     let mesh = RING.tetrahedra(counts);
-    let clamped = if support == Support::Free { Vec::new() } else { mesh.set("low").unwrap().to_vec() };
+    let clamped = if support == RingSupport::Free { Vec::new() } else { mesh.set("low").unwrap().to_vec() };
     let grid = grid(&mesh, &clamped, RINGS).unwrap();
     assert_eq!(grid.points.len(), 36);
     let options = CasingReductionOptions {
@@ -48,7 +49,7 @@ fn tetrahedra(counts: [usize; 3], support: Support) -> Reduction {
     reduce_casing(mesh, &Material::steel(), &clamped, &grid, &patches, &options, &silent).unwrap()
 }
 
-fn bricks(counts: [usize; 3], support: Support) -> Rom {
+fn bricks(counts: [usize; 3], support: RingSupport) -> Rom {
     let ring = RING.bricks(counts, RINGS, support);
     let options =
         CasingOptions { patches: PATCHES, fixed_interface_modes: 60, modes: MODES, checked_modes: 12, ..ring };
@@ -71,14 +72,14 @@ fn worst(found: &[f64], expected: &[f64]) -> f64 {
 /// The casing of bricks, reduced once for all tests of this file.
 fn of_bricks() -> &'static Rom {
     static ROM: OnceLock<Rom> = OnceLock::new();
-    ROM.get_or_init(|| bricks([72, 1, 10], Support::Low))
+    ROM.get_or_init(|| bricks([72, 1, 10], RingSupport::Low))
 }
 
 /// Those of a coarse and a fine mesh of tetrahedra.
 fn of_mesh(mesh: usize) -> &'static Rom {
     static ROMS: [OnceLock<Rom>; 2] = [const { OnceLock::new() }; 2];
     let counts = [[36, 1, 4], [72, 1, 8]];
-    ROMS[mesh].get_or_init(|| tetrahedra(counts[mesh], Support::Low).rom)
+    ROMS[mesh].get_or_init(|| tetrahedra(counts[mesh], RingSupport::Low).rom)
 }
 
 /// Displacements are held against the largest under a unit force. At the point force itself they depend on the elements around it in any mesh: they
@@ -109,7 +110,7 @@ fn tetrahedra_converge_to_the_casing_of_bricks() {
 #[test]
 fn static_answers_between_nodes_are_those_of_the_mesh() {
     let counts = [24, 1, 4];
-    let (rom, mesh) = (tetrahedra(counts, Support::Low).rom, RING.tetrahedra(counts));
+    let (rom, mesh) = (tetrahedra(counts, RingSupport::Low).rom, RING.tetrahedra(counts));
     let clamped = mesh.set("low").unwrap();
     let points = grid(&mesh, clamped, RINGS).unwrap().points;
     let axes = |point: usize| {
@@ -189,7 +190,7 @@ fn interpolation_keeps_rigid_motions_forces_and_moments() {
 /// Modes of a free casing at 0 Hz move the grid as a rigid body, with the mass of the mesh.
 #[test]
 fn a_free_casing_of_tetrahedra_has_its_mass_and_rigid_motions() {
-    let Reduction { rom, mesh, .. } = tetrahedra([24, 1, 4], Support::Free);
+    let Reduction { rom, mesh, .. } = tetrahedra([24, 1, 4], RingSupport::Free);
     let mesh = mesh.unwrap();
     let mass: f64 = mesh
         .elements
@@ -281,7 +282,7 @@ fn rejects_what_is_no_single_full_inner_surface() {
     let seam = RING.tetrahedra_with(counts, false);
     refused(&seam, "inner", axial, &["no full ring", "not connected at 5.6", "merge coincident nodes"]);
     let mut twice = good.clone();
-    let outside = Ring { radius: 0.3, ..RING }.tetrahedra(counts);
+    let outside = TetrahedralRing { radius: 0.3, ..RING }.tetrahedra(counts);
     let first = twice.nodes.len();
     twice.nodes.extend(&outside.nodes);
     for element in &outside.elements {

@@ -3,10 +3,10 @@
 use nalgebra::DVector;
 use tiprub_core::Rom;
 use tiprub_model::CasingOptions;
-use tiprub_model::casing::{RingCounts, Support};
+use tiprub_model::casing::{RingCounts, RingSupport};
 
 /// casing37 with fewer elements and modes.
-pub fn coarse(support: Support) -> CasingOptions {
+pub fn coarse(support: RingSupport) -> CasingOptions {
     CasingOptions {
         counts: RingCounts { around: 24, through: 1, along: 8, flange: 1 },
         patches: [12, 2],

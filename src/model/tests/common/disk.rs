@@ -15,17 +15,17 @@ use super::{division, linear};
 
 /// Cells of the annulus in radius, around and along the axis; the blade is one cell thick and `blade` cells high.
 #[derive(Debug, Clone, Copy)]
-pub struct Counts {
+pub struct CellCounts {
     pub hub: usize,
     pub around: usize,
     pub along: usize,
     pub blade: usize,
 }
 
-pub const COARSE: Counts = Counts { hub: 2, around: 3, along: 2, blade: 2 };
+pub const COARSE: CellCounts = CellCounts { hub: 2, around: 3, along: 2, blade: 2 };
 
 /// A sector with its two faces as node sets LOW and HIGH, the bore as BORE and the blade's tip as TIP.
-pub fn sector(kind: ElementKind, sectors: usize, counts: Counts) -> Mesh {
+pub fn sector(kind: ElementKind, sectors: usize, counts: CellCounts) -> Mesh {
     let pitch = TAU / sectors as f64;
     let blade_cell = counts.around / 2;
     let mut number = std::collections::BTreeMap::new();

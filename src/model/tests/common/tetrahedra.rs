@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use tiprub_model::casing::{CasingOptions, ContactRings, Contour, RingCounts, RingGeometry, Support};
+use tiprub_model::casing::{CasingOptions, ContactRings, InnerContour, RingCounts, RingGeometry, RingSupport};
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::{Element, Mesh};
 
@@ -10,7 +10,7 @@ use super::{division, wobble};
 
 /// A cylinder without flanges.
 #[derive(Debug, Clone, Copy)]
-pub struct Ring {
+pub struct TetrahedralRing {
     pub radius: f64,
     pub thickness: f64,
     pub axial: [f64; 2],
@@ -21,7 +21,7 @@ const TURN: f64 = 0.0837;
 /// Fraction of the edges by which corners move.
 const JITTER: f64 = 0.18;
 
-impl Ring {
+impl TetrahedralRing {
     /// Tetrahedra, six to a brick; corners of bricks move along the surfaces and inside. Nodes in the middle of edges lie on the curved
     /// surfaces. Sets: `inner`, `low` (the end face), `all`.
     pub fn tetrahedra(&self, counts: [usize; 3]) -> Mesh {
@@ -80,8 +80,13 @@ impl Ring {
     }
 
     /// The same ring of quadratic bricks with nodes at regular angles.
-    pub fn bricks(&self, [around, through, along]: [usize; 3], rings: ContactRings, support: Support) -> CasingOptions {
-        let contour = Contour::new(&self.axial.map(|z| [z, self.radius])).unwrap();
+    pub fn bricks(
+        &self,
+        [around, through, along]: [usize; 3],
+        rings: ContactRings,
+        support: RingSupport,
+    ) -> CasingOptions {
+        let contour = InnerContour::new(&self.axial.map(|z| [z, self.radius])).unwrap();
         CasingOptions {
             name: "bricks".into(),
             geometry: RingGeometry { contour, thickness: self.thickness, flanges: [None, None] },

@@ -2,20 +2,22 @@
 
 use std::f64::consts::PI;
 
-use tiprub_model::casing::{ContactRings, Contour, RingCounts, RingGeometry};
-use tiprub_model::conduction::{Conduction, ConductionOptions, Conductor, reduce_conduction, reduce_ring_conduction};
+use tiprub_model::casing::{ContactRings, InnerContour, RingCounts, RingGeometry};
+use tiprub_model::conduction::{
+    ConductionOptions, ConductionReduction, Conductor, reduce_conduction, reduce_ring_conduction,
+};
 use tiprub_model::progress::silent;
 use tiprub_model::{CasingOptions, Mesh};
-use tiprub_thermal::Simulation;
+use tiprub_thermal::ThermalSimulation;
 
 use super::{get, options, set, wall, whole};
 
-fn reduced(mesh: &Mesh, options: &ConductionOptions) -> Conduction {
+fn reduced(mesh: &Mesh, options: &ConductionOptions) -> ConductionReduction {
     reduce_conduction(mesh, &whole(), options, &silent).unwrap()
 }
 
-fn hot(model: tiprub_thermal::Model, temperature: f64) -> Simulation {
-    let mut simulation = Simulation::new(model).unwrap();
+fn hot(model: tiprub_thermal::ConductionModel, temperature: f64) -> ThermalSimulation {
+    let mut simulation = ThermalSimulation::new(model).unwrap();
     set(&mut simulation, "initial_temperature", temperature);
     simulation.initialise(0.0).unwrap();
     simulation
@@ -92,7 +94,7 @@ fn steps_shorter_than_elements_resolve_are_warned_of() {
     println!("| step, of the diffusion time of an element | surface, against the closed form | warned |");
     let low = [1e-3, 1e-2, 0.1, 0.99, 1.01, 4.0].map(|share| {
         let step = share * model.element_time;
-        let mut simulation = Simulation::new(model.clone()).unwrap();
+        let mut simulation = ThermalSimulation::new(model.clone()).unwrap();
         set(&mut simulation, "casing_heat", flux * area);
         simulation.initialise(0.0).unwrap();
         simulation.do_step(0.0, step).unwrap();
@@ -118,7 +120,7 @@ fn steps_shorter_than_elements_resolve_are_warned_of() {
 
 /// A casing without flanges: a cylinder of radii a and b, whose end faces let no heat through.
 fn cylinder(around: usize, through: usize) -> CasingOptions {
-    let contour = Contour::new(&[[0.0, 0.05], [0.02, 0.05]]).unwrap();
+    let contour = InnerContour::new(&[[0.0, 0.05], [0.02, 0.05]]).unwrap();
     CasingOptions {
         name: "cylinder".into(),
         geometry: RingGeometry { contour, thickness: 0.05, flanges: [None, None] },
@@ -146,7 +148,7 @@ fn heat_flows_through_a_cylinder_as_the_logarithm_of_its_radii_says() {
             ..options(films, [0.0, length], 8)
         };
         let model = reduce_ring_conduction(&cylinder(around, through), &options, &silent).unwrap().model;
-        let mut simulation = Simulation::new(model).unwrap();
+        let mut simulation = ThermalSimulation::new(model).unwrap();
         let state = simulation.table().find("initial_state").unwrap().reference;
         simulation.set_integer(state, 2).unwrap();
         set(&mut simulation, "gas_temperature", gas);
@@ -193,7 +195,7 @@ fn after_shutdown_a_casing_soaks_exponentially_through_the_air() {
     let films = [500.0, 30.0];
     let model = reduced(&mesh, &options(films, [-1.0, 1.0], 8)).model;
     let (capacity, air) = (model.heat_capacity, model.ambient_conductance());
-    let mut simulation = Simulation::new(model).unwrap();
+    let mut simulation = ThermalSimulation::new(model).unwrap();
     set(&mut simulation, "casing_heat", 40.0);
     simulation.initialise(0.0).unwrap();
     simulation.do_step(0.0, 600.0).unwrap();

@@ -10,11 +10,11 @@ mod unstructured;
 
 use std::f64::consts::PI;
 
-use tiprub_core::rom::Patch;
+use tiprub_core::rom::ThermalPatch;
 use tiprub_model::Mesh;
 use tiprub_model::conduction::{ConductionOptions, Conductor};
 use tiprub_model::element::ElementKind;
-use tiprub_thermal::Simulation;
+use tiprub_thermal::ThermalSimulation;
 
 /// Steel with the films given (W/(m² K)).
 fn options(films: [f64; 2], heated: [f64; 2], modes: usize) -> ConductionOptions {
@@ -23,8 +23,8 @@ fn options(films: [f64; 2], heated: [f64; 2], modes: usize) -> ConductionOptions
 }
 
 /// One patch that holds everything.
-fn whole() -> Vec<Patch> {
-    vec![Patch { angle: [0.0, 2.0 * PI], axial: [-1.0, 1.0] }]
+fn whole() -> Vec<ThermalPatch> {
+    vec![ThermalPatch { angle: [0.0, 2.0 * PI], axial: [-1.0, 1.0] }]
 }
 
 /// A plane wall from x = 1 m, the side of the gas, outwards: its other sides meet the air.
@@ -35,13 +35,13 @@ fn wall(thickness: f64, elements: usize) -> Mesh {
 }
 
 #[track_caller]
-fn set(simulation: &mut Simulation, name: &str, value: f64) {
+fn set(simulation: &mut ThermalSimulation, name: &str, value: f64) {
     let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
     simulation.set_real(reference, value).unwrap();
 }
 
 #[track_caller]
-fn get(simulation: &Simulation, name: &str) -> f64 {
+fn get(simulation: &ThermalSimulation, name: &str) -> f64 {
     let reference = simulation.table().find(name).unwrap_or_else(|| panic!("no {name}")).reference;
     simulation.real(reference).unwrap()
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use faer::Mat;
-use tiprub_model::casing::{ContactRings, Contour, RingCounts, RingGeometry, Support, supported_ring};
+use tiprub_model::casing::{ContactRings, InnerContour, RingCounts, RingGeometry, RingSupport, supported_ring};
 use tiprub_model::conduction::{
     ConductionOptions, Conductor, FullConduction, reduce_conduction, reduce_ring_conduction,
 };
@@ -11,13 +11,13 @@ use tiprub_model::progress::silent;
 use tiprub_model::sparse::SparseMatrix;
 use tiprub_model::thermal::equal_patches;
 use tiprub_model::{CasingOptions, Mesh};
-use tiprub_thermal::Simulation;
+use tiprub_thermal::ThermalSimulation;
 
 use super::{get, options, set, wall, whole};
 use crate::common::casing::coarse;
 
 fn casing() -> CasingOptions {
-    CasingOptions { patches: [12, 1], ..coarse(Support::Low) }
+    CasingOptions { patches: [12, 1], ..coarse(RingSupport::Low) }
 }
 
 fn of_casing(modes: usize) -> ConductionOptions {
@@ -43,7 +43,7 @@ fn reduces_a_casing_whose_rates_stand_close_together() {
     let cylinder = CasingOptions {
         name: "cylinder".into(),
         geometry: RingGeometry {
-            contour: Contour::new(&[[0.0, 0.25], [0.1, 0.25]]).unwrap(),
+            contour: InnerContour::new(&[[0.0, 0.25], [0.1, 0.25]]).unwrap(),
             thickness: 4e-3,
             flanges: [None, None],
         },
@@ -156,7 +156,7 @@ fn transients_are_those_of_the_full_model_by_the_trapezoidal_rule() {
     let mut deviations = Vec::new();
     for modes in [5, 20, 60] {
         let model = reduce_conduction(&mesh, &patches, &of_casing(modes), &silent).unwrap().model;
-        let mut simulation = Simulation::new(model).unwrap();
+        let mut simulation = ThermalSimulation::new(model).unwrap();
         set(&mut simulation, "casing_heat", 100.0);
         simulation.initialise(0.0).unwrap();
         let (mut time, mut worst) = (0.0, 0.0_f64);

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use tiprub_core::rom::Patch;
+use tiprub_core::rom::ThermalPatch;
 use tiprub_model::CasingOptions;
-use tiprub_model::casing::{ContactRings, Support};
+use tiprub_model::casing::{ContactRings, RingSupport};
 use tiprub_model::conduction::Conductor;
 use tiprub_model::conduction::{ConductionOptions, FullConduction, reduce_mesh_conduction, reduce_ring_conduction};
 use tiprub_model::mesh::Mesh;
@@ -12,14 +12,14 @@ use tiprub_model::progress::silent;
 use tiprub_model::thermal::equal_patches;
 
 use super::options;
-use crate::common::tetrahedra::Ring;
+use crate::common::tetrahedra::TetrahedralRing;
 
-const RING: Ring = Ring { radius: 0.05, thickness: 0.02, axial: [0.0, 0.04] };
+const RING: TetrahedralRing = TetrahedralRing { radius: 0.05, thickness: 0.02, axial: [0.0, 0.04] };
 const HEATED: [f64; 2] = [0.0113, 0.0291];
 const PATCHES: [usize; 2] = [5, 1];
 const COUNTS: [[usize; 3]; 2] = [[12, 1, 3], [24, 2, 6]];
 
-fn full(mesh: &Mesh, heated: [f64; 2], patches: &[Patch]) -> FullConduction {
+fn full(mesh: &Mesh, heated: [f64; 2], patches: &[ThermalPatch]) -> FullConduction {
     FullConduction::new(mesh, patches, &options([400.0, 60.0], heated, 4)).unwrap()
 }
 
@@ -111,10 +111,10 @@ fn heat_through_tetrahedra_follows_the_logarithm_of_the_radius() {
 #[test]
 fn a_casing_of_tetrahedra_conducts_as_one_of_bricks() {
     let rings = ContactRings { around: 20, along: 2, axial: HEATED };
-    let of_bricks = CasingOptions { patches: PATCHES, ..RING.bricks([40, 2, 12], rings, Support::Free) };
+    let of_bricks = CasingOptions { patches: PATCHES, ..RING.bricks([40, 2, 12], rings, RingSupport::Free) };
     let settings = ConductionOptions { ..options([400.0, 60.0], HEATED, 12) };
     let bricks = reduce_ring_conduction(&of_bricks, &settings, &silent).unwrap();
-    let answers = |model: &tiprub_thermal::Model| {
+    let answers = |model: &tiprub_thermal::ConductionModel| {
         let matrix = &model.conduction + &model.gas_convection + &model.ambient_convection;
         let answer = matrix.cholesky().unwrap().solve(&model.heat_loads);
         [&model.patch_means * &answer, model.heat_loads.transpose() * &answer]

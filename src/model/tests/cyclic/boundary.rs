@@ -1,6 +1,6 @@
 //! Pairing of the faces of a sector, and what is refused.
 
-use crate::common::disk::{COARSE, Counts, boundary, model, options, sector, tips};
+use crate::common::disk::{COARSE, CellCounts, boundary, model, options, sector, tips};
 use tiprub_model::cyclic::{CyclicBoundary, ModeSelection, PairingReport, reduce_cyclic, whole_disk};
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
@@ -164,7 +164,7 @@ fn the_disk_is_closed() {
 
 #[test]
 fn two_sectors_held_at_two_points_can_turn_about_the_line_through_them() {
-    let mesh = sector(ElementKind::Hex8, 2, Counts { around: 5, ..COARSE });
+    let mesh = sector(ElementKind::Hex8, 2, CellCounts { around: 5, ..COARSE });
     let options = options(ModeSelection::Count(2), 0);
     let faces = boundary(&mesh, 2);
     let inner =

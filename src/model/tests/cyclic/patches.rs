@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use crate::guide::told;
 
-use crate::common::disk::{COARSE, Counts, boundary, copies, model, pencils, sector};
+use crate::common::disk::{COARSE, CellCounts, boundary, copies, model, pencils, sector};
 use faer::Mat;
 use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_model::Mesh;
@@ -14,7 +14,7 @@ use tiprub_model::element::ElementKind;
 use tiprub_model::patches::{contact_patches, find_tip};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, ReductionKind};
-use tiprub_model::rotor37::Tip;
+use tiprub_model::rotor37::TipContact;
 use tiprub_model::sparse::principal_pair;
 use tiprub_model::stage::{StageOptions, reduce_stage, stage_model};
 
@@ -152,7 +152,7 @@ fn receptance([mass, stiffness, map]: &[DMatrix<Complex<f64>>; 3], angular: f64)
 #[test]
 fn forced_responses_of_a_patch_converge_faster_with_free_interface_modes() {
     let sectors = 5;
-    let mesh = sector(ElementKind::Hex8, sectors, Counts { along: 1, ..COARSE });
+    let mesh = sector(ElementKind::Hex8, sectors, CellCounts { along: 1, ..COARSE });
     let contact = patches(&mesh, 2);
     for clamped in [mesh.set("BORE").unwrap(), &[]] {
         let all = reduced(&mesh, (sectors, clamped), &contact, ReductionKind::FixedInterface, 1).free_dofs - 6;
@@ -183,8 +183,12 @@ fn forced_responses_of_a_patch_converge_faster_with_free_interface_modes() {
 #[test]
 fn five_patches_of_the_stage() {
     for kind in KINDS {
-        let options =
-            StageOptions { tip: Tip::Patches(5), kind, modes: ModeSelection::Families(6), ..StageOptions::coarse() };
+        let options = StageOptions {
+            tip: TipContact::Patches(5),
+            kind,
+            modes: ModeSelection::Families(6),
+            ..StageOptions::coarse()
+        };
         let stage = stage_model(&options, &silent).unwrap();
         let names: Vec<&str> = stage.contact.iter().map(|point| point.name.as_str()).collect();
         assert_eq!(names, ["leading_edge", "tip_2", "mid_chord", "tip_4", "trailing_edge"]);

@@ -1,14 +1,14 @@
 //! Checks of a cyclic reduction, choice of modes, and properties of its matrices.
 
-use crate::common::disk::{COARSE, Counts, boundary, copies, model, options, pencils, sector, tips};
-use tiprub_core::rom::{Frame, RomChecks};
+use crate::common::disk::{COARSE, CellCounts, boundary, copies, model, options, pencils, sector, tips};
+use tiprub_core::rom::{DisplacementFrame, RomChecks};
 use tiprub_model::Material;
 use tiprub_model::cyclic::{
     CyclicOptions, CyclicReduction, ModeSelection, SMALLEST_GAP, WHEEL_MODES, reduce_cyclic, whole_disk,
 };
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Mesh;
-use tiprub_model::progress::{Progress, silent};
+use tiprub_model::progress::{ReductionProgress, silent};
 use tiprub_model::reduce::{ContactPoint, ReductionKind, ReductionOptions, reduce};
 use tiprub_model::stress::StressPlaces;
 
@@ -45,7 +45,7 @@ fn reduced_whole(mesh: &Mesh, sectors: usize, modes: usize, checked_modes: usize
         modes,
         checked_modes,
         sectors: 1,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         watched: Vec::new(),
         stress: StressPlaces::default(),
         damping_ratio: 0.005,
@@ -191,7 +191,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn a_free_disk_has_six_rigid_body_modes() {
     let sectors = 8;
-    let mesh = sector(ElementKind::Hex8, sectors, Counts { hub: 1, ..COARSE });
+    let mesh = sector(ElementKind::Hex8, sectors, CellCounts { hub: 1, ..COARSE });
     let reduction = reduced(&mesh, sectors, false, &options(ModeSelection::Count(6), 6));
     let elastic = reduction.nodal_diameters[2].full_frequencies[0];
     let rigid = |list: &[f64]| list.iter().filter(|&&f| f < 1e-4 * elastic).count();
@@ -263,7 +263,7 @@ fn progress_is_told_from_the_calling_thread_and_ends_full() {
     let mesh = sector(ElementKind::Hex8, 7, COARSE);
     let caller = std::thread::current().id();
     let told = std::cell::RefCell::new(Vec::new());
-    let listener = |progress: Progress| {
+    let listener = |progress: ReductionProgress| {
         assert_eq!(std::thread::current().id(), caller);
         told.borrow_mut().push(progress);
     };

@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use crate::common::disk::{COARSE, Counts, boundary, copies, model, options, pencils, sector, tips};
+use crate::common::disk::{COARSE, CellCounts, boundary, copies, model, options, pencils, sector, tips};
 use faer::Mat;
 use nalgebra::{Complex, DMatrix, DVector};
 use tiprub_model::assembly::free_dofs;
@@ -21,7 +21,7 @@ fn reduced(mesh: &Mesh, sectors: usize, contact: usize, options: &CyclicOptions)
 }
 
 /// K and M of the whole disk with its bore clamped, the free dofs, and the node of the disk for sector and node.
-struct Whole {
+struct AssembledDisk {
     stiffness: SparseMatrix,
     mass: SparseMatrix,
     free: Vec<usize>,
@@ -29,12 +29,12 @@ struct Whole {
     mesh: Mesh,
 }
 
-fn whole(mesh: &Mesh, sectors: usize) -> Whole {
+fn whole(mesh: &Mesh, sectors: usize) -> AssembledDisk {
     let disk = whole_disk(mesh, &boundary(mesh, sectors)).unwrap();
     let free = free_dofs(disk.mesh.nodes.len(), disk.mesh.set("BORE").unwrap());
     let all = model(disk.mesh.clone());
     let (stiffness, mass) = principal_pair(&all.stiffness, &all.mass, &free);
-    Whole { stiffness, mass, free, nodes: disk.nodes, mesh: disk.mesh }
+    AssembledDisk { stiffness, mass, free, nodes: disk.nodes, mesh: disk.mesh }
 }
 
 /// Frequencies of all nodal diameters as often as the disk has them, up to where every nodal diameter's list reaches.
@@ -52,7 +52,7 @@ fn disk_frequencies(reduction: &CyclicReduction, sectors: usize) -> Vec<f64> {
 }
 
 #[track_caller]
-fn assert_same_frequencies(kind: ElementKind, sectors: usize, counts: Counts) {
+fn assert_same_frequencies(kind: ElementKind, sectors: usize, counts: CellCounts) {
     let mesh = sector(kind, sectors, counts);
     let reduction = reduced(&mesh, sectors, 2, &options(ModeSelection::Count(4), 6));
     let cyclic = disk_frequencies(&reduction, sectors);
@@ -83,14 +83,14 @@ fn frequencies_of_seven_sectors_are_those_of_the_disk() {
 
 #[test]
 fn frequencies_of_two_and_three_sectors_are_those_of_the_disk() {
-    let counts = Counts { around: 5, ..COARSE };
+    let counts = CellCounts { around: 5, ..COARSE };
     assert_same_frequencies(ElementKind::Hex8, 2, counts);
     assert_same_frequencies(ElementKind::Hex8, 3, counts);
 }
 
 #[test]
 fn frequencies_of_fifty_six_sectors_are_those_of_the_disk() {
-    assert_same_frequencies(ElementKind::Hex8, 56, Counts { hub: 1, along: 1, ..COARSE });
+    assert_same_frequencies(ElementKind::Hex8, 56, CellCounts { hub: 1, along: 1, ..COARSE });
 }
 
 /// ω² of a small Hermitian pencil through the real symmetric one of twice the size, every value twice there.

@@ -6,10 +6,10 @@ use tiprub_model::element::{ElementKind, nodal_stress, stress};
 use crate::common::{distorted_box, steel, straight_box, wobble};
 
 /// Displacements whose strains (εxx, εyy, εzz, γxy, γyz, γzx) are the second.
-type Field = fn([f64; 3]) -> ([f64; 3], [f64; 6]);
+type DisplacementField = fn([f64; 3]) -> ([f64; 3], [f64; 6]);
 
 /// Stress at every node of every element, against that of the strain there: largest deviation beside the largest stress.
-fn deviation(kind: ElementKind, distorted: bool, field: Field) -> f64 {
+fn deviation(kind: ElementKind, distorted: bool, field: DisplacementField) -> f64 {
     let (counts, size) = ([2, 2, 2], [0.3, 0.2, 0.1]);
     let mesh =
         if distorted { distorted_box(kind, counts, size, wobble(0.15)) } else { straight_box(kind, counts, size) };
@@ -33,7 +33,7 @@ fn deviation(kind: ElementKind, distorted: bool, field: Field) -> f64 {
 
 #[test]
 fn constant_stress_is_exact_in_distorted_elements() {
-    let field: Field = |[x, y, z]| {
+    let field: DisplacementField = |[x, y, z]| {
         let u = [1e-4 * x + 2e-4 * y, -3e-4 * y + 5e-5 * z, 4e-4 * z - 1e-4 * x];
         (u, [1e-4, -3e-4, 4e-4, 2e-4, 5e-5, -1e-4])
     };
@@ -46,7 +46,7 @@ fn constant_stress_is_exact_in_distorted_elements() {
 /// Bending: quadratic elements hold it, and its stress is linear over the thickness.
 #[test]
 fn stress_of_bending_is_exact_in_quadratic_elements() {
-    let field: Field = |[x, y, z]| {
+    let field: DisplacementField = |[x, y, z]| {
         // εxx = κ y with free cross contraction (Poisson's ratio of steel, 0.3).
         let (kappa, nu) = (1e-3, 0.3);
         let u = [kappa * x * y, -0.5 * kappa * (x * x + nu * (y * y - z * z)), -kappa * nu * y * z];

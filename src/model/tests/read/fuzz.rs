@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tiprub_model::progress::silent;
-use tiprub_model::read::{Axis, MatrixFiles, Units, parse_mesh, read_matrices};
+use tiprub_model::read::{EngineAxis, MatrixFiles, Units, parse_mesh, read_matrices};
 use tiprub_model::{Error, FeModel, Material};
 
 fn data(name: &str) -> Vec<u8> {
@@ -87,7 +87,7 @@ fn damaged_matrices_and_node_tables() {
         nodes: root.path().join("nodes.csv"),
         dofs: None,
         units: Units::Si,
-        axis: Axis::Z,
+        axis: EngineAxis::Z,
         left_out: vec!["B".into()],
     };
     let mut draws = Draws(0x1234_5678_9abc_def1);

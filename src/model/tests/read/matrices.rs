@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 use tiprub_core::Rom;
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 use tiprub_model::progress::silent;
 use tiprub_model::read::{
-    Axis, ContactChoice, Imported, MatrixFiles, MeshOptions, Units, choose_contact_nodes, read_matrices, read_mesh,
+    ContactChoice, EngineAxis, Imported, MatrixFiles, MeshOptions, Units, choose_contact_nodes, read_matrices,
+    read_mesh,
 };
 use tiprub_model::reduce::{ReductionKind, ReductionOptions};
 use tiprub_model::stress::StressPlaces;
@@ -35,7 +36,7 @@ fn rom(imported: &Imported) -> Rom {
         modes: 8,
         checked_modes: 6,
         sectors: 1,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         watched: Vec::new(),
         stress: StressPlaces::default(),
         damping_ratio: 0.005,
@@ -61,7 +62,7 @@ fn files(directory: &Path, stiffness: &str, mass: &str, nodes: &str) -> MatrixFi
         nodes: directory.join(nodes),
         dofs: None,
         units: Units::Si,
-        axis: Axis::Z,
+        axis: EngineAxis::Z,
         left_out: Vec::new(),
     }
 }
@@ -338,7 +339,7 @@ fn another_engine_axis_turns_the_model_and_its_matrices_alike() {
         entries.iter().map(line).collect::<String>()
     };
     let written = Written::new(&text(false), &text(true), &table);
-    let turned = read_matrices(&MatrixFiles { axis: Axis::X, ..written.files() }).unwrap();
+    let turned = read_matrices(&MatrixFiles { axis: EngineAxis::X, ..written.files() }).unwrap();
     assert!(turned.warnings.is_empty(), "{:?}", turned.warnings);
     assert_eq!(turned.model.nodes, bar.model.nodes);
     let off = difference(&expected, &rom(&turned));

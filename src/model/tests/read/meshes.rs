@@ -6,7 +6,7 @@ use tiprub_model::assembly::free_dofs;
 use tiprub_model::element::{ElementKind, QuadraturePoint};
 use tiprub_model::progress::silent;
 use tiprub_model::read::{
-    Axis, ContactChoice, Imported, MeshOptions, Units, choose_contact_nodes, read_mesh, total_mass,
+    ContactChoice, EngineAxis, Imported, MeshOptions, Units, choose_contact_nodes, read_mesh, total_mass,
 };
 use tiprub_model::reduce::full_modes;
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
@@ -208,7 +208,7 @@ fn units_are_converted() {
 #[test]
 fn another_engine_axis_turns_the_mesh_without_mirroring_it() {
     let z = imported("blade_hex8.inp").model;
-    for (axis, from) in [(Axis::X, [1, 2, 0]), (Axis::Y, [2, 0, 1])] {
+    for (axis, from) in [(EngineAxis::X, [1, 2, 0]), (EngineAxis::Y, [2, 0, 1])] {
         let units = Units::MillimetreTonneSecond;
         let options = MeshOptions { units, axis, material: Some(steel()), ..MeshOptions::default() };
         // A mirrored mesh would be turned inside out, and refused.

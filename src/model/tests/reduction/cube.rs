@@ -3,9 +3,9 @@
 use crate::guide::told;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 use tiprub_model::cube::{
-    CubeOptions, MassMatrix, RingOptions, Side, cube_material, cube_of, reduce_cube, reduce_cube_ring, ring_grid,
+    CubeOptions, MassMatrix, RingOptions, RingSide, cube_material, cube_of, reduce_cube, reduce_cube_ring, ring_grid,
     ring_material, ring_of,
 };
 use tiprub_model::patches::face_patches;
@@ -21,7 +21,7 @@ fn cube(elements: usize, mass: MassMatrix, modes: Option<usize>) -> Reduction {
     reduce_cube(&CubeOptions { elements, mass, modes, ..CubeOptions::default() }, &silent).unwrap()
 }
 
-fn ring(side: Side, elements: [usize; 3], mass: MassMatrix, modes: usize, static_responses: usize) -> Reduction {
+fn ring(side: RingSide, elements: [usize; 3], mass: MassMatrix, modes: usize, static_responses: usize) -> Reduction {
     let options = RingOptions { elements, mass, modes, static_responses, ..RingOptions::new(side) };
     reduce_cube_ring(&options, &silent).unwrap()
 }
@@ -55,7 +55,7 @@ fn equal(a: &DMatrix<f64>, b: &DMatrix<f64>, bound: f64) {
 #[test]
 fn a_free_body_moves_as_a_whole_without_strain() {
     let rom = cube(3, MassMatrix::Lumped, Some(8)).rom;
-    assert_eq!((rom.frame, rom.contact_nodes.len(), rom.order()), (Frame::Cartesian, 32, 96 + 8));
+    assert_eq!((rom.frame, rom.contact_nodes.len(), rom.order()), (DisplacementFrame::Cartesian, 32, 96 + 8));
     let zeros = (0..rom.order()).filter(|&mode| rom.stiffness[(mode, mode)] == 0.0).count();
     assert_eq!(zeros, 6);
     let rigid = rom.contact_map.columns(0, 6).into_owned();
@@ -92,7 +92,7 @@ fn with_all_modes_nothing_is_lost() {
                 > 1e-4 * full.amax()
         );
     }
-    for side in Side::BOTH {
+    for side in RingSide::BOTH {
         let [stiffness, inertia] = dense(ring_of(side, COARSE), &ring_material(), MassMatrix::Lumped);
         let (free, rows) = ring_rows(side);
         let full = (&stiffness + 1e3 * shift * &inertia).select_rows(&free).select_columns(&free);
@@ -107,7 +107,7 @@ fn with_all_modes_nothing_is_lost() {
 }
 
 /// Free dofs of the coarse ring, and where the rows of its grid are among them.
-fn ring_rows(side: Side) -> (Vec<usize>, Vec<Option<usize>>) {
+fn ring_rows(side: RingSide) -> (Vec<usize>, Vec<Option<usize>>) {
     let mesh = ring_of(side, COARSE);
     let clamped = mesh.set("CLAMPED").unwrap();
     let free: Vec<usize> = (0..3 * mesh.nodes.len()).filter(|dof| !clamped.contains(&(dof / 3))).collect();
@@ -119,7 +119,7 @@ fn ring_rows(side: Side) -> (Vec<usize>, Vec<Option<usize>>) {
 
 #[test]
 fn static_responses_to_all_forces_make_the_panel_exact_at_rest_and_fewer_come_near() {
-    let (side, mass) = (Side::Left, MassMatrix::Lumped);
+    let (side, mass) = (RingSide::Left, MassMatrix::Lumped);
     let [stiffness, _] = dense(ring_of(side, COARSE), &ring_material(), mass);
     let (free, rows) = ring_rows(side);
     let full = stiffness.select_rows(&free).select_columns(&free).cholesky().unwrap().inverse();
@@ -259,8 +259,8 @@ fn forced_responses_of_a_free_cube_converge_faster_with_free_interface_modes() {
 /// Grids run so that S_t × S_s points to the cube, and the rings mirror each other.
 #[test]
 fn normals_point_to_the_cube() {
-    let roms = Side::BOTH.map(|side| ring(side, COARSE, MassMatrix::Lumped, 12, 6).rom);
-    for (rom, side) in roms.iter().zip(Side::BOTH) {
+    let roms = RingSide::BOTH.map(|side| ring(side, COARSE, MassMatrix::Lumped, 12, 6).rom);
+    for (rom, side) in roms.iter().zip(RingSide::BOTH) {
         let grid = rom.extras.grid.unwrap();
         assert_eq!((grid.around, grid.along, grid.closed), (COARSE[2] + 1, COARSE[1] + 1, false));
         let place = |i: usize, j: usize| nalgebra::Vector3::from(rom.contact_nodes[j * grid.around + i].position);
@@ -280,7 +280,7 @@ fn normals_point_to_the_cube() {
 
 #[test]
 fn what_cannot_be_reduced_is_refused() {
-    let options = RingOptions { elements: COARSE, static_responses: 76, modes: 4, ..RingOptions::new(Side::Left) };
+    let options = RingOptions { elements: COARSE, static_responses: 76, modes: 4, ..RingOptions::new(RingSide::Left) };
     let error = reduce_cube_ring(&options, &silent).unwrap_err().to_string();
     assert!(error.contains("only 75 components"), "{error}");
     let options = CubeOptions { elements: 2, modes: Some(28), ..CubeOptions::default() };

@@ -4,12 +4,12 @@ use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble}
 use faer::Mat;
 use nalgebra::DMatrix;
 use proptest::prelude::*;
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::{craig_bampton, dense_modes};
 use tiprub_model::eigen::lowest_modes;
 use tiprub_model::element::ElementKind;
-use tiprub_model::progress::{Progress, Stage, silent};
+use tiprub_model::progress::{ReductionProgress, ReductionStage, silent};
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, full_modes, reduce};
 use tiprub_model::sparse::{SparseMatrix, principal_pair};
 use tiprub_model::stress::StressPlaces;
@@ -33,7 +33,7 @@ fn lanczos_finds_what_a_dense_solver_finds() {
     let (exact, _) = dense_modes(&dense(&stiffness), &dense(&mass)).unwrap();
     let factor = stiffness.factor("K", "").unwrap();
     for count in [1, 7, 40, stiffness.order()] {
-        let modes = lowest_modes(&mass, &factor, 0.0, count, Stage::FullModes, &silent).unwrap();
+        let modes = lowest_modes(&mass, &factor, 0.0, count, ReductionStage::FullModes, &silent).unwrap();
         for (k, (found, exact)) in modes.eigenvalues.iter().zip(&exact).enumerate() {
             assert!((found / exact - 1.0).abs() < 1e-9, "{count} modes, number {k}: {found} instead of {exact}");
         }
@@ -81,7 +81,7 @@ fn a_hinged_body_is_refused_as_a_mechanism() {
         let mesh = distorted_box(kind, [4, 2, 2], SIZE, wobble(0.1));
         let edge: Vec<usize> =
             nodes_at(&mesh, 0, 0.0).into_iter().filter(|&node| mesh.nodes[node][2].abs() < 1e-9).collect();
-        let error = reduce(mesh, &steel(), &edge, &[], &options(3, Frame::Cartesian), &silent).unwrap_err();
+        let error = reduce(mesh, &steel(), &edge, &[], &options(3, DisplacementFrame::Cartesian), &silent).unwrap_err();
         assert!(matches!(error, Error::NotPositiveDefinite { .. }), "{kind:?}: {error}");
     }
 }
@@ -90,7 +90,7 @@ fn a_hinged_body_is_refused_as_a_mechanism() {
 fn a_free_body_held_by_two_contact_nodes_is_refused() {
     let mesh = beam();
     let contact = contact(&mesh);
-    let error = reduce(mesh, &steel(), &[], &contact, &options(3, Frame::Cartesian), &silent).unwrap_err();
+    let error = reduce(mesh, &steel(), &[], &contact, &options(3, DisplacementFrame::Cartesian), &silent).unwrap_err();
     assert!(error.to_string().contains("choose at least three contact nodes that are not on one line"), "{error}");
 }
 
@@ -109,7 +109,7 @@ proptest! {
         let sparse = |matrix: &DMatrix<f64>| SparseMatrix { pattern: pattern.clone(), values: matrix.as_slice().to_vec() };
         let mass_dense = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(masses));
         let (stiffness, mass) = (sparse(&stiffness_dense), sparse(&mass_dense));
-        let modes = lowest_modes(&mass, &stiffness.factor("K", "").unwrap(), 0.0, count, Stage::FullModes, &silent).unwrap();
+        let modes = lowest_modes(&mass, &stiffness.factor("K", "").unwrap(), 0.0, count, ReductionStage::FullModes, &silent).unwrap();
         let (exact, _) = dense_modes(&stiffness_dense, &mass_dense).unwrap();
         for k in 0..count {
             prop_assert!((modes.eigenvalues[k] / exact[k] - 1.0).abs() < 1e-9, "mode {}", k);
@@ -121,7 +121,7 @@ proptest! {
 fn more_modes_than_dofs_are_refused() {
     let (stiffness, mass) = clamped_pencil(&straight_box(ElementKind::Hex8, [1, 1, 1], [0.1; 3]));
     let factor = stiffness.factor("K", "").unwrap();
-    let error = lowest_modes(&mass, &factor, 0.0, 13, Stage::FullModes, &silent).unwrap_err().to_string();
+    let error = lowest_modes(&mass, &factor, 0.0, 13, ReductionStage::FullModes, &silent).unwrap_err().to_string();
     assert!(error.starts_with("number of modes: 13 modes asked of 12"), "{error}");
 }
 
@@ -157,7 +157,7 @@ fn constraint_modes_keep_the_static_answer_whatever_the_number_of_modes() {
     }
 }
 
-fn options(modes: usize, frame: Frame) -> ReductionOptions {
+fn options(modes: usize, frame: DisplacementFrame) -> ReductionOptions {
     ReductionOptions {
         name: "beam".into(),
         kind: ReductionKind::FixedInterface,
@@ -181,7 +181,7 @@ fn contact(mesh: &Mesh) -> Vec<ContactPoint> {
         .to_vec()
 }
 
-fn reduced_beam(modes: usize, frame: Frame) -> Reduction {
+fn reduced_beam(modes: usize, frame: DisplacementFrame) -> Reduction {
     let mesh = beam();
     let (clamped, contact) = (nodes_at(&mesh, 0, 0.0), contact(&mesh));
     reduce(mesh, &steel(), &clamped, &contact, &options(modes, frame), &silent).unwrap()
@@ -191,7 +191,7 @@ fn reduced_beam(modes: usize, frame: Frame) -> Reduction {
 fn more_component_modes_never_make_the_reduced_model_worse() {
     let mut previous: Option<Reduction> = None;
     for modes in [2, 4, 8, 16, 32, 64] {
-        let reduction = reduced_beam(modes, Frame::Cartesian);
+        let reduction = reduced_beam(modes, DisplacementFrame::Cartesian);
         let checks = &reduction.rom.checks;
         println!(
             "{modes} modes: deviation {:.2?} %, RCC {:.2?} %",
@@ -228,7 +228,8 @@ fn residual_criterion_is_equation_12() {
     let phi = DMatrix::from_fn(k.nrows(), model.mass.nrows(), |i, j| model.transformation[(i, j)]);
     let inverse = k.clone().cholesky().unwrap();
     let (squares, vectors) = dense_modes(&model.stiffness, &model.mass).unwrap();
-    let reduction = reduce(mesh, &steel(), &clamped, &contact, &options(modes, Frame::Cartesian), &silent).unwrap();
+    let reduction =
+        reduce(mesh, &steel(), &clamped, &contact, &options(modes, DisplacementFrame::Cartesian), &silent).unwrap();
     for i in 0..8 {
         let z = vectors.column(i);
         let r = inverse.solve(&((&k - squares[i] * &m) * &phi * z));
@@ -240,7 +241,8 @@ fn residual_criterion_is_equation_12() {
 
 #[test]
 fn the_frame_turns_displacements_and_leaves_frequencies() {
-    let (cartesian, cylindrical) = (reduced_beam(10, Frame::Cartesian), reduced_beam(10, Frame::Cylindrical));
+    let (cartesian, cylindrical) =
+        (reduced_beam(10, DisplacementFrame::Cartesian), reduced_beam(10, DisplacementFrame::Cylindrical));
     let pairs = cartesian.rom.checks.reduced_frequencies.iter().zip(&cylindrical.rom.checks.reduced_frequencies);
     pairs.for_each(|(a, b)| assert!((a / b - 1.0).abs() < 1e-9));
     // Static compliance of the second node, turned by hand.
@@ -262,7 +264,7 @@ fn a_free_structure_keeps_its_rigid_modes() {
     let mut points = contact(&mesh);
     let far = mesh.nodes.iter().position(|p| p[0] == 0.0 && p[1] == 0.0 && p[2] == SIZE[2]).unwrap();
     points.push(ContactPoint::at("far", far, 0.0));
-    let reduction = reduce(mesh, &steel(), &[], &points, &options(10, Frame::Cartesian), &silent).unwrap();
+    let reduction = reduce(mesh, &steel(), &[], &points, &options(10, DisplacementFrame::Cartesian), &silent).unwrap();
     let omega = &reduction.reduced_angular_frequencies;
     assert!(omega[5] < 1e-3 * omega[6], "{:?}", &omega[..8]);
     let checks = &reduction.rom.checks;
@@ -275,7 +277,9 @@ fn wrong_contact_nodes_are_refused_by_name() {
         let mesh = beam();
         let (clamped, mut contact) = (nodes_at(&mesh, 0, 0.0), contact(&mesh));
         change(&mesh, &mut contact);
-        reduce(mesh, &steel(), &clamped, &contact, &options(3, Frame::Cartesian), &silent).unwrap_err().to_string()
+        reduce(mesh, &steel(), &clamped, &contact, &options(3, DisplacementFrame::Cartesian), &silent)
+            .unwrap_err()
+            .to_string()
     };
     assert!(
         refusal(|mesh, points| points[0].node = nodes_at(mesh, 0, 0.0)[0])
@@ -292,7 +296,8 @@ fn a_contact_node_on_the_axis_has_no_cylindrical_frame() {
     let mesh = straight_box(ElementKind::Hex8, [2, 1, 1], [0.2, 0.1, 0.1]);
     let clamped = nodes_at(&mesh, 0, 0.2);
     let contact = [ContactPoint::at("centre", 0, 0.0)];
-    let error = reduce(mesh, &steel(), &clamped, &contact, &options(3, Frame::Cylindrical), &silent).unwrap_err();
+    let error =
+        reduce(mesh, &steel(), &clamped, &contact, &options(3, DisplacementFrame::Cylindrical), &silent).unwrap_err();
     assert!(error.to_string().starts_with("contact node `centre`: it lies on the z axis"), "{error}");
 }
 
@@ -300,11 +305,17 @@ fn a_contact_node_on_the_axis_has_no_cylindrical_frame() {
 fn every_stage_is_reported_from_start_to_end() {
     let mesh = beam();
     let (clamped, contact) = (nodes_at(&mesh, 0, 0.0), contact(&mesh));
-    let seen = std::cell::RefCell::new(Vec::<Progress>::new());
-    let listener = |progress: Progress| seen.borrow_mut().push(progress);
-    reduce(mesh, &steel(), &clamped, &contact, &options(5, Frame::Cartesian), &listener).unwrap();
+    let seen = std::cell::RefCell::new(Vec::<ReductionProgress>::new());
+    let listener = |progress: ReductionProgress| seen.borrow_mut().push(progress);
+    reduce(mesh, &steel(), &clamped, &contact, &options(5, DisplacementFrame::Cartesian), &listener).unwrap();
     let seen = seen.into_inner();
-    let stages = [Stage::Assembly, Stage::FullModes, Stage::FixedInterfaceModes, Stage::ConstraintModes, Stage::Checks];
+    let stages = [
+        ReductionStage::Assembly,
+        ReductionStage::FullModes,
+        ReductionStage::FixedInterfaceModes,
+        ReductionStage::ConstraintModes,
+        ReductionStage::Checks,
+    ];
     for stage in stages {
         let fractions: Vec<f64> = seen.iter().filter(|p| p.stage == stage).map(|p| p.fraction).collect();
         assert!(fractions.windows(2).all(|pair| pair[0] <= pair[1]), "{stage}: {fractions:?}");

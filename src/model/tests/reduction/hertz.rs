@@ -5,7 +5,7 @@ use crate::guide::told;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::dynamics::modal::{ModalModel, NodePair};
-use tiprub_core::gaps::{Drive, FixedGap, GapLaw};
+use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::system::{System, SystemSettings};
 use tiprub_model::assembly::assemble_with;
@@ -54,7 +54,7 @@ fn graded(size: f64, fine: f64, factor: f64, length: f64) -> Vec<f64> {
     places
 }
 
-struct Block {
+struct HertzBlock {
     rom: Rom,
     /// Distance of every contact node from the axis (m).
     distance: Vec<f64>,
@@ -65,7 +65,7 @@ struct Block {
 
 /// Quarter of a block x, y ≤ L, −L ≤ z ≤ 0 with symmetry at x = 0 and y = 0 and held outside; `per_radius` elements per radius of
 /// the contact. Refined everywhere alike: twice as many elements grow by the root of the factor.
-fn block(per_radius: usize) -> Block {
+fn block(per_radius: usize) -> HertzBlock {
     let (size, factor) = (CONTACT / per_radius as f64, (1.17 / per_radius as f64).exp());
     let side = graded(size, REACH * CONTACT, factor, EXTENT * CONTACT);
     let depth = graded(size, CONTACT, factor, EXTENT * CONTACT);
@@ -101,7 +101,7 @@ fn block(per_radius: usize) -> Block {
         touching.iter().map(|[i, j]| free.partition_point(|dof| *dof < 3 * number(*i, *j, nz - 1) + 2)).collect();
     let reduced = craig_bampton(&stiffness, &mass, &interface, 4, &silent).unwrap();
     let share = |i: usize| if i == 0 { 0.5 * size } else { size };
-    Block {
+    HertzBlock {
         distance: touching.iter().map(|[i, j]| side[*i].hypot(side[*j])).collect(),
         area: touching.iter().map(|[i, j]| share(*i) * share(*j)).collect(),
         elements,
@@ -118,7 +118,7 @@ fn rom(name: &str, mass: DMatrix<f64>, stiffness: DMatrix<f64>, nodes: usize) ->
 }
 
 /// A paraboloid r²/2R, as in Hertz's theory, closer by `approach` than touching; the sphere is above the block.
-fn law(block: &Block, approach: f64) -> GapLaw {
+fn law(block: &HertzBlock, approach: f64) -> GapLaw {
     GapLaw::Fixed(FixedGap {
         normals: vec![[0.0, 0.0, -1.0]; block.distance.len()],
         gaps: block.distance.iter().map(|r| r * r / (2.0 * RADIUS) - approach).collect(),
@@ -137,13 +137,13 @@ struct AtRest {
 }
 
 /// Settle under strong damping with the sphere held at `approach` (m).
-fn at_rest(block: &Block, model: &ModalModel, solver: Solver, approach: f64) -> AtRest {
+fn at_rest(block: &HertzBlock, model: &ModalModel, solver: Solver, approach: f64) -> AtRest {
     let settings = SystemSettings { scheme: Scheme::ModalExact, solver, ledger: true };
     let mut system = System::new(model, 1, law(block, approach), 0.0, settings);
     system.set_step(0.5 / model.frequencies[0]);
-    system.start(&[Drive::default()]);
+    system.start(&[PrescribedMotion::default()]);
     for _ in 0..200 {
-        system.step(&[Drive::default()]).unwrap();
+        system.step(&[PrescribedMotion::default()]).unwrap();
     }
     let nodes = block.distance.len();
     let forces: Vec<f64> = (0..nodes).map(|node| system.multiplier(node, 0)).collect();
@@ -262,10 +262,10 @@ fn a_sphere_that_hits_a_block_meets_hertz() {
         system.set_step(step);
         // The sphere comes from above with its lowest point on the surface at time 0.
         system.bank_mut().set_modal_state(last, 0, 0.0, -speed * (0.25 * mass).sqrt());
-        system.start(&[Drive::default()]);
+        system.start(&[PrescribedMotion::default()]);
         let (mut release, mut force, mut deepest, mut impulse) = (0.0, 0.0_f64, 0.0_f64, 0.0);
         while (system.steps() as f64) * step < 1.2 * duration {
-            system.step(&[Drive::default()]).unwrap();
+            system.step(&[PrescribedMotion::default()]).unwrap();
             let now: f64 = 4.0 * (0..nodes).map(|node| system.multiplier(node, 0)).sum::<f64>();
             if now > 0.0 {
                 release = system.steps() as f64 * step;

@@ -4,14 +4,14 @@ use crate::guide::told;
 
 use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
 use nalgebra::DMatrix;
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::ElementKind;
 use tiprub_model::patches::{contact_patches, tip_patches};
 use tiprub_model::progress::silent;
 use tiprub_model::reduce::{ContactPoint, Reduction, ReductionKind, ReductionOptions, reduce};
-use tiprub_model::rotor37::{MeshCounts, Tip, blade_mesh};
+use tiprub_model::rotor37::{MeshCounts, TipContact, blade_mesh};
 use tiprub_model::sparse::principal_pair;
 use tiprub_model::stress::StressPlaces;
 use tiprub_model::{Mesh, Rotor37Options, reduce_rotor37};
@@ -34,7 +34,7 @@ fn reduced(mesh: Mesh, contact: &[ContactPoint], kind: ReductionKind, modes: usi
         modes,
         checked_modes: 6,
         sectors: 1,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         watched: Vec::new(),
         stress: StressPlaces::default(),
         damping_ratio: 0.01,
@@ -190,7 +190,7 @@ fn a_free_structure_keeps_its_modes_beside_patches() {
         modes: 10,
         checked_modes: 10,
         sectors: 1,
-        frame: Frame::Cylindrical,
+        frame: DisplacementFrame::Cylindrical,
         watched: Vec::new(),
         stress: StressPlaces::default(),
         damping_ratio: 0.01,
@@ -205,7 +205,7 @@ fn a_free_structure_keeps_its_modes_beside_patches() {
 /// Point forces dig in as the mesh is refined; forces on patches do not.
 #[test]
 fn the_flexibility_of_a_patch_converges_and_that_of_a_point_does_not() {
-    let own = |tip: Tip, chord: usize| -> f64 {
+    let own = |tip: TipContact, chord: usize| -> f64 {
         let mesh = MeshCounts { chord, thickness: (chord / 8).max(1), span: chord };
         let options = Rotor37Options {
             tip,
@@ -218,8 +218,8 @@ fn the_flexibility_of_a_patch_converges_and_that_of_a_point_does_not() {
         let rom = reduce_rotor37(&options, &silent).unwrap().rom;
         rom.stiffness.cholesky().unwrap().inverse()[(6, 6)]
     };
-    let grows = |tip: Tip| [6, 12, 24].map(|chord| own(tip, chord));
-    let (points, patches) = (grows(Tip::Nodes(5)), grows(Tip::Patches(5)));
+    let grows = |tip: TipContact| [6, 12, 24].map(|chord| own(tip, chord));
+    let (points, patches) = (grows(TipContact::Nodes(5)), grows(TipContact::Patches(5)));
     for (chord, (point, patch)) in [6, 12, 24].into_iter().zip(points.into_iter().zip(patches)) {
         told!("| {chord} | {point} | {patch} |");
     }
@@ -235,7 +235,7 @@ fn a_patch_of_rotor_37_stands_on_the_arc_of_its_chord() {
     let patches = blade.contact_patches(3).unwrap();
     assert_eq!(patches.iter().map(|patch| patch.name.as_str()).collect::<Vec<_>>(), ["patch_1", "patch_2", "patch_3"]);
     let options = Rotor37Options {
-        tip: Tip::Patches(3),
+        tip: TipContact::Patches(3),
         kind: ReductionKind::FreeInterface,
         mesh: MeshCounts { chord: 8, thickness: 1, span: 4 },
         modes: 4,

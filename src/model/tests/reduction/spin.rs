@@ -3,7 +3,7 @@
 use crate::common::{blade_steel, distorted_box, nodes_at, straight_box, wobble};
 use faer::Mat;
 use nalgebra::DMatrix;
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 use tiprub_model::assembly::{Assembled, assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::ElementKind;
@@ -85,14 +85,14 @@ fn motion_across_the_axis_softens_by_the_square_of_the_speed() {
     }
 }
 
-struct Body {
+struct SpinningBody {
     mesh: Mesh,
     material: Material,
     assembled: Assembled,
     free: Vec<usize>,
 }
 
-impl Body {
+impl SpinningBody {
     fn clamped(mesh: Mesh, material: Material, clamped: &[usize]) -> Self {
         let assembled = assemble(&mesh, &material, &silent).unwrap();
         let free = free_dofs(mesh.nodes.len(), clamped);
@@ -110,11 +110,11 @@ impl Body {
 }
 
 /// A beam along x from the axis, as high as wide, its middle line on y = z = 0.
-fn beam(elements: usize, length: f64, height: f64, poisson_ratio: f64) -> Body {
+fn beam(elements: usize, length: f64, height: f64, poisson_ratio: f64) -> SpinningBody {
     let mut mesh = straight_box(ElementKind::Hex20, [elements, 1, 1], [length, height, height]);
     mesh.nodes.iter_mut().for_each(|x| (1..3).for_each(|i| x[i] -= 0.5 * height));
     let clamped = nodes_at(&mesh, 0, 0.0);
-    Body::clamped(mesh, blade_steel(poisson_ratio), &clamped)
+    SpinningBody::clamped(mesh, blade_steel(poisson_ratio), &clamped)
 }
 
 /// A thin rod stretched by 3 %: with P = E(λ³ - λ)/2 and ρΩ²x along it, (3λ⁴ - 2λ²)/8 + ρΩ²x²/2E is constant, and λ = 1 at
@@ -182,11 +182,12 @@ fn what_cannot_spin_is_refused() {
     assert!(free.unwrap_err().to_string().contains("no node is clamped"));
     for speed in [0.0, -3.0, f64::NAN, f64::INFINITY] {
         let (mesh, clamped, contact) = blade();
-        let error = spinning(mesh, &clamped, &contact, &options(Frame::Cartesian), speed);
+        let error = spinning(mesh, &clamped, &contact, &options(DisplacementFrame::Cartesian), speed);
         assert!(error.unwrap_err().to_string().starts_with("largest speed: "), "{speed}");
     }
     let (mesh, clamped, contact) = blade();
-    let still = reduce(mesh, &blade_steel(0.3), &clamped, &contact, &options(Frame::Cartesian), &silent).unwrap();
+    let still =
+        reduce(mesh, &blade_steel(0.3), &clamped, &contact, &options(DisplacementFrame::Cartesian), &silent).unwrap();
     assert!(frequencies_at(&still.rom, 100.0, true).unwrap_err().to_string().contains("no spin matrices"));
 }
 
@@ -223,7 +224,7 @@ fn spinning(
     reduce_model(model, clamped, contact, options, Some(speed), &silent)
 }
 
-fn options(frame: Frame) -> ReductionOptions {
+fn options(frame: DisplacementFrame) -> ReductionOptions {
     ReductionOptions {
         name: "blade".into(),
         kind: ReductionKind::FixedInterface,
@@ -242,12 +243,12 @@ fn options(frame: Frame) -> ReductionOptions {
 #[test]
 fn spin_adds_its_arrays_and_changes_nothing_else() {
     let steel = blade_steel(0.3);
-    let both = [Frame::Cartesian, Frame::Cylindrical].map(|frame| {
+    let both = [DisplacementFrame::Cartesian, DisplacementFrame::Cylindrical].map(|frame| {
         let (mesh, clamped, contact) = blade();
         spinning(mesh, &clamped, &contact, &options(frame), 1200.0).unwrap()
     });
     let (mesh, clamped, contact) = blade();
-    let still = reduce(mesh, &steel, &clamped, &contact, &options(Frame::Cylindrical), &silent).unwrap();
+    let still = reduce(mesh, &steel, &clamped, &contact, &options(DisplacementFrame::Cylindrical), &silent).unwrap();
     assert!(still.rom.extras.spin.is_none() && still.spin_checks.is_empty());
     let mut stripped = both[1].rom.clone();
     let spin = stripped.extras.spin.take().unwrap();
@@ -277,7 +278,7 @@ fn spin_adds_its_arrays_and_changes_nothing_else() {
 #[test]
 fn a_blade_without_component_modes_still_spins() {
     let (mesh, clamped, contact) = blade();
-    let options = ReductionOptions { modes: 0, ..options(Frame::Cylindrical) };
+    let options = ReductionOptions { modes: 0, ..options(DisplacementFrame::Cylindrical) };
     let reduction = spinning(mesh, &clamped, &contact, &options, 1200.0).unwrap();
     assert_eq!(reduction.rom.order(), 6);
     let (checked, largest) = (&reduction.spin_checks[0], &reduction.spin_checks[1]);
@@ -295,7 +296,7 @@ fn with_all_modes_the_fitted_speed_is_exact() {
     let tip = nodes_at(&mesh, 0, 0.32)[0];
     let contact = [ContactPoint::at("tip", tip, 0.0)];
     let free = 3 * (mesh.nodes.len() - clamped.len());
-    let options = ReductionOptions { modes: free - 3, ..options(Frame::Cylindrical) };
+    let options = ReductionOptions { modes: free - 3, ..options(DisplacementFrame::Cylindrical) };
     let reduction = spinning(mesh, &clamped, &contact, &options, 1500.0).unwrap();
     let check = &reduction.spin_checks[1];
     for deviation in check.frequency_deviation() {

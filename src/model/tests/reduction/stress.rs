@@ -4,7 +4,7 @@ use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble}
 use crate::guide::{self, told};
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Simulation;
-use tiprub_core::rom::{Frame, STRESSES, von_mises};
+use tiprub_core::rom::{DisplacementFrame, STRESSES, von_mises};
 use tiprub_model::assembly::{assemble, free_dofs};
 use tiprub_model::craig_bampton::dense_modes;
 use tiprub_model::element::{ElementKind, nodal_stress};
@@ -31,7 +31,7 @@ fn reduced(
         modes,
         checked_modes: 6,
         sectors: 1,
-        frame: Frame::Cartesian,
+        frame: DisplacementFrame::Cartesian,
         watched: Vec::new(),
         stress,
         damping_ratio: 0.0,
@@ -95,8 +95,8 @@ fn directions_follow_the_frame() {
         // The same force along x on the first patch, in the directions of either frame at its middle.
         let [r, angle, _] = rom.contact_nodes[0].position;
         let direction = match frame {
-            Frame::Cartesian => [1.0, 0.0, 0.0],
-            Frame::Cylindrical => [angle.cos(), -angle.sin(), 0.0],
+            DisplacementFrame::Cartesian => [1.0, 0.0, 0.0],
+            DisplacementFrame::Cylindrical => [angle.cos(), -angle.sin(), 0.0],
         };
         assert!(r > 0.0);
         let mut force = DVector::zeros(6);
@@ -106,8 +106,8 @@ fn directions_follow_the_frame() {
         let values: [f64; STRESSES] = std::array::from_fn(|i| (stress.map.row(i) * &moved)[0]);
         (values, stress.points[0].position)
     };
-    let (cartesian, position) = of(Frame::Cartesian);
-    let (cylindrical, place) = of(Frame::Cylindrical);
+    let (cartesian, position) = of(DisplacementFrame::Cartesian);
+    let (cylindrical, place) = of(DisplacementFrame::Cylindrical);
     assert!((place[0] - position[0].hypot(position[1])).abs() < 1e-15);
     // A patch spreads a cylindrical force along each node's own directions: nearly that force.
     let close = |a: f64, b: f64| assert!((a - b).abs() < 2e-2 * von_mises(cartesian), "{cartesian:?} {cylindrical:?}");
@@ -292,7 +292,7 @@ fn a_heated_structure_has_the_thermal_stress_of_the_full_model() {
                 modes: if clamped.is_empty() { 12 } else { 4 },
                 checked_modes: 4,
                 sectors: 1,
-                frame: Frame::Cartesian,
+                frame: DisplacementFrame::Cartesian,
                 watched: Vec::new(),
                 stress: StressPlaces { nodes: places, modes: 0 },
                 damping_ratio: 0.0,
@@ -336,7 +336,7 @@ fn a_warm_blade_in_a_scene_has_the_stress_of_the_full_model() {
             modes: 3,
             checked_modes: 4,
             sectors: 2,
-            frame: Frame::Cylindrical,
+            frame: DisplacementFrame::Cylindrical,
             watched: Vec::new(),
             stress: StressPlaces { nodes: places, modes: 0 },
             damping_ratio: 0.01,

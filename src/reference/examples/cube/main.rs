@@ -11,9 +11,9 @@ mod tables;
 use std::path::{Path, PathBuf};
 
 use tiprub_reference::cube::files::{BodyFile, write_json};
-use tiprub_reference::cube::history::History;
-use tiprub_reference::cube::scene::{Mass, Scene, Setting};
-use tiprub_reference::methods::{Method, Run};
+use tiprub_reference::cube::history::CubeHistory;
+use tiprub_reference::cube::scene::{CubeScene, CubeSetting, Mass};
+use tiprub_reference::methods::{CubeMethod, MethodRun};
 use tiprub_reference::surface::SurfaceKind;
 
 fn main() {
@@ -39,9 +39,9 @@ fn main() {
 }
 
 /// Run a method on a scene and say how it went.
-fn run(method: Method, setting: Setting, step: f64, end: f64, stride: usize) -> History {
-    let scene = Scene::new(setting).expect("the scene can be built");
-    let run = Run { step, end, stride, snapshots: vec![1e-4, 2e-4, 3e-4, 5e-4, 8e-4] };
+fn run(method: CubeMethod, setting: CubeSetting, step: f64, end: f64, stride: usize) -> CubeHistory {
+    let scene = CubeScene::new(setting).expect("the scene can be built");
+    let run = MethodRun { step, end, stride, snapshots: vec![1e-4, 2e-4, 3e-4, 5e-4, 8e-4] };
     let history = method.run(&scene, &run).expect("the run ends well");
     eprintln!(
         "{} ({:?}, {:?} mass, µ = {}, {} m/s, h = {step:e} s): {:.2} s of processor time and {:.2} s to prepare",
@@ -56,23 +56,23 @@ fn run(method: Method, setting: Setting, step: f64, end: f64, stride: usize) -> 
     history
 }
 
-fn save(directory: &Path, name: &str, history: &History) {
+fn save(directory: &Path, name: &str, history: &CubeHistory) {
     std::fs::write(directory.join(format!("{name}.csv")), history.csv()).expect("a CSV file can be written");
     write_json(&directory.join(format!("{name}.json")), history).expect("a JSON file can be written");
 }
 
 /// All pairs of a, b, c over 3 ms.
 fn pairs(directory: &Path, mass: Mass) {
-    let spline = Setting { mass, ..Setting::default() };
-    let facets = Setting { surface: SurfaceKind::Facets, ..spline };
+    let spline = CubeSetting { mass, ..CubeSetting::default() };
+    let facets = CubeSetting { surface: SurfaceKind::Facets, ..spline };
     // A consistent mass lowers the limit of central differences and has to be solved for: only the contact is followed.
     let (explicit, stride, end) = if mass == Mass::Lumped { (5e-7, 2, 3e-3) } else { (4e-7, 5, 1e-3) };
     let named = [
-        ("a, film", run(Method::Film(Default::default()), spline, explicit, end, stride)),
-        ("b, bi-potential, facets", run(Method::Bipotential, facets, 1e-6, end, 1)),
-        ("b, bi-potential, spline", run(Method::Bipotential, spline, 1e-6, end, 1)),
-        ("c, augmented Lagrangian, facets", run(Method::Augmented(Default::default()), facets, 1e-6, end, 1)),
-        ("c, augmented Lagrangian, spline", run(Method::Augmented(Default::default()), spline, 1e-6, end, 1)),
+        ("a, film", run(CubeMethod::Film(Default::default()), spline, explicit, end, stride)),
+        ("b, bi-potential, facets", run(CubeMethod::Bipotential, facets, 1e-6, end, 1)),
+        ("b, bi-potential, spline", run(CubeMethod::Bipotential, spline, 1e-6, end, 1)),
+        ("c, augmented Lagrangian, facets", run(CubeMethod::Augmented(Default::default()), facets, 1e-6, end, 1)),
+        ("c, augmented Lagrangian, spline", run(CubeMethod::Augmented(Default::default()), spline, 1e-6, end, 1)),
     ];
     for ((_, history), name) in named.iter().zip(["a-film", "b-facets", "b-spline", "c-facets", "c-spline"]) {
         save(directory, name, history);
@@ -83,7 +83,7 @@ fn pairs(directory: &Path, mass: Mass) {
 
 /// Method b at 100 m/s until the cube has left, a record every 4 µs.
 fn table(directory: &Path) {
-    let history = run(Method::Bipotential, Setting::default(), 5e-7, 1e-3, 8);
+    let history = run(CubeMethod::Bipotential, CubeSetting::default(), 5e-7, 1e-3, 8);
     let mut text = String::from(
         "# Cube between two rings, 100 m/s, friction 0.15, lumped mass, B-spline: method b (bi-potential, trapezoidal rule), h = 0.5 us,\n\
          # full finite-element model. Displacements of node 1 and velocity of the centre at t, mean normal force on node 1 since the\n\
@@ -101,7 +101,7 @@ fn table(directory: &Path) {
 /// Node tables, elements, sets and matrices of the three bodies, both masses.
 fn files(directory: &Path) {
     for mass in [Mass::Lumped, Mass::Consistent] {
-        let scene = Scene::new(Setting { mass, ..Setting::default() }).expect("the scene can be built");
+        let scene = CubeScene::new(CubeSetting { mass, ..CubeSetting::default() }).expect("the scene can be built");
         for (body, name) in scene.bodies.iter().zip(["cube", "left", "right"]) {
             let path = directory.join(format!("{name}-{mass:?}.json").to_lowercase());
             write_json(&path, &BodyFile::from(body)).expect("a JSON file can be written");

@@ -5,10 +5,10 @@ use std::path::Path;
 use tiprub_reference::compare::relative_l2;
 use tiprub_reference::cube::calculix;
 use tiprub_reference::cube::cube_mesh;
-use tiprub_reference::cube::history::History;
+use tiprub_reference::cube::history::CubeHistory;
 use tiprub_reference::cube::outside::COLUMNS;
-use tiprub_reference::cube::scene::{Mass, Setting};
-use tiprub_reference::methods::Method;
+use tiprub_reference::cube::scene::{CubeSetting, Mass};
+use tiprub_reference::methods::CubeMethod;
 use tiprub_reference::surface::SurfaceKind;
 
 use super::run;
@@ -18,7 +18,7 @@ const REBOUNDED: f64 = 1.2e-4;
 
 /// What a CalculiX `.dat` file says of the cube.
 #[derive(Default)]
-struct Theirs {
+struct CalculixResults {
     times: Vec<f64>,
     /// Of node 1 (m).
     displacements: Vec<[f64; 3]>,
@@ -28,10 +28,10 @@ struct Theirs {
     left: Vec<f64>,
 }
 
-fn read(path: &str) -> Theirs {
+fn read(path: &str) -> CalculixResults {
     let text = std::fs::read_to_string(path).expect("the .dat file can be read");
     let cube = cube_mesh();
-    let mut theirs = Theirs::default();
+    let mut theirs = CalculixResults::default();
     let (mut in_displacements, mut in_contact) = (false, false);
     for line in text.lines() {
         if line.contains(" for ") {
@@ -70,7 +70,7 @@ fn read(path: &str) -> Theirs {
 /// `stiffness` is the
 /// pressure per overclosure of its run (Pa/m): by pressure over stiffness its node lies inside the ring, which is added to u1x.
 pub fn compare(directory: &Path, path: &str, stiffness: f64) {
-    let Theirs { times, mut displacements, pressures, left } = read(path);
+    let CalculixResults { times, mut displacements, pressures, left } = read(path);
     let corner = calculix::area(&cube_mesh(), 0);
     let mut table = format!("{COLUMNS}\n");
     for (i, t) in times.iter().enumerate() {
@@ -84,9 +84,9 @@ pub fn compare(directory: &Path, path: &str, stiffness: f64) {
     println!("CalculiX: {} increments to {:.4} ms, µ = {friction}", times.len(), end * 1e3);
     let settings = [(SurfaceKind::Facets, Mass::Consistent), (SurfaceKind::Spline, Mass::Consistent)];
     for (surface, mass) in settings {
-        let setting = Setting { surface, mass, friction, ..Setting::default() };
-        for method in [Method::Bipotential, Method::Augmented(Default::default())] {
-            let history: History = run(method, setting, 1e-6, end, 1);
+        let setting = CubeSetting { surface, mass, friction, ..CubeSetting::default() };
+        for method in [CubeMethod::Bipotential, CubeMethod::Augmented(Default::default())] {
+            let history: CubeHistory = run(method, setting, 1e-6, end, 1);
             // Before REBOUNDED CalculiX's node 1 still jumps on the ring.
             for (from, to) in [(0.0, REBOUNDED), (REBOUNDED, end), (0.0, end)] {
                 let at: Vec<f64> = (1..=200).map(|i| from + (to - from) * f64::from(i) / 200.0).collect();

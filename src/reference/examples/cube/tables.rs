@@ -1,20 +1,20 @@
 //! Numbers of the comparison as Markdown.
 
 use tiprub_reference::compare::{WINDOW, agreement, asymmetry, exit_speed, relative_l2, windowed};
-use tiprub_reference::cube::history::History;
-use tiprub_reference::cube::scene::{Mass, Setting};
-use tiprub_reference::methods::{Method, penalty};
+use tiprub_reference::cube::history::CubeHistory;
+use tiprub_reference::cube::scene::{CubeSetting, Mass};
+use tiprub_reference::methods::{CubeMethod, penalty};
 
 use super::run;
 
 /// Last time of contact of node 1 (s).
-fn released(history: &History) -> f64 {
+fn released(history: &CubeHistory) -> f64 {
     let last = history.first_force().iter().rposition(|force| *force > 0.0).unwrap_or(0);
     history.times[last]
 }
 
 /// Every pair of runs.
-pub fn pairs(named: &[(&str, History)], speed: f64) {
+pub fn pairs(named: &[(&str, CubeHistory)], speed: f64) {
     let touching = released(&named[0].1);
     let contact = named[0].1.last_contact().unwrap_or(0.0);
     println!("node 1 touches until {:.4} ms, the cube until {:.4} ms (of a)\n", touching * 1e3, contact * 1e3);
@@ -41,7 +41,7 @@ pub fn pairs(named: &[(&str, History)], speed: f64) {
 }
 
 /// What one reads off the figures, run by run.
-pub fn readings(named: &[(&str, History)]) {
+pub fn readings(named: &[(&str, CubeHistory)]) {
     println!(
         "\n| run | u1x least, largest (mm) | u1z least, largest (mm) | peak λ1, means over 2 µs and 20 µs (N) | node 1 until (ms) | cube until (ms) | exit (m/s) | asymmetry ux, λ | deepest (µm) | steps (s), preparation (s) |"
     );
@@ -75,25 +75,25 @@ pub fn readings(named: &[(&str, History)]) {
 
 /// Errors over h, against the finest run of a, on the same mesh and spline.
 pub fn convergence(mass: Mass) {
-    let setting = Setting { mass, ..Setting::default() };
+    let setting = CubeSetting { mass, ..CubeSetting::default() };
     // Node 1 has left the rings by then.
     let end = 5e-4;
     let explicit: &[(f64, usize)] = match mass {
         Mass::Lumped => &[(8e-7, 1), (4e-7, 5), (2e-7, 10), (1e-7, 20), (5e-8, 40), (2.5e-8, 80)],
         Mass::Consistent => &[(4e-7, 5), (2e-7, 10)],
     };
-    let film = Method::Film(Default::default());
-    let film: Vec<History> = explicit.iter().map(|(h, stride)| run(film, setting, *h, end, *stride)).collect();
-    let implicit: Vec<History> = [(2e-6, 1), (1e-6, 2), (5e-7, 4), (2.5e-7, 8)]
-        .map(|(h, stride)| run(Method::Bipotential, setting, h, end, stride))
+    let film = CubeMethod::Film(Default::default());
+    let film: Vec<CubeHistory> = explicit.iter().map(|(h, stride)| run(film, setting, *h, end, *stride)).collect();
+    let implicit: Vec<CubeHistory> = [(2e-6, 1), (1e-6, 2), (5e-7, 4), (2.5e-7, 8)]
+        .map(|(h, stride)| run(CubeMethod::Bipotential, setting, h, end, stride))
         .into();
-    let stiff = penalty::Options { stiffness: 5e9, ..penalty::Options::default() };
-    let mut others: Vec<History> = [(2e-6, 1), (1e-6, 2)]
-        .map(|(h, stride)| run(Method::Augmented(Default::default()), setting, h, end, stride))
+    let stiff = penalty::PenaltyOptions { stiffness: 5e9, ..penalty::PenaltyOptions::default() };
+    let mut others: Vec<CubeHistory> = [(2e-6, 1), (1e-6, 2)]
+        .map(|(h, stride)| run(CubeMethod::Augmented(Default::default()), setting, h, end, stride))
         .into();
     if mass == Mass::Lumped {
-        others.push(run(Method::Penalty(Default::default()), setting, 1e-7, end, 20));
-        let mut stiffer = run(Method::Penalty(stiff), setting, 1e-7, end, 20);
+        others.push(run(CubeMethod::Penalty(Default::default()), setting, 1e-7, end, 20));
+        let mut stiffer = run(CubeMethod::Penalty(stiff), setting, 1e-7, end, 20);
         stiffer.method.push_str(", ten times stiffer");
         others.push(stiffer);
     }

@@ -1,10 +1,10 @@
 //! A table of another code beside one of our methods.
 
 use tiprub_reference::compare::{agreement, relative_l2, windowed};
-use tiprub_reference::cube::history::History;
+use tiprub_reference::cube::history::CubeHistory;
 use tiprub_reference::cube::outside;
-use tiprub_reference::cube::scene::{Mass, Setting};
-use tiprub_reference::methods::{Method, augmented};
+use tiprub_reference::cube::scene::{CubeSetting, Mass};
+use tiprub_reference::methods::{CubeMethod, augmented};
 use tiprub_reference::surface::SurfaceKind;
 
 use super::run;
@@ -17,20 +17,22 @@ pub fn compare(path: &str, words: &[&str]) {
     let text = std::fs::read_to_string(path).expect("the table can be read");
     let [method, surface, mass, friction, step, rest @ ..] = words else { panic!("too few words") };
     let number = |word: &str| -> f64 { word.parse().expect("a number") };
-    let setting = Setting {
+    let setting = CubeSetting {
         surface: if *surface == "facets" { SurfaceKind::Facets } else { SurfaceKind::Spline },
         mass: if *mass == "lumped" { Mass::Lumped } else { Mass::Consistent },
         friction: number(friction),
-        ..Setting::default()
+        ..CubeSetting::default()
     };
     let theirs = outside::read(&text, setting.speed).expect("the table is sound");
     let end = theirs.times[theirs.times.len() - 1];
     let method = match *method {
-        "a" => Method::Film(Default::default()),
-        "b" => Method::Bipotential,
-        _ => {
-            Method::Augmented(augmented::Options { penalty: number(rest[0]), corners: number(rest[1]), tolerance: 1.0 })
-        }
+        "a" => CubeMethod::Film(Default::default()),
+        "b" => CubeMethod::Bipotential,
+        _ => CubeMethod::Augmented(augmented::AugmentedOptions {
+            penalty: number(rest[0]),
+            corners: number(rest[1]),
+            tolerance: 1.0,
+        }),
     };
     // Recorded as often as theirs, so that both are interpolated alike.
     let stride = (1..).find(|k| (*k as f64 + 0.5) * number(step) > theirs.step).expect("some multiple");
@@ -39,7 +41,7 @@ pub fn compare(path: &str, words: &[&str]) {
     print(&theirs, &ours, setting.speed, end);
 }
 
-fn print(theirs: &History, ours: &History, speed: f64, end: f64) {
+fn print(theirs: &CubeHistory, ours: &CubeHistory, speed: f64, end: f64) {
     let found = agreement(theirs, ours, speed, TOUCHING.min(end), end);
     let percent = |values: [f64; 3]| values.map(|x| format!("{:.3} %", 100.0 * x)).join(", ");
     println!("  touching: u1x, slowing, u1z {}", percent(found.touching));
@@ -55,17 +57,17 @@ fn print(theirs: &History, ours: &History, speed: f64, end: f64) {
         100.0 * found.left_impulse,
         100.0 * found.exit
     );
-    let largest = |history: &History| {
+    let largest = |history: &CubeHistory| {
         windowed(&history.times, &history.first_force(), 2e-5, TOUCHING).iter().fold(0.0, |a: f64, x| a.max(*x))
     };
     println!("  largest 20 µs mean of λ1: {:.0} N, {:.0} N", largest(theirs), largest(ours));
 }
 
-fn within(theirs: &History, ours: &History, speed: f64, from: f64, to: f64) -> [f64; 3] {
+fn within(theirs: &CubeHistory, ours: &CubeHistory, speed: f64, from: f64, to: f64) -> [f64; 3] {
     let at: Vec<f64> = (1..=200).map(|i| from + (to - from) * f64::from(i) / 200.0).collect();
     [0, 1, 2].map(|component| {
         let lag = if component == 1 { speed } else { 0.0 };
-        let series = |history: &History| -> Vec<f64> {
+        let series = |history: &CubeHistory| -> Vec<f64> {
             history.first(component).iter().zip(&history.times).map(|(u, t)| u + lag * t).collect()
         };
         relative_l2((&theirs.times, &series(theirs)), (&ours.times, &series(ours)), &at)

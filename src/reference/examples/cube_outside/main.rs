@@ -8,9 +8,9 @@ mod refine;
 
 use std::path::Path;
 
-use tiprub_reference::cube::history::History;
-use tiprub_reference::cube::scene::{Scene, Setting};
-use tiprub_reference::methods::{Method, Run};
+use tiprub_reference::cube::history::CubeHistory;
+use tiprub_reference::cube::scene::{CubeScene, CubeSetting};
+use tiprub_reference::methods::{CubeMethod, MethodRun};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -36,13 +36,13 @@ fn main() {
 }
 
 /// Run a method on the paper's meshes.
-fn run(method: Method, setting: Setting, step: f64, end: f64, stride: usize) -> History {
-    let scene = Scene::new(setting).expect("the scene can be built");
+fn run(method: CubeMethod, setting: CubeSetting, step: f64, end: f64, stride: usize) -> CubeHistory {
+    let scene = CubeScene::new(setting).expect("the scene can be built");
     run_scene(&scene, method, step, end, stride)
 }
 
-fn run_scene(scene: &Scene, method: Method, step: f64, end: f64, stride: usize) -> History {
-    let history = method.run(scene, &Run { step, end, stride, snapshots: vec![] }).expect("the run ends well");
+fn run_scene(scene: &CubeScene, method: CubeMethod, step: f64, end: f64, stride: usize) -> CubeHistory {
+    let history = method.run(scene, &MethodRun { step, end, stride, snapshots: vec![] }).expect("the run ends well");
     eprintln!(
         "{} {:?}, h = {step:e} s: {:.1} s of processor time, {:.1} s to prepare",
         history.method, scene.setting, history.processor_time, history.preparation_time

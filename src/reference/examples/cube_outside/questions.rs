@@ -1,9 +1,9 @@
 //! Two questions to method a: which gaps it leaves with consistent mass, and what the turning of normals does to the energy.
 
 use tiprub_reference::cube::OUTER_RADIUS;
-use tiprub_reference::cube::history::History;
-use tiprub_reference::cube::scene::{Mass, Setting};
-use tiprub_reference::methods::{Method, film};
+use tiprub_reference::cube::history::CubeHistory;
+use tiprub_reference::cube::scene::{CubeSetting, Mass};
+use tiprub_reference::methods::{CubeMethod, film};
 use tiprub_reference::surface::SurfaceKind;
 
 use super::run;
@@ -20,9 +20,9 @@ pub fn gaps() {
         (Mass::Lumped, SurfaceKind::Spline, 4e-7),
     ] {
         for complementary in [false, true] {
-            let options = film::Options { complementary, ..film::Options::default() };
-            let setting = Setting { mass, surface, ..Setting::default() };
-            let history = run(Method::Film(options), setting, step, 3e-4, 1);
+            let options = film::FilmOptions { complementary, ..film::FilmOptions::default() };
+            let setting = CubeSetting { mass, surface, ..CubeSetting::default() };
+            let history = run(CubeMethod::Film(options), setting, step, 3e-4, 1);
             println!(
                 "| {mass:?} | {surface:?} | {} | {:.1} | {:.2e} | {:.4} | {:.1} |",
                 if complementary { "complementarity" } else { "the paper's" },
@@ -44,8 +44,8 @@ pub fn turning() {
     println!("|---|---|---|---|---|---|");
     let speed = 50.0;
     for (step, stride) in [(8e-7, 1), (4e-7, 2), (2e-7, 4), (1e-7, 8)] {
-        let setting = Setting { speed, friction: 0.0, ..Setting::default() };
-        let history: History = run(Method::Film(Default::default()), setting, step, 2.1e-3, stride);
+        let setting = CubeSetting { speed, friction: 0.0, ..CubeSetting::default() };
+        let history: CubeHistory = run(CubeMethod::Film(Default::default()), setting, step, 2.1e-3, stride);
         let (total, interval) = (history.total(), step * stride as f64);
         let impulse: f64 = history.forces.iter().map(|sides| sides[0] + sides[1]).sum::<f64>() * interval;
         let gain = speed * speed * step * impulse / OUTER_RADIUS;

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use tiprub_reference::compare::{agreement, exit_speed, windowed};
 use tiprub_reference::cube::files::{read_json, write_json};
-use tiprub_reference::cube::history::History;
-use tiprub_reference::cube::scene::{Scene, Setting};
-use tiprub_reference::cube::{OUTER_RADIUS, SIDE, Side};
+use tiprub_reference::cube::history::CubeHistory;
+use tiprub_reference::cube::scene::{CubeScene, CubeSetting};
+use tiprub_reference::cube::{OUTER_RADIUS, RingSide, SIDE};
 use tiprub_reference::cube::{cube_of, ring_of};
-use tiprub_reference::methods::Method;
+use tiprub_reference::methods::CubeMethod;
 
 use super::run_scene;
 
@@ -25,23 +25,23 @@ fn file(directory: &Path, n: usize, case: &str) -> PathBuf {
 /// `courant` is the step (s) that n = 5 would have; every record is about 4 µs long.
 pub fn level(directory: &Path, n: usize, case: &str, courant: f64, end: f64) {
     let setting = match case {
-        "fast" => Setting::default(),
-        _ => Setting { speed: 50.0, friction: 0.0, ..Setting::default() },
+        "fast" => CubeSetting::default(),
+        _ => CubeSetting { speed: 50.0, friction: 0.0, ..CubeSetting::default() },
     };
     // As in the paper's mesh, eight to five, and even.
     let (wide, arc) = (2 * ((4 * n + 2) / 5), 8 * n);
-    let rings = Side::BOTH.map(|side| ring_of(side, [n, wide, arc]));
-    let scene = Scene::of(setting, cube_of(n), rings, [arc, wide]).expect("the scene can be built");
+    let rings = RingSide::BOTH.map(|side| ring_of(side, [n, wide, arc]));
+    let scene = CubeScene::of(setting, cube_of(n), rings, [arc, wide]).expect("the scene can be built");
     let step = courant * 5.0 / n as f64;
     let stride = (1_usize..).find(|k| *k as f64 * step > 3.999e-6).expect("a number of steps");
-    let history = run_scene(&scene, Method::Film(Default::default()), step, end, stride);
+    let history = run_scene(&scene, CubeMethod::Film(Default::default()), step, end, stride);
     write_json(&file(directory, n, case), &history).expect("the history can be written");
 }
 
 /// What every mesh says, and how far each is from the next and from the finest.
 pub fn table(directory: &Path, counts: &[usize]) {
-    let read = |n: usize, case: &str| read_json::<History>(&file(directory, n, case)).ok();
-    let fast: Vec<(usize, History)> = counts.iter().filter_map(|&n| Some((n, read(n, "fast")?))).collect();
+    let read = |n: usize, case: &str| read_json::<CubeHistory>(&file(directory, n, case)).ok();
+    let fast: Vec<(usize, CubeHistory)> = counts.iter().filter_map(|&n| Some((n, read(n, "fast")?))).collect();
     println!(
         "| n | h (µs) | largest u1x (mm) | largest slowing (mm) | largest u1z (mm) | corner: peak (MPa) | impulse (Pa·s) | face: impulse (N·s) | node 1 leaves (ms) | cube leaves (ms) | exit (m/s) | CPU (s) |"
     );
@@ -59,7 +59,7 @@ pub fn table(directory: &Path, counts: &[usize]) {
     counts.iter().filter_map(|&n| Some((n, read(n, "slow")?))).for_each(|(n, history)| print_slow(n, &history));
 }
 
-fn print_fast(n: usize, history: &History) {
+fn print_fast(n: usize, history: &CubeHistory) {
     // A corner of the face has a quarter of an element's face.
     let area = (SIDE / n as f64).powi(2) / 4.0;
     let windows = windowed(&history.times, &history.first_force(), 2e-5, TOUCHING + 4e-5);
@@ -85,9 +85,9 @@ fn print_fast(n: usize, history: &History) {
     );
 }
 
-fn print_pair([n, other]: [usize; 2], history: &History, finer: &History) {
+fn print_pair([n, other]: [usize; 2], history: &CubeHistory, finer: &CubeHistory) {
     // A run may be shorter than the contact; impulse and speed are then those until its end.
-    let last = |history: &History| history.times.last().copied().unwrap_or(0.0);
+    let last = |history: &CubeHistory| history.times.last().copied().unwrap_or(0.0);
     let [ours, theirs] = [history, finer].map(last);
     let end = CONTACT.min(ours).min(theirs);
     let mut shorter = history.clone();
@@ -110,7 +110,7 @@ fn print_pair([n, other]: [usize; 2], history: &History, finer: &History) {
     );
 }
 
-fn print_slow(n: usize, history: &History) {
+fn print_slow(n: usize, history: &CubeHistory) {
     let total = history.total();
     let interval = history.times[1] - history.times[0];
     let impulse: f64 = history.forces.iter().map(|sides| sides[0] + sides[1]).sum::<f64>() * interval;

@@ -12,16 +12,16 @@ use nalgebra::{DMatrix, DVector};
 use tiprub_model::sparse::Factor;
 use tiprub_model::{Error, Result};
 
-use super::{Blade, Gauge, Part, dot, product};
+use super::{FullBlade, Gauge, TipPart, dot, product};
 use crate::reduced::complementarity;
-use crate::reduced::rub::{Obstacle, Touch};
+use crate::reduced::rub::{BumpedCasing, Touch};
 
 /// Parts farther than this do not take part in a step (m): a hundred times what a tip moves in one.
 const NEAR: f64 = 1e-4;
 
 /// How to go.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Steps {
+pub struct BladeSteps {
     /// Time between samples (s).
     pub interval: f64,
     /// Steps in it.
@@ -32,7 +32,7 @@ pub struct Steps {
 
 /// What a run leaves behind, sample by sample.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct History {
+pub struct BladeHistory {
     /// Displacements of the watched nodes, node by node along radius, circumference, axis (m).
     pub displacements: Vec<Vec<f64>>,
     /// Stress at the gauges, six components of each (Pa).
@@ -52,8 +52,8 @@ pub struct History {
 }
 
 /// What is pushed, as the step sees it.
-struct Contact {
-    parts: Vec<Part>,
+struct PushedContact {
+    parts: Vec<TipPart>,
     /// Displacements of the parts (three rows each) per displacement of the tip's nodes.
     map: DMatrix<f64>,
     /// First row of every node of the tip.
@@ -64,8 +64,8 @@ struct Contact {
     flexibility: DMatrix<f64>,
 }
 
-impl Contact {
-    fn new(blade: &Blade, parts: &[Part], factor: &Factor) -> Result<Self> {
+impl PushedContact {
+    fn new(blade: &FullBlade, parts: &[TipPart], factor: &Factor) -> Result<Self> {
         let clamped = || Error::invalid("tip of the blade", "one of its nodes is clamped", "Clamp the root only");
         let mut entries = Vec::new();
         let mut nodes = Vec::new();
@@ -99,8 +99,8 @@ impl Contact {
     }
 
     /// Parts near the casing with their touch; `moved` are their displacements.
-    fn near(&self, obstacle: &Obstacle, time: f64, moved: &DVector<f64>) -> Vec<(usize, Touch)> {
-        let touch = |(index, part): (usize, &Part)| {
+    fn near(&self, obstacle: &BumpedCasing, time: f64, moved: &DVector<f64>) -> Vec<(usize, Touch)> {
+        let touch = |(index, part): (usize, &TipPart)| {
             let moved = std::array::from_fn(|i| moved[3 * index + i]);
             (index, obstacle.meets(&part.tip, time, moved))
         };
@@ -142,25 +142,25 @@ impl Contact {
     }
 }
 
-impl Blade {
+impl FullBlade {
     /// March from rest, with contact on `parts`; displacements of the `watched` nodes and stress at the gauges are kept.
     ///
     /// # Errors
     /// A clamped node among these, or a contact problem that is not solved.
     pub fn march(
         &self,
-        parts: &[Part],
-        obstacle: &Obstacle,
-        steps: Steps,
+        parts: &[TipPart],
+        obstacle: &BumpedCasing,
+        steps: BladeSteps,
         (watched, gauges): (&[usize], &[Gauge]),
-    ) -> Result<History> {
+    ) -> Result<BladeHistory> {
         let h = steps.interval / f64::from(steps.division);
         let factor = self.factor(0.25 * h * h)?;
-        let contact = Contact::new(self, parts, &factor)?;
-        let watched: Vec<Part> =
-            watched.iter().map(|node| Part::mean(&self.nodes, [(*node, 1.0)].into_iter(), 0.0)).collect();
+        let contact = PushedContact::new(self, parts, &factor)?;
+        let watched: Vec<TipPart> =
+            watched.iter().map(|node| TipPart::mean(&self.nodes, [(*node, 1.0)].into_iter(), 0.0)).collect();
         let (mut u, mut v) = (vec![0.0; self.order()], vec![0.0; self.order()]);
-        let mut found = History::default();
+        let mut found = BladeHistory::default();
         let (mut work, mut friction, mut largest, mut off) = (0.0, 0.0, 0.0_f64, 0.0_f64);
         for sample in 0..steps.samples {
             let mut impulse = 0.0;
@@ -204,8 +204,8 @@ impl Blade {
         past.iter().enumerate().map(|(row, past)| solved[(row, 0)] - past).collect()
     }
 
-    fn watch(&self, watched: &[Part], u: &[f64]) -> Vec<f64> {
-        let of = |part: &Part| {
+    fn watch(&self, watched: &[TipPart], u: &[f64]) -> Vec<f64> {
+        let of = |part: &TipPart| {
             let mut found = [0.0; 3];
             for (node, rows) in part.seen() {
                 let first = self.rows[node].unwrap_or_default();
@@ -219,8 +219,8 @@ impl Blade {
 
 /// Work of friction: forces along the slip of the tip over the casing.
 fn rubbed(
-    parts: &[Part],
-    obstacle: &Obstacle,
+    parts: &[TipPart],
+    obstacle: &BumpedCasing,
     near: &[(usize, Touch)],
     impulses: &DVector<f64>,
     moving: &DVector<f64>,

@@ -16,13 +16,13 @@ use tiprub_model::sparse::{Factor, SparseMatrix, principal_pair};
 use tiprub_model::{FeModel, Material, Mesh, Result};
 
 pub use gauge::{COMPONENTS, Gauge, equivalent};
-pub use march::{History, Steps};
+pub use march::{BladeHistory, BladeSteps};
 pub use pushed::PushedBlade;
-pub use tip::Part;
+pub use tip::TipPart;
 
 /// The full model of a blade.
 #[derive(Debug, Clone)]
-pub struct Blade {
+pub struct FullBlade {
     nodes: Vec<[f64; 3]>,
     /// First of the three rows of every node; none of clamped ones.
     rows: Vec<Option<usize>>,
@@ -32,7 +32,7 @@ pub struct Blade {
     masses: Vec<Vec<(usize, f64)>>,
 }
 
-impl Blade {
+impl FullBlade {
     /// Assemble; `clamped` nodes stand still.
     ///
     /// # Errors
@@ -128,7 +128,7 @@ mod tests {
     use tiprub_model::rotor37::{MeshCounts, blade_mesh};
 
     use super::*;
-    use crate::reduced::rub::Obstacle;
+    use crate::reduced::rub::BumpedCasing;
 
     /// Points of faces see a displacement of the whole tip along the axis as it is, and slope as the tip does; nothing touches a casing
     /// that is far away, and what touches is pushed inwards.
@@ -141,7 +141,7 @@ mod tests {
             .iter()
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], slope| [low.min(*slope), high.max(*slope)]);
         for each in 1..=3 {
-            let parts = Part::points(&blade.mesh, tip, each);
+            let parts = TipPart::points(&blade.mesh, tip, each);
             assert_eq!(parts.len(), 3 * each * each);
             for part in &parts {
                 let total: f64 = part.seen().map(|(_, rows)| rows[2][2]).sum();
@@ -150,21 +150,21 @@ mod tests {
             }
         }
         // Of three faces in a row: all nodes but the middles of the two edges between them.
-        let outline = Part::outline(&blade.mesh, tip);
+        let outline = TipPart::outline(&blade.mesh, tip);
         assert_eq!(outline.len(), tip.len() - 2, "{outline:?}");
         assert!(outline.iter().all(|part| (low - 0.02..high + 0.02).contains(&part.tip.slope)), "{outline:?}");
-        let full = Blade::new(&blade.mesh, &Material::steel(), blade.mesh.set("hub").unwrap()).unwrap();
-        let parts = Part::points(&blade.mesh, tip, 1);
-        let steps = Steps { interval: 1e-5, division: 4, samples: 40 };
+        let full = FullBlade::new(&blade.mesh, &Material::steel(), blade.mesh.set("hub").unwrap()).unwrap();
+        let parts = TipPart::points(&blade.mesh, tip, 1);
+        let steps = BladeSteps { interval: 1e-5, division: 4, samples: 40 };
         let run = |clearance: f64| {
-            let obstacle = Obstacle { clearance, speed: 1800.0, friction: 0.0, bumps: [4e-4, 0.15, 1e-4] };
+            let obstacle = BumpedCasing { clearance, speed: 1800.0, friction: 0.0, bumps: [4e-4, 0.15, 1e-4] };
             full.march(&parts, &obstacle, steps, (&tip[..1], &[])).unwrap()
         };
         let far = run(1e-3);
         assert!(far.displacements.iter().flatten().all(|u| *u == 0.0) && far.pushed == 0);
         let near = run(3.5e-4);
-        let turned = Part::points(&blade.mesh, tip, 1).into_iter().map(|part| part.turned(1.0)).collect::<Vec<_>>();
-        let obstacle = Obstacle { clearance: 3.5e-4, speed: 1800.0, friction: 0.15, bumps: [4e-4, 0.15, 1e-4] };
+        let turned = TipPart::points(&blade.mesh, tip, 1).into_iter().map(|part| part.turned(1.0)).collect::<Vec<_>>();
+        let obstacle = BumpedCasing { clearance: 3.5e-4, speed: 1800.0, friction: 0.15, bumps: [4e-4, 0.15, 1e-4] };
         let rubbed = full.march(&turned, &obstacle, steps, (&tip[..1], &[])).unwrap();
         assert!(rubbed.pushed > 0 && rubbed.residual < 1e-8 && near.residual < 1e-8, "{near:?} {rubbed:?}");
         assert!(rubbed.displacements.iter().any(|u| u[0] < -1e-6) && rubbed.friction_work[39] > 0.01);

@@ -3,7 +3,7 @@
 use tiprub_model::rotor37::{MeshCounts, blade_mesh};
 use tiprub_model::{Material, Mesh, Result, Rotor37Options};
 
-use super::{Blade, Gauge, calculix};
+use super::{FullBlade, Gauge, calculix};
 
 /// Force on the first of nine patches in the first of two rows (N): inwards, back along the circumference, along the axis.
 const FORCE: [f64; 3] = [-1000.0, -150.0, 0.0];
@@ -16,7 +16,7 @@ const PLACES: [usize; 6] = [1494, 2742, 1062, 490, 2762, 386];
 pub struct PushedBlade {
     mesh: Mesh,
     material: Material,
-    full: Blade,
+    full: FullBlade,
     /// Node, force along x, y, z (N).
     forces: Vec<(usize, [f64; 3])>,
 }
@@ -29,7 +29,7 @@ impl PushedBlade {
     pub fn new() -> Result<Self> {
         let blade = blade_mesh(MeshCounts { chord: 12, thickness: 2, span: 20 })?;
         let material = Rotor37Options::default().material;
-        let full = Blade::new(&blade.mesh, &material, blade.mesh.set("hub")?)?;
+        let full = FullBlade::new(&blade.mesh, &material, blade.mesh.set("hub")?)?;
         let patches = blade.contact_rows([9, 2])?;
         let forces = patches[0].weights().map(|(node, weight)| {
             let [x, y, _] = blade.mesh.nodes[node];

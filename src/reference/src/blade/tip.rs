@@ -6,13 +6,13 @@ use tiprub_model::Mesh;
 use tiprub_model::element::ElementKind;
 use tiprub_model::mesh::Element;
 
-use crate::reduced::rub::Tip;
+use crate::reduced::rub::RubTip;
 
 /// Something that must stay inside the casing and is pushed by one normal force.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Part {
+pub struct TipPart {
     /// Where it stands.
-    pub(super) tip: Tip,
+    pub(super) tip: RubTip,
     /// Nodes, their weights (sum 1), and the angle of the radial direction that their displacements are seen along (rad).
     pub(super) shares: Vec<(usize, f64, f64)>,
 }
@@ -24,14 +24,14 @@ const GAUSS: [&[f64]; 3] = [
     &[0.112_701_665_379_258_3, 0.5, 0.887_298_334_620_741_7],
 ];
 
-impl Part {
+impl TipPart {
     /// The mean over nodes with weights (sum 1), each along directions of its own, on a contour that slopes so much.
     pub fn mean(nodes: &[[f64; 3]], weights: impl Iterator<Item = (usize, f64)>, slope: f64) -> Self {
         let angle = |node: usize| nodes[node][1].atan2(nodes[node][0]);
         let shares: Vec<_> = weights.map(|(node, weight)| (node, weight, angle(node))).collect();
         let mean = |of: &dyn Fn(usize) -> f64| shares.iter().map(|(node, weight, _)| weight * of(*node)).sum();
         let radius = mean(&|node| nodes[node][0].hypot(nodes[node][1]));
-        Self { tip: Tip { radius, angle: mean(&angle), slope }, shares }
+        Self { tip: RubTip { radius, angle: mean(&angle), slope }, shares }
     }
 
     /// Gauss's points of all faces whose nodes are in the set (ascending), `each` by `each` of a face (up to 3).
@@ -67,7 +67,10 @@ impl Part {
         let total = |of: fn(&[f64; 2]) -> f64| rates.iter().map(of).sum::<f64>();
         let slope = total(|[dr, dz]| dr * dz) / total(|[_, dz]| dz * dz);
         let nodes = element.nodes.iter().zip(shape.values).filter(|(_, value)| value.abs() > 1e-12);
-        Self { tip: Tip { radius, angle, slope }, shares: nodes.map(|(node, value)| (*node, value, angle)).collect() }
+        Self {
+            tip: RubTip { radius, angle, slope },
+            shares: nodes.map(|(node, value)| (*node, value, angle)).collect(),
+        }
     }
 
     /// All nodes of the outline of the faces whose nodes are in the set (ascending), ends of the tip included, on the slope of the nearest of

@@ -2,7 +2,7 @@
 
 /// Block, spring, belt and friction forces.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Belt {
+pub struct StickSlipBelt {
     /// Mass (kg).
     pub mass: f64,
     /// Spring (N/m).
@@ -15,7 +15,7 @@ pub struct Belt {
     pub sliding: f64,
 }
 
-impl Belt {
+impl StickSlipBelt {
     /// ω = √(k/m) (rad/s).
     pub(crate) fn omega(&self) -> f64 {
         (self.stiffness / self.mass).sqrt()

@@ -8,11 +8,11 @@ use std::fmt::Write as _;
 use tiprub_model::element::ElementKind;
 use tiprub_model::{Material, Mesh};
 
-use super::{CUBE_ELEMENTS, SIDE, Side, cube_material, cube_mesh, ring_material, ring_mesh};
+use super::{CUBE_ELEMENTS, RingSide, SIDE, cube_material, cube_mesh, ring_material, ring_mesh};
 
 /// Choices of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Run {
+pub struct CalculixRun {
     /// Speed along −y (m/s).
     pub speed: f64,
     /// Coefficient of friction; 0 for none.
@@ -32,12 +32,12 @@ pub struct Run {
 }
 
 /// Text of the input file: full 3D, all three bodies, implicit steps of fixed size without numerical damping.
-pub fn input(run: &Run) -> String {
+pub fn input(run: &CalculixRun) -> String {
     let mut text = String::from("*HEADING\nCube between two rings; m, kg, s, N\n");
     let bodies = [
         ("CUBE", cube_mesh(), cube_material()),
-        ("LEFT", ring_mesh(Side::Left), ring_material()),
-        ("RIGHT", ring_mesh(Side::Right), ring_material()),
+        ("LEFT", ring_mesh(RingSide::Left), ring_material()),
+        ("RIGHT", ring_mesh(RingSide::Right), ring_material()),
     ];
     let (mut first_node, mut first_element) = (1, 1);
     let mut cube_nodes = 0;

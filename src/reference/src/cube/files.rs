@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use tiprub_model::sparse::{Pattern, SparseMatrix};
 use tiprub_model::{Error, FeModel, Result};
 
-use super::scene::Body;
+use super::scene::CubeBody;
 
 /// One body: node table, elements, sets and matrices (compressed columns, both triangles; dof 3·node + component).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,8 +30,8 @@ pub struct BodyFile {
     pub mass: Vec<f64>,
 }
 
-impl From<&Body> for BodyFile {
-    fn from(body: &Body) -> Self {
+impl From<&CubeBody> for BodyFile {
+    fn from(body: &CubeBody) -> Self {
         Self {
             nodes: body.mesh.nodes.clone(),
             elements: body.mesh.elements.iter().map(|element| element.nodes.clone()).collect(),
@@ -82,7 +82,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     std::fs::write(path, text).map_err(|error| file_error(path, error))
 }
 
-/// Read what [`write_json`] wrote: a [`BodyFile`] or a [`super::history::History`].
+/// Read what [`write_json`] wrote: a [`BodyFile`] or a [`super::history::CubeHistory`].
 ///
 /// # Errors
 /// [`Error::File`], also when the contents are of another kind.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Displacements of all masters at one time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Snapshot {
+pub struct CubeSnapshot {
     /// Time (s).
     pub time: f64,
     /// (x, y, z) of the masters, left face then right (m).
@@ -13,7 +13,7 @@ pub struct Snapshot {
 
 /// Time histories of a run, one entry per recorded step.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct History {
+pub struct CubeHistory {
     /// Name of the method.
     pub method: String,
     /// Step (s).
@@ -35,7 +35,7 @@ pub struct History {
     /// Largest penetration left by each step (m).
     pub penetration: Vec<f64>,
     /// Displacements of all masters at the times asked for.
-    pub snapshots: Vec<Snapshot>,
+    pub snapshots: Vec<CubeSnapshot>,
     /// Processor time of the steps (s), all threads.
     pub processor_time: f64,
     /// Processor time of assembly-independent preparation: factors and condensed matrices (s).
@@ -44,7 +44,7 @@ pub struct History {
     pub iterations: usize,
 }
 
-impl History {
+impl CubeHistory {
     /// Kinetic and strain energy (J).
     pub fn total(&self) -> Vec<f64> {
         self.kinetic.iter().zip(&self.strain).map(|(kinetic, strain)| kinetic + strain).collect()

@@ -8,6 +8,6 @@ pub mod outside;
 pub mod scene;
 
 pub use tiprub_model::cube::{
-    CENTRE, CUBE_ELEMENTS, FRICTION, HALF_ARC, INNER_RADIUS, OUTER_RADIUS, RING_ELEMENTS, SIDE, START, Side, THICKNESS,
-    WIDTH, cube_material, cube_mesh, cube_of, ring_material, ring_mesh, ring_of,
+    CENTRE, CUBE_ELEMENTS, FRICTION, HALF_ARC, INNER_RADIUS, OUTER_RADIUS, RING_ELEMENTS, RingSide, SIDE, START,
+    THICKNESS, WIDTH, cube_material, cube_mesh, cube_of, ring_material, ring_mesh, ring_of,
 };

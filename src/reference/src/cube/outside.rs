@@ -2,7 +2,7 @@
 
 use tiprub_model::{Error, Result};
 
-use super::history::History;
+use super::history::CubeHistory;
 
 /// Columns of a table, in order; lines that begin with `#` or with `t` are skipped.
 pub const COLUMNS: &str = "t,u1x,u1y,u1z,lambda1,left,vy";
@@ -12,8 +12,8 @@ pub const COLUMNS: &str = "t,u1x,u1y,u1z,lambda1,left,vy";
 ///
 /// # Errors
 /// [`Error::Invalid`] for a row that is not seven numbers, or times that do not grow.
-pub fn read(text: &str, speed: f64) -> Result<History> {
-    let mut history = History { method: "outside".into(), ..History::default() };
+pub fn read(text: &str, speed: f64) -> Result<CubeHistory> {
+    let mut history = CubeHistory { method: "outside".into(), ..CubeHistory::default() };
     push(&mut history, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -speed]);
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.starts_with(['#', 't'])) {
         let numbers: Vec<f64> = line.split(',').filter_map(|word| word.trim().parse().ok()).collect();
@@ -29,7 +29,7 @@ pub fn read(text: &str, speed: f64) -> Result<History> {
     Ok(history)
 }
 
-fn push(history: &mut History, [time, x, y, z, first, left, speed]: [f64; 7]) {
+fn push(history: &mut CubeHistory, [time, x, y, z, first, left, speed]: [f64; 7]) {
     let mut corners = [[0.0; 3]; 8];
     corners[0] = [x, y, z];
     history.times.push(time);

@@ -8,9 +8,9 @@ use tiprub_model::sparse::{Factor, SparseMatrix, principal_pair};
 use tiprub_model::{Material, Mesh, Result};
 
 use super::{
-    CENTRE, FRICTION, HALF_ARC, RING_ELEMENTS, Side, WIDTH, cube_material, cube_mesh, ring_material, ring_mesh,
+    CENTRE, FRICTION, HALF_ARC, RING_ELEMENTS, RingSide, WIDTH, cube_material, cube_mesh, ring_material, ring_mesh,
 };
-use crate::surface::{Surface, SurfaceKind};
+use crate::surface::{SplineSurface, SurfaceKind};
 
 /// Mass matrix of the finite elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub enum Mass {
 
 /// What can be chosen about the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setting {
+pub struct CubeSetting {
     /// Speed of the cube along −y (m/s).
     pub speed: f64,
     /// Coefficient of friction.
@@ -34,7 +34,7 @@ pub struct Setting {
     pub mass: Mass,
 }
 
-impl Default for Setting {
+impl Default for CubeSetting {
     /// The paper's case with the spline: 100 m/s, µ = 0.15; lumped mass.
     fn default() -> Self {
         Self { speed: 100.0, friction: FRICTION, surface: SurfaceKind::Spline, mass: Mass::Lumped }
@@ -43,7 +43,7 @@ impl Default for Setting {
 
 /// A body with the matrices of all its nodes; dof 3·node + component.
 #[derive(Debug, Clone)]
-pub struct Body {
+pub struct CubeBody {
     /// Mesh and node sets.
     pub mesh: Mesh,
     /// Material.
@@ -58,7 +58,7 @@ pub struct Body {
     pub contact: Vec<usize>,
 }
 
-impl Body {
+impl CubeBody {
     /// Assemble a mesh.
     ///
     /// # Errors
@@ -115,44 +115,45 @@ impl Body {
 
 /// Cube, left ring, right ring.
 #[derive(Debug, Clone)]
-pub struct Scene {
+pub struct CubeScene {
     /// What was chosen.
-    pub setting: Setting,
+    pub setting: CubeSetting,
     /// Cube, left ring, right ring.
-    pub bodies: [Body; 3],
+    pub bodies: [CubeBody; 3],
     /// Surfaces of the left and the right ring.
-    pub surfaces: [Surface; 2],
+    pub surfaces: [SplineSurface; 2],
     /// Masters per side.
     pub masters: usize,
     /// Divisions of a ring's surface along arc and width.
     divisions: [usize; 2],
 }
 
-impl Scene {
+impl CubeScene {
     /// The paper's meshes.
     ///
     /// # Errors
     /// Those of assembly.
-    pub fn new(setting: Setting) -> Result<Self> {
-        Self::of(setting, cube_mesh(), Side::BOTH.map(ring_mesh), [RING_ELEMENTS[2], RING_ELEMENTS[1]])
+    pub fn new(setting: CubeSetting) -> Result<Self> {
+        Self::of(setting, cube_mesh(), RingSide::BOTH.map(ring_mesh), [RING_ELEMENTS[2], RING_ELEMENTS[1]])
     }
 
     /// Meshes of another refinement; `divisions` are those of a ring's surface along arc and width.
     ///
     /// # Errors
     /// Those of assembly; a set that a mesh lacks.
-    pub fn of(setting: Setting, cube: Mesh, [left, right]: [Mesh; 2], divisions: [usize; 2]) -> Result<Self> {
+    pub fn of(setting: CubeSetting, cube: Mesh, [left, right]: [Mesh; 2], divisions: [usize; 2]) -> Result<Self> {
         let masters = [cube.set("MASTER_LEFT")?, cube.set("MASTER_RIGHT")?].concat();
         let ring = |mesh: Mesh| {
             let slaves = mesh.set("SLAVE")?.to_vec();
-            Body::new(mesh, ring_material(), setting.mass, slaves)
+            CubeBody::new(mesh, ring_material(), setting.mass, slaves)
         };
-        let surface = |side: Side| Surface::new(setting.surface, divisions[0] + 1, divisions[1] + 1, -side.sign());
+        let surface =
+            |side: RingSide| SplineSurface::new(setting.surface, divisions[0] + 1, divisions[1] + 1, -side.sign());
         Ok(Self {
             setting,
             masters: masters.len() / 2,
-            bodies: [Body::new(cube, cube_material(), setting.mass, masters)?, ring(left)?, ring(right)?],
-            surfaces: Side::BOTH.map(surface),
+            bodies: [CubeBody::new(cube, cube_material(), setting.mass, masters)?, ring(left)?, ring(right)?],
+            surfaces: RingSide::BOTH.map(surface),
             divisions,
         })
     }
@@ -171,7 +172,7 @@ impl Scene {
 
     /// Surface parameters of the point of the undeformed ring nearest to a place.
     pub(crate) fn guess(&self, side: usize, place: [f64; 3]) -> [f64; 2] {
-        let angle = place[1].atan2(CENTRE - Side::BOTH[side].sign() * place[0]);
+        let angle = place[1].atan2(CENTRE - RingSide::BOTH[side].sign() * place[0]);
         let [arc, wide] = self.divisions;
         [(angle + HALF_ARC) / (2.0 * HALF_ARC) * arc as f64, (place[2] / WIDTH + 0.5) * wide as f64]
     }

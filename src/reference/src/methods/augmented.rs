@@ -7,19 +7,19 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 use tiprub_model::{Error, Result};
 
-use super::Run;
+use super::MethodRun;
 use super::contact::{
-    Contact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
+    RingContact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
 };
-use super::operator::{Operator, inner};
-use super::recorder::{Entry, Recorder};
-use crate::cube::history::History;
-use crate::cube::scene::Scene;
+use super::operator::{BodyOperator, inner};
+use super::recorder::{Recorder, StepEntry};
+use crate::cube::history::CubeHistory;
+use crate::cube::scene::CubeScene;
 use crate::surface::is_zero;
 
 /// Choices of this method.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct AugmentedOptions {
     /// ε (N/m) per node.
     pub penalty: f64,
     /// ε of a face's corner nodes over that of the other nodes.
@@ -28,7 +28,7 @@ pub struct Options {
     pub tolerance: f64,
 }
 
-impl Default for Options {
+impl Default for AugmentedOptions {
     /// 24 times E·a of the cube's 10 mm elements, so that a node under 2500 N goes 5 µm deep; another augmentation beyond a
     /// hundredth of the element.
     fn default() -> Self {
@@ -48,12 +48,12 @@ type Memory = Vec<(usize, usize, [f64; 3])>;
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
+pub(crate) fn run(scene: &CubeScene, run: &MethodRun, options: AugmentedOptions) -> Result<CubeHistory> {
     let mut recorder = Recorder::new(scene, run, "augmented");
     let h = run.step;
     let quarter = 0.25 * h * h;
-    let operator = Operator::new(scene, quarter)?;
-    let mut problem = Problem {
+    let operator = BodyOperator::new(scene, quarter)?;
+    let mut problem = AugmentedProblem {
         scene,
         operator: &operator,
         rest: surface_at_rest(scene),
@@ -91,7 +91,7 @@ pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History>
         acceleration = next;
         if recorder.wants(step) {
             let elastic = operator.elastic(&now);
-            recorder.record(&Entry {
+            recorder.record(&StepEntry {
                 time: step as f64 * h,
                 displacements: &now,
                 cube_velocity: &velocity[0],
@@ -103,29 +103,29 @@ pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History>
     Ok(recorder.finish())
 }
 
-struct Problem<'a> {
-    scene: &'a Scene,
-    operator: &'a Operator,
+struct AugmentedProblem<'a> {
+    scene: &'a CubeScene,
+    operator: &'a BodyOperator,
     rest: SurfaceVectors,
     quarter: f64,
-    options: Options,
+    options: AugmentedOptions,
     friction_memory: Memory,
 }
 
-struct Found {
-    contacts: Vec<Contact>,
+struct AugmentedSolution {
+    contacts: Vec<RingContact>,
     forces: Vec<[f64; 3]>,
     iterations: usize,
     penetration: f64,
 }
 
 /// Entry of a contact in a memory, in its frame.
-fn recall(memory: &Memory, contact: &Contact) -> Vector3<f64> {
+fn recall(memory: &Memory, contact: &RingContact) -> Vector3<f64> {
     let same = |(side, master, _): &&(usize, usize, [f64; 3])| *side == contact.side && *master == contact.master;
     memory.iter().find(same).map_or_else(Vector3::zeros, |(_, _, force)| contact.local(*force).into())
 }
 
-fn memory(contacts: &[Contact], forces: &[Vector3<f64>]) -> Memory {
+fn memory(contacts: &[RingContact], forces: &[Vector3<f64>]) -> Memory {
     contacts
         .iter()
         .zip(forces)
@@ -133,16 +133,16 @@ fn memory(contacts: &[Contact], forces: &[Vector3<f64>]) -> Memory {
         .collect()
 }
 
-impl Problem<'_> {
+impl AugmentedProblem<'_> {
     /// ε of a contact (N/m).
-    fn penalty(&self, contact: &Contact) -> f64 {
+    fn penalty(&self, contact: &RingContact) -> f64 {
         let cube = &self.scene.bodies[0];
         let node = cube.contact[contact.side * self.scene.masters + contact.master];
         let corner = ["CORNERS_LEFT", "CORNERS_RIGHT"].iter().any(|set| cube.mesh.sets[*set].contains(&node));
         self.options.penalty * if corner { self.options.corners } else { 1.0 }
     }
 
-    fn solve(&mut self, start: &SurfaceVectors, free: &SurfaceVectors, step: usize) -> Result<Found> {
+    fn solve(&mut self, start: &SurfaceVectors, free: &SurfaceVectors, step: usize) -> Result<AugmentedSolution> {
         let masters = self.scene.masters;
         let mut moved = free.clone();
         let (mut multipliers, mut iterations, mut last) = (Memory::new(), 0, f64::NAN);
@@ -189,7 +189,7 @@ impl Problem<'_> {
             let penetration = find(self.scene, &self.rest, &moved, 0.0).iter().fold(0.0, |a: f64, c| a.max(-c.gap));
             if penetration <= self.options.tolerance {
                 self.friction_memory = memory(&contacts, &forces);
-                return Ok(Found { contacts, forces: local, iterations, penetration });
+                return Ok(AugmentedSolution { contacts, forces: local, iterations, penetration });
             }
             multipliers =
                 memory(&contacts, &forces.iter().map(|force| Vector3::new(force[0], 0.0, 0.0)).collect::<Vec<_>>());

@@ -12,14 +12,14 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use tiprub_model::{Error, Result};
 
-use super::Run;
+use super::MethodRun;
 use super::contact::{
-    Contact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
+    RingContact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
 };
-use super::operator::{Operator, inner};
-use super::recorder::{Entry, Recorder};
-use crate::cube::history::History;
-use crate::cube::scene::Scene;
+use super::operator::{BodyOperator, inner};
+use super::recorder::{Recorder, StepEntry};
+use crate::cube::history::CubeHistory;
+use crate::cube::scene::CubeScene;
 use crate::surface::is_zero;
 
 /// Masters closer than this to a surface take part (m).
@@ -37,12 +37,12 @@ const UPDATES: usize = 30;
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub(crate) fn run(scene: &Scene, run: &Run) -> Result<History> {
+pub(crate) fn run(scene: &CubeScene, run: &MethodRun) -> Result<CubeHistory> {
     let mut recorder = Recorder::new(scene, run, "bipotential");
     let (h, square) = (run.step, run.step * run.step);
-    let operator = Operator::new(scene, 0.25 * square)?;
+    let operator = BodyOperator::new(scene, 0.25 * square)?;
     let mut problem =
-        Problem { scene, operator: &operator, rest: surface_at_rest(scene), square, previous: Vec::new() };
+        BipotentialProblem { scene, operator: &operator, rest: surface_at_rest(scene), square, previous: Vec::new() };
     recorder.prepared();
     let mut now = scene.rest();
     let mut change: Vectors = scene.launch().map(|v| v.iter().map(|v| h * v).collect());
@@ -71,7 +71,7 @@ pub(crate) fn run(scene: &Scene, run: &Run) -> Result<History> {
                 let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect::<Vec<f64>>();
                 0.125 * inner(&sum(&now[i], &next[i]), &sum(&elastic[i], &elastic_next[i]))
             };
-            recorder.record(&Entry {
+            recorder.record(&StepEntry {
                 time: step as f64 * h,
                 displacements: &now,
                 cube_velocity: &velocity[0],
@@ -89,25 +89,25 @@ fn advanced(now: &Vectors, change: &Vectors, second: &Vectors) -> Vectors {
     core::array::from_fn(|i| (0..now[i].len()).map(|dof| now[i][dof] + (change[i][dof] + second[i][dof])).collect())
 }
 
-struct Problem<'a> {
-    scene: &'a Scene,
-    operator: &'a Operator,
+struct BipotentialProblem<'a> {
+    scene: &'a CubeScene,
+    operator: &'a BodyOperator,
     rest: SurfaceVectors,
     square: f64,
     /// Reactions of the last step, to start from: (side, master, force in the frame).
     previous: Vec<(usize, usize, [f64; 3])>,
 }
 
-struct Found {
-    contacts: Vec<Contact>,
+struct BipotentialSolution {
+    contacts: Vec<RingContact>,
     forces: Vec<[f64; 3]>,
     sweeps: usize,
     penetration: f64,
 }
 
-impl Problem<'_> {
+impl BipotentialProblem<'_> {
     /// Reactions that keep the gaps of the end of the step open, from surface displacements at its start and without contact.
-    fn solve(&mut self, start: &SurfaceVectors, free: &SurfaceVectors, step: usize) -> Result<Found> {
+    fn solve(&mut self, start: &SurfaceVectors, free: &SurfaceVectors, step: usize) -> Result<BipotentialSolution> {
         let masters = self.scene.masters;
         let mut moved = free.clone();
         let (mut sweeps, mut last) = (0, f64::NAN);
@@ -143,14 +143,14 @@ impl Problem<'_> {
             }
             if last < SETTLED {
                 let penetration = find(self.scene, &self.rest, &moved, 0.0).iter().fold(0.0, |a: f64, c| a.max(-c.gap));
-                return Ok(Found { contacts, forces, sweeps, penetration });
+                return Ok(BipotentialSolution { contacts, forces, sweeps, penetration });
             }
         }
         let problem = format!("in step {step} the feet still move by {last:.1e} m after {UPDATES} updates");
         Err(Error::invalid("contact geometry of the bi-potential method", problem, "Take a smaller step"))
     }
 
-    fn remembered(&self, contact: &Contact) -> [f64; 3] {
+    fn remembered(&self, contact: &RingContact) -> [f64; 3] {
         let same = |(side, master, _): &&(usize, usize, [f64; 3])| *side == contact.side && *master == contact.master;
         self.previous.iter().find(same).map_or([0.0; 3], |(_, _, force)| *force)
     }

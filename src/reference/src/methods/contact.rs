@@ -1,6 +1,6 @@
 //! Where masters meet a ring's surface: gap, frame, weights; relative displacements; forces back on the bodies.
 
-use crate::cube::scene::Scene;
+use crate::cube::scene::CubeScene;
 use crate::surface::{add_scaled, cross, dot, minus, scaled, unit};
 
 /// Displacements, forces or velocities of all dofs of cube, left ring, right ring.
@@ -11,7 +11,7 @@ pub(super) type SurfaceVectors = [Vec<[f64; 3]>; 3];
 
 /// A master near or inside a ring.
 #[derive(Debug, Clone)]
-pub(crate) struct Contact {
+pub(crate) struct RingContact {
     /// 0 left, 1 right.
     pub side: usize,
     /// Number of the master on its face.
@@ -24,7 +24,7 @@ pub(crate) struct Contact {
     pub gap: f64,
 }
 
-impl Contact {
+impl RingContact {
     /// Displacement of the master relative to the surface at the foot, global directions.
     pub(super) fn relative(&self, masters: usize, surface: &SurfaceVectors) -> [f64; 3] {
         let mut difference = surface[0][self.side * masters + self.master];
@@ -48,7 +48,7 @@ impl Contact {
 }
 
 /// Displacements of masters and carriers out of those of all dofs.
-pub(super) fn surface_of(scene: &Scene, vectors: &Vectors) -> SurfaceVectors {
+pub(super) fn surface_of(scene: &CubeScene, vectors: &Vectors) -> SurfaceVectors {
     core::array::from_fn(|index| {
         let body = &scene.bodies[index];
         let take = |&node: &usize| core::array::from_fn(|i| vectors[index][3 * node + i]);
@@ -58,7 +58,7 @@ pub(super) fn surface_of(scene: &Scene, vectors: &Vectors) -> SurfaceVectors {
 }
 
 /// Positions of masters and carriers at rest.
-pub(super) fn surface_at_rest(scene: &Scene) -> SurfaceVectors {
+pub(super) fn surface_at_rest(scene: &CubeScene) -> SurfaceVectors {
     core::array::from_fn(|index| {
         let body = &scene.bodies[index];
         let nodal: Vec<[f64; 3]> = body.contact.iter().map(|&node| body.mesh.nodes[node]).collect();
@@ -67,7 +67,7 @@ pub(super) fn surface_at_rest(scene: &Scene) -> SurfaceVectors {
 }
 
 /// All masters with a gap below `margin` (m), left side first; `rest` are the positions at rest.
-pub(super) fn find(scene: &Scene, rest: &SurfaceVectors, moved: &SurfaceVectors, margin: f64) -> Vec<Contact> {
+pub(super) fn find(scene: &CubeScene, rest: &SurfaceVectors, moved: &SurfaceVectors, margin: f64) -> Vec<RingContact> {
     let mut contacts = Vec::new();
     for side in 0..2 {
         let sum =
@@ -80,7 +80,7 @@ pub(super) fn find(scene: &Scene, rest: &SurfaceVectors, moved: &SurfaceVectors,
                 let axis = [0.0, 0.0, 1.0];
                 let across = unit(minus(axis, scaled(foot.normal, foot.normal[2])));
                 let frame = [foot.normal, cross(across, foot.normal), across];
-                contacts.push(Contact { side, master, frame, weights: foot.weights, gap: foot.gap });
+                contacts.push(RingContact { side, master, frame, weights: foot.weights, gap: foot.gap });
             }
         }
     }
@@ -88,7 +88,7 @@ pub(super) fn find(scene: &Scene, rest: &SurfaceVectors, moved: &SurfaceVectors,
 }
 
 /// Forces (local frames, on the masters) as forces on masters and carriers; action and reaction.
-pub(super) fn surface_forces(scene: &Scene, contacts: &[Contact], forces: &[[f64; 3]]) -> SurfaceVectors {
+pub(super) fn surface_forces(scene: &CubeScene, contacts: &[RingContact], forces: &[[f64; 3]]) -> SurfaceVectors {
     let mut all: SurfaceVectors = [
         vec![[0.0; 3]; 2 * scene.masters],
         vec![[0.0; 3]; scene.surfaces[0].count()],
@@ -105,7 +105,7 @@ pub(super) fn surface_forces(scene: &Scene, contacts: &[Contact], forces: &[[f64
 }
 
 /// Add forces on masters and carriers, times a factor, to loads on all dofs.
-pub(super) fn add_to_loads(scene: &Scene, forces: &SurfaceVectors, factor: f64, loads: &mut Vectors) {
+pub(super) fn add_to_loads(scene: &CubeScene, forces: &SurfaceVectors, factor: f64, loads: &mut Vectors) {
     for index in 0..3 {
         let body = &scene.bodies[index];
         let nodal = if index == 0 { forces[0].clone() } else { scene.surfaces[index - 1].spread(&forces[index]) };

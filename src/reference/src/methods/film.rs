@@ -6,18 +6,18 @@
 use nalgebra::{DMatrix, DVector};
 use tiprub_model::{Error, Result};
 
-use super::Run;
+use super::MethodRun;
 use super::contact::{
-    Contact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
+    RingContact, SurfaceVectors, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of,
 };
-use super::operator::{Operator, inner};
-use super::recorder::{Entry, Recorder};
-use crate::cube::history::History;
-use crate::cube::scene::Scene;
+use super::operator::{BodyOperator, inner};
+use super::recorder::{Recorder, StepEntry};
+use crate::cube::history::CubeHistory;
+use crate::cube::scene::CubeScene;
 
 /// Choices of this method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Options {
+pub struct FilmOptions {
     /// Let contacts with a negative multiplier go and solve again for the others.
     pub release_tension: bool,
     /// Solve the whole complementarity problem instead: also masters that only the others' forces push in take part, and
@@ -32,7 +32,7 @@ const ROUNDING: f64 = 1e-14;
 /// Most exchanges of one contact in a complementarity problem.
 const EXCHANGES: usize = 10_000;
 
-impl Default for Options {
+impl Default for FilmOptions {
     fn default() -> Self {
         Self { release_tension: true, complementary: false }
     }
@@ -42,9 +42,9 @@ impl Default for Options {
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
+pub(crate) fn run(scene: &CubeScene, run: &MethodRun, options: FilmOptions) -> Result<CubeHistory> {
     let mut recorder = Recorder::new(scene, run, "film");
-    let operator = Operator::new(scene, 0.0)?;
+    let operator = BodyOperator::new(scene, 0.0)?;
     let rest = surface_at_rest(scene);
     operator.check_step(scene, run.step)?;
     recorder.prepared();
@@ -80,7 +80,7 @@ pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History>
             let velocity: Vectors = core::array::from_fn(|index| change[index].iter().map(|d| d / h).collect());
             let left = find(scene, &rest, &surface_of(scene, &next), 0.0);
             recorder.note_penetration(left.iter().fold(0.0, |largest, contact| largest.max(-contact.gap)));
-            recorder.record(&Entry {
+            recorder.record(&StepEntry {
                 time: step as f64 * h,
                 displacements: &now,
                 cube_velocity: &velocity[0],
@@ -96,12 +96,12 @@ pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History>
 
 /// Eq. 11: λ from C_Nᵀ M⁻¹ C_NT h² λ = −g; forces (normal, tangential) in the frames.
 fn multipliers(
-    scene: &Scene,
-    operator: &Operator,
-    contacts: &[Contact],
+    scene: &CubeScene,
+    operator: &BodyOperator,
+    contacts: &[RingContact],
     slip: &SurfaceVectors,
     square: f64,
-    options: Options,
+    options: FilmOptions,
     recorder: &mut Recorder<'_>,
 ) -> Result<Vec<[f64; 3]>> {
     let directions: Vec<[f64; 3]> = contacts.iter().map(|contact| direction(scene, contact, slip)).collect();
@@ -147,7 +147,7 @@ fn multipliers(
 fn exchanged(
     active: &[usize],
     multipliers: &[f64],
-    contacts: &[Contact],
+    contacts: &[RingContact],
     entry: impl Fn(usize, usize) -> f64,
 ) -> Vec<usize> {
     let wrong = (0..contacts.len()).find(|&a| match active.binary_search(&a) {
@@ -170,7 +170,7 @@ fn exchanged(
 }
 
 /// Force per multiplier in the frame: the normal, and µ against the predicted sliding.
-fn direction(scene: &Scene, contact: &Contact, slip: &SurfaceVectors) -> [f64; 3] {
+fn direction(scene: &CubeScene, contact: &RingContact, slip: &SurfaceVectors) -> [f64; 3] {
     let friction = scene.setting.friction;
     let master = slip[0][contact.side * scene.masters + contact.master];
     let mut relative = contact.relative(scene.masters, slip);

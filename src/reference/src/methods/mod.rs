@@ -11,12 +11,12 @@ mod operator;
 pub mod penalty;
 mod recorder;
 
-use crate::cube::history::History;
-use crate::cube::scene::Scene;
+use crate::cube::history::CubeHistory;
+use crate::cube::scene::CubeScene;
 
 /// How long and how finely to run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub struct MethodRun {
     /// Step h (s).
     pub step: f64,
     /// End (s).
@@ -27,7 +27,7 @@ pub struct Run {
     pub snapshots: Vec<f64>,
 }
 
-impl Run {
+impl MethodRun {
     /// Number of steps to the end.
     pub(crate) fn steps(&self) -> usize {
         let mut steps = 0;
@@ -40,24 +40,24 @@ impl Run {
 
 /// One of the methods, with a name for reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Method {
+pub enum CubeMethod {
     /// [`film`].
-    Film(film::Options),
+    Film(film::FilmOptions),
     /// `bipotential`.
     Bipotential,
     /// [`augmented`].
-    Augmented(augmented::Options),
+    Augmented(augmented::AugmentedOptions),
     /// [`penalty`].
-    Penalty(penalty::Options),
+    Penalty(penalty::PenaltyOptions),
 }
 
-impl Method {
+impl CubeMethod {
     /// Run the scene.
     ///
     /// # Errors
     /// A mass or iteration matrix that is not positive definite; a solver that does not converge; an explicit step that
     /// is not stable.
-    pub fn run(self, scene: &Scene, run: &Run) -> tiprub_model::Result<History> {
+    pub fn run(self, scene: &CubeScene, run: &MethodRun) -> tiprub_model::Result<CubeHistory> {
         match self {
             Self::Film(options) => film::run(scene, run, options),
             Self::Bipotential => bipotential::run(scene, run),

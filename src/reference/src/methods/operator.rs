@@ -5,9 +5,9 @@ use tiprub_model::sparse::Factor;
 use tiprub_model::{Error, Result};
 
 use super::blocks::BlockMatrix;
-use super::contact::{Contact, SurfaceVectors, Vectors};
-use crate::cube::scene::{Mass, Scene};
-use crate::surface::{Surface, is_zero};
+use super::contact::{RingContact, SurfaceVectors, Vectors};
+use crate::cube::scene::{CubeScene, Mass};
+use crate::surface::{SplineSurface, is_zero};
 
 #[derive(Debug)]
 enum Inverse {
@@ -18,13 +18,13 @@ enum Inverse {
 
 /// Displacements of contact points per contact force: of masters for the cube, of carriers for a ring.
 #[derive(Debug)]
-enum Compliance {
+enum MethodCompliance {
     /// The same in all three directions, and uncoupled.
     Isotropic(DMatrix<f64>),
     Full(DMatrix<f64>),
 }
 
-impl Compliance {
+impl MethodCompliance {
     fn block(&self, a: usize, b: usize) -> Matrix3<f64> {
         match self {
             Self::Isotropic(matrix) => Matrix3::identity() * matrix[(a, b)],
@@ -35,16 +35,16 @@ impl Compliance {
 
 /// M + c K of the three bodies.
 #[derive(Debug)]
-pub(super) struct Operator {
+pub(super) struct BodyOperator {
     inverses: [Inverse; 3],
-    compliances: [Compliance; 3],
+    compliances: [MethodCompliance; 3],
     pub(super) stiffness: [BlockMatrix; 3],
     pub(super) mass: [BlockMatrix; 3],
     free: [Vec<bool>; 3],
 }
 
-impl Operator {
-    pub(super) fn new(scene: &Scene, c: f64) -> Result<Self> {
+impl BodyOperator {
+    pub(super) fn new(scene: &CubeScene, c: f64) -> Result<Self> {
         let (mut inverses, mut compliances) = (Vec::new(), Vec::new());
         for (index, body) in scene.bodies.iter().enumerate() {
             let surface = (index > 0).then(|| &scene.surfaces[index - 1]);
@@ -61,11 +61,11 @@ impl Operator {
                 let contact = DMatrix::from_fn(body.contact.len(), body.contact.len(), |a, b| {
                     if a == b { inverse[3 * body.contact[a]] } else { 0.0 }
                 });
-                compliances.push(Compliance::Isotropic(isotropic_carriers(surface, contact)));
+                compliances.push(MethodCompliance::Isotropic(isotropic_carriers(surface, contact)));
                 inverses.push(Inverse::Diagonal(inverse));
             } else {
                 let factor = body.factor(c)?;
-                compliances.push(Compliance::Full(carriers(surface, body.contact_inverse(&factor))));
+                compliances.push(MethodCompliance::Full(carriers(surface, body.contact_inverse(&factor))));
                 inverses.push(Inverse::Factor(factor));
             }
         }
@@ -85,7 +85,7 @@ impl Operator {
     }
 
     /// (M + c K)⁻¹ b.
-    pub(super) fn solve(&self, scene: &Scene, right: &Vectors) -> Vectors {
+    pub(super) fn solve(&self, scene: &CubeScene, right: &Vectors) -> Vectors {
         core::array::from_fn(|index| match &self.inverses[index] {
             Inverse::Diagonal(inverse) => inverse.iter().zip(&right[index]).map(|(a, b)| a * b).collect(),
             Inverse::Factor(factor) => scene.bodies[index].solve(factor, &right[index]),
@@ -93,7 +93,7 @@ impl Operator {
     }
 
     /// Refuse a step beyond 2/ω of the highest frequency, found by power iteration on M⁻¹K of every body (c = 0).
-    pub(super) fn check_step(&self, scene: &Scene, step: f64) -> Result<()> {
+    pub(super) fn check_step(&self, scene: &CubeScene, step: f64) -> Result<()> {
         let mut vectors: Vectors = core::array::from_fn(|index| {
             let count = scene.bodies[index].dofs();
             (0..count).map(|dof| if self.free[index][dof] { (1.7 * dof as f64).sin() } else { 0.0 }).collect()
@@ -138,13 +138,13 @@ impl Operator {
     }
 
     /// Relative displacement (local frames) of each contact per force on each, 3n × 3n.
-    pub(super) fn delassus(&self, contacts: &[Contact], masters: usize) -> DMatrix<f64> {
+    pub(super) fn delassus(&self, contacts: &[RingContact], masters: usize) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(3 * contacts.len(), 3 * contacts.len());
         let frames: Vec<Matrix3<f64>> =
             contacts.iter().map(|contact| Matrix3::from_fn(|i, j| contact.frame[j][i])).collect();
         for (b, second) in contacts.iter().enumerate() {
             for (a, first) in contacts.iter().enumerate() {
-                let place = |contact: &Contact| contact.side * masters + contact.master;
+                let place = |contact: &RingContact| contact.side * masters + contact.master;
                 let mut block = self.compliances[0].block(place(first), place(second));
                 if first.side == second.side {
                     let ring = &self.compliances[1 + first.side];
@@ -168,8 +168,8 @@ impl Operator {
             for (b, force) in forces[index].iter().enumerate().filter(|(_, force)| !is_zero(force)) {
                 for (a, u) in moved.iter_mut().enumerate() {
                     match &self.compliances[index] {
-                        Compliance::Isotropic(matrix) => (0..3).for_each(|i| u[i] += matrix[(a, b)] * force[i]),
-                        Compliance::Full(matrix) => {
+                        MethodCompliance::Isotropic(matrix) => (0..3).for_each(|i| u[i] += matrix[(a, b)] * force[i]),
+                        MethodCompliance::Full(matrix) => {
                             for i in 0..3 {
                                 u[i] += (0..3).map(|j| matrix[(3 * a + i, 3 * b + j)] * force[j]).sum::<f64>();
                             }
@@ -187,7 +187,7 @@ pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// A⁻¹ S A⁻ᵀ with the map A⁻¹ from nodes to carriers.
-fn carriers(surface: Option<&Surface>, nodal: DMatrix<f64>) -> DMatrix<f64> {
+fn carriers(surface: Option<&SplineSurface>, nodal: DMatrix<f64>) -> DMatrix<f64> {
     let Some(surface) = surface else { return nodal };
     let map = |matrix: &DMatrix<f64>| {
         let mut mapped = DMatrix::zeros(matrix.nrows(), matrix.ncols());
@@ -203,7 +203,7 @@ fn carriers(surface: Option<&Surface>, nodal: DMatrix<f64>) -> DMatrix<f64> {
     map(&map(&nodal).transpose()).transpose()
 }
 
-fn isotropic_carriers(surface: Option<&Surface>, nodal: DMatrix<f64>) -> DMatrix<f64> {
+fn isotropic_carriers(surface: Option<&SplineSurface>, nodal: DMatrix<f64>) -> DMatrix<f64> {
     let Some(surface) = surface else { return nodal };
     let map = |matrix: &DMatrix<f64>| {
         let mut mapped = DMatrix::zeros(matrix.nrows(), matrix.ncols());

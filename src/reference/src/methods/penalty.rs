@@ -2,23 +2,23 @@
 
 use tiprub_model::Result;
 
-use super::Run;
-use super::contact::{Contact, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of};
-use super::operator::{Operator, inner};
-use super::recorder::{Entry, Recorder};
-use crate::cube::history::History;
-use crate::cube::scene::Scene;
+use super::MethodRun;
+use super::contact::{RingContact, Vectors, add_to_loads, find, surface_at_rest, surface_forces, surface_of};
+use super::operator::{BodyOperator, inner};
+use super::recorder::{Recorder, StepEntry};
+use crate::cube::history::CubeHistory;
+use crate::cube::scene::CubeScene;
 
 /// Choices of this method.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct PenaltyOptions {
     /// Contact stiffness ε per node (N/m).
     pub stiffness: f64,
     /// Below this sliding speed friction is viscous (m/s).
     pub sticking_speed: f64,
 }
 
-impl Default for Options {
+impl Default for PenaltyOptions {
     /// As stiff as the augmented Lagrangian's penalty; friction regularised below 0.5 m/s.
     fn default() -> Self {
         Self { stiffness: 5e8, sticking_speed: 0.5 }
@@ -29,9 +29,9 @@ impl Default for Options {
 ///
 /// # Errors
 /// As [`super::Method::run`].
-pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History> {
+pub(crate) fn run(scene: &CubeScene, run: &MethodRun, options: PenaltyOptions) -> Result<CubeHistory> {
     let mut recorder = Recorder::new(scene, run, "penalty");
-    let operator = Operator::new(scene, 0.0)?;
+    let operator = BodyOperator::new(scene, 0.0)?;
     let rest = surface_at_rest(scene);
     operator.check_step(scene, run.step)?;
     recorder.prepared();
@@ -59,7 +59,7 @@ pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History>
         recorder.note_penetration(deepest);
         recorder.note_forces(&contacts, &forces);
         if recorder.wants(step) {
-            recorder.record(&Entry {
+            recorder.record(&StepEntry {
                 time: step as f64 * h,
                 displacements: &now,
                 cube_velocity: &velocity[0],
@@ -72,7 +72,7 @@ pub(crate) fn run(scene: &Scene, run: &Run, options: Options) -> Result<History>
     Ok(recorder.finish())
 }
 
-fn spring(contact: &Contact, sliding: [f64; 3], friction: f64, options: Options) -> [f64; 3] {
+fn spring(contact: &RingContact, sliding: [f64; 3], friction: f64, options: PenaltyOptions) -> [f64; 3] {
     let normal = -options.stiffness * contact.gap;
     let factor = -friction * normal / sliding[1].hypot(sliding[2]).max(options.sticking_speed);
     [normal, factor * sliding[1], factor * sliding[2]]

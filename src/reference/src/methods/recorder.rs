@@ -1,12 +1,12 @@
-//! Fills a [`History`] as a run goes on.
+//! Fills a [`CubeHistory`] as a run goes on.
 
-use super::Run;
-use super::contact::{Contact, Vectors};
-use crate::cube::history::{History, Snapshot, processor_time};
-use crate::cube::scene::Scene;
+use super::MethodRun;
+use super::contact::{RingContact, Vectors};
+use crate::cube::history::{CubeHistory, CubeSnapshot, processor_time};
+use crate::cube::scene::CubeScene;
 
 /// What a method knows about one step.
-pub(super) struct Entry<'a> {
+pub(super) struct StepEntry<'a> {
     pub(super) time: f64,
     pub(super) displacements: &'a Vectors,
     /// Velocity of the cube (any consistent choice of the scheme), all dofs.
@@ -16,12 +16,12 @@ pub(super) struct Entry<'a> {
 }
 
 pub(super) struct Recorder<'a> {
-    scene: &'a Scene,
-    run: &'a Run,
+    scene: &'a CubeScene,
+    run: &'a MethodRun,
     /// Nodes 1, 6, 85, 90 and 31, 36, 91, 96 (from 1), and their masters.
     corners: Vec<(usize, usize)>,
     masses: Vec<f64>,
-    history: History,
+    history: CubeHistory,
     started: f64,
     prepared: f64,
     penetration: f64,
@@ -32,7 +32,7 @@ pub(super) struct Recorder<'a> {
 
 impl<'a> Recorder<'a> {
     /// Starts the clock of the preparation.
-    pub(super) fn new(scene: &'a Scene, run: &'a Run, method: &str) -> Self {
+    pub(super) fn new(scene: &'a CubeScene, run: &'a MethodRun, method: &str) -> Self {
         let cube = &scene.bodies[0];
         let nodes = ["CORNERS_LEFT", "CORNERS_RIGHT"].map(|set| cube.mesh.sets[set].clone()).concat();
         let master = |node: usize| cube.contact.iter().position(|other| *other == node).expect("corners are masters");
@@ -43,7 +43,7 @@ impl<'a> Recorder<'a> {
             run,
             corners: nodes.into_iter().map(|node| (node, master(node))).collect(),
             masses,
-            history: History { method: method.into(), step: run.step, ..History::default() },
+            history: CubeHistory { method: method.into(), step: run.step, ..CubeHistory::default() },
             started: processor_time(),
             prepared: f64::NAN,
             penetration: 0.0,
@@ -72,14 +72,14 @@ impl<'a> Recorder<'a> {
     }
 
     /// Contact forces of a step (in the frames, N); records hold their means.
-    pub(super) fn note_forces(&mut self, contacts: &[Contact], forces: &[[f64; 3]]) {
+    pub(super) fn note_forces(&mut self, contacts: &[RingContact], forces: &[[f64; 3]]) {
         for (contact, force) in contacts.iter().zip(forces) {
             self.forces[contact.side * self.scene.masters + contact.master] += force[0];
         }
         self.summed += 1;
     }
 
-    pub(super) fn record(&mut self, entry: &Entry<'_>) {
+    pub(super) fn record(&mut self, entry: &StepEntry<'_>) {
         let steps = self.summed.max(1) as f64;
         let normal: Vec<f64> = self.forces.iter().map(|sum| sum / steps).collect();
         let (left, right) = normal.split_at(self.scene.masters);
@@ -104,11 +104,11 @@ impl<'a> Recorder<'a> {
         let wanted = self.run.snapshots.get(history.snapshots.len());
         if wanted.is_some_and(|time| entry.time > time - 1e-3 * self.run.step) {
             let masters = self.scene.bodies[0].contact.iter().map(|&node| at(node)).collect();
-            history.snapshots.push(Snapshot { time: entry.time, masters });
+            history.snapshots.push(CubeSnapshot { time: entry.time, masters });
         }
     }
 
-    pub(super) fn finish(mut self) -> History {
+    pub(super) fn finish(mut self) -> CubeHistory {
         self.history.preparation_time = self.prepared - self.started;
         self.history.processor_time = processor_time() - self.prepared;
         self.history

@@ -6,11 +6,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Contact, Method, Scene, Step, energy, finite};
+use super::{NodeContact, ReducedMethod, ReducedScene, ReducedStep, energy, finite};
 
 /// Choices of this method.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct NewmarkOptions {
     /// ε (N/m).
     pub penalty: f64,
     /// Largest penetration without another augmentation (m).
@@ -24,9 +24,9 @@ const AUGMENTATIONS: usize = 200;
 const ITERATIONS: usize = 60;
 
 /// State of a run.
-pub struct Augmented<'a, S: Scene> {
+pub struct Augmented<'a, S: ReducedScene> {
     scene: &'a S,
-    options: Options,
+    options: NewmarkOptions,
     step: f64,
     steps: u64,
     position: Vec<f64>,
@@ -37,9 +37,9 @@ pub struct Augmented<'a, S: Scene> {
     compliance: Vec<f64>,
 }
 
-impl<'a, S: Scene> Augmented<'a, S> {
+impl<'a, S: ReducedScene> Augmented<'a, S> {
     /// From the scene's start with steps of `step` (s), without contact at first.
-    pub fn new(scene: &'a S, step: f64, options: Options) -> Self {
+    pub fn new(scene: &'a S, step: f64, options: NewmarkOptions) -> Self {
         let modes = scene.modes();
         let (position, velocity) = scene.start();
         let at_first = |mode: usize| {
@@ -70,7 +70,7 @@ impl<'a, S: Scene> Augmented<'a, S> {
     }
 
     /// λ = max(0, k − ε g) with k raised until no node is too deep; gaps are those at the end of the step.
-    fn multipliers(&self, group: &[Contact]) -> Result<(DVector<f64>, f64), String> {
+    fn multipliers(&self, group: &[NodeContact]) -> Result<(DVector<f64>, f64), String> {
         let count = group.len();
         let matrix = DMatrix::from_fn(count, count, |i, j| group[i].normal.weighted(&self.compliance, &group[j].force));
         let gaps = DVector::from_fn(count, |i, _| group[i].gap);
@@ -116,9 +116,9 @@ impl<'a, S: Scene> Augmented<'a, S> {
     }
 }
 
-impl<S: Scene> Method for Augmented<'_, S> {
+impl<S: ReducedScene> ReducedMethod for Augmented<'_, S> {
     #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
-    fn step(&mut self) -> Result<Step, String> {
+    fn step(&mut self) -> Result<ReducedStep, String> {
         let (h, modes, load) = (self.step, self.scene.modes(), self.scene.load());
         let count = modes.len();
         // q* = q + h v + h²/4 a, v* = v + h/2 a; a⁺ follows from the equation of motion at the end.
@@ -134,7 +134,7 @@ impl<S: Scene> Method for Augmented<'_, S> {
         }
         self.steps += 1;
         let contacts = self.scene.contacts(self.steps as f64 * h, &free, self.options.margin);
-        let mut report = Step { forces: Vec::new(), least_gap: f64::INFINITY };
+        let mut report = ReducedStep { forces: Vec::new(), least_gap: f64::INFINITY };
         let mut pushed = vec![0.0; if contacts.is_empty() { 0 } else { count }];
         for group in contacts.chunk_by(|a, b| a.group == b.group) {
             let (found, least) = self.multipliers(group)?;

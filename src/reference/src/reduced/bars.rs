@@ -3,14 +3,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::modes::Modes;
-use super::{Contact, Row, Scene};
+use super::modes::DampedModes;
+use super::{NodeContact, ReducedScene, SparseRow};
 use crate::carpenter;
 use crate::closed::bouncing_bar;
 
 /// A rod or two as matrices, its one contact, and how it starts.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rod {
+pub struct RodModel {
     /// Lumped mass (kg).
     pub mass: DMatrix<f64>,
     /// Stiffness (N/m).
@@ -46,7 +46,7 @@ fn unit(count: usize, i: usize) -> DVector<f64> {
 }
 
 /// Carpenter's two bars with `elements` elements each. `end_mass`: share of their mass that the meeting nodes keep.
-pub fn carpenter(elements: usize, end_mass: f64) -> Rod {
+pub fn carpenter(elements: usize, end_mass: f64) -> RodModel {
     let size = carpenter::LENGTH / elements as f64;
     let element = [carpenter::YOUNG * carpenter::AREA / size, carpenter::DENSITY * carpenter::AREA * size];
     let (nodes, count) = (elements + 1, 2 * (elements + 1));
@@ -56,7 +56,7 @@ pub fn carpenter(elements: usize, end_mass: f64) -> Rod {
     mass[(elements, elements)] *= end_mass;
     mass[(nodes, nodes)] *= end_mass;
     let sign = |node: usize| if node < nodes { 1.0 } else { -1.0 };
-    Rod {
+    RodModel {
         mass,
         stiffness,
         closing: unit(count, elements) - unit(count, nodes),
@@ -75,7 +75,7 @@ pub fn carpenter_exact(time: f64) -> f64 {
 }
 
 /// The bouncing bar per unit of cross-section; node 0 is its bottom.
-pub fn bouncing(elements: usize, end_mass: f64) -> Rod {
+pub fn bouncing(elements: usize, end_mass: f64) -> RodModel {
     let size = bouncing_bar::LENGTH / elements as f64;
     let count = elements + 1;
     let (mut mass, mut stiffness) = (DMatrix::zeros(count, count), DMatrix::zeros(count, count));
@@ -83,7 +83,7 @@ pub fn bouncing(elements: usize, end_mass: f64) -> Rod {
     add_rod(&mut mass, &mut stiffness, 0, elements, element);
     let load = DVector::from_fn(count, |node, _| -bouncing_bar::GRAVITY * mass[(node, node)]);
     mass[(0, 0)] *= end_mass;
-    Rod {
+    RodModel {
         mass,
         stiffness,
         closing: -unit(count, 0),
@@ -96,7 +96,7 @@ pub fn bouncing(elements: usize, end_mass: f64) -> Rod {
 
 /// A bar held at its top that hangs above the ground (`touching` false) or stands on it under twice its weight (true), and is
 /// shaken so gently that it never touches or never lifts off.
-pub fn shaken(elements: usize, end_mass: f64, touching: bool) -> Rod {
+pub fn shaken(elements: usize, end_mass: f64, touching: bool) -> RodModel {
     let whole = bouncing(elements, end_mass);
     let keep = |matrix: &DMatrix<f64>| matrix.view((0, 0), (elements, elements)).into_owned();
     let (mass, stiffness) = (keep(&whole.mass), keep(&whole.stiffness));
@@ -112,7 +112,7 @@ pub fn shaken(elements: usize, end_mass: f64, touching: bool) -> Rod {
     resting[0] *= f64::from(u8::from(!touching));
     let displacement = held.cholesky().map_or_else(|| DVector::zeros(elements), |factor| factor.solve(&resting));
     let swing = |node: usize| (std::f64::consts::PI * node as f64 / elements as f64).sin();
-    Rod {
+    RodModel {
         mass,
         stiffness,
         closing: -unit(elements, 0),
@@ -126,7 +126,7 @@ pub fn shaken(elements: usize, end_mass: f64, touching: bool) -> Rod {
 /// A rod in its modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RodScene {
-    modes: Modes,
+    modes: DampedModes,
     load: Vec<f64>,
     start: (Vec<f64>, Vec<f64>),
     normal: Vec<f64>,
@@ -138,8 +138,8 @@ pub struct RodScene {
 impl RodScene {
     /// `whole`: compare all modal amplitudes (displacements weighted with the mass) instead of the contact's displacement.
     /// `None` for a mass that is not positive.
-    pub fn new(rod: &Rod, whole: bool) -> Option<Self> {
-        let modes = Modes::new(&rod.mass, &rod.stiffness, 0.0)?;
+    pub fn new(rod: &RodModel, whole: bool) -> Option<Self> {
+        let modes = DampedModes::new(&rod.mass, &rod.stiffness, 0.0)?;
         Some(Self {
             load: modes.force(&rod.load),
             start: (modes.amplitudes(&rod.mass, &rod.displacement), modes.amplitudes(&rod.mass, &rod.velocity)),
@@ -151,18 +151,18 @@ impl RodScene {
     }
 }
 
-impl Scene for RodScene {
-    fn modes(&self) -> &Modes {
+impl ReducedScene for RodScene {
+    fn modes(&self) -> &DampedModes {
         &self.modes
     }
 
-    fn contacts(&self, _: f64, position: &[f64], within: f64) -> Vec<Contact> {
+    fn contacts(&self, _: f64, position: &[f64], within: f64) -> Vec<NodeContact> {
         let gap = self.gap + self.normal.iter().zip(position).map(|(n, q)| n * q).sum::<f64>();
         if gap > within {
             return Vec::new();
         }
-        let row = Row(vec![(0, self.normal.clone())]);
-        vec![Contact { node: 0, group: 0, gap, rate: 0.0, normal: row.clone(), force: row }]
+        let row = SparseRow(vec![(0, self.normal.clone())]);
+        vec![NodeContact { node: 0, group: 0, gap, rate: 0.0, normal: row.clone(), force: row }]
     }
 
     fn load(&self) -> &[f64] {

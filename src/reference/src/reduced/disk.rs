@@ -8,9 +8,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, DVector, Vector3};
 
-use super::modes::Modes;
+use super::modes::DampedModes;
 use super::ring::Ring;
-use super::{Contact, Row, Scene};
+use super::{NodeContact, ReducedScene, SparseRow};
 
 /// Reduced matrices of one nodal diameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +25,7 @@ pub struct Pencil {
 
 /// The casing.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Casing {
+pub struct CasingModel {
     /// Mass.
     pub mass: DMatrix<f64>,
     /// Stiffness.
@@ -44,7 +44,7 @@ pub struct Casing {
 
 /// The whole stage.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stage {
+pub struct StageReference {
     /// Nodal diameters from 0.
     pub pencils: Vec<Pencil>,
     /// Radius, angle and axial place of the tip nodes of sector 0.
@@ -54,7 +54,7 @@ pub struct Stage {
     /// Modal damping ratio of the disk.
     pub damping: f64,
     /// The casing.
-    pub casing: Casing,
+    pub casing: CasingModel,
     /// Clearance (m).
     pub clearance: f64,
     /// Angular velocity (rad/s).
@@ -68,8 +68,8 @@ pub struct Stage {
 /// A stage in its modes: those of the disk, then those of the casing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageScene {
-    stage: Stage,
-    modes: Modes,
+    stage: StageReference,
+    modes: DampedModes,
     /// Number of modes of the disk.
     disk: usize,
     /// Rows of the tip nodes of all sectors over the modes of the disk, `[(sector · nodes + node) · 3 + component]`.
@@ -104,15 +104,15 @@ fn directions(angle: f64) -> [Vector3<f64>; 2] {
 }
 
 /// Modes of a nodal diameter, and the rows of all sectors over them.
-fn diameter(stage: &Stage, number: usize) -> Option<(Modes, Vec<DMatrix<f64>>)> {
+fn diameter(stage: &StageReference, number: usize) -> Option<(DampedModes, Vec<DMatrix<f64>>)> {
     let pencil = &stage.pencils[number];
     let real = number == 0 || 2 * number == stage.sectors;
     let weight = (if real { 1.0 } else { 2.0 } / stage.sectors as f64).sqrt();
     let part = |matrix: &DMatrix<Complex<f64>>| matrix.map(|entry| entry.re);
     let modes = if real {
-        Modes::new(&part(&pencil.mass), &part(&pencil.stiffness), stage.damping)?
+        DampedModes::new(&part(&pencil.mass), &part(&pencil.stiffness), stage.damping)?
     } else {
-        Modes::new(&embedded(&pencil.mass), &embedded(&pencil.stiffness), stage.damping)?
+        DampedModes::new(&embedded(&pencil.mass), &embedded(&pencil.stiffness), stage.damping)?
     };
     let rows = (0..stage.sectors).map(|sector| {
         let (sine, cosine) = (TAU * (number * sector) as f64 / stage.sectors as f64).sin_cos();
@@ -126,9 +126,9 @@ fn diameter(stage: &Stage, number: usize) -> Option<(Modes, Vec<DMatrix<f64>>)> 
 
 impl StageScene {
     /// `None` for masses that are not positive definite, or a grid without a surface.
-    pub fn new(stage: Stage) -> Option<Self> {
+    pub fn new(stage: StageReference) -> Option<Self> {
         let nodes = 3 * stage.tips.len();
-        let mut modes = Modes { frequencies: Vec::new(), damping: Vec::new(), shapes: DMatrix::zeros(0, 0) };
+        let mut modes = DampedModes { frequencies: Vec::new(), damping: Vec::new(), shapes: DMatrix::zeros(0, 0) };
         let mut rows = vec![Vec::new(); nodes * stage.sectors];
         for number in 0..stage.pencils.len() {
             let (own, seen) = diameter(&stage, number)?;
@@ -142,7 +142,7 @@ impl StageScene {
         }
         let disk = modes.len();
         let casing = &stage.casing;
-        let own = Modes::new(&casing.mass, &casing.stiffness, casing.damping)?;
+        let own = DampedModes::new(&casing.mass, &casing.stiffness, casing.damping)?;
         modes.frequencies.extend(&own.frequencies);
         modes.damping.extend(&own.damping);
         let seen = &casing.contact_map * &own.shapes;
@@ -155,7 +155,7 @@ impl StageScene {
             let force = amplitude * radius * TAU / count as f64 * (waves * angle - phase).cos();
             load[disk..].iter_mut().zip(&grid[3 * node]).for_each(|(load, row)| *load += force * row);
         }
-        let contour = Contour::new(&stage.tips)?;
+        let contour = SplineContour::new(&stage.tips)?;
         Some(Self {
             ring: Ring::new(around, rings.len())?,
             radii: casing.positions.iter().map(|place| contour.radius(place[2]) + stage.clearance).collect(),
@@ -224,7 +224,7 @@ impl StageScene {
         (time, position): (f64, &[f64]),
         control: &[Vector3<f64>],
         within: f64,
-    ) -> Option<Contact> {
+    ) -> Option<NodeContact> {
         let stage = &self.stage;
         let [radius, angle, axial] = stage.tips[node];
         let own = angle + TAU * sector as f64 / stage.sectors as f64 + stage.speed * time;
@@ -257,9 +257,9 @@ impl StageScene {
         let row = |direction: Vector3<f64>| {
             let along = [direction.dot(&radial), direction.dot(&tangential), direction.z];
             let disk = (0..self.disk).map(|mode| (0..3).map(|i| along[i] * rows[i][mode]).sum());
-            Row(vec![(0, disk.collect()), (self.disk, self.casing_row(&weights, direction))])
+            SparseRow(vec![(0, disk.collect()), (self.disk, self.casing_row(&weights, direction))])
         };
-        Some(Contact {
+        Some(NodeContact {
             node: node * stage.sectors + sector,
             group: 0,
             gap,
@@ -270,12 +270,12 @@ impl StageScene {
     }
 }
 
-impl Scene for StageScene {
-    fn modes(&self) -> &Modes {
+impl ReducedScene for StageScene {
+    fn modes(&self) -> &DampedModes {
         &self.modes
     }
 
-    fn contacts(&self, time: f64, position: &[f64], within: f64) -> Vec<Contact> {
+    fn contacts(&self, time: f64, position: &[f64], within: f64) -> Vec<NodeContact> {
         let control = self.control(time, position);
         let mut found = Vec::new();
         for sector in 0..self.stage.sectors {
@@ -308,12 +308,12 @@ impl Scene for StageScene {
 }
 
 /// Tip contour r(z): natural cubic spline, straight beyond its ends.
-struct Contour {
+struct SplineContour {
     /// (z, r, r'').
     points: Vec<[f64; 3]>,
 }
 
-impl Contour {
+impl SplineContour {
     fn new(tips: &[[f64; 3]]) -> Option<Self> {
         let mut points: Vec<[f64; 3]> = tips.iter().map(|tip| [tip[2], tip[0], 0.0]).collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));

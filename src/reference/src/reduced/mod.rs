@@ -1,6 +1,6 @@
 //! Independent time steppers over a reduced model: modes, contact rows and a gap function, nothing else.
 //!
-//! A [`Scene`] says where its contact nodes stand when the modes have given amplitudes; the methods march
+//! A [`ReducedScene`] says where its contact nodes stand when the modes have given amplitudes; the methods march
 //! q̈ + 2ξω q̇ + ω² q = f + Σ λ F with gap g(q, t), normal row N = ∂g/∂q and force row F = N − µT of every contact:
 //!
 //! * [`moreau`]: the θ-method with θ = ½ and velocities that are complementary to impulses (exact complementarity);
@@ -20,13 +20,13 @@ pub mod penalty;
 pub mod ring;
 pub mod rub;
 
-use modes::Modes;
+use modes::DampedModes;
 
 /// A sparse row over the modes: pieces that begin at the first mode of a body. Two rows meet where pieces begin alike.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Row(pub Vec<(usize, Vec<f64>)>);
+pub struct SparseRow(pub Vec<(usize, Vec<f64>)>);
 
-impl Row {
+impl SparseRow {
     /// Σ row·values.
     pub(crate) fn dot(&self, values: &[f64]) -> f64 {
         let piece =
@@ -55,7 +55,7 @@ impl Row {
 
 /// One contact node near the obstacle.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Contact {
+pub struct NodeContact {
     /// Which node, over the whole scene.
     pub node: usize,
     /// Contacts of different groups do not know of each other.
@@ -65,18 +65,18 @@ pub struct Contact {
     /// What prescribed motion adds to its rate (m/s).
     pub rate: f64,
     /// ∂g/∂q.
-    pub normal: Row,
+    pub normal: SparseRow,
     /// Modal force per unit multiplier, friction included.
-    pub force: Row,
+    pub force: SparseRow,
 }
 
 /// A reduced model with its obstacle.
-pub trait Scene {
+pub trait ReducedScene {
     /// The modes.
-    fn modes(&self) -> &Modes;
+    fn modes(&self) -> &DampedModes;
 
     /// The contacts with a gap of at most `within` (m) at a time (s) and modal amplitudes, groups one after the other.
-    fn contacts(&self, time: f64, position: &[f64], within: f64) -> Vec<Contact>;
+    fn contacts(&self, time: f64, position: &[f64], within: f64) -> Vec<NodeContact>;
 
     /// Modal forces beside contact.
     fn load(&self) -> &[f64];
@@ -90,7 +90,7 @@ pub trait Scene {
 
 /// What a step of any method leaves behind.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Step {
+pub struct ReducedStep {
     /// Multipliers of the step: node and normal force (N).
     pub forces: Vec<(usize, f64)>,
     /// Smallest gap that was seen in the step (m).
@@ -98,12 +98,12 @@ pub struct Step {
 }
 
 /// A method that marches a scene.
-pub trait Method {
+pub trait ReducedMethod {
     /// One step.
     ///
     /// # Errors
     /// The contact problem is not solved, or the state is not finite.
-    fn step(&mut self) -> Result<Step, String>;
+    fn step(&mut self) -> Result<ReducedStep, String>;
 
     /// Modal amplitudes and velocities at the time reached.
     fn state(&self) -> (&[f64], &[f64]);
@@ -113,7 +113,7 @@ pub trait Method {
 }
 
 /// Kinetic and strain energy of modal amplitudes and velocities of one instant (J).
-fn energy(modes: &Modes, position: &[f64], velocity: &[f64]) -> f64 {
+fn energy(modes: &DampedModes, position: &[f64], velocity: &[f64]) -> f64 {
     let each = position.iter().zip(velocity).zip(&modes.frequencies);
     each.map(|((q, v), w)| 0.5 * (v * v + w * w * q * q)).sum()
 }

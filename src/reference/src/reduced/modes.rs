@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Mass-normalised modes with modal damping.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Modes {
+pub struct DampedModes {
     /// Angular frequencies ω (rad/s).
     pub frequencies: Vec<f64>,
     /// Damping ratio ξ of all modes.
@@ -16,7 +16,7 @@ pub struct Modes {
 /// Squares of frequencies below this part of the largest are those of rigid modes.
 const RIGID: f64 = 1e-12;
 
-impl Modes {
+impl DampedModes {
     /// Solve K φ = ω² M φ by Cholesky's factor of the mass; `None` where the mass is not positive definite.
     pub(crate) fn new(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let lower = mass.clone().cholesky()?.l();

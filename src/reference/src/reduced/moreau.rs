@@ -8,10 +8,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::complementarity;
-use super::{Contact, Method, Scene, Step, energy, finite};
+use super::{NodeContact, ReducedMethod, ReducedScene, ReducedStep, energy, finite};
 
 /// State of a run.
-pub struct Moreau<'a, S: Scene> {
+pub struct Moreau<'a, S: ReducedScene> {
     scene: &'a S,
     step: f64,
     steps: u64,
@@ -23,7 +23,7 @@ pub struct Moreau<'a, S: Scene> {
     middle: Vec<f64>,
 }
 
-impl<'a, S: Scene> Moreau<'a, S> {
+impl<'a, S: ReducedScene> Moreau<'a, S> {
     /// From the scene's start with steps of `step` (s).
     pub fn new(scene: &'a S, step: f64) -> Self {
         let modes = scene.modes();
@@ -46,7 +46,7 @@ impl<'a, S: Scene> Moreau<'a, S> {
     }
 
     /// Impulses of the contacts that are closed, by the velocities without them.
-    fn impulses(&self, contacts: &[Contact], free: &[f64]) -> Result<Vec<f64>, String> {
+    fn impulses(&self, contacts: &[NodeContact], free: &[f64]) -> Result<Vec<f64>, String> {
         let mut impulses = Vec::with_capacity(contacts.len());
         for group in contacts.chunk_by(|a, b| a.group == b.group) {
             let count = group.len();
@@ -61,9 +61,9 @@ impl<'a, S: Scene> Moreau<'a, S> {
     }
 }
 
-impl<S: Scene> Method for Moreau<'_, S> {
+impl<S: ReducedScene> ReducedMethod for Moreau<'_, S> {
     #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
-    fn step(&mut self) -> Result<Step, String> {
+    fn step(&mut self) -> Result<ReducedStep, String> {
         let (h, modes, load) = (self.step, self.scene.modes(), self.scene.load());
         let mut free = Vec::with_capacity(modes.len());
         for mode in 0..modes.len() {
@@ -89,7 +89,7 @@ impl<S: Scene> Method for Moreau<'_, S> {
         self.velocity = free;
         self.steps += 1;
         finite(&self.position, self.steps)?;
-        Ok(Step {
+        Ok(ReducedStep {
             forces: contacts.iter().zip(&impulses).map(|(contact, impulse)| (contact.node, impulse / h)).collect(),
             least_gap: contacts.iter().fold(f64::INFINITY, |least, contact| least.min(contact.gap)),
         })

@@ -1,9 +1,9 @@
 //! Central differences with a penalty: a node that penetrates by δ is pushed back with ε δ.
 
-use super::{Method, Scene, Step, finite};
+use super::{ReducedMethod, ReducedScene, ReducedStep, finite};
 
 /// State of a run: amplitudes at t, velocities half a step earlier.
-pub struct Penalty<'a, S: Scene> {
+pub struct Penalty<'a, S: ReducedScene> {
     scene: &'a S,
     stiffness: f64,
     step: f64,
@@ -12,7 +12,7 @@ pub struct Penalty<'a, S: Scene> {
     velocity: Vec<f64>,
 }
 
-impl<'a, S: Scene> Penalty<'a, S> {
+impl<'a, S: ReducedScene> Penalty<'a, S> {
     /// From the scene's start with steps of `step` (s) and contact stiffness `stiffness` (N/m) per node.
     ///
     /// # Errors
@@ -35,9 +35,9 @@ impl<'a, S: Scene> Penalty<'a, S> {
     }
 }
 
-impl<S: Scene> Method for Penalty<'_, S> {
+impl<S: ReducedScene> ReducedMethod for Penalty<'_, S> {
     #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
-    fn step(&mut self) -> Result<Step, String> {
+    fn step(&mut self) -> Result<ReducedStep, String> {
         let (h, modes) = (self.step, self.scene.modes());
         let contacts = self.scene.contacts(self.steps as f64 * h, &self.position, 0.0);
         let mut push = self.scene.load().to_vec();
@@ -54,7 +54,7 @@ impl<S: Scene> Method for Penalty<'_, S> {
         }
         self.steps += 1;
         finite(&self.position, self.steps)?;
-        Ok(Step {
+        Ok(ReducedStep {
             forces: contacts.iter().map(|contact| (contact.node, -self.stiffness * contact.gap)).collect(),
             least_gap: contacts.iter().fold(f64::INFINITY, |least, contact| least.min(contact.gap)),
         })

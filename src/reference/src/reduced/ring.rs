@@ -18,7 +18,7 @@ fn basis(x: f64) -> [f64; 3] {
 }
 
 /// Point, derivatives along ξ and η, and ξξ, ξη, ηη of a place.
-pub(crate) type GridIndex = [Vector3<f64>; 6];
+pub(crate) type SurfaceDerivatives = [Vector3<f64>; 6];
 
 /// The interpolation problem of a grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,7 +86,7 @@ impl Ring {
     }
 
     /// The surface at a place in grid steps.
-    pub(crate) fn at(&self, control: &[Vector3<f64>], xi: f64, eta: f64) -> GridIndex {
+    pub(crate) fn at(&self, control: &[Vector3<f64>], xi: f64, eta: f64) -> SurfaceDerivatives {
         let mut place = [Vector3::zeros(); 6];
         for (index, weights) in self.local(xi, eta) {
             for (part, weight) in place.iter_mut().zip(weights) {
@@ -111,7 +111,7 @@ impl Ring {
         control: &[Vector3<f64>],
         point: Vector3<f64>,
         guess: [f64; 2],
-    ) -> Option<([f64; 2], GridIndex)> {
+    ) -> Option<([f64; 2], SurfaceDerivatives)> {
         let [mut xi, mut eta] = guess;
         for _ in 0..30 {
             let place = self.at(control, xi, eta);

@@ -6,12 +6,12 @@
 
 use nalgebra::DMatrix;
 
-use super::modes::Modes;
-use super::{Contact, Row, Scene};
+use super::modes::DampedModes;
+use super::{NodeContact, ReducedScene, SparseRow};
 
 /// A contact node: radius (m), angle (rad), meridional slope.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tip {
+pub struct RubTip {
     /// Radius (m).
     pub radius: f64,
     /// Angle in the sector (rad).
@@ -22,7 +22,7 @@ pub struct Tip {
 
 /// A rigid casing with two bumps half a turn apart, and how blades pass it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Obstacle {
+pub struct BumpedCasing {
     /// Radial clearance (m).
     pub clearance: f64,
     /// Angular velocity (rad/s).
@@ -46,7 +46,7 @@ pub(crate) struct Touch {
     pub(crate) rate: f64,
 }
 
-impl Obstacle {
+impl BumpedCasing {
     /// Change of the casing's radius at a fixed angle, its slope and its rate of growth, with the ramp in it.
     fn shape(&self, angle: f64, time: f64) -> [f64; 3] {
         use std::f64::consts::PI;
@@ -63,7 +63,7 @@ impl Obstacle {
     }
 
     /// A point of the tip displaced by `moved` (m), at a time (s).
-    pub(crate) fn meets(&self, tip: &Tip, time: f64, [radial, tangential, axial]: [f64; 3]) -> Touch {
+    pub(crate) fn meets(&self, tip: &RubTip, time: f64, [radial, tangential, axial]: [f64; 3]) -> Touch {
         let [shape, slope, growth] = self.shape(tip.angle + self.speed * time + tangential / tip.radius, time);
         let gradient = [-1.0, slope / tip.radius, tip.slope];
         let length = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
@@ -90,7 +90,7 @@ pub struct Blades {
     /// Radial, tangential and axial displacement of every tip node per coordinate.
     pub contact_map: DMatrix<f64>,
     /// Tip nodes.
-    pub tips: Vec<Tip>,
+    pub tips: Vec<RubTip>,
     /// Number of blades.
     pub sectors: usize,
     /// Modal damping ratio.
@@ -100,14 +100,14 @@ pub struct Blades {
     /// Radial clearance of each blade (m); empty: that of the obstacle.
     pub clearances: Vec<f64>,
     /// What they rub against.
-    pub obstacle: Obstacle,
+    pub obstacle: BumpedCasing,
 }
 
 /// Blades in their modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BladeScene {
     blades: Blades,
-    modes: Modes,
+    modes: DampedModes,
     /// Contact rows of one blade over its modes.
     rows: Vec<Vec<f64>>,
     load: Vec<f64>,
@@ -116,7 +116,7 @@ pub struct BladeScene {
 impl BladeScene {
     /// `None` for a mass that is not positive definite.
     pub fn new(blades: Blades) -> Option<Self> {
-        let modes = Modes::new(&blades.mass, &blades.stiffness, blades.damping)?;
+        let modes = DampedModes::new(&blades.mass, &blades.stiffness, blades.damping)?;
         let seen = &blades.contact_map * &modes.shapes;
         let rows = seen.row_iter().map(|row| row.iter().copied().collect()).collect();
         let mut modes = modes.repeated(blades.sectors);
@@ -135,21 +135,21 @@ impl BladeScene {
         self.rows[row].iter().zip(&position[sector * each..]).map(|(a, b)| a * b).sum()
     }
 
-    fn contact(&self, node: usize, sector: usize, time: f64, position: &[f64], within: f64) -> Option<Contact> {
+    fn contact(&self, node: usize, sector: usize, time: f64, position: &[f64], within: f64) -> Option<NodeContact> {
         let (tip, blades) = (self.blades.tips[node], &self.blades);
         let moved = std::array::from_fn(|component| self.moved(3 * node + component, sector, position));
         let pitch = std::f64::consts::TAU * sector as f64 / blades.sectors as f64;
-        let tip = Tip { angle: tip.angle + pitch, ..tip };
+        let tip = RubTip { angle: tip.angle + pitch, ..tip };
         let clearance = blades.clearances.get(sector).copied().unwrap_or(blades.obstacle.clearance);
-        let Touch { gap, normal, force, rate } = Obstacle { clearance, ..blades.obstacle }.meets(&tip, time, moved);
+        let Touch { gap, normal, force, rate } = BumpedCasing { clearance, ..blades.obstacle }.meets(&tip, time, moved);
         if gap > within {
             return None;
         }
         let row = |direction: [f64; 3]| {
             let entry = |mode: usize| (0..3).map(|i| direction[i] * self.rows[3 * node + i][mode]).sum();
-            Row(vec![(sector * self.each(), (0..self.each()).map(entry).collect())])
+            SparseRow(vec![(sector * self.each(), (0..self.each()).map(entry).collect())])
         };
-        Some(Contact {
+        Some(NodeContact {
             node: node * blades.sectors + sector,
             group: sector,
             gap,
@@ -160,12 +160,12 @@ impl BladeScene {
     }
 }
 
-impl Scene for BladeScene {
-    fn modes(&self) -> &Modes {
+impl ReducedScene for BladeScene {
+    fn modes(&self) -> &DampedModes {
         &self.modes
     }
 
-    fn contacts(&self, time: f64, position: &[f64], within: f64) -> Vec<Contact> {
+    fn contacts(&self, time: f64, position: &[f64], within: f64) -> Vec<NodeContact> {
         let mut found = Vec::new();
         for sector in 0..self.blades.sectors {
             for node in 0..self.blades.tips.len() {

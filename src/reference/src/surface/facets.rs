@@ -1,17 +1,22 @@
 //! Closest point on bilinear facets.
 
-use super::{Foot, Surface, add_scaled, cross, dot, minus, scaled, unit};
+use super::{SplineSurface, SurfaceFoot, add_scaled, cross, dot, minus, scaled, unit};
 
 /// The nearest facet of the cell of the guess and its eight neighbours. Beyond an edge between facets that is convex towards
 /// the point the foot lies on the edge and the normal is that of the nearer facet.
-pub(super) fn foot(surface: &Surface, point: [f64; 3], carriers: &[[f64; 3]], guess: [f64; 2]) -> Option<Foot> {
+pub(super) fn foot(
+    surface: &SplineSurface,
+    point: [f64; 3],
+    carriers: &[[f64; 3]],
+    guess: [f64; 2],
+) -> Option<SurfaceFoot> {
     let ends = [surface.rows - 1, surface.columns - 1];
     if (0..2).any(|i| !(guess[i] >= 0.0 && guess[i] <= ends[i] as f64)) {
         return None;
     }
     let cell: [usize; 2] = core::array::from_fn(|i| (0..ends[i]).rev().find(|k| *k as f64 <= guess[i]).unwrap_or(0));
     let around = |i: usize| cell[i].saturating_sub(1)..(cell[i] + 2).min(ends[i]);
-    let mut nearest: Option<(f64, Foot)> = None;
+    let mut nearest: Option<(f64, SurfaceFoot)> = None;
     for row in around(0) {
         for column in around(1) {
             let (distance, foot) = on_facet(surface, point, carriers, [row, column]);
@@ -23,7 +28,12 @@ pub(super) fn foot(surface: &Surface, point: [f64; 3], carriers: &[[f64; 3]], gu
     nearest.map(|(_, foot)| foot)
 }
 
-fn on_facet(surface: &Surface, point: [f64; 3], carriers: &[[f64; 3]], [row, column]: [usize; 2]) -> (f64, Foot) {
+fn on_facet(
+    surface: &SplineSurface,
+    point: [f64; 3],
+    carriers: &[[f64; 3]],
+    [row, column]: [usize; 2],
+) -> (f64, SurfaceFoot) {
     let corner = |i: usize, j: usize| (row + i) * surface.columns + column + j;
     let corners = [corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)];
     let mut at = [0.5; 2];
@@ -46,7 +56,10 @@ fn on_facet(surface: &Surface, point: [f64; 3], carriers: &[[f64; 3]], [row, col
     let away = minus(point, position);
     let [x, y] = at;
     let weights = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
-    (dot(away, away), Foot { normal, gap: dot(away, normal), weights: corners.into_iter().zip(weights).collect() })
+    (
+        dot(away, away),
+        SurfaceFoot { normal, gap: dot(away, normal), weights: corners.into_iter().zip(weights).collect() },
+    )
 }
 
 /// Position, derivatives along s and t, and mixed derivative of a bilinear facet.

@@ -20,7 +20,7 @@ pub enum SurfaceKind {
 
 /// Foot of a point on the surface.
 #[derive(Debug, Clone)]
-pub struct Foot {
+pub struct SurfaceFoot {
     /// Unit normal, out of the ring.
     pub normal: [f64; 3],
     /// Distance along the normal (m), negative inside the ring.
@@ -31,7 +31,7 @@ pub struct Foot {
 
 /// Surface over a grid of nodes: `rows` along the arc, `columns` along z; node (i, j) is number i·columns + j.
 #[derive(Debug, Clone)]
-pub struct Surface {
+pub struct SplineSurface {
     kind: SurfaceKind,
     rows: usize,
     columns: usize,
@@ -40,7 +40,7 @@ pub struct Surface {
     tensor: Tensor,
 }
 
-impl Surface {
+impl SplineSurface {
     /// A surface over rows × columns nodes.
     pub fn new(kind: SurfaceKind, rows: usize, columns: usize, orientation: f64) -> Self {
         let tensor = match kind {
@@ -67,7 +67,7 @@ impl Surface {
 
     /// Closest point of the surface with these carriers (positions, m); `guess` are parameters near it, in elements.
     /// None beyond the ends and edges.
-    pub fn foot(&self, point: [f64; 3], carriers: &[[f64; 3]], guess: [f64; 2]) -> Option<Foot> {
+    pub fn foot(&self, point: [f64; 3], carriers: &[[f64; 3]], guess: [f64; 2]) -> Option<SurfaceFoot> {
         match self.kind {
             SurfaceKind::Spline => spline::foot(self, point, carriers, guess),
             SurfaceKind::Facets => facets::foot(self, point, carriers, guess),

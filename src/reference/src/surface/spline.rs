@@ -1,6 +1,6 @@
 //! Closest point on a bicubic uniform B-spline (eqs 6 and 7).
 
-use super::{Foot, Surface, add_scaled, cross, dot, minus, scaled, unit};
+use super::{SplineSurface, SurfaceFoot, add_scaled, cross, dot, minus, scaled, unit};
 
 /// Cubic basis on one segment, x from 0 to 1: values, first and second derivatives.
 fn basis(x: f64) -> [[f64; 4]; 3] {
@@ -15,12 +15,12 @@ fn basis(x: f64) -> [[f64; 4]; 3] {
 
 /// Weights of the control points along one direction, derivative by derivative; those outside the grid are folded
 /// into it: Q_{−1} = 2 Q₀ − Q₁.
-struct Line {
+struct LineWeights {
     first: usize,
     weights: [[f64; 4]; 3],
 }
 
-impl Line {
+impl LineWeights {
     fn at(parameter: f64, count: usize) -> Self {
         let mut segment = 0;
         while segment + 2 < count && parameter >= (segment + 1) as f64 {
@@ -39,16 +39,16 @@ impl Line {
     }
 }
 
-struct Point {
+struct SurfaceTerm {
     /// S, S_s, S_t, S_ss, S_st, S_tt.
     jets: [[f64; 3]; 6],
-    lines: [Line; 2],
+    lines: [LineWeights; 2],
 }
 
 const JETS: [(usize, usize); 6] = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
 
-fn evaluate(surface: &Surface, carriers: &[[f64; 3]], [s, t]: [f64; 2]) -> Point {
-    let lines = [Line::at(s, surface.rows), Line::at(t, surface.columns)];
+fn evaluate(surface: &SplineSurface, carriers: &[[f64; 3]], [s, t]: [f64; 2]) -> SurfaceTerm {
+    let lines = [LineWeights::at(s, surface.rows), LineWeights::at(t, surface.columns)];
     let mut jets = [[0.0; 3]; 6];
     for a in 0..4 {
         for b in 0..4 {
@@ -58,11 +58,16 @@ fn evaluate(surface: &Surface, carriers: &[[f64; 3]], [s, t]: [f64; 2]) -> Point
             }
         }
     }
-    Point { jets, lines }
+    SurfaceTerm { jets, lines }
 }
 
 /// Newton's method for (x − S)·S_s = (x − S)·S_t = 0.
-pub(super) fn foot(surface: &Surface, point: [f64; 3], carriers: &[[f64; 3]], guess: [f64; 2]) -> Option<Foot> {
+pub(super) fn foot(
+    surface: &SplineSurface,
+    point: [f64; 3],
+    carriers: &[[f64; 3]],
+    guess: [f64; 2],
+) -> Option<SurfaceFoot> {
     let ends = [(surface.rows - 1) as f64, (surface.columns - 1) as f64];
     let mut at = guess;
     for _ in 0..30 {
@@ -92,6 +97,6 @@ pub(super) fn foot(surface: &Surface, point: [f64; 3], carriers: &[[f64; 3]], gu
                 weights.push((carrier, found.lines[0].weights[0][a] * found.lines[1].weights[0][b]));
             }
         }
-        Foot { normal, gap: dot(minus(point, found.jets[0]), normal), weights }
+        SurfaceFoot { normal, gap: dot(minus(point, found.jets[0]), normal), weights }
     })
 }

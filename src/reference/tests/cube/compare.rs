@@ -1,7 +1,7 @@
 //! The measures of agreement on histories made by hand.
 
 use tiprub_reference::compare::{agreement, asymmetry, relative_l2, sample, windowed};
-use tiprub_reference::cube::history::History;
+use tiprub_reference::cube::history::CubeHistory;
 
 #[test]
 fn windows_hold_the_impulse() {
@@ -26,20 +26,20 @@ fn samples_lie_on_straight_lines_and_differences_are_relative() {
     assert!(same < 1e-15 && (tenth - 0.1).abs() < 1e-12, "{same} {tenth}");
 }
 
-fn history(scale: f64) -> History {
+fn history(scale: f64) -> CubeHistory {
     let times: Vec<f64> = (0..=100).map(|i| 1e-6 * f64::from(i)).collect();
     let corner = |t: f64| {
         let left = [scale * t, -100.0 * t + scale * t * t, 2.0 * scale * t];
         let right = [-left[0], left[1], left[2]];
         [left, left, left, left, right, right, right, right]
     };
-    History {
+    CubeHistory {
         corners: times.iter().map(|t| corner(*t)).collect(),
         corner_forces: times.iter().map(|_| [scale; 8]).collect(),
         forces: times.iter().map(|_| [4.0 * scale, 4.0 * scale]).collect(),
         velocity: times.iter().map(|_| [0.0, -50.0 * scale, 0.0]).collect(),
         times,
-        ..History::default()
+        ..CubeHistory::default()
     }
 }
 

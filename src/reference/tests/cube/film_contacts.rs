@@ -1,17 +1,17 @@
 //! Which contacts method a takes: the paper's (all that the prediction puts inside) or the whole complementarity problem.
 
-use tiprub_reference::cube::history::History;
-use tiprub_reference::cube::scene::{Mass, Scene, Setting};
-use tiprub_reference::methods::{Method, Run, film};
+use tiprub_reference::cube::history::CubeHistory;
+use tiprub_reference::cube::scene::{CubeScene, CubeSetting, Mass};
+use tiprub_reference::methods::{CubeMethod, MethodRun, film};
 
-fn run(mass: Mass, complementary: bool) -> History {
-    let scene = Scene::new(Setting { mass, ..Setting::default() }).unwrap();
-    let options = film::Options { complementary, ..film::Options::default() };
-    let run = Run { step: 4e-7, end: 1.6e-4, stride: 1, snapshots: vec![] };
-    Method::Film(options).run(&scene, &run).unwrap()
+fn run(mass: Mass, complementary: bool) -> CubeHistory {
+    let scene = CubeScene::new(CubeSetting { mass, ..CubeSetting::default() }).unwrap();
+    let options = film::FilmOptions { complementary, ..film::FilmOptions::default() };
+    let run = MethodRun { step: 4e-7, end: 1.6e-4, stride: 1, snapshots: vec![] };
+    CubeMethod::Film(options).run(&scene, &run).unwrap()
 }
 
-fn deepest(history: &History) -> f64 {
+fn deepest(history: &CubeHistory) -> f64 {
     history.penetration.iter().fold(0.0, |a: f64, x| a.max(*x))
 }
 

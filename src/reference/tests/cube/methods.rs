@@ -1,18 +1,18 @@
 //! The four methods on the cube between two rings, kept short: they must agree with each other, be symmetric and keep the ledger.
 
 use tiprub_reference::compare::{agreement, asymmetry};
-use tiprub_reference::cube::history::History;
-use tiprub_reference::cube::scene::{Mass, Scene, Setting};
-use tiprub_reference::methods::{Method, Run};
+use tiprub_reference::cube::history::CubeHistory;
+use tiprub_reference::cube::scene::{CubeScene, CubeSetting, Mass};
+use tiprub_reference::methods::{CubeMethod, MethodRun};
 use tiprub_reference::surface::SurfaceKind;
 
-const FILM: fn() -> Method = || Method::Film(Default::default());
-const AUGMENTED: fn() -> Method = || Method::Augmented(Default::default());
-const PENALTY: fn() -> Method = || Method::Penalty(Default::default());
+const FILM: fn() -> CubeMethod = || CubeMethod::Film(Default::default());
+const AUGMENTED: fn() -> CubeMethod = || CubeMethod::Augmented(Default::default());
+const PENALTY: fn() -> CubeMethod = || CubeMethod::Penalty(Default::default());
 
-fn run(method: Method, setting: Setting, step: f64, end: f64, stride: usize) -> History {
-    let scene = Scene::new(setting).unwrap();
-    let run = Run { step, end, stride, snapshots: vec![5e-5, 1e-4] };
+fn run(method: CubeMethod, setting: CubeSetting, step: f64, end: f64, stride: usize) -> CubeHistory {
+    let scene = CubeScene::new(setting).unwrap();
+    let run = MethodRun { step, end, stride, snapshots: vec![5e-5, 1e-4] };
     let history = method.run(&scene, &run).unwrap();
     assert_eq!(history.snapshots.len(), 2);
     history
@@ -22,10 +22,10 @@ fn run(method: Method, setting: Setting, step: f64, end: f64, stride: usize) -> 
 /// bi-potential keep gaps closed; the other two let nodes in by some micrometres, which is what keeps them apart.
 #[test]
 fn all_methods_meet_while_in_contact() {
-    let (setting, end) = (Setting::default(), 2e-4);
+    let (setting, end) = (CubeSetting::default(), 2e-4);
     let film = run(FILM(), setting, 2e-7, end, 5);
     for (method, step, stride, bounds) in [
-        (Method::Bipotential, 1e-6, 1, [0.001, 0.005, 0.002]),
+        (CubeMethod::Bipotential, 1e-6, 1, [0.001, 0.005, 0.002]),
         (AUGMENTED(), 1e-6, 1, [0.02, 0.06, 0.03]),
         (PENALTY(), 2e-7, 5, [0.02, 0.06, 0.03]),
     ] {
@@ -44,12 +44,12 @@ fn left_and_right_are_equal_to_rounding() {
     for (method, mass) in [
         (FILM(), Mass::Lumped),
         (FILM(), Mass::Consistent),
-        (Method::Bipotential, Mass::Consistent),
+        (CubeMethod::Bipotential, Mass::Consistent),
         (AUGMENTED(), Mass::Lumped),
         (PENALTY(), Mass::Lumped),
     ] {
-        let setting = Setting { mass, ..Setting::default() };
-        let step = if matches!(method, Method::Film(_) | Method::Penalty(_)) { 4e-7 } else { 2e-6 };
+        let setting = CubeSetting { mass, ..CubeSetting::default() };
+        let step = if matches!(method, CubeMethod::Film(_) | CubeMethod::Penalty(_)) { 4e-7 } else { 2e-6 };
         let history = run(method, setting, step, 1.2e-4, 1);
         let [moved, force] = asymmetry(&history, 1.0);
         println!("{}: {moved:.1e} of ux, {force:.1e} of the forces", history.method);
@@ -61,8 +61,8 @@ fn left_and_right_are_equal_to_rounding() {
 #[test]
 fn gaps_stay_closed_and_friction_takes_its_share_of_the_energy() {
     for (surface, friction) in [(SurfaceKind::Spline, 0.0), (SurfaceKind::Facets, 0.0), (SurfaceKind::Spline, 0.15)] {
-        for (method, step) in [(FILM(), 5e-7), (Method::Bipotential, 1e-6)] {
-            let setting = Setting { surface, friction, ..Setting::default() };
+        for (method, step) in [(FILM(), 5e-7), (CubeMethod::Bipotential, 1e-6)] {
+            let setting = CubeSetting { surface, friction, ..CubeSetting::default() };
             let history = run(method, setting, step, 1.5e-4, 1);
             let deepest = history.penetration.iter().fold(0.0, |a: f64, x| a.max(*x));
             assert!(deepest < 1e-8, "{} goes {deepest} m deep", history.method);
@@ -83,9 +83,10 @@ fn gaps_stay_closed_and_friction_takes_its_share_of_the_energy() {
 
 #[test]
 fn an_explicit_step_beyond_the_limit_is_refused() {
-    let scene = Scene::new(Setting::default()).unwrap();
+    let scene = CubeScene::new(CubeSetting::default()).unwrap();
     for method in [FILM(), PENALTY()] {
-        let error = method.run(&scene, &Run { step: 1.2e-6, end: 1e-4, stride: 1, snapshots: vec![] }).unwrap_err();
+        let error =
+            method.run(&scene, &MethodRun { step: 1.2e-6, end: 1e-4, stride: 1, snapshots: vec![] }).unwrap_err();
         assert!(error.to_string().contains("beyond the limit of central differences"), "{error}");
     }
 }

@@ -1,41 +1,41 @@
 //! Codes of others on the cube between two rings beside methods b and c. Their meshes are the same; element matrices, contact
 //! search, normals, friction and tangents are theirs. Tables: `tests/data`, with the commands they come from.
 
-use tiprub_reference::compare::{Agreement, agreement};
-use tiprub_reference::cube::history::History;
+use tiprub_reference::compare::{HistoryDifference, agreement};
+use tiprub_reference::cube::history::CubeHistory;
 use tiprub_reference::cube::outside;
-use tiprub_reference::cube::scene::{Mass, Scene, Setting};
-use tiprub_reference::methods::{Method, Run, augmented};
+use tiprub_reference::cube::scene::{CubeScene, CubeSetting, Mass};
+use tiprub_reference::methods::{CubeMethod, MethodRun, augmented};
 use tiprub_reference::surface::SurfaceKind;
 
-fn facets(friction: f64) -> Setting {
-    Setting { surface: SurfaceKind::Facets, mass: Mass::Consistent, friction, ..Setting::default() }
+fn facets(friction: f64) -> CubeSetting {
+    CubeSetting { surface: SurfaceKind::Facets, mass: Mass::Consistent, friction, ..CubeSetting::default() }
 }
 
-fn table(text: &str) -> History {
-    outside::read(text, Setting::default().speed).unwrap()
+fn table(text: &str) -> CubeHistory {
+    outside::read(text, CubeSetting::default().speed).unwrap()
 }
 
 /// A method run as long as a table, and recorded as often.
-fn run(method: Method, friction: f64, step: f64, theirs: &History) -> History {
+fn run(method: CubeMethod, friction: f64, step: f64, theirs: &CubeHistory) -> CubeHistory {
     let stride = (1..).find(|k| (*k as f64 + 0.5) * step > theirs.step).unwrap();
-    let scene = Scene::new(facets(friction)).unwrap();
+    let scene = CubeScene::new(facets(friction)).unwrap();
     let end = theirs.times[theirs.times.len() - 1] + step;
-    method.run(&scene, &Run { step, end, stride, snapshots: vec![] }).unwrap()
+    method.run(&scene, &MethodRun { step, end, stride, snapshots: vec![] }).unwrap()
 }
 
-fn spring(penalty: f64, corners: f64) -> Method {
-    Method::Augmented(augmented::Options { penalty, corners, tolerance: 1.0 })
+fn spring(penalty: f64, corners: f64) -> CubeMethod {
+    CubeMethod::Augmented(augmented::AugmentedOptions { penalty, corners, tolerance: 1.0 })
 }
 
 /// Compare up to two windows of force before the end of a table.
-fn compare(name: &str, a: &History, b: &History, end: f64) -> Agreement {
-    let found = agreement(a, b, Setting::default().speed, end - 4e-5, end);
+fn compare(name: &str, a: &CubeHistory, b: &CubeHistory, end: f64) -> HistoryDifference {
+    let found = agreement(a, b, CubeSetting::default().speed, end - 4e-5, end);
     println!("{name}: {found:?}");
     found
 }
 
-fn assert_within(found: &Agreement, bounds: [f64; 3], name: &str) {
+fn assert_within(found: &HistoryDifference, bounds: [f64; 3], name: &str) {
     for (part, (apart, bound)) in ["u1x", "slowing", "u1z"].iter().zip(found.touching.iter().zip(bounds)) {
         assert!(*apart < bound, "{name}: {part} {apart}");
     }
@@ -68,7 +68,7 @@ fn getfem_has_the_same_penalty_and_friction() {
 fn getfem_holds_gaps_like_the_bipotential() {
     let theirs = table(include_str!("../data/cube_getfem_held.csv"));
     let end = theirs.times[theirs.times.len() - 1];
-    let found = compare("b and GetFEM", &theirs, &run(Method::Bipotential, 0.15, 1e-6, &theirs), end);
+    let found = compare("b and GetFEM", &theirs, &run(CubeMethod::Bipotential, 0.15, 1e-6, &theirs), end);
     assert!(found.contact.iter().all(|apart| *apart < 4e-4), "{found:?}");
     assert!(found.windows < 1e-3 && found.left_impulse.abs() < 5e-4, "{found:?}");
 }

@@ -2,10 +2,10 @@
 
 use tiprub_model::Mesh;
 use tiprub_reference::cube::files::{BodyFile, read_json, write_json};
-use tiprub_reference::cube::scene::{Mass, Scene, Setting};
-use tiprub_reference::cube::{CENTRE, OUTER_RADIUS, SIDE, Side, THICKNESS, WIDTH};
+use tiprub_reference::cube::scene::{CubeScene, CubeSetting, Mass};
+use tiprub_reference::cube::{CENTRE, OUTER_RADIUS, RingSide, SIDE, THICKNESS, WIDTH};
 use tiprub_reference::cube::{cube_mesh, cube_of, ring_mesh, ring_of};
-use tiprub_reference::surface::{Surface, SurfaceKind};
+use tiprub_reference::surface::{SplineSurface, SurfaceKind};
 
 #[test]
 fn the_meshes_are_the_papers() {
@@ -20,8 +20,8 @@ fn the_meshes_are_the_papers() {
         let ([x, y, z], [u, v, w]) = (cube.nodes[a - 1], cube.nodes[b - 1]);
         assert!(x + u == 0.0 && y - v == 0.0 && z - w == 0.0, "nodes {a} and {b} mirror each other");
     }
-    for side in Side::BOTH {
-        assert_eq!(cube.set(if side == Side::Left { "MASTER_LEFT" } else { "MASTER_RIGHT" }).unwrap().len(), 36);
+    for side in RingSide::BOTH {
+        assert_eq!(cube.set(if side == RingSide::Left { "MASTER_LEFT" } else { "MASTER_RIGHT" }).unwrap().len(), 36);
         let ring = ring_mesh(side);
         ring.validate().unwrap();
         assert_eq!((ring.nodes.len(), ring.elements.len()), (41 * 9 * 6, 1600));
@@ -41,7 +41,7 @@ fn the_meshes_are_the_papers() {
 fn masses_are_those_of_the_solids_and_rigid_motion_costs_no_energy() {
     let arc = 2.0 * std::f64::consts::FRAC_PI_3;
     for mass in [Mass::Lumped, Mass::Consistent] {
-        let scene = Scene::new(Setting { mass, ..Setting::default() }).unwrap();
+        let scene = CubeScene::new(CubeSetting { mass, ..CubeSetting::default() }).unwrap();
         for (index, body) in scene.bodies.iter().enumerate() {
             let inner = OUTER_RADIUS - THICKNESS;
             // 40 chords instead of the arc: the area of a sector is that of the triangles.
@@ -69,18 +69,18 @@ fn grid(mesh: &Mesh) -> Vec<[f64; 3]> {
 }
 
 /// Parameters of a point by its polar angle, in elements.
-fn guess(side: Side, arc: usize, wide: usize, [x, y, z]: [f64; 3]) -> [f64; 2] {
+fn guess(side: RingSide, arc: usize, wide: usize, [x, y, z]: [f64; 3]) -> [f64; 2] {
     let angle = y.atan2(CENTRE - side.sign() * x) / std::f64::consts::FRAC_PI_3;
     [(angle + 1.0) * 0.5 * arc as f64, (z / WIDTH + 0.5) * wide as f64]
 }
 
 #[test]
 fn the_spline_goes_through_the_nodes_and_nears_the_cylinder_at_fourth_order() {
-    for side in Side::BOTH {
+    for side in RingSide::BOTH {
         let mut errors = Vec::new();
         for arc in [20, 40, 80] {
             let nodes = grid(&ring_of(side, [1, 8, arc]));
-            let surface = Surface::new(SurfaceKind::Spline, arc + 1, 9, -side.sign());
+            let surface = SplineSurface::new(SurfaceKind::Spline, arc + 1, 9, -side.sign());
             let carriers = surface.carriers(&nodes);
             for node in nodes.iter().filter(|node| node[1].abs() < 0.15 && node[2].abs() < 0.039) {
                 let foot = surface.foot(*node, &carriers, guess(side, arc, 8, *node)).unwrap();
@@ -113,7 +113,7 @@ fn the_spline_meets_the_nodes_of_ends_and_edges() {
     let (rows, columns) = (7, 6);
     let place = |i: usize, j: usize| [i as f64, j as f64, 0.3 * (2.0 * i as f64 + 3.1 * j as f64).sin()];
     let nodes: Vec<[f64; 3]> = (0..rows).flat_map(|i| (0..columns).map(move |j| place(i, j))).collect();
-    let surface = Surface::new(SurfaceKind::Spline, rows, columns, 1.0);
+    let surface = SplineSurface::new(SurfaceKind::Spline, rows, columns, 1.0);
     let carriers = surface.carriers(&nodes);
     for i in 0..rows {
         for j in 0..columns {
@@ -131,12 +131,12 @@ fn the_spline_meets_the_nodes_of_ends_and_edges() {
 
 #[test]
 fn facets_are_the_chords_of_the_cylinder() {
-    let nodes = grid(&ring_mesh(Side::Left));
-    let surface = Surface::new(SurfaceKind::Facets, 41, 9, 1.0);
+    let nodes = grid(&ring_mesh(RingSide::Left));
+    let surface = SplineSurface::new(SurfaceKind::Facets, 41, 9, 1.0);
     let half = std::f64::consts::FRAC_PI_3 / 40.0;
     // Over the middle of a facet the cylinder stands higher by its sagitta R (1 − cos(π/120)).
     let point = [-CENTRE + OUTER_RADIUS * half.cos(), OUTER_RADIUS * half.sin(), 0.003];
-    let foot = surface.foot(point, &surface.carriers(&nodes), guess(Side::Left, 40, 8, point)).unwrap();
+    let foot = surface.foot(point, &surface.carriers(&nodes), guess(RingSide::Left, 40, 8, point)).unwrap();
     let sagitta = OUTER_RADIUS * (1.0 - half.cos());
     assert!((foot.gap - sagitta).abs() < 1e-12, "{} {sagitta}", foot.gap);
     assert!((foot.weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs() < 1e-14);
@@ -144,7 +144,7 @@ fn facets_are_the_chords_of_the_cylinder() {
 
 #[test]
 fn spread_forces_do_the_work_of_the_carriers() {
-    let surface = Surface::new(SurfaceKind::Spline, 41, 9, 1.0);
+    let surface = SplineSurface::new(SurfaceKind::Spline, 41, 9, 1.0);
     let irregular = |seed: f64| -> Vec<[f64; 3]> {
         (0..surface.count()).map(|i| core::array::from_fn(|k| (seed * (i as f64 + 0.3) + k as f64).sin())).collect()
     };
@@ -158,9 +158,9 @@ fn spread_forces_do_the_work_of_the_carriers() {
 
 #[test]
 fn matrices_come_back_from_their_file() {
-    let setting = Setting { mass: Mass::Consistent, ..Setting::default() };
-    let rings = Side::BOTH.map(|side| ring_of(side, [1, 2, 6]));
-    let scene = Scene::of(setting, cube_of(2), rings, [6, 2]).unwrap();
+    let setting = CubeSetting { mass: Mass::Consistent, ..CubeSetting::default() };
+    let rings = RingSide::BOTH.map(|side| ring_of(side, [1, 2, 6]));
+    let scene = CubeScene::of(setting, cube_of(2), rings, [6, 2]).unwrap();
     let directory = std::env::temp_dir().join(format!("tiprub-reference-{}", std::process::id()));
     std::fs::create_dir_all(&directory).unwrap();
     for body in &scene.bodies {

@@ -86,7 +86,7 @@ fn hidden_files_become_the_same_as_files_without_a_name() {
     let [plain, target] = ["plain", "target"].map(|name| root.path().join(name));
     fs::write(&plain, "").unwrap();
     let named = temporary().tempfile_in(root.path()).unwrap();
-    let mut draft = Draft { file: named.reopen().unwrap(), named: Some(named) };
+    let mut draft = PendingFile { file: named.reopen().unwrap(), named: Some(named) };
     draft.write_all(b"bytes").unwrap();
     persist(draft, &target).unwrap();
     assert_eq!((fs::read_to_string(&target).unwrap().as_str(), mode(&target)), ("bytes", mode(&plain)));

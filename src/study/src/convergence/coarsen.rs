@@ -4,7 +4,7 @@
 use nalgebra::{ComplexField, DMatrix};
 use tiprub_core::{
     Rom,
-    rom::{ContactNode, Frame, Harmonic},
+    rom::{ContactNode, DisplacementFrame, Harmonic},
 };
 
 /// The ROM with every other patch along the chord, each with half of its two neighbours.
@@ -143,7 +143,7 @@ fn patch(rom: &Rom, (row, middle): (usize, usize), weights: &DMatrix<f64>, share
     let around = |patch: &ContactNode, axis: usize| {
         let off = patch.position[axis] - middle.position[axis];
         // Angles from the middle do not jump.
-        if axis == 1 && rom.frame == Frame::Cylindrical { off.sin().atan2(off.cos()) } else { off }
+        if axis == 1 && rom.frame == DisplacementFrame::Cylindrical { off.sin().atan2(off.cos()) } else { off }
     };
     ContactNode {
         position: std::array::from_fn(|axis| middle.position[axis] + sum(weights, &|patch| around(patch, axis))),
@@ -160,7 +160,7 @@ mod tests {
         Rotor37Options,
         reduce::ReductionKind,
         reduce_rotor37,
-        rotor37::{MeshCounts, Tip},
+        rotor37::{MeshCounts, TipContact},
     };
 
     use super::*;
@@ -171,7 +171,7 @@ mod tests {
         let of = |patches: usize| {
             let options = Rotor37Options {
                 mesh: MeshCounts { chord: 8, thickness: 1, span: 4 },
-                tip: Tip::Patches(patches),
+                tip: TipContact::Patches(patches),
                 kind: ReductionKind::FreeInterface,
                 modes: 6,
                 ..Rotor37Options::paper()
@@ -207,7 +207,7 @@ mod tests {
         let of = |counts: [usize; 2]| {
             let options = Rotor37Options {
                 mesh: MeshCounts { chord: 8, thickness: 2, span: 2 },
-                tip: Tip::patches(counts),
+                tip: TipContact::patches(counts),
                 kind: ReductionKind::FreeInterface,
                 modes: 6,
                 ..Rotor37Options::paper()

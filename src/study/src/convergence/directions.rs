@@ -4,7 +4,7 @@ use tiprub_core::Scene;
 use tiprub_shell::Result;
 
 use super::{
-    refine::{Again, Direction, MESH, MODES, MODES_KEPT, NODES, ROWS, STEP},
+    refine::{Again, MESH, MODES, MODES_KEPT, NODES, ROWS, RefinementDirection, STEP},
     refiner::Refiner,
 };
 
@@ -12,7 +12,7 @@ use super::{
 ///
 /// # Errors
 /// A source that does not give the ROM of the scene, and what its reduction refuses.
-pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Direction>> {
+pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<RefinementDirection>> {
     let refiner = Refiner::checked(scene, own, again)?;
     let asked = |name: &str| again.only.is_empty() || again.only.iter().any(|only| only == name);
     let mut all = Vec::new();
@@ -29,9 +29,13 @@ pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Directio
         all.extend(refiner.rows()?);
     }
     if let Some(structure) = scene.settings.structures.get(MODES.len()).filter(|_| again.only.is_empty()) {
-        all.push(Direction {
+        all.push(RefinementDirection {
             missing: format!("the study refines {} structures", MODES.len()),
-            ..Direction::new("modes-more", format!("modes of {} and those after it", structure.name), MODES_KEPT)
+            ..RefinementDirection::new(
+                "modes-more",
+                format!("modes of {} and those after it", structure.name),
+                MODES_KEPT,
+            )
         });
     }
     if asked(MESH) {

@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// What three levels tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limit {
+pub struct ConvergedLimit {
     /// Order that was read, from [`LEAST`] to [`MOST`].
     pub order: f64,
     /// What further refinement would still add to the value of the finest level.
@@ -29,10 +29,10 @@ pub struct Limit {
 
 /// Order, `least` or more, and rest of a value whose changes from the first of three levels to the second and from that to the third are
 /// `changes`; `sizes` fall from level to level. `None` where it is not to be read.
-pub fn of_changes(sizes: [f64; 3], changes: [f64; 2], least: f64) -> Option<Limit> {
+pub fn of_changes(sizes: [f64; 3], changes: [f64; 2], least: f64) -> Option<ConvergedLimit> {
     let [before, last] = changes;
     if before == 0.0 && last == 0.0 {
-        return Some(Limit { order: MOST, rest: 0.0 });
+        return Some(ConvergedLimit { order: MOST, rest: 0.0 });
     }
     let ratio = before / last;
     if !(ratio.is_finite() && ratio >= falls(sizes, LEAST)) {
@@ -40,20 +40,20 @@ pub fn of_changes(sizes: [f64; 3], changes: [f64; 2], least: f64) -> Option<Limi
     }
     let order = order(sizes, ratio).max(least);
     let [_, middle, fine] = sizes.map(|size| size.powf(order));
-    Some(Limit { order, rest: last * fine / (middle - fine) })
+    Some(ConvergedLimit { order, rest: last * fine / (middle - fine) })
 }
 
 /// The same of values themselves; changes that are rounding are none.
-pub fn of_values(sizes: [f64; 3], values: [f64; 3]) -> Option<Limit> {
+pub fn of_values(sizes: [f64; 3], values: [f64; 3]) -> Option<ConvergedLimit> {
     let least = ROUNDING * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     let change = |from: f64, to: f64| if (to - from).abs() <= least { 0.0 } else { to - from };
     of_changes(sizes, [change(values[0], values[1]), change(values[1], values[2])], LEAST)
 }
 
 /// What two meshes alone tell, the first of them coarser than the second.
-pub fn of_two_meshes([coarse, fine]: [f64; 2], change: f64) -> Limit {
+pub fn of_two_meshes([coarse, fine]: [f64; 2], change: f64) -> ConvergedLimit {
     let [coarse, fine] = [coarse, fine].map(|size| size.powf(OF_TWO_MESHES));
-    Limit { order: OF_TWO_MESHES, rest: change * fine / (coarse - fine) }
+    ConvergedLimit { order: OF_TWO_MESHES, rest: change * fine / (coarse - fine) }
 }
 
 /// The finest of levels with these falling sizes, and two before it that are far enough away to tell an order; fewer where there are fewer.
@@ -138,7 +138,7 @@ mod tests {
         for changes in [[1.0, 1.0], [1.0, 1.2], [-1.0, 0.2], [0.0, 1.0], [1.0, 0.0], [f64::NAN, 1.0]] {
             assert_eq!(of_changes(sizes, changes, LEAST), None, "{changes:?}");
         }
-        let still = Limit { order: MOST, rest: 0.0 };
+        let still = ConvergedLimit { order: MOST, rest: 0.0 };
         assert_eq!([of_changes(sizes, [0.0; 2], LEAST), of_values(sizes, [5.0, 5.0, 5.0 + 1e-14])], [Some(still); 2]);
     }
 }

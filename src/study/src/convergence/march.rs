@@ -8,13 +8,13 @@ use tiprub_core::{Rom, Scene, rom::ContactNode};
 use super::coarsen::{COMMON, common};
 use crate::error::{
     measure::parts_apart,
-    run::{Run, Seen},
+    run::{StepExtremes, TimedRun},
     scene::SceneRun,
 };
 
 /// What a run leaves behind.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Marched {
+pub struct RunSummary {
     /// Displacements of all watched points, of all sectors, sample by sample: point by point, axis by axis, sector by sector (m). Where
     /// there are no watched points, those of the patches that other numbers of patches have in common, or of contact nodes, without flight.
     pub displacements: Vec<Vec<f64>>,
@@ -34,7 +34,7 @@ pub struct Marched {
 pub const QUANTITIES: [(&str, &str); 4] =
     [("impulse", "N·s"), ("friction work", "J"), ("peak force", "N"), ("strain energy", "J")];
 
-impl Marched {
+impl RunSummary {
     /// A run of which nothing else is known.
     pub(crate) fn of_displacements(points: Vec<ContactNode>, displacements: Vec<Vec<f64>>) -> Self {
         let (impulse, friction_work, peak_force, strain_energy) = (0.0, 0.0, 0.0, 0.0);
@@ -135,12 +135,17 @@ impl Observed {
 ///
 /// # Errors
 /// Why it is refused or fails.
-pub fn march(scene: &Scene, settings: &[(String, String)], division: u32, samples: usize) -> Result<Marched, String> {
+pub fn march(
+    scene: &Scene,
+    settings: &[(String, String)],
+    division: u32,
+    samples: usize,
+) -> Result<RunSummary, String> {
     let interval = scene.settings.experiment.communication_step;
     let mut run = SceneRun::with_start_values(scene, interval, division, settings)?;
     let (observed, points) = Observed::of(&scene.roms[crate::master(scene)]);
-    let mut found = Marched::of_displacements(points, Vec::with_capacity(samples));
-    let mut seen = Seen::nothing();
+    let mut found = RunSummary::of_displacements(points, Vec::with_capacity(samples));
+    let mut seen = StepExtremes::nothing();
     for _ in 0..samples {
         seen.next();
         run.watch(&mut seen)?;
@@ -157,8 +162,8 @@ pub fn march(scene: &Scene, settings: &[(String, String)], division: u32, sample
 mod tests {
     use super::*;
 
-    fn marched(nodes: &[f64], displacement: f64, impulse: f64) -> Marched {
-        Marched {
+    fn marched(nodes: &[f64], displacement: f64, impulse: f64) -> RunSummary {
+        RunSummary {
             displacements: vec![nodes.iter().flat_map(|node| [displacement * node, 0.0, 0.0]).collect()],
             points: nodes
                 .iter()

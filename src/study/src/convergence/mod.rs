@@ -19,15 +19,15 @@ pub mod truncate;
 use std::time::Instant;
 
 use directions::directions;
-use limit::Limit;
-use march::{Marched, march};
-use refine::{Again, Direction, Level, Source, goes_by_tolerance};
+use limit::ConvergedLimit;
+use march::{RunSummary, march};
+use refine::{Again, RefinementDirection, RefinementLevel, RomSource, goes_by_tolerance};
 use tiprub_core::{Rom, Scene, rom::RubErrors};
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_shell::{
     Failure, Result,
     console::Console,
-    forecast::{Forecast, Ledger},
+    forecast::{Forecast, WorkPlan},
     sweep,
 };
 
@@ -35,28 +35,28 @@ use super::Study;
 use crate::{
     arguments::ConvergenceArguments,
     error::{
-        case::Case,
-        own::{Own, refuse_compared},
+        case::ErrorCase,
+        own::{UserScene, refuse_compared},
     },
     estimate::{self, Estimate},
     master, one_rotor,
-    stability::structure::Structure,
+    stability::structure::SingleStructure,
 };
 
 /// One direction with the runs of its levels.
 #[derive(Debug)]
 pub struct Refined {
     /// What is refined.
-    pub direction: Direction,
+    pub direction: RefinementDirection,
     /// A run per level, or why it is refused.
-    pub runs: Vec<std::result::Result<Marched, String>>,
+    pub runs: Vec<std::result::Result<RunSummary, String>>,
     /// Per level: friction coefficient beyond which the closed tip digs in; `None` where there is none, and without friction.
     pub digging: Vec<Option<f64>>,
 }
 
 /// Everything that was found of a scene.
 #[derive(Debug)]
-pub struct Found {
+pub struct ConvergenceResult {
     /// Name of the scene on the command line, and in the scene.
     pub names: [String; 2],
     /// Time compared (s), and its communication steps.
@@ -71,16 +71,16 @@ pub struct Found {
 
 /// A ROM with what a study found of it.
 #[derive(Debug)]
-pub struct Judged {
+pub struct EstimatedRom {
     /// The ROM.
     pub rom: Rom,
     /// Whether an error was found that a ROM carries.
     pub known: bool,
 }
 
-impl Found {
+impl ConvergenceResult {
     /// The ROM of the master with its errors on this scene; as it was where none was found.
-    pub fn with_errors(&self, scene: &Scene) -> Judged {
+    pub fn with_errors(&self, scene: &Scene) -> EstimatedRom {
         let index = master(scene);
         let of = |name: &str| {
             let refined = self.refined.iter().find(|refined| refined.direction.name == name)?;
@@ -95,10 +95,10 @@ impl Found {
             mesh: of(refine::MESH),
         };
         if found.is_empty() {
-            return Judged { rom, known: false };
+            return EstimatedRom { rom, known: false };
         }
         rom.checks.rub_errors = Some(found);
-        Judged { rom, known: true }
+        EstimatedRom { rom, known: true }
     }
 }
 
@@ -108,13 +108,13 @@ impl Found {
 /// The scene cannot be read or does not run, or a model cannot be reduced again.
 pub fn study(
     arguments: &ConvergenceArguments,
-    source: Option<&dyn Source>,
+    source: Option<&dyn RomSource>,
     console: &Console,
-) -> Result<(Study, Judged)> {
+) -> Result<(Study, EstimatedRom)> {
     refuse_compared(&arguments.set)?;
     let cache = arguments.common.cache.cache();
     let scene = arguments.common.options.load(&arguments.scene, &cache, console)?;
-    let asked = Asked {
+    let asked = ConvergenceRequest {
         cache,
         mesh: 1.0,
         finest_tip: refine::FINEST_TIP,
@@ -130,7 +130,7 @@ pub fn study(
 }
 
 /// What is asked of a scene.
-pub struct Asked<'a> {
+pub struct ConvergenceRequest<'a> {
     /// Start values that replace its own (name, value as text).
     pub settings: &'a [(String, String)],
     /// Time that is compared (s); where none is given, that of a quick study or of a whole one.
@@ -140,7 +140,7 @@ pub struct Asked<'a> {
     /// Runs at the same time.
     pub threads: usize,
     /// Where the ROM of the master comes from, if that is a file and known.
-    pub source: Option<&'a dyn Source>,
+    pub source: Option<&'a dyn RomSource>,
     /// Where models that ship are kept.
     pub cache: RomCache,
     /// Mesh of the master where it ships: 1, or what its elements along the edges are multiplied with.
@@ -155,9 +155,9 @@ pub struct Asked<'a> {
 ///
 /// # Errors
 /// The scene does not run, or a model cannot be reduced again.
-pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Result<Found> {
+pub fn found(name: &str, scene: &Scene, asked: &ConvergenceRequest, console: &Console) -> Result<ConvergenceResult> {
     one_rotor(&scene.settings)?;
-    let case = Own::of(name, scene.clone(), asked.settings, (asked.window, asked.quick), console)?;
+    let case = UserScene::of(name, scene.clone(), asked.settings, (asked.window, asked.quick), console)?;
     let interval = case.interval();
     let own = case.own_division();
     let mut runner =
@@ -187,7 +187,7 @@ pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Res
         refined.push(runner.refined(direction, (number, scene, own), &forecast)?);
     }
     forecast.finish();
-    Ok(Found {
+    Ok(ConvergenceResult {
         names: [name.to_owned(), scene.settings.name.clone()],
         window: (interval * case.samples() as f64, case.samples()),
         method: crate::error::competitor::method_name((scene.settings.time.scheme, scene.settings.contacts[0].solver)),
@@ -197,8 +197,8 @@ pub fn found(name: &str, scene: &Scene, asked: &Asked, console: &Console) -> Res
 }
 
 /// All runs, as steps times sizes of the models, at the rate of the run of the scene as it stands.
-fn planned(directions: &[Direction], scene: &Scene, (own, seconds): (u32, f64), runner: &Runner) -> Ledger {
-    let mut ledger = Ledger::new(seconds / runner.threads as f64);
+fn planned(directions: &[RefinementDirection], scene: &Scene, (own, seconds): (u32, f64), runner: &Runner) -> WorkPlan {
+    let mut ledger = WorkPlan::new(seconds / runner.threads as f64);
     for (number, direction) in directions.iter().enumerate() {
         ledger.plan(number, work(direction, scene, own));
     }
@@ -206,14 +206,14 @@ fn planned(directions: &[Direction], scene: &Scene, (own, seconds): (u32, f64), 
 }
 
 /// Work of a direction, in runs of the scene as it stands.
-fn work(direction: &Direction, scene: &Scene, own: u32) -> f64 {
+fn work(direction: &RefinementDirection, scene: &Scene, own: u32) -> f64 {
     let size = |scene: &Scene| scene.roms.iter().map(|rom| rom.total_order() as f64).sum::<f64>();
-    let steps = |level: &Level| match goes_by_tolerance(scene) {
+    let steps = |level: &RefinementLevel| match goes_by_tolerance(scene) {
         // A decade doubles the steps.
         true => (f64::from(level.division) / f64::from(own)).powf(0.3),
         false => f64::from(level.division) / f64::from(own),
     };
-    let cost = |level: &Level| steps(level) * size(&level.scene) / size(scene);
+    let cost = |level: &RefinementLevel| steps(level) * size(&level.scene) / size(scene);
     direction.levels.iter().filter(|level| !level.own || direction.shorter.is_some()).map(cost).sum()
 }
 
@@ -227,7 +227,7 @@ pub(crate) struct Runner<'a> {
     threads: usize,
     console: &'a Console,
     /// The scene as it stands, where it has been run.
-    own: Option<Marched>,
+    own: Option<RunSummary>,
 }
 
 impl<'a> Runner<'a> {
@@ -236,7 +236,7 @@ impl<'a> Runner<'a> {
     }
 
     /// Run a direction with the steps that it says.
-    pub(crate) fn as_it_is(&self, direction: Direction) -> Result<Refined> {
+    pub(crate) fn as_it_is(&self, direction: RefinementDirection) -> Result<Refined> {
         let count = direction.levels.len();
         let task = self.console.task(&format!("Refining {}", direction.title), Some(count as u64));
         let progress = |done: usize| {
@@ -249,11 +249,11 @@ impl<'a> Runner<'a> {
     /// Run a direction. A ROM with more modes or nodes may ask for a shorter step than the scene's: then all of its levels take one.
     fn refined(
         &self,
-        mut direction: Direction,
+        mut direction: RefinementDirection,
         (number, scene, own): (usize, &Scene, u32),
         forecast: &Forecast,
     ) -> Result<Refined> {
-        let counted = |direction: &Direction| {
+        let counted = |direction: &RefinementDirection| {
             let each = work(direction, scene, own) / direction.levels.len() as f64;
             self.runs(direction, &|_| forecast.done(number, each))
         };
@@ -272,12 +272,12 @@ impl<'a> Runner<'a> {
     }
 
     /// What friction the master's tip digs in with, level by level; it is of the model, not of the steps.
-    fn digging(&self, direction: &Direction) -> Result<Vec<Option<f64>>> {
-        let of = |level: &Level| {
+    fn digging(&self, direction: &RefinementDirection) -> Result<Vec<Option<f64>>> {
+        let of = |level: &RefinementLevel| {
             let (index, scene) = (master(&level.scene), &level.scene);
             let (rom, settings) = (&scene.roms[index], &scene.settings.structures[index]);
             let rubs = scene.settings.contacts.iter().any(|contact| contact.friction > 0.0);
-            let found = Structure::new(rom, rom.damping_ratio, 0.0).ok().filter(|_| rubs);
+            let found = SingleStructure::new(rom, rom.damping_ratio, 0.0).ok().filter(|_| rubs);
             Ok(found.and_then(|structure| Some(structure.digs_in(settings.speed)?.friction)))
         };
         match direction.name == refine::STEP {
@@ -288,10 +288,10 @@ impl<'a> Runner<'a> {
 
     fn runs(
         &self,
-        direction: &Direction,
+        direction: &RefinementDirection,
         progress: &dyn Fn(usize),
-    ) -> Result<Vec<std::result::Result<Marched, String>>> {
-        let run = |level: &Level| {
+    ) -> Result<Vec<std::result::Result<RunSummary, String>>> {
+        let run = |level: &RefinementLevel| {
             Ok(match &self.own {
                 Some(own) if level.own && direction.shorter.is_none() => Ok(own.clone()),
                 _ => march(&level.scene, self.settings, level.division, self.samples),
@@ -303,7 +303,7 @@ impl<'a> Runner<'a> {
 
 impl Refined {
     /// Levels that ran, with their runs.
-    pub fn ran(&self) -> Vec<(&Level, &Marched)> {
+    pub fn ran(&self) -> Vec<(&RefinementLevel, &RunSummary)> {
         let levels = self.direction.levels.iter().zip(&self.runs);
         levels.filter_map(|(level, run)| Some((level, run.as_ref().ok()?))).collect()
     }
@@ -315,14 +315,14 @@ impl Refined {
 
     /// Levels that are read: the finest of those that ran, the last, and those before it that are far enough apart; sizes go with a power
     /// of the error.
-    fn read(&self) -> Vec<(f64, &Marched)> {
+    fn read(&self) -> Vec<(f64, &RunSummary)> {
         let ran = self.ran();
         let sizes: Vec<f64> = ran.iter().map(|(level, _)| self.direction.size(level.value)).collect();
         limit::chosen(&sizes).into_iter().map(|index| (sizes[index], ran[index].1)).collect()
     }
 
     /// What further refinement would still do to the displacements of the finest level (relative L2). Of two meshes the order is assumed.
-    pub fn rest(&self) -> Option<Limit> {
+    pub fn rest(&self) -> Option<ConvergedLimit> {
         match &self.read()[..] {
             [a, b, c] => {
                 let changes = [a.1.displacement_change(b.1)?, b.1.displacement_change(c.1)?];
@@ -337,16 +337,16 @@ impl Refined {
     }
 
     /// Where the quantities go, and what the finest level lacks of that; `None` of one that is not to be read.
-    pub fn limits(&self) -> [Option<Limit>; 4] {
+    pub fn limits(&self) -> [Option<ConvergedLimit>; 4] {
         let read = self.read();
         let [a, b, c] = &read[..] else { return [None; 4] };
-        let [x, y, z] = [a.1, b.1, c.1].map(Marched::quantities);
+        let [x, y, z] = [a.1, b.1, c.1].map(RunSummary::quantities);
         std::array::from_fn(|index| limit::of_values([a.0, b.0, c.0], [x[index], y[index], z[index]]))
     }
 
     /// Error of a run of this direction: displacements (L2) and every quantity, relative to the limit; `None` where that is not to be
     /// read. Displacements are as far from the limit as from the finest level, and what that one lacks.
-    pub fn errors(&self, run: &Marched) -> [Option<f64>; 5] {
+    pub fn errors(&self, run: &RunSummary) -> [Option<f64>; 5] {
         let Some((_, finest)) = self.ran().last().copied() else { return [None; 5] };
         let mut found = [None; 5];
         found[0] = self.rest().and_then(|rest| Some(run.displacement_change(finest)? + rest.rest));

@@ -56,21 +56,21 @@ mod tests {
     use tiprub_gallery::{rom_cache::RomCache, scene_source};
     use tiprub_model::{
         Rotor37Options, reduce_rotor37,
-        rotor37::{MeshCounts, Tip},
+        rotor37::{MeshCounts, TipContact},
     };
     use tiprub_shell::{Failure, Result, console::Console};
 
     use super::*;
     use crate::convergence::{
         directions::directions,
-        refine::{Again, Direction, Meshed, Source},
+        refine::{Again, Meshed, RefinementDirection, RomSource},
     };
 
     /// A coarse blade, its nodes named as the reduction likes.
-    struct Blade;
+    struct CoarseBlade;
 
-    impl Source for Blade {
-        fn reduce(&self, other: Option<usize>, modes: usize, tip: Tip, _: &Console) -> Result<Meshed> {
+    impl RomSource for CoarseBlade {
+        fn reduce(&self, other: Option<usize>, modes: usize, tip: TipContact, _: &Console) -> Result<Meshed> {
             let mesh = MeshCounts { chord: 4, thickness: 1, span: if other.is_some() { 8 } else { 4 } };
             let options = Rotor37Options { mesh, tip, modes, ..Rotor37Options::paper() };
             let found =
@@ -84,22 +84,22 @@ mod tests {
     }
 
     /// Modes and contact nodes of a blade with nodes of these names, and a pair for each beginning.
-    fn refined(names: [&str; 3], pairs: &[&str]) -> [Direction; 3] {
+    fn refined(names: [&str; 3], pairs: &[&str]) -> [RefinementDirection; 3] {
         let console = Console::new(true, false);
-        let mut rom = Blade.reduce(None, 4, Tip::Nodes(3), &console).unwrap().rom;
+        let mut rom = CoarseBlade.reduce(None, 4, TipContact::Nodes(3), &console).unwrap().rom;
         rom.contact_nodes.iter_mut().zip(names).for_each(|(node, name)| node.name = name.into());
         let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
         let contact = scene.settings.contacts.remove(0);
         let of = |start: &&str| ContactSettings { nodes: Some((*start).into()), ..contact.clone() };
         scene.settings.contacts = pairs.iter().map(of).collect();
-        let (cache, source) = (RomCache::off(), Some(&Blade as &dyn Source));
+        let (cache, source) = (RomCache::off(), Some(&CoarseBlade as &dyn RomSource));
         let again =
             Again { source, cache: &cache, mesh: 1.0, finest_tip: 4, only: &[], quick: true, console: &console };
         let [_, modes, nodes, mesh] = directions(&scene, 1, &again).unwrap().try_into().unwrap();
         [modes, nodes, mesh]
     }
 
-    fn names(direction: &Direction) -> Vec<Vec<String>> {
+    fn names(direction: &RefinementDirection) -> Vec<Vec<String>> {
         let of = |rom: &Rom| rom.contact_nodes.iter().map(|node| node.name.clone()).collect();
         direction.levels.iter().map(|level| of(&level.scene.roms[0])).collect()
     }
@@ -119,10 +119,11 @@ mod tests {
     fn finer_tips_end_where_the_mesh_has_no_more_places() {
         let console = Console::new(true, false);
         let scene =
-            scene_source::rotor37_scene_with(Blade.reduce(None, 4, Tip::Nodes(3), &console).unwrap().rom).unwrap();
+            scene_source::rotor37_scene_with(CoarseBlade.reduce(None, 4, TipContact::Nodes(3), &console).unwrap().rom)
+                .unwrap();
         let (cache, only) = (RomCache::off(), ["nodes".to_owned()]);
         let of = |finest_tip| {
-            let source = Some(&Blade as &dyn Source);
+            let source = Some(&CoarseBlade as &dyn RomSource);
             let again =
                 Again { source, cache: &cache, mesh: 1.0, finest_tip, only: &only, quick: false, console: &console };
             let [nodes] = directions(&scene, 1, &again).unwrap().try_into().unwrap();

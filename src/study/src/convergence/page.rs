@@ -9,11 +9,11 @@ use tiprub_figure::{
 use tiprub_shell::Result;
 
 use super::{
-    Found, Refined,
-    march::{Marched, QUANTITIES},
-    refine::{Direction, OF_CLEARANCE, SECONDS, goes_by_tolerance},
+    ConvergenceResult, Refined,
+    march::{QUANTITIES, RunSummary},
+    refine::{OF_CLEARANCE, RefinementDirection, SECONDS, goes_by_tolerance},
 };
-use crate::{Figure, Picture, Sheet, Statement, Study, estimate};
+use crate::{Picture, Sheet, Statement, Study, StudyFigure, estimate};
 
 /// Largest change by the next refinement that is called small.
 const SMALL: f64 = 0.05;
@@ -30,7 +30,7 @@ const HOW_TO_READ: &str = "One thing is refined at a time, all else is the scene
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn study(found: &Found) -> Result<Study> {
+pub fn study(found: &ConvergenceResult) -> Result<Study> {
     let figures = found.refined.iter().filter(|refined| !refined.direction.levels.is_empty());
     let [name, scene] = &found.names;
     let (window, samples) = found.window;
@@ -92,7 +92,7 @@ fn error(refined: &Refined) -> Option<Statement> {
 }
 
 /// What was found, in words.
-pub fn statements(found: &Found) -> Vec<Statement> {
+pub fn statements(found: &ConvergenceResult) -> Vec<Statement> {
     let mut all: Vec<Statement> = found.refined.iter().filter_map(error).collect();
     all.extend(found.refined.iter().filter_map(small));
     all.extend(worst(found));
@@ -129,7 +129,7 @@ fn digging(refined: &Refined) -> Option<Statement> {
 
 /// "modes of rotor", and with which step where it is not the scene's.
 fn title(refined: &Refined) -> String {
-    let Direction { title, shorter, .. } = &refined.direction;
+    let RefinementDirection { title, shorter, .. } = &refined.direction;
     match shorter {
         None => title.clone(),
         Some(factor) => format!("{title} (all at 1/{factor} of the scene's step, at which one is refused)"),
@@ -148,7 +148,7 @@ fn small(refined: &Refined) -> Option<Statement> {
 }
 
 /// What to refine first.
-fn worst(found: &Found) -> Option<Statement> {
+fn worst(found: &ConvergenceResult) -> Option<Statement> {
     let most = |refined: &Refined| {
         let (changes, _) = refined.at_own()?;
         Some(changes.iter().flatten().fold(0.0, |most: f64, change| most.max(*change)))
@@ -162,7 +162,7 @@ fn worst(found: &Found) -> Option<Statement> {
 }
 
 /// Titles of the directions with a level finer than the scene that ran, of those with coarser ones only, and of the others.
-fn directions(found: &Found) -> [Vec<&str>; 3] {
+fn directions(found: &ConvergenceResult) -> [Vec<&str>; 3] {
     let which = |refined: &Refined| {
         let ran = refined.ran();
         let own = ran.iter().position(|(level, _)| level.own);
@@ -183,7 +183,7 @@ fn directions(found: &Found) -> [Vec<&str>; 3] {
 }
 
 /// What was refined and what not: the errors above are of nothing else. Beside it what the ROM says of itself.
-fn scope(found: &Found) -> Vec<Statement> {
+fn scope(found: &ConvergenceResult) -> Vec<Statement> {
     let [finer, coarser, not] = directions(found).map(|titles| titles.join(", "));
     let parts = [("finer than the scene: ", finer), ("coarser ones only: ", coarser), ("not at all: ", not)];
     let parts: Vec<String> = parts
@@ -214,7 +214,7 @@ const HEADINGS: [&str; 13] = [
 ];
 
 /// The internal step of a level (s); empty where it goes by a tolerance.
-fn step(level: &super::Level) -> String {
+fn step(level: &super::RefinementLevel) -> String {
     if goes_by_tolerance(&level.scene) {
         return String::new();
     }
@@ -226,7 +226,7 @@ fn step(level: &super::Level) -> String {
 fn rows(refined: &Refined) -> Vec<Vec<String>> {
     let mut changes = refined.changes().into_iter();
     let levels = refined.direction.levels.iter().zip(&refined.runs);
-    let row = |(level, run): (&super::Level, &std::result::Result<super::Marched, String>)| {
+    let row = |(level, run): (&super::RefinementLevel, &std::result::Result<super::RunSummary, String>)| {
         let own = if level.own { "yes" } else { "" };
         let mut cells = vec![refined.direction.title.clone(), shown(level.value), own.into(), step(level)];
         match run {
@@ -259,7 +259,9 @@ pub fn limit_rows(refined: &Refined) -> Vec<Vec<String>> {
     let (errors, quantities) = (refined.errors(own), own.quantities());
     let title = &refined.direction.title;
     let error = |index: usize| errors[index].map_or("not to be read".into(), |error| format!("{error:.3e}"));
-    let order = |limit: Option<super::limit::Limit>| limit.map_or(String::new(), |limit| format!("{:.2}", limit.order));
+    let order = |limit: Option<super::limit::ConvergedLimit>| {
+        limit.map_or(String::new(), |limit| format!("{:.2}", limit.order))
+    };
     let first =
         vec![title.clone(), "displacements".into(), order(refined.rest()), String::new(), String::new(), error(0)];
     let limits = refined.limits().into_iter().enumerate().map(|(index, limit)| {
@@ -276,20 +278,20 @@ fn limit_table(refined: &Refined) -> Table {
     Table { rows: limit_rows(refined), ..Table::new(caption, LIMIT_HEADINGS) }
 }
 
-fn limits_csv(found: &Found) -> String {
+fn limits_csv(found: &ConvergenceResult) -> String {
     let head = LIMIT_HEADINGS.join(",") + "\n";
     let lines = found.refined.iter().flat_map(limit_rows).map(|cells| cells.join(",") + "\n");
     [head].into_iter().chain(lines).collect()
 }
 
-fn csv(found: &Found) -> String {
+fn csv(found: &ConvergenceResult) -> String {
     let head = HEADINGS.join(",") + "\n";
     let lines = found.refined.iter().flat_map(rows).map(|cells| cells.join(",") + "\n");
     [head].into_iter().chain(lines).collect()
 }
 
 /// Errors of a run for a picture: where no limit is read, how far it is from the finest level.
-pub fn drawn(refined: &Refined, run: &Marched) -> [Option<f64>; 5] {
+pub fn drawn(refined: &Refined, run: &RunSummary) -> [Option<f64>; 5] {
     let finest = refined.ran().last().map(|(_, finest)| run.changes(finest)).unwrap_or([None; 5]);
     let errors = refined.errors(run);
     std::array::from_fn(|index| errors[index].or(finest[index]))
@@ -325,7 +327,7 @@ pub fn picture(refined: &Refined) -> Result<Picture> {
     })
 }
 
-fn figure(refined: &Refined) -> Result<Figure> {
+fn figure(refined: &Refined) -> Result<StudyFigure> {
     let (ran, changes, direction) = (refined.ran(), refined.changes(), &refined.direction);
     let picture = picture(refined)?;
     let tables = format!("{}{}", limit_table(refined).to_html(false), table(refined).to_html(false));
@@ -348,16 +350,16 @@ fn figure(refined: &Refined) -> Result<Figure> {
         title(refined)
     );
     let html = format!("{}{tables}", picture.html);
-    Ok(Figure { name: direction.name, caption, picture: Picture { html, ..picture }, sheet })
+    Ok(StudyFigure { name: direction.name, caption, picture: Picture { html, ..picture }, sheet })
 }
 
 /// For programs.
-pub fn results(found: &Found) -> Value {
+pub fn results(found: &ConvergenceResult) -> Value {
     let level = |refined: &Refined| {
         let mut changes = refined.changes().into_iter();
         let levels = refined.direction.levels.iter().zip(&refined.runs).zip(&refined.digging);
-        type Reached = std::result::Result<Marched, String>;
-        let each = |((level, run), digging): ((&super::Level, &Reached), &Option<f64>)| match run {
+        type ReachedErrors = std::result::Result<RunSummary, String>;
+        let each = |((level, run), digging): ((&super::RefinementLevel, &ReachedErrors), &Option<f64>)| match run {
             Ok(run) => json!({
                 "value": level.value, "own": level.own, "digs_in_above": digging, "impulse": run.impulse, "friction_work": run.friction_work,
                 "peak_force": run.peak_force, "strain_energy": run.strain_energy,

@@ -2,7 +2,7 @@
 
 use tiprub_core::{Rom, Scene, settings::Scheme};
 use tiprub_gallery::rom_cache::RomCache;
-use tiprub_model::rotor37::Tip;
+use tiprub_model::rotor37::TipContact;
 use tiprub_shell::{Result, console::Console};
 
 /// A ROM and what it was reduced from.
@@ -15,13 +15,13 @@ pub struct Meshed {
 }
 
 /// Where the ROM of the master comes from, if it can be reduced again.
-pub trait Source {
+pub trait RomSource {
     /// The ROM with `modes` modes beside the responses to contact and this tip, reduced again: from its own mesh, or from one of
     /// the [others](Self::others).
     ///
     /// # Errors
     /// Whatever the reduction refuses.
-    fn reduce(&self, other: Option<usize>, modes: usize, tip: Tip, console: &Console) -> Result<Meshed>;
+    fn reduce(&self, other: Option<usize>, modes: usize, tip: TipContact, console: &Console) -> Result<Meshed>;
 
     /// How many other meshes of the same structure there are.
     fn others(&self) -> usize;
@@ -29,7 +29,7 @@ pub trait Source {
 
 /// One setting of a direction.
 #[derive(Debug, Clone)]
-pub struct Level {
+pub struct RefinementLevel {
     /// Internal step (s), tolerance, number of modes, of contact nodes or of nodes of the mesh.
     pub value: f64,
     /// Whether the scene is as it stands.
@@ -42,7 +42,7 @@ pub struct Level {
 
 /// What is refined while all else stays.
 #[derive(Debug, Clone)]
-pub struct Direction {
+pub struct RefinementDirection {
     /// For file names.
     pub name: &'static str,
     /// `modes of rotor`.
@@ -50,14 +50,14 @@ pub struct Direction {
     /// Of the values.
     pub unit: &'static str,
     /// The coarsest first; empty where there is nothing to refine.
-    pub levels: Vec<Level>,
+    pub levels: Vec<RefinementLevel>,
     /// What cannot be refined, and why; empty where all can.
     pub missing: String,
     /// All levels take a step shorter by this factor than the scene's, at which one of them is refused.
     pub shorter: Option<u32>,
 }
 
-impl Direction {
+impl RefinementDirection {
     pub(super) fn new(name: &'static str, title: String, unit: &'static str) -> Self {
         Self { name, title, unit, levels: Vec::new(), missing: String::new(), shorter: None }
     }
@@ -141,7 +141,7 @@ pub fn modes_of(structure: usize) -> Option<&'static str> {
 /// How models are reduced again.
 pub struct Again<'a> {
     /// Where the ROM of the master comes from, if that is a file and known.
-    pub source: Option<&'a dyn Source>,
+    pub source: Option<&'a dyn RomSource>,
     /// Where models that ship are kept.
     pub cache: &'a RomCache,
     /// Mesh of the scene's model where it ships: 1, or what its elements along the edges are multiplied with.

@@ -1,23 +1,23 @@
 //! Scenes at every level of a direction: other steps, modes, contact nodes, patches and meshes.
 
-use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::Frame, settings::TOLERANCE};
+use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::DisplacementFrame, settings::TOLERANCE};
 use tiprub_format::builtin_model;
 use tiprub_gallery::{
-    builtin::{self, Other},
+    builtin::{self, ModelVariant},
     scene_source::BUILTIN,
 };
-use tiprub_model::rotor37::Tip;
+use tiprub_model::rotor37::TipContact;
 use tiprub_shell::{Failure, Result};
 
 use super::{
     coarsen::coarsened,
     nodes::{common_start, named_as, starting_with},
     refine::{
-        Again, Direction, Level, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, OF_CLEARANCE, SECONDS, STEP, Source,
-        goes_by_tolerance, with_division,
+        Again, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, OF_CLEARANCE, RefinementDirection, RefinementLevel,
+        RomSource, SECONDS, STEP, goes_by_tolerance, with_division,
     },
     rows::MOST_ROWS,
-    truncate::{Form, truncated},
+    truncate::{Truncation, truncated},
 };
 use crate::{master, stability::asked::divided};
 
@@ -79,7 +79,7 @@ impl<'a> Refiner<'a> {
         let found = match (self.again.source, self.with_chord()) {
             (Some(source), _) => source.reduce(None, factor * modes, tip, self.again.console).map(|found| found.rom),
             (None, Some(name)) => {
-                let other = Other { modes: factor as f64, tip, mesh: self.again.mesh };
+                let other = ModelVariant { modes: factor as f64, tip, mesh: self.again.mesh };
                 builtin::refined(name, other, self.again.cache, self.again.console)?
             }
             (None, None) => return None,
@@ -92,8 +92,8 @@ impl<'a> Refiner<'a> {
         Some(self.with_rom(index, rom))
     }
 
-    pub(super) fn level(&self, value: f64, own: bool, scene: Scene) -> Level {
-        Level { value, own, scene, division: self.own }
+    pub(super) fn level(&self, value: f64, own: bool, scene: Scene) -> RefinementLevel {
+        RefinementLevel { value, own, scene, division: self.own }
     }
 
     pub(super) fn with_rom(&self, index: usize, rom: Rom) -> Scene {
@@ -109,17 +109,21 @@ impl<'a> Refiner<'a> {
     }
 
     /// So many nodes along the chord, or patches in its rows where the master has such.
-    pub(super) fn tip(&self, count: usize) -> Tip {
+    pub(super) fn tip(&self, count: usize) -> TipContact {
         self.tip_in_rows(count, self.scene.roms[master(self.scene)].rows())
     }
 
-    pub(super) fn tip_in_rows(&self, count: usize, rows: usize) -> Tip {
+    pub(super) fn tip_in_rows(&self, count: usize, rows: usize) -> TipContact {
         let nodes = &self.scene.roms[master(self.scene)].contact_nodes;
-        if nodes.iter().all(|node| node.area > 0.0) { Tip::patches([count, rows]) } else { Tip::Nodes(count) }
+        if nodes.iter().all(|node| node.area > 0.0) {
+            TipContact::patches([count, rows])
+        } else {
+            TipContact::Nodes(count)
+        }
     }
 
     /// From the source, with the damping of the scene's ROM: a command line may propose another.
-    fn reduced(&self, source: &dyn Source, other: Option<usize>, [modes, nodes]: [usize; 2]) -> Result<Meshed> {
+    fn reduced(&self, source: &dyn RomSource, other: Option<usize>, [modes, nodes]: [usize; 2]) -> Result<Meshed> {
         let found = source.reduce(other, modes, self.tip(nodes), self.again.console)?;
         let damping_ratio = self.scene.roms[master(self.scene)].damping_ratio;
         Ok(Meshed { rom: Rom { damping_ratio, ..found.rom }, ..found })
@@ -132,7 +136,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// The source must give what the scene has; anything else would be a study of another model. Nodes of its mesh.
-    fn check(&self, source: &dyn Source) -> Result<usize> {
+    fn check(&self, source: &dyn RomSource) -> Result<usize> {
         let rom = &self.scene.roms[master(self.scene)];
         let (modes, nodes) = self.own_counts();
         let Meshed { rom: again, nodes: of_mesh } = self.reduced(source, None, [modes, nodes])?;
@@ -172,7 +176,7 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    pub(super) fn steps(&self) -> Direction {
+    pub(super) fn steps(&self) -> RefinementDirection {
         let shares = if self.again.quick { &QUICK_STEPS[..] } else { &STEPS[..] };
         let time = &self.scene.settings.time;
         let tolerant = goes_by_tolerance(self.scene);
@@ -188,19 +192,19 @@ impl<'a> Refiner<'a> {
             // As it stands, to the last bit.
             let scene = if division == self.own { self.scene.clone() } else { with_division(self.scene, division) };
             let value = step * f64::from(self.own) / f64::from(division);
-            Level { value, own: division == self.own, scene, division }
+            RefinementLevel { value, own: division == self.own, scene, division }
         };
         let levels = divisions.into_iter().map(level).collect();
         let (title, unit) = if tolerant { ("tolerance", OF_CLEARANCE) } else { ("internal step", SECONDS) };
-        Direction { levels, ..Direction::new(STEP, title.into(), unit) }
+        RefinementDirection { levels, ..RefinementDirection::new(STEP, title.into(), unit) }
     }
 
     /// Modes of one structure: fewer of the ROM's own, more where it can be reduced again.
-    pub(super) fn modes(&self, index: usize, name: &'static str) -> Result<Direction> {
+    pub(super) fn modes(&self, index: usize, name: &'static str) -> Result<RefinementDirection> {
         let (rom, structure) = (&self.scene.roms[index], &self.scene.settings.structures[index]);
-        let form = Form::of(rom);
+        let form = Truncation::of(rom);
         let own = form.modes(rom);
-        let mut direction = Direction::new(name, format!("modes of {}", structure.name), MODES_KEPT);
+        let mut direction = RefinementDirection::new(name, format!("modes of {}", structure.name), MODES_KEPT);
         let fewer = if self.again.quick { &QUICK_FEWER[..] } else { &FEWER[..] };
         let mut counts: Vec<usize> = fewer.iter().map(|share| count(share * own as f64) as usize).collect();
         counts.retain(|count| *count < own);
@@ -217,7 +221,7 @@ impl<'a> Refiner<'a> {
             match self.more_modes(index, own, *factor) {
                 Some(rom) => {
                     let rom = rom?;
-                    let modes = Form::of(&rom).modes(&rom);
+                    let modes = Truncation::of(&rom).modes(&rom);
                     if modes > own {
                         direction.levels.push(self.level(modes as f64, false, self.with_rom(index, rom)));
                     }
@@ -238,7 +242,7 @@ impl<'a> Refiner<'a> {
             None => {
                 let name = builtin_model(&self.scene.settings.structures[index])?;
                 let mesh = if master { self.again.mesh } else { 1.0 };
-                let other = Other { modes: factor, tip: self.tip(nodes), mesh };
+                let other = ModelVariant { modes: factor, tip: self.tip(nodes), mesh };
                 builtin::refined(name, other, self.again.cache, self.again.console)?
             }
         };
@@ -246,21 +250,21 @@ impl<'a> Refiner<'a> {
     }
 
     /// Contact nodes of the master along its chord, each number with the ends of the others.
-    pub(super) fn nodes(&self) -> Result<Direction> {
+    pub(super) fn nodes(&self) -> Result<RefinementDirection> {
         let index = master(self.scene);
         let structure = &self.scene.settings.structures[index];
         let title = format!("contact nodes of {}", structure.name);
-        let mut direction = Direction::new(NODES, title, "nodes");
+        let mut direction = RefinementDirection::new(NODES, title, "nodes");
         let builtin = self.with_chord();
         let (modes, own) = self.own_counts();
-        let patches = !matches!(self.tip(own), Tip::Nodes(_));
+        let patches = !matches!(self.tip(own), TipContact::Nodes(_));
         if patches {
             (direction.title, direction.unit) = (format!("contact patches of {}", structure.name), "patches");
             self.fewer_patches(&mut direction);
         }
         if self.again.source.is_none() && builtin.is_none() {
             direction.misses(
-                if self.scene.roms[index].frame == Frame::Cartesian || structure.rom.starts_with(BUILTIN) {
+                if self.scene.roms[index].frame == DisplacementFrame::Cartesian || structure.rom.starts_with(BUILTIN) {
                     "contact nodes are chosen anew of blades only".into()
                 } else {
                     no_source(if patches { "more patches" } else { "contact nodes" }, &self.scene.roms[index])
@@ -309,7 +313,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// Half and a quarter of the patches, which follow from the ROM itself; the fewest first.
-    fn fewer_patches(&self, direction: &mut Direction) {
+    fn fewer_patches(&self, direction: &mut RefinementDirection) {
         let index = master(self.scene);
         let mut rom = self.scene.roms[index].clone();
         for _ in 0..if self.again.quick { 1 } else { 2 } {
@@ -330,8 +334,8 @@ impl<'a> Refiner<'a> {
         self.built_in_with(name, self.tip(nodes), mesh)
     }
 
-    pub(super) fn built_in_with(&self, name: &str, tip: Tip, mesh: f64) -> Result<Rom> {
-        let other = Other { modes: 1.0, tip, mesh: mesh * self.again.mesh };
+    pub(super) fn built_in_with(&self, name: &str, tip: TipContact, mesh: f64) -> Result<Rom> {
+        let other = ModelVariant { modes: 1.0, tip, mesh: mesh * self.again.mesh };
         let found = builtin::refined(name, other, self.again.cache, self.again.console);
         found.unwrap_or_else(|| Err(Failure::new(name, "no such model", "")))
     }
@@ -340,12 +344,12 @@ impl<'a> Refiner<'a> {
     ///
     /// # Errors
     /// A mesh that cannot be reduced.
-    pub(crate) fn meshes(&self) -> Result<Direction> {
+    pub(crate) fn meshes(&self) -> Result<RefinementDirection> {
         let index = master(self.scene);
         let (rom, structure) = (&self.scene.roms[index], &self.scene.settings.structures[index]);
-        let mut direction = Direction::new(MESH, format!("mesh of {}", structure.name), MESH_NODES);
+        let mut direction = RefinementDirection::new(MESH, format!("mesh of {}", structure.name), MESH_NODES);
         let Some(own_nodes) = self.mesh_nodes else {
-            direction.missing = if structure.rom.starts_with(BUILTIN) || rom.frame == Frame::Cartesian {
+            direction.missing = if structure.rom.starts_with(BUILTIN) || rom.frame == DisplacementFrame::Cartesian {
                 "meshes are chosen anew of blades only".into()
             } else {
                 no_source("what the mesh leaves out", rom)

@@ -1,13 +1,13 @@
 //! Rows of contact patches of the master, across the thickness of its tip.
 
 use tiprub_core::Rom;
-use tiprub_model::rotor37::Tip;
+use tiprub_model::rotor37::TipContact;
 use tiprub_shell::Result;
 
 use super::{
     coarsen::fewer_rows,
     nodes::{common_start, starting_with},
-    refine::{Direction, ROWS},
+    refine::{ROWS, RefinementDirection},
     refiner::{Refiner, no_source},
 };
 use crate::master;
@@ -17,16 +17,16 @@ pub(super) const MOST_ROWS: usize = 3;
 
 impl Refiner<'_> {
     /// Fewer rows follow from the ROM itself, more where it can be reduced again; none of contact nodes.
-    pub(super) fn rows(&self) -> Result<Option<Direction>> {
+    pub(super) fn rows(&self) -> Result<Option<RefinementDirection>> {
         let index = master(self.scene);
         let (modes, along) = self.own_counts();
         let (rom, own) = (&self.scene.roms[index], self.scene.roms[index].rows());
-        if matches!(self.tip(along), Tip::Nodes(_)) {
+        if matches!(self.tip(along), TipContact::Nodes(_)) {
             return Ok(None);
         }
         let title =
             format!("rows of contact patches of {}, across the thickness", self.scene.settings.structures[index].name);
-        let mut direction = Direction::new(ROWS, title, "rows");
+        let mut direction = RefinementDirection::new(ROWS, title, "rows");
         let fewer = (1..own).filter_map(|rows| Some((rows, fewer_rows(rom, rows).ok()?)));
         for (rows, rom) in fewer {
             direction.levels.push(self.level(rows as f64, false, self.with_rom(index, rom)));
@@ -72,18 +72,18 @@ pub(crate) mod tests {
         Rotor37Options,
         reduce::ReductionKind,
         reduce_rotor37,
-        rotor37::{MeshCounts, Tip},
+        rotor37::{MeshCounts, TipContact},
     };
     use tiprub_shell::console::Console;
 
     use super::*;
-    use crate::convergence::refine::{Again, Meshed, Source};
+    use crate::convergence::refine::{Again, Meshed, RomSource};
 
     /// A coarse blade with patches.
-    pub(crate) struct Blade;
+    pub(crate) struct PatchedBlade;
 
-    impl Source for Blade {
-        fn reduce(&self, _: Option<usize>, modes: usize, tip: Tip, _: &Console) -> Result<Meshed> {
+    impl RomSource for PatchedBlade {
+        fn reduce(&self, _: Option<usize>, modes: usize, tip: TipContact, _: &Console) -> Result<Meshed> {
             let mesh = MeshCounts { chord: 4, thickness: 2, span: 2 };
             let kind = ReductionKind::FreeInterface;
             let found = reduce_rotor37(&Rotor37Options { mesh, tip, modes, kind, ..Rotor37Options::paper() }, &|_| {});
@@ -98,7 +98,7 @@ pub(crate) mod tests {
     }
 
     pub(crate) fn scene(rows: usize) -> Scene {
-        let rom = Blade.reduce(None, 6, Tip::patches([3, rows]), &Console::new(true, false)).unwrap().rom;
+        let rom = PatchedBlade.reduce(None, 6, TipContact::patches([3, rows]), &Console::new(true, false)).unwrap().rom;
         let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
         scene.settings.structures[0].rom = "own.rom.safetensors".into();
         scene
@@ -107,19 +107,19 @@ pub(crate) mod tests {
     #[test]
     fn rows_are_refined_from_the_rom_and_from_the_mesh() {
         let (console, cache) = (Console::new(true, false), RomCache::off());
-        let found = |rows: usize, source: Option<&dyn Source>| {
+        let found = |rows: usize, source: Option<&dyn RomSource>| {
             let scene = scene(rows);
             let again =
                 Again { source, cache: &cache, mesh: 1.0, finest_tip: 4, only: &[], quick: true, console: &console };
             let direction = Refiner::checked(&scene, 1, &again).unwrap().rows().unwrap().unwrap();
-            let of = |level: &crate::convergence::refine::Level| {
+            let of = |level: &crate::convergence::refine::RefinementLevel| {
                 let rom = &level.scene.roms[0];
                 assert_eq!((rom.rows() as f64, rom.contact_nodes.len()), (level.value, 3 * rom.rows()));
                 (rom.rows(), level.own)
             };
             (direction.levels.iter().map(of).collect::<Vec<_>>(), direction.missing)
         };
-        let (levels, missing) = found(1, Some(&Blade));
+        let (levels, missing) = found(1, Some(&PatchedBlade));
         assert_eq!((levels, missing.as_str()), (vec![(1, true), (2, false), (3, false)], ""));
         let (levels, missing) = found(3, None);
         assert_eq!((levels, missing.as_str()), (vec![(1, false), (2, false), (3, true)], ""));
@@ -134,7 +134,7 @@ pub(crate) mod tests {
         for (rows, finer) in [(1, [(5, 2), (9, 3)]), (2, [(5, 3), (9, 3)]), (3, [(5, 3), (9, 3)])] {
             let scene = scene(rows);
             let again = Again {
-                source: Some(&Blade),
+                source: Some(&PatchedBlade),
                 cache: &cache,
                 mesh: 1.0,
                 finest_tip: 4,

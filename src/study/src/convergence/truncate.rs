@@ -4,12 +4,12 @@
 use nalgebra::{ComplexField, DMatrix};
 use tiprub_core::{
     Rom,
-    rom::{Basis, Harmonic, RomChecks, Spin, Thermal},
+    rom::{Harmonic, ReductionBasis, RomChecks, Spin, Thermal},
 };
 
 /// How a ROM is truncated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
+pub enum Truncation {
     /// Modes with the contact nodes held, beside the displacements of these.
     Held,
     /// Natural modes, beside the responses at rest to contact forces.
@@ -18,13 +18,13 @@ pub enum Form {
     Natural,
 }
 
-impl Form {
+impl Truncation {
     /// Of a ROM.
     pub fn of(rom: &Rom) -> Self {
         match rom.extras.basis {
             _ if rom.contact_map.nrows() >= rom.order() => Self::Natural,
-            Basis::FixedInterface => Self::Held,
-            Basis::FreeInterface => Self::Free,
+            ReductionBasis::FixedInterface => Self::Held,
+            ReductionBasis::FreeInterface => Self::Free,
         }
     }
 
@@ -42,7 +42,7 @@ impl Form {
 /// # Errors
 /// Why it cannot be truncated.
 pub fn truncated(rom: &Rom, modes: usize) -> Result<Rom, String> {
-    let form = Form::of(rom);
+    let form = Truncation::of(rom);
     let less = form.modes(rom).saturating_sub(modes);
     let basis = basis(form, [&rom.mass, &rom.stiffness, &rom.contact_map], less)?;
     let [mass, stiffness] = [&rom.mass, &rom.stiffness].map(|matrix| congruent(matrix, &basis));
@@ -69,7 +69,7 @@ pub fn truncated(rom: &Rom, modes: usize) -> Result<Rom, String> {
     Ok(found)
 }
 
-fn of_harmonic(form: Form, harmonic: &Harmonic, less: usize) -> Result<Harmonic, String> {
+fn of_harmonic(form: Truncation, harmonic: &Harmonic, less: usize) -> Result<Harmonic, String> {
     let basis = basis(form, [&harmonic.mass, &harmonic.stiffness, &harmonic.contact_map], less)?;
     Ok(Harmonic {
         mass: congruent(&harmonic.mass, &basis),
@@ -100,16 +100,16 @@ fn congruent<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>, basis: &DMat
 /// Columns that are kept: static responses to displacements of the contact nodes and modes with these held, or natural modes; `less`
 /// of the highest modes are left out.
 fn basis<T: ComplexField<RealField = f64>>(
-    form: Form,
+    form: Truncation,
     [mass, stiffness, map]: [&DMatrix<T>; 3],
     less: usize,
 ) -> Result<DMatrix<T>, String> {
     let order = mass.nrows();
-    if form == Form::Natural {
+    if form == Truncation::Natural {
         let kept = order.checked_sub(less).filter(|kept| *kept > 0).ok_or("no mode would be left")?;
         return modes(&DMatrix::identity(order, order), mass, stiffness, kept);
     }
-    if form == Form::Free {
+    if form == Truncation::Free {
         return free_basis([mass, stiffness, map], less);
     }
     // Displacements of the contact nodes by the shortest coordinates, and what moves none of them.
@@ -171,7 +171,7 @@ mod tests {
     use tiprub_core::dynamics::modal::ModalModel;
     use tiprub_model::{
         Rotor37Options, reduce_rotor37,
-        rotor37::{MeshCounts, Tip},
+        rotor37::{MeshCounts, TipContact},
     };
 
     use super::*;
@@ -181,14 +181,17 @@ mod tests {
     fn truncation_is_the_reduction_with_fewer_modes() {
         let options = |modes: usize| Rotor37Options {
             mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
-            tip: Tip::Nodes(2),
+            tip: TipContact::Nodes(2),
             modes,
             spin: Some(1000.0),
             ..Rotor37Options::paper()
         };
         let [fine, coarse] = [8, 4].map(|modes| reduce_rotor37(&options(modes), &|_| {}).unwrap().rom);
         let found = truncated(&fine, 4).unwrap();
-        assert_eq!((Form::of(&fine), Form::of(&fine).modes(&fine), found.order()), (Form::Held, 8, coarse.order()));
+        assert_eq!(
+            (Truncation::of(&fine), Truncation::of(&fine).modes(&fine), found.order()),
+            (Truncation::Held, 8, coarse.order())
+        );
         // The stiffness over speed is a fit, to the modes that are kept.
         for (speed, close) in [(0.0, 1e-6), (900.0, 1e-3)] {
             let [own, other] = [&found, &coarse].map(|rom| ModalModel::at_speed(rom, 0.01, speed).unwrap());
@@ -219,7 +222,7 @@ mod tests {
     fn a_rom_with_more_contact_than_coordinates_keeps_its_lowest_modes() {
         let options = Rotor37Options {
             mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
-            tip: Tip::Nodes(2),
+            tip: TipContact::Nodes(2),
             modes: 8,
             ..Rotor37Options::paper()
         };
@@ -232,7 +235,7 @@ mod tests {
             .map(|(number, node)| tiprub_core::rom::ContactNode { name: format!("node_{number}"), ..node.clone() })
             .collect();
         let found = truncated(&rom, 5).unwrap();
-        assert_eq!((Form::of(&rom), found.order()), (Form::Natural, 5));
+        assert_eq!((Truncation::of(&rom), found.order()), (Truncation::Natural, 5));
         for (a, b) in ModalModel::from_rom(&found, 0.01).unwrap().frequencies.iter().zip(&frequencies) {
             assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
         }

@@ -1,12 +1,12 @@
 //! What every scene of the study offers: its sizes, its steps, and a run of any competitor.
 
 use super::{
-    competitor::{Competitor, DEFAULT, Family, TOLERANT},
-    run::{Run, Trace},
+    competitor::{Competitor, DEFAULT, EquationFamily, TOLERANT},
+    run::{TimedRun, Trace},
 };
 
 /// A scene in several sizes: numbers of elements, or of component modes.
-pub trait Case {
+pub trait ErrorCase {
     /// For file names and `--scene`.
     fn name(&self) -> &'static str;
 
@@ -97,7 +97,7 @@ pub trait Case {
         competitor: Competitor,
         division: u32,
         perturbation: f64,
-    ) -> Result<Box<dyn Run + 'a>, String>;
+    ) -> Result<Box<dyn TimedRun + 'a>, String>;
 
     /// The exact solution, or that of the full model, where there is one.
     fn exact(&self) -> Option<Trace> {
@@ -142,7 +142,7 @@ pub trait Case {
     }
 
     /// Equations other than those of the first reference whose limits are computed at a size.
-    fn families(&self, size: usize) -> Vec<Family>;
+    fn families(&self, size: usize) -> Vec<EquationFamily>;
 }
 
 /// Of the divisions at the standard size, those of another size: without the finest.

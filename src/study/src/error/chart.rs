@@ -29,7 +29,7 @@ pub struct Points {
 
 /// A chart.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chart {
+pub struct ErrorChart {
     /// Text of the vertical axis.
     pub error_label: String,
     /// The competitors.
@@ -65,12 +65,12 @@ fn decades(values: impl Iterator<Item = f64>) -> [f64; 2] {
 }
 
 /// Places on the page.
-struct Frame {
+struct ChartFrame {
     time: [f64; 2],
     error: [f64; 2],
 }
 
-impl Frame {
+impl ChartFrame {
     fn x(&self, time: f64) -> f64 {
         tenth(LEFT + (RIGHT - LEFT) * (time.log10() - self.time[0]) / (self.time[1] - self.time[0]))
     }
@@ -85,12 +85,12 @@ fn tenth(value: f64) -> f64 {
     (value * 10.0).round() / 10.0
 }
 
-impl Chart {
+impl ErrorChart {
     /// A whole SVG file.
     pub fn to_svg(&self) -> String {
         let points = || self.all.iter().flat_map(|each| each.points.iter());
         let clamped = points().map(|point| point.1.clamp(ERRORS[0], ERRORS[1]));
-        let frame = Frame { time: decades(points().map(|point| point.0)), error: decades(clamped) };
+        let frame = ChartFrame { time: decades(points().map(|point| point.0)), error: decades(clamped) };
         let mut svg = format!(
             r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="13" fill="#343a42"><rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>"##
         );
@@ -104,7 +104,7 @@ impl Chart {
         svg
     }
 
-    fn draw_axes(&self, frame: &Frame, svg: &mut String) {
+    fn draw_axes(&self, frame: &ChartFrame, svg: &mut String) {
         let line = |svg: &mut String, [x, y]: [f64; 2], [u, v]: [f64; 2], color: &str| {
             let _ = write!(svg, r#"<path d="M{x} {y}L{u} {v}" stroke="{color}" fill="none"/>"#);
         };
@@ -139,7 +139,7 @@ impl Chart {
         }
     }
 
-    fn draw_front(&self, frame: &Frame, svg: &mut String) {
+    fn draw_front(&self, frame: &ChartFrame, svg: &mut String) {
         let points: Vec<_> = self.all.iter().flat_map(|each| each.points.iter().copied()).collect();
         let mut path = String::new();
         for (index, (time, error)) in front(&points).into_iter().enumerate() {
@@ -149,7 +149,7 @@ impl Chart {
         let _ = write!(svg, r##"<path d="{path}" stroke="#c9ced5" stroke-width="7" fill="none"/>"##);
     }
 
-    fn draw_points(&self, frame: &Frame, each: &Points, svg: &mut String) {
+    fn draw_points(&self, frame: &ChartFrame, each: &Points, svg: &mut String) {
         let color = COLORS[each.competitor.color() % COLORS.len()];
         let places: Vec<_> = each.points.iter().map(|(time, error)| (frame.x(*time), frame.y(*error))).collect();
         if self.joined && places.len() > 1 {
@@ -227,7 +227,7 @@ mod tests {
             .into_iter()
             .map(|competitor| Points { competitor, points: vec![(1e-3, 1e-2), (1e-1, 1e-4)] })
             .collect();
-        let svg = Chart {
+        let svg = ErrorChart {
             error_label: "error".into(),
             all,
             joined: true,

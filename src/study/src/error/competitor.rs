@@ -47,14 +47,14 @@ pub const PAPER: Competitor = Competitor::Core(Scheme::CentralDifference, Solver
 pub const DEFAULT: Competitor = Competitor::Core(Scheme::ModalExact, Solver::Lcp);
 /// Which equations a competitor solves: runs of one family have one limit for h → 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Family {
+pub struct EquationFamily {
     /// The contact nodes have no inertia.
     pub massless: bool,
     /// Contacts may stick, and slide in any direction; otherwise they slide along the circumference.
     pub sticking: bool,
 }
 
-impl Family {
+impl EquationFamily {
     /// Inertia everywhere and sliding, as the first reference.
     pub const PLAIN: Self = Self { massless: false, sticking: false };
     /// No inertia of the contact nodes.
@@ -100,9 +100,9 @@ impl Competitor {
     }
 
     /// The equations it solves.
-    pub fn family(self) -> Family {
-        let Self::Core(scheme, solver) = self else { return Family::PLAIN };
-        Family { massless: scheme.is_massless(), sticking: solver == Solver::Coulomb }
+    pub fn family(self) -> EquationFamily {
+        let Self::Core(scheme, solver) = self else { return EquationFamily::PLAIN };
+        EquationFamily { massless: scheme.is_massless(), sticking: solver == Solver::Coulomb }
     }
 
     /// Whether a tolerance takes the place of its step. What divides the sample then divides the smallest clearance.

@@ -4,12 +4,12 @@ use std::iter::zip;
 
 use tiprub_shell::{
     Failure, Result,
-    forecast::{Forecast, Ledger},
+    forecast::{Forecast, WorkPlan},
 };
 
 use super::{
-    case::Case,
-    competitor::{Competitor, FINEST, Family},
+    case::ErrorCase,
+    competitor::{Competitor, EquationFamily, FINEST},
     run::{self, Trace},
 };
 
@@ -42,7 +42,7 @@ pub struct Figures {
 
 /// One configuration.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct MeasuredRow {
     /// Index of the size.
     pub size: usize,
     /// Who.
@@ -54,28 +54,28 @@ pub struct Row {
 }
 
 /// References of one size.
-pub struct References {
+pub struct CaseReferences {
     /// The product's.
     pub first: Trace,
     /// The outside one.
     pub second: Trace,
     /// The product's for other equations.
-    pub limits: Vec<(Family, Trace)>,
+    pub limits: Vec<(EquationFamily, Trace)>,
     /// Displacements and windowed impulses of the first two, relative.
     pub apart: [f64; 2],
     /// Displacements of two schemes without mass of the contact nodes, relative, where one of them goes by a tolerance.
     pub massless_apart: Option<f64>,
 }
 
-impl References {
+impl CaseReferences {
     /// Limit of the equations of a family; where nothing can stick, those of sliding.
-    pub fn limit(&self, family: Family) -> &Trace {
-        let of = |family: Family| self.limits.iter().find(|limit| limit.0 == family).map(|limit| &limit.1);
-        of(family).or_else(|| of(Family { sticking: false, ..family })).unwrap_or(&self.first)
+    pub fn limit(&self, family: EquationFamily) -> &Trace {
+        let of = |family: EquationFamily| self.limits.iter().find(|limit| limit.0 == family).map(|limit| &limit.1);
+        of(family).or_else(|| of(EquationFamily { sticking: false, ..family })).unwrap_or(&self.first)
     }
 
     /// How far the limit of a family is from the first reference; `None` where it was not computed.
-    pub fn away(&self, family: Family) -> Option<f64> {
+    pub fn away(&self, family: EquationFamily) -> Option<f64> {
         let own = self.limits.iter().find(|limit| limit.0 == family)?;
         Some(apart(&own.1, &self.first))
     }
@@ -84,9 +84,9 @@ impl References {
 /// Everything measured of a scene.
 pub struct Measured {
     /// All configurations.
-    pub rows: Vec<Row>,
+    pub rows: Vec<MeasuredRow>,
     /// By size.
-    pub references: Vec<References>,
+    pub references: Vec<CaseReferences>,
     /// Displacements of the reference of each size from the truth.
     pub truncation: Vec<f64>,
 }
@@ -155,7 +155,7 @@ pub(super) fn kind(case_number: usize, competitor: Competitor) -> usize {
 }
 
 /// Work of a run, as internal steps of one size: a decade of a tolerance doubles the steps.
-pub(super) fn units(case: &dyn Case, size: usize, competitor: Competitor, division: u32) -> f64 {
+pub(super) fn units(case: &dyn ErrorCase, size: usize, competitor: Competitor, division: u32) -> f64 {
     let usual = || {
         let divisions = case.divisions(size);
         f64::from(divisions.get(divisions.len() / 2).copied().unwrap_or(1))
@@ -177,7 +177,7 @@ fn timed(repetitions: usize) -> f64 {
     (1 + repetitions) as f64
 }
 
-fn of_references(case: &dyn Case, size: usize) -> f64 {
+fn of_references(case: &dyn ErrorCase, size: usize) -> f64 {
     let (division, outside) = case.reference_divisions(size);
     let second = if case.second_trace().is_some() { 0.0 } else { units(case, size, case.second(), outside) };
     let own = units(case, size, case.first(), division);
@@ -187,7 +187,7 @@ fn of_references(case: &dyn Case, size: usize) -> f64 {
 }
 
 /// Plan the runs of the case with that number.
-pub fn plan(case: &dyn Case, case_number: usize, repetitions: usize, ledger: &mut Ledger) {
+pub fn plan(case: &dyn ErrorCase, case_number: usize, repetitions: usize, ledger: &mut WorkPlan) {
     for size in 0..case.sizes().len() {
         ledger.plan(KINDS * case_number, of_references(case, size));
         for competitor in case.competitors(size) {
@@ -200,7 +200,7 @@ pub fn plan(case: &dyn Case, case_number: usize, repetitions: usize, ledger: &mu
 }
 
 /// Number of runs of a scene.
-pub fn count(case: &dyn Case) -> u64 {
+pub fn count(case: &dyn ErrorCase) -> u64 {
     let of = |size: usize| {
         let all = case.competitors(size).into_iter();
         all.map(|competitor| case.divisions_of(size, competitor).len()).sum::<usize>() + 1
@@ -212,7 +212,7 @@ pub fn count(case: &dyn Case) -> u64 {
 ///
 /// # Errors
 /// A reference fails.
-pub fn measure(case: &dyn Case, case_number: usize, repetitions: usize, forecast: &Forecast) -> Result<Measured> {
+pub fn measure(case: &dyn ErrorCase, case_number: usize, repetitions: usize, forecast: &Forecast) -> Result<Measured> {
     let mut references = Vec::new();
     for size in 0..case.sizes().len() {
         references.push(refer(case, size)?);
@@ -227,7 +227,7 @@ pub fn measure(case: &dyn Case, case_number: usize, repetitions: usize, forecast
             for division in case.divisions_of(size, competitor) {
                 let outcome = judge(case, size, (competitor, division), own, truth, repetitions);
                 let whole = if competitor.is_by_tolerance() { 1.0 } else { case.interval() };
-                rows.push(Row { size, competitor, step: whole / f64::from(division), outcome });
+                rows.push(MeasuredRow { size, competitor, step: whole / f64::from(division), outcome });
                 forecast
                     .done(kind(case_number, competitor), timed(repetitions) * units(case, size, competitor, division));
             }
@@ -238,7 +238,7 @@ pub fn measure(case: &dyn Case, case_number: usize, repetitions: usize, forecast
 }
 
 /// The references of one size.
-fn refer(case: &dyn Case, size: usize) -> Result<References> {
+fn refer(case: &dyn ErrorCase, size: usize) -> Result<CaseReferences> {
     let (division, outside) = case.reference_divisions(size);
     let trace = |competitor: Competitor, division: u32| {
         let run = case.start(size, competitor, division, 0.0);
@@ -255,7 +255,7 @@ fn refer(case: &dyn Case, size: usize) -> Result<References> {
     // Equations that are refused at this size have no limit; their rows say why.
     let limits =
         case.families(size).into_iter().map(|family| Some((family, trace(family.reference(), division).ok()?)));
-    let mut limits: Vec<(Family, Trace)> = limits.flatten().collect();
+    let mut limits: Vec<(EquationFamily, Trace)> = limits.flatten().collect();
     let by_tolerance = case.tolerant();
     let tolerant = case.competitors(size).contains(&by_tolerance).then(|| trace(by_tolerance, FINEST).ok()).flatten();
     let mut massless_apart = None;
@@ -265,7 +265,7 @@ fn refer(case: &dyn Case, size: usize) -> Result<References> {
         massless_apart = other.map(|(_, other)| apart(&other, &finest));
         limits.push((family, finest));
     }
-    Ok(References {
+    Ok(CaseReferences {
         apart: [apart(&second, &first), windows_apart(&second, &first, case.impulse_window())],
         limits,
         massless_apart,
@@ -276,10 +276,10 @@ fn refer(case: &dyn Case, size: usize) -> Result<References> {
 
 /// Run one configuration once to look at it, and again for its time.
 fn judge(
-    case: &dyn Case,
+    case: &dyn ErrorCase,
     size: usize,
     (competitor, division): (Competitor, u32),
-    own: &References,
+    own: &CaseReferences,
     truth: &Trace,
     repetitions: usize,
 ) -> Result<Figures, String> {
@@ -314,7 +314,7 @@ fn judge(
 }
 
 /// Largest error of a release.
-fn release(case: &dyn Case, found: &Trace, truth: &Trace) -> Option<f64> {
+fn release(case: &dyn ErrorCase, found: &Trace, truth: &Trace) -> Option<f64> {
     let errors = case.releases().into_iter().map(|[touch, free]| {
         let before = |trace: &Trace| {
             let index = |i: &usize| (*i + 1) as f64 * case.interval() <= free * (1.0 + 1e-12);

@@ -1,8 +1,8 @@
 //! Error against run time: every scheme, solver and step of the product on a scene, against fine runs that must meet.
 //!
-//! A [`case::Case`] is a scene in one or several sizes; [`competitor::Competitor`] is who steps it; [`measure`] holds every
+//! A [`case::ErrorCase`] is a scene in one or several sizes; [`competitor::Competitor`] is who steps it; [`measure`] holds every
 //! configuration against two references, and [`ranking`] says who is cheapest. Refusals and failures are rows like all others.
-//! [`own::Own`] makes a case of any scene.
+//! [`own::UserScene`] makes a case of any scene.
 
 pub mod case;
 pub mod chart;
@@ -21,24 +21,24 @@ pub mod window;
 
 use std::iter::zip;
 
-use case::Case;
-use chart::Chart;
-use competitor::{Competitor, Family};
-use measure::{Measured, Row};
-use ranking::Kind;
+use case::ErrorCase;
+use chart::ErrorChart;
+use competitor::{Competitor, EquationFamily};
+use measure::{Measured, MeasuredRow};
+use ranking::ErrorKind;
 use serde_json::{Value, json};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_figure::table::Table;
 use tiprub_shell::{
     Result,
     console::Console,
-    forecast::{Forecast, Ledger},
+    forecast::{Forecast, WorkPlan},
 };
 
-use super::{Figure, Picture, Statement, Study};
+use super::{Picture, Statement, Study, StudyFigure};
 use crate::{
     arguments::ErrorArguments,
-    convergence::refine::{Again, FINEST_TIP, Source},
+    convergence::refine::{Again, FINEST_TIP, RomSource},
 };
 
 /// How far apart the two references of a scene may be.
@@ -48,8 +48,8 @@ const MEET: f64 = 2e-3;
 ///
 /// # Errors
 /// The scene cannot be read or stepped, a reference fails, or the source does not give the ROM of the scene.
-pub fn study(arguments: &ErrorArguments, source: Option<&dyn Source>, console: &Console) -> Result<Study> {
-    let case = own::Own::new(arguments, console)?;
+pub fn study(arguments: &ErrorArguments, source: Option<&dyn RomSource>, console: &Console) -> Result<Study> {
+    let case = own::UserScene::new(arguments, console)?;
     let (quick, cache) = (arguments.common.quick, arguments.common.cache.cache());
     let (title, all) = (case.title().to_owned(), measure::count(&case));
     // First: what cannot be reduced again is told before the long work.
@@ -114,8 +114,8 @@ fn repetitions(quick: bool) -> usize {
 }
 
 /// What the study of several cases plans; nothing is known of its rate.
-pub fn planned(cases: &[Box<dyn Case>], smooth: &[&dyn Case], quick: bool) -> Ledger {
-    let mut ledger = Ledger::new(0.0);
+pub fn planned(cases: &[Box<dyn ErrorCase>], smooth: &[&dyn ErrorCase], quick: bool) -> WorkPlan {
+    let mut ledger = WorkPlan::new(0.0);
     for (number, case) in cases.iter().enumerate() {
         measure::plan(case.as_ref(), number, repetitions(quick), &mut ledger);
     }
@@ -130,8 +130,8 @@ pub fn planned(cases: &[Box<dyn Case>], smooth: &[&dyn Case], quick: bool) -> Le
 /// # Errors
 /// A reference fails.
 pub fn of_cases(
-    cases: Vec<Box<dyn Case>>,
-    smooth: &[&dyn Case],
+    cases: Vec<Box<dyn ErrorCase>>,
+    smooth: &[&dyn ErrorCase],
     (quick, summary): (bool, String),
     forecast: &Forecast,
 ) -> Result<Study> {
@@ -172,11 +172,12 @@ pub fn of_cases(
 }
 
 /// Tables over all scenes, where there are several.
-fn add_summary(study: &mut Study, measured: &[(Box<dyn Case>, Measured)]) {
+fn add_summary(study: &mut Study, measured: &[(Box<dyn ErrorCase>, Measured)]) {
     if measured.len() < 2 {
         return;
     }
-    let scenes: Vec<(&dyn Case, &Measured)> = measured.iter().map(|(case, found)| (case.as_ref(), found)).collect();
+    let scenes: Vec<(&dyn ErrorCase, &Measured)> =
+        measured.iter().map(|(case, found)| (case.as_ref(), found)).collect();
     let tables = [
         ("summary-steps.md", "cheapest settings for an error of the steps", summary::of_steps(&scenes)),
         ("summary-total.md", "cheapest settings for a total error", summary::in_total(&scenes)),
@@ -194,7 +195,7 @@ fn guide_page(facts: &[(String, String)]) -> String {
 }
 
 /// A scene's part of it.
-fn section(case: &dyn Case, tables: &[Table]) -> String {
+fn section(case: &dyn ErrorCase, tables: &[Table]) -> String {
     let title = case.title();
     let drawn = if sheets::has_total(case) { 2 } else { 1 };
     let pictures: String =
@@ -209,22 +210,26 @@ fn section(case: &dyn Case, tables: &[Table]) -> String {
 }
 
 /// Orders while nothing changes its contact, and in the scenes that were measured.
-fn orders(smooth: &[&dyn Case], measured: &[(Box<dyn Case>, Measured)], forecast: &Forecast) -> Result<Table> {
+fn orders(
+    smooth: &[&dyn ErrorCase],
+    measured: &[(Box<dyn ErrorCase>, Measured)],
+    forecast: &Forecast,
+) -> Result<Table> {
     let numbered = smooth.iter().zip(measured.len()..);
     let found =
         numbered.map(|(case, number)| measure::measure(*case, number, 1, forecast)).collect::<Result<Vec<_>>>()?;
-    let mut all: Vec<(&dyn Case, &Measured)> = zip(smooth.iter().copied(), &found).collect();
+    let mut all: Vec<(&dyn ErrorCase, &Measured)> = zip(smooth.iter().copied(), &found).collect();
     all.extend(measured.iter().map(|(case, found)| (case.as_ref(), found)));
     Ok(ranking::orders(&all))
 }
 
 /// Figures, statements and files of one scene; its tables are returned.
-fn add(study: &mut Study, case: &dyn Case, found: &Measured) -> Vec<Table> {
+fn add(study: &mut Study, case: &dyn ErrorCase, found: &Measured) -> Vec<Table> {
     let about = sheets::references(case, found);
     let mut all = vec![about.clone()];
     // With one size and no exact solution both are one.
-    let of_steps = Kind::of_steps(case);
-    let kinds: &[Kind] = if sheets::has_total(case) { &[of_steps, Kind::Total] } else { &[of_steps] };
+    let of_steps = ErrorKind::of_steps(case);
+    let kinds: &[ErrorKind] = if sheets::has_total(case) { &[of_steps, ErrorKind::Total] } else { &[of_steps] };
     for (&kind, name) in zip(kinds, case.figures()) {
         let (chart, sheet) = sheets::chart(case, found, kind);
         let (winners, costs) = (ranking::winners(case, found, kind), ranking::costs(case, found, kind));
@@ -240,7 +245,7 @@ fn add(study: &mut Study, case: &dyn Case, found: &Measured) -> Vec<Table> {
             html.push_str(&sheets::rows(case, found).to_html(true));
         }
         let picture = Picture { svg: chart.to_svg(), html };
-        study.figures.push(Figure { name, caption: caption(case, found, kind, &chart), picture, sheet });
+        study.figures.push(StudyFigure { name, caption: caption(case, found, kind, &chart), picture, sheet });
         all.extend([winners, costs]);
     }
     study.statements.extend(statements(case, found));
@@ -252,12 +257,12 @@ fn add(study: &mut Study, case: &dyn Case, found: &Measured) -> Vec<Table> {
     all
 }
 
-fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> String {
+fn caption(case: &dyn ErrorCase, found: &Measured, kind: ErrorKind, chart: &ErrorChart) -> String {
     let standard = case.standard();
     let own = &found.references[standard];
     let size = case.sizes()[standard];
     let what = match kind {
-        Kind::OfTime | Kind::OfOwn => format!(
+        ErrorKind::OfTime | ErrorKind::OfOwn => format!(
             "{}: error of the steps alone at {size} {}: relative L2 of the displacements against {} at h = {:.2e} s. {} at h = {:.2e} s, {}, is \
              {:.1e} away.",
             case.title(),
@@ -269,15 +274,15 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
             case.relation(),
             own.apart[0]
         ),
-        Kind::Total => {
+        ErrorKind::Total => {
             format!("{}: total error of the displacements, all numbers of {}.", case.title(), case.size_name())
         }
     };
-    let away = |family: Family, what: &str| {
+    let away = |family: EquationFamily, what: &str| {
         own.away(family)
             .map_or_else(String::new, |away| format!(" {what} tends to a limit of its own, {away:.1e} away."))
     };
-    let mut limits = away(case.tolerant().family(), "massless-boundary") + &away(Family::STICKING, "coulomb");
+    let mut limits = away(case.tolerant().family(), "massless-boundary") + &away(EquationFamily::STICKING, "coulomb");
     if let Some(apart) = own.massless_apart {
         limits.push_str(&format!(
             " galerkin tends to that of massless-boundary: two fine runs are {apart:.1e} apart. Every method is held against its own limit."
@@ -287,13 +292,13 @@ fn caption(case: &dyn Case, found: &Measured, kind: Kind, chart: &Chart) -> Stri
     let shown: usize = chart.all.iter().map(|each| each.points.len()).sum();
     format!(
         "{what}{} {} {shown} configurations; {refused} of this scene were refused or failed and stand in the table of all runs.",
-        if kind == Kind::Total { "" } else { limits.as_str() },
-        if kind == Kind::Total { String::new() } else { case.description() }
+        if kind == ErrorKind::Total { "" } else { limits.as_str() },
+        if kind == ErrorKind::Total { String::new() } else { case.description() }
     )
 }
 
 /// What every scene should show.
-fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
+fn statements(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let title = case.title();
     let lcp = Scheme::RECURRENCES.map(|scheme| Competitor::Core(scheme, Solver::Lcp));
     let ran = found.rows.iter().filter(|row| lcp.contains(&row.competitor));
@@ -319,7 +324,7 @@ fn statements(case: &dyn Case, found: &Measured) -> Vec<Statement> {
 }
 
 /// Two references that share no code meet.
-fn meeting(case: &dyn Case, found: &Measured) -> Vec<Statement> {
+fn meeting(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let title = case.title();
     let (size, apart) = (case.sizes()[case.standard()], found.references[case.standard()].apart[0]);
     let Some((full, who)) = case.meeting() else {
@@ -347,9 +352,10 @@ fn meeting(case: &dyn Case, found: &Measured) -> Vec<Statement> {
 }
 
 /// What has no mass of the contact nodes tends to a limit of its own, which two schemes share.
-fn massless(case: &dyn Case, found: &Measured) -> Vec<Statement> {
+fn massless(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let (own, title) = (&found.references[case.standard()], case.title());
-    let Some(away) = own.away(case.tolerant().family()).filter(|_| Kind::of_steps(case) == Kind::OfOwn) else {
+    let Some(away) = own.away(case.tolerant().family()).filter(|_| ErrorKind::of_steps(case) == ErrorKind::OfOwn)
+    else {
         return Vec::new();
     };
     let between = Statement::remark(
@@ -372,19 +378,19 @@ struct Tried {
     /// s
     step: f64,
     /// Whether it ran, was refused for its stability, or failed otherwise.
-    outcome: Outcome,
+    outcome: RunOutcome,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Outcome {
+enum RunOutcome {
     Ran,
     /// ω_max·h ≥ 2.
     Unstable,
     Failed,
 }
 
-impl Outcome {
-    fn of(row: &Row) -> Self {
+impl RunOutcome {
+    fn of(row: &MeasuredRow) -> Self {
         match &row.outcome {
             Ok(_) => Self::Ran,
             Err(reason) if reason.contains("ω_max·h = ") => Self::Unstable,
@@ -395,22 +401,22 @@ impl Outcome {
 
 /// Whether steps were refused, all for ω_max·h ≥ 2, and at every size some ran, all of them shorter than those refused.
 fn bounded(tried: &[Tried]) -> bool {
-    let steps = |size: usize, outcome: Outcome| {
+    let steps = |size: usize, outcome: RunOutcome| {
         tried.iter().filter(move |one| one.size == size && one.outcome == outcome).map(|one| one.step)
     };
     let parted = |size: usize| {
-        let longest = steps(size, Outcome::Ran).fold(0.0, f64::max);
-        longest > 0.0 && longest < steps(size, Outcome::Unstable).fold(f64::INFINITY, f64::min)
+        let longest = steps(size, RunOutcome::Ran).fold(0.0, f64::max);
+        longest > 0.0 && longest < steps(size, RunOutcome::Unstable).fold(f64::INFINITY, f64::min)
     };
-    let has = |outcome: Outcome| tried.iter().any(|one| one.outcome == outcome);
-    has(Outcome::Unstable) && !has(Outcome::Failed) && tried.iter().all(|one| parted(one.size))
+    let has = |outcome: RunOutcome| tried.iter().any(|one| one.outcome == outcome);
+    has(RunOutcome::Unstable) && !has(RunOutcome::Failed) && tried.iter().all(|one| parted(one.size))
 }
 
 /// The longest step that ran and the shortest that did not, at each size.
-fn bounds(case: &dyn Case, tried: &[Tried]) -> String {
+fn bounds(case: &dyn ErrorCase, tried: &[Tried]) -> String {
     let of = |at: usize, size: usize| {
         let steps = |ran: bool| {
-            let own = tried.iter().filter(move |one| one.size == at && (one.outcome == Outcome::Ran) == ran);
+            let own = tried.iter().filter(move |one| one.size == at && (one.outcome == RunOutcome::Ran) == ran);
             own.map(|one| 1e6 * one.step)
         };
         let longest = steps(true).fold(0.0, f64::max);
@@ -422,18 +428,18 @@ fn bounds(case: &dyn Case, tried: &[Tried]) -> String {
 }
 
 /// What central differences refuse, and how long the steps of modal-exact may be.
-fn limits(case: &dyn Case, found: &Measured) -> Vec<Statement> {
+fn limits(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let own = |scheme: Scheme| {
         let competitor = Competitor::Core(scheme, Solver::Lcp);
         found.rows.iter().filter(move |row| row.competitor == competitor)
     };
-    let standard = |row: &&Row| row.size == case.standard();
+    let standard = |row: &&MeasuredRow| row.size == case.standard();
     let longest = |scheme: Scheme| -> f64 {
         own(scheme).filter(standard).filter(|row| row.outcome.is_ok()).map(|row| row.step).fold(0.0, f64::max)
     };
     let (central, exact) = (longest(Scheme::CentralDifference), longest(Scheme::ModalExact));
     let tried: Vec<Tried> = own(Scheme::CentralDifference)
-        .map(|row| Tried { size: row.size, step: row.step, outcome: Outcome::of(row) })
+        .map(|row| Tried { size: row.size, step: row.step, outcome: RunOutcome::of(row) })
         .collect();
     if tried.is_empty() {
         return Vec::new();
@@ -446,7 +452,7 @@ fn limits(case: &dyn Case, found: &Measured) -> Vec<Statement> {
             ),
             found: bounds(case, &tried),
             // Steps that all run say nothing about the limit.
-            holds: tried.iter().any(|one| one.outcome != Outcome::Ran).then(|| bounded(&tried)),
+            holds: tried.iter().any(|one| one.outcome != RunOutcome::Ran).then(|| bounded(&tried)),
         },
         Statement::remark(
             format!("{}: longest step of modal-exact that ran", case.title()),
@@ -457,18 +463,18 @@ fn limits(case: &dyn Case, found: &Measured) -> Vec<Statement> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Outcome, Tried, bounded};
+    use super::{RunOutcome, Tried, bounded};
 
-    fn holds(tried: &[(usize, f64, Outcome)]) -> bool {
+    fn holds(tried: &[(usize, f64, RunOutcome)]) -> bool {
         let tried: Vec<Tried> = tried.iter().map(|&(size, step, outcome)| Tried { size, step, outcome }).collect();
         bounded(&tried)
     }
 
     #[test]
     fn a_limit_parts_what_is_refused_from_what_runs() {
-        use Outcome::{Failed, Ran, Unstable};
+        use RunOutcome::{Failed, Ran, Unstable};
         let tried = [(0, 4.0, Unstable), (0, 2.0, Ran), (1, 2.0, Unstable), (1, 1.0, Ran)];
-        let with = |more: (usize, f64, Outcome)| [&tried[..], &[more]].concat();
+        let with = |more: (usize, f64, RunOutcome)| [&tried[..], &[more]].concat();
         assert!(holds(&tried));
         assert!(holds(&with((2, 1.0, Ran))), "a size at which no step was long enough");
         assert!(!holds(&tried[..3]), "nothing ran at the second size");

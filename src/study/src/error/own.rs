@@ -5,13 +5,13 @@ use tiprub_core::{
     settings::{Scheme, Solver, TOLERANCE},
     shown,
 };
-use tiprub_shell::{Failure, Result, console::Console, forecast::Ledger, schedule::Schedule};
+use tiprub_shell::{Failure, Result, console::Console, forecast::WorkPlan, schedule::Schedule};
 
 use super::{
-    case::Case,
-    competitor::{Competitor, DEFAULT, Family, TOLERANCES, TOLERANT},
+    case::ErrorCase,
+    competitor::{Competitor, DEFAULT, EquationFamily, TOLERANCES, TOLERANT},
     measure::units,
-    run::{Run, Seen},
+    run::{StepExtremes, TimedRun},
     scene::SceneRun,
     window,
 };
@@ -48,7 +48,7 @@ pub fn refuse_compared(settings: &[(String, String)]) -> Result<()> {
 }
 
 /// A scene of one's own.
-pub struct Own {
+pub struct UserScene {
     title: String,
     scene: Scene,
     settings: Vec<(String, String)>,
@@ -60,7 +60,7 @@ pub struct Own {
     parting: Vec<f64>,
 }
 
-impl Own {
+impl UserScene {
     /// Read the scene, and see how long it can be followed.
     ///
     /// # Errors
@@ -140,7 +140,7 @@ fn divisions_around(base: u32, quick: bool) -> Vec<u32> {
     divisions
 }
 
-impl Own {
+impl UserScene {
     /// The sample of the first contact, the samples of a `window` (s), or of `most` beyond that contact, and how far runs part over them; the
     /// experiment has `all`.
     fn follow(&self, (window, most): (Option<f64>, usize), all: usize) -> Result<(usize, usize, Vec<f64>), String> {
@@ -188,10 +188,10 @@ impl Own {
 
     /// Plans nothing yet. Its rate is the slowest of three runs per unit of work: the scene's own method, and fixed steps with `lcp` and `coulomb`,
     /// which most of the work consists of.
-    pub fn ledger(&self) -> Ledger {
+    pub fn ledger(&self) -> WorkPlan {
         let sticking = Competitor::Core(Scheme::ModalExact, Solver::Coulomb);
         let runs = [(self.method(), self.own_division()), (DEFAULT, self.base), (sticking, self.base)];
-        Ledger::new(runs.into_iter().filter_map(|(method, division)| self.rate(method, division)).fold(0.0, f64::max))
+        WorkPlan::new(runs.into_iter().filter_map(|(method, division)| self.rate(method, division)).fold(0.0, f64::max))
     }
 
     /// Seconds per unit of work of a method, from its first second of stepping; `None` if it does not start.
@@ -210,7 +210,7 @@ impl Own {
     /// Communication steps before the first contact, at most `most`.
     fn first_touch(&self, division: u32, most: usize) -> Result<usize, String> {
         let mut run = self.start(0, DEFAULT, division, 0.0)?;
-        let mut seen = Seen::nothing();
+        let mut seen = StepExtremes::nothing();
         for sample in 0..most {
             run.watch(&mut seen)?;
             if seen.impulse > 0.0 {
@@ -255,7 +255,7 @@ pub(super) fn count(value: f64) -> u32 {
     value.round().clamp(1.0, 1e8) as u32
 }
 
-impl Case for Own {
+impl ErrorCase for UserScene {
     fn name(&self) -> &'static str {
         "scene"
     }
@@ -334,8 +334,8 @@ impl Case for Own {
         "clearance or velocity"
     }
 
-    fn families(&self, _: usize) -> Vec<Family> {
-        vec![Family::MASSLESS, Family::STICKING, Family::BOTH]
+    fn families(&self, _: usize) -> Vec<EquationFamily> {
+        vec![EquationFamily::MASSLESS, EquationFamily::STICKING, EquationFamily::BOTH]
     }
 
     fn start<'a>(
@@ -344,7 +344,7 @@ impl Case for Own {
         competitor: Competitor,
         division: u32,
         perturbation: f64,
-    ) -> Result<Box<dyn Run + 'a>, String> {
+    ) -> Result<Box<dyn TimedRun + 'a>, String> {
         let Competitor::Core(scheme, solver) = competitor else { return Err("not on a scene of one's own".into()) };
         let scene = SceneRun::by(&self.scene, (scheme, solver), self.interval, division, perturbation);
         Ok(Box::new(SceneRun::with_start_values(&scene, self.interval, division, &self.settings)?))
@@ -353,13 +353,13 @@ impl Case for Own {
 
 #[cfg(test)]
 mod tests {
-    use tiprub_model::rotor37::Tip;
+    use tiprub_model::rotor37::TipContact;
     use tiprub_shell::console::Console;
 
     use super::*;
     use crate::convergence::{
-        refine::Source as _,
-        rows::tests::{Blade, scene},
+        refine::RomSource as _,
+        rows::tests::{PatchedBlade, scene},
     };
 
     /// The base of the fixed steps is one that the whole window accepts, so that half of it and more can be compared.
@@ -367,11 +367,11 @@ mod tests {
     fn fixed_steps_beside_adaptive_ones_run_the_whole_window() {
         let console = Console::new(true, false);
         let mut scene = scene(2);
-        scene.roms[0] = Blade.reduce(None, 10, Tip::patches([5, 2]), &console).unwrap().rom;
+        scene.roms[0] = PatchedBlade.reduce(None, 10, TipContact::patches([5, 2]), &console).unwrap().rom;
         scene.settings.contacts[0].friction = 0.4;
         (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::Galerkin, 8e-5);
         let first = base(&scene, &[], 1e-5).unwrap();
-        let case = Own::of("a blade", scene, &[], (Some(1.5e-3), true), &console).unwrap();
+        let case = UserScene::of("a blade", scene, &[], (Some(1.5e-3), true), &console).unwrap();
         assert!(case.base >= first && case.first_touch(case.base, 150).is_ok(), "{first} {}", case.base);
         assert_eq!(case.divisions, [case.base / 2, case.base, 2 * case.base, 4 * case.base]);
     }

@@ -4,9 +4,9 @@ use tiprub_core::settings::{Scheme, Solver};
 use tiprub_figure::table::Table;
 
 use super::{
-    case::Case,
+    case::ErrorCase,
     competitor::{Competitor, PAPER},
-    measure::{Figures, Measured, Row},
+    measure::{Figures, Measured, MeasuredRow},
 };
 use crate::Statement;
 
@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// Which error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ErrorKind {
     /// Of the steps alone, at the standard size.
     OfTime,
     /// The same, against the limit of the equations that a competitor solves: those without mass of the contact nodes, or with sticking,
@@ -29,9 +29,9 @@ pub enum Kind {
     Total,
 }
 
-impl Kind {
+impl ErrorKind {
     /// Errors of the steps of a case: with one size and no exact solution each competitor has its own limit.
-    pub fn of_steps(case: &dyn Case) -> Self {
+    pub fn of_steps(case: &dyn ErrorCase) -> Self {
         if case.sizes().len() > 1 || case.exact().is_some() { Self::OfTime } else { Self::OfOwn }
     }
 
@@ -45,42 +45,48 @@ impl Kind {
     }
 
     /// The rows it is about.
-    pub fn rows<'a>(self, case: &dyn Case, measured: &'a Measured) -> Vec<&'a Row> {
+    pub fn rows<'a>(self, case: &dyn ErrorCase, measured: &'a Measured) -> Vec<&'a MeasuredRow> {
         let standard = case.standard();
         measured.rows.iter().filter(|row| self == Self::Total || row.size == standard).collect()
     }
 }
 
 /// Errors below this cannot be read: how far two references that share no code are apart where the truth is one of them.
-pub fn readable(case: &dyn Case, measured: &Measured, kind: Kind) -> f64 {
+pub fn readable(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> f64 {
     let apart = |size: usize| measured.references.get(size).map_or(0.0, |references| references.apart[0]);
     match (case.meeting(), kind) {
         (Some((distance, _)), _) => distance,
-        (None, Kind::OfTime | Kind::OfOwn) => apart(case.standard()),
-        (None, Kind::Total) if case.exact().is_some() => 0.0,
-        (None, Kind::Total) => apart(measured.references.len().saturating_sub(1)),
+        (None, ErrorKind::OfTime | ErrorKind::OfOwn) => apart(case.standard()),
+        (None, ErrorKind::Total) if case.exact().is_some() => 0.0,
+        (None, ErrorKind::Total) => apart(measured.references.len().saturating_sub(1)),
     }
 }
 
 /// The same for one competitor: that of its own limit.
-pub fn readable_of(case: &dyn Case, measured: &Measured, kind: Kind, competitor: Competitor) -> f64 {
+pub fn readable_of(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind, competitor: Competitor) -> f64 {
     let own = || measured.references.get(case.standard())?.massless_apart;
-    let massless = kind == Kind::OfOwn && competitor.family().massless;
+    let massless = kind == ErrorKind::OfOwn && competitor.family().massless;
     own().filter(|_| massless).unwrap_or_else(|| readable(case, measured, kind))
 }
 
 /// The rows of competitors whose limit is known well enough to tell this error.
-pub fn that_tell<'a>(case: &dyn Case, measured: &Measured, kind: Kind, rows: &[&'a Row], error: f64) -> Vec<&'a Row> {
+pub fn that_tell<'a>(
+    case: &dyn ErrorCase,
+    measured: &Measured,
+    kind: ErrorKind,
+    rows: &[&'a MeasuredRow],
+    error: f64,
+) -> Vec<&'a MeasuredRow> {
     rows.iter().copied().filter(|row| error >= readable_of(case, measured, kind, row.competitor)).collect()
 }
 
 /// The row of least time with at most this error, among those of a competitor or of all.
 pub fn cheapest<'a>(
-    rows: &[&'a Row],
-    kind: Kind,
+    rows: &[&'a MeasuredRow],
+    kind: ErrorKind,
     only: Option<Competitor>,
     error: f64,
-) -> Option<(&'a Row, &'a Figures)> {
+) -> Option<(&'a MeasuredRow, &'a Figures)> {
     let asked = rows.iter().filter(|row| only.is_none_or(|competitor| row.competitor == competitor));
     let done = asked.filter_map(|row| row.outcome.as_ref().ok().map(|figures| (*row, figures)));
     let good = done.filter(|(_, figures)| kind.of(figures) <= error);
@@ -97,17 +103,17 @@ pub fn seconds(time: f64) -> String {
 }
 
 /// Cheapest configuration for every target, and what the paper's method needs.
-pub fn winners(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
+pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Table {
     let rows = kind.rows(case, measured);
     let sizes = case.sizes();
     let what = match kind {
-        Kind::OfTime | Kind::OfOwn => format!(
+        ErrorKind::OfTime | ErrorKind::OfOwn => format!(
             "{}: cheapest for an error of the steps alone, at {} {}",
             case.title(),
             sizes[case.standard()],
             case.size_name()
         ),
-        Kind::Total => {
+        ErrorKind::Total => {
             format!("{}: cheapest for a total error, over all numbers of {}", case.title(), case.size_name())
         }
     };
@@ -123,9 +129,12 @@ pub fn winners(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
             continue;
         }
         let paper = cheapest(&told, kind, Some(PAPER), target);
-        let text = |(row, figures): (&Row, &Figures)| {
-            let size =
-                if kind == Kind::Total { format!("{} {}, ", sizes[row.size], case.size_name()) } else { String::new() };
+        let text = |(row, figures): (&MeasuredRow, &Figures)| {
+            let size = if kind == ErrorKind::Total {
+                format!("{} {}, ", sizes[row.size], case.size_name())
+            } else {
+                String::new()
+            };
             format!("{} ({size}{})", seconds(figures.seconds), row.competitor.setting(row.step))
         };
         let paper_text = paper.map_or_else(|| "does not reach it".into(), text);
@@ -147,16 +156,16 @@ pub fn winners(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
 }
 
 /// What every competitor needs for every target.
-pub fn costs(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
+pub fn costs(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Table {
     let rows = kind.rows(case, measured);
-    let of = if kind == Kind::Total { "all, modes included" } else { "the steps alone" };
+    let of = if kind == ErrorKind::Total { "all, modes included" } else { "the steps alone" };
     let caption = format!("{}: time that every competitor needs for an error of {of}", case.title());
     let mut table = Table::new(
         caption,
         ["competitor", "1e-1", "1e-2", "1e-3", "1e-4", "least error", "largest step or tolerance that ran"],
     );
     for competitor in Competitor::all() {
-        let own: Vec<&Row> = rows.iter().copied().filter(|row| row.competitor == competitor).collect();
+        let own: Vec<&MeasuredRow> = rows.iter().copied().filter(|row| row.competitor == competitor).collect();
         let done = || own.iter().filter_map(|row| row.outcome.as_ref().ok().map(|figures| (row, figures)));
         if own.is_empty() {
             continue;
@@ -182,7 +191,7 @@ pub fn costs(case: &dyn Case, measured: &Measured, kind: Kind) -> Table {
 }
 
 /// How far film stays behind lcp; only where several nodes are coupled.
-pub fn floor(case: &dyn Case, found: &Measured) -> Option<Statement> {
+pub fn floor(case: &dyn ErrorCase, found: &Measured) -> Option<Statement> {
     let errors = |solver: Solver| -> Vec<f64> {
         let competitor = Competitor::Core(Scheme::ModalExact, solver);
         let own = found.rows.iter().filter(|row| row.size == case.standard() && row.competitor == competitor);
@@ -226,7 +235,7 @@ impl Order {
 }
 
 /// Order of a competitor at the standard size, from its finest steps, against the limit of its own equations.
-pub fn order(case: &dyn Case, measured: &Measured, competitor: Competitor) -> Order {
+pub fn order(case: &dyn ErrorCase, measured: &Measured, competitor: Competitor) -> Order {
     let rows = measured.rows.iter().filter(|row| row.size == case.standard() && row.competitor == competitor);
     let points: Vec<(f64, f64)> =
         rows.filter_map(|row| row.outcome.as_ref().ok().map(|figures| (row.step, figures.of_own))).collect();
@@ -252,7 +261,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 }
 
 /// Orders of all competitors in several scenes.
-pub fn orders(scenes: &[(&dyn Case, &Measured)]) -> Table {
+pub fn orders(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let caption = format!(
         "Observed orders: power of h with which displacements tend to the limit of their own equations, from the finest {FITTED} steps"
     );

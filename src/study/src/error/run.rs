@@ -10,7 +10,7 @@ const LEAST_TIME: f64 = 5e-3;
 const MOST_REPETITIONS: usize = 40;
 
 /// A competitor that marches a scene from one sample time to the next.
-pub trait Run {
+pub trait TimedRun {
     /// March to the next sample time.
     ///
     /// # Errors
@@ -21,7 +21,7 @@ pub trait Run {
     ///
     /// # Errors
     /// As there.
-    fn watch(&mut self, seen: &mut Seen) -> Result<(), String>;
+    fn watch(&mut self, seen: &mut StepExtremes) -> Result<(), String>;
 
     /// The displacements that are compared (m).
     fn displacements(&self) -> Vec<f64>;
@@ -45,7 +45,7 @@ pub trait Run {
 
 /// What is gathered over internal steps.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
+pub struct StepExtremes {
     /// ∫ of all normal forces since the last sample (N·s).
     pub impulse: f64,
     /// The same of every structure that touches, where a run tells them apart.
@@ -58,7 +58,7 @@ pub struct Seen {
     pub adhesion: f64,
 }
 
-impl Seen {
+impl StepExtremes {
     /// The next sample.
     pub fn next(&mut self) {
         self.impulse = 0.0;
@@ -91,7 +91,7 @@ impl Seen {
 pub struct Trace {
     /// Displacements, sample by sample (m).
     pub displacements: Vec<Vec<f64>>,
-    /// See [`Run::parts`].
+    /// See [`TimedRun::parts`].
     pub parts: Vec<usize>,
     /// Normal impulse between samples (N·s).
     pub impulses: Vec<f64>,
@@ -103,7 +103,7 @@ pub struct Trace {
     pub energies: Vec<f64>,
     /// Energy at the start (J).
     pub initial_energy: f64,
-    /// See [`Run::residual`].
+    /// See [`TimedRun::residual`].
     pub residual: Option<f64>,
     /// Deepest penetration (m).
     pub penetration: f64,
@@ -115,7 +115,7 @@ pub struct Trace {
 ///
 /// # Errors
 /// Why the run ends early.
-pub fn trace(run: &mut dyn Run, samples: usize) -> Result<Trace, String> {
+pub fn trace(run: &mut dyn TimedRun, samples: usize) -> Result<Trace, String> {
     let mut found = Trace {
         displacements: Vec::with_capacity(samples),
         parts: Vec::new(),
@@ -128,7 +128,7 @@ pub fn trace(run: &mut dyn Run, samples: usize) -> Result<Trace, String> {
         penetration: 0.0,
         adhesion: 0.0,
     };
-    let mut seen = Seen::nothing();
+    let mut seen = StepExtremes::nothing();
     for _ in 0..samples {
         seen.next();
         run.watch(&mut seen)?;
@@ -149,7 +149,7 @@ pub fn trace(run: &mut dyn Run, samples: usize) -> Result<Trace, String> {
 /// # Errors
 /// Why a run ends early.
 pub fn time<'a>(
-    start: &dyn Fn() -> Result<Box<dyn Run + 'a>, String>,
+    start: &dyn Fn() -> Result<Box<dyn TimedRun + 'a>, String>,
     samples: usize,
     repetitions: usize,
     known: Option<f64>,

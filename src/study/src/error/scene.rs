@@ -2,14 +2,14 @@
 
 use tiprub_core::{
     Scene, Simulation,
-    settings::{ADAPTIVE_STEP, Motion, Scheme, Solver},
+    settings::{ADAPTIVE_STEP, BodyMotion, Scheme, Solver},
     system::Structure,
 };
 use tiprub_shell::native;
 
 use super::{
     competitor::Competitor,
-    run::{Run, Seen},
+    run::{StepExtremes, TimedRun},
 };
 
 /// A run of a scene.
@@ -128,7 +128,7 @@ impl SceneRun {
             let mut pairs = pairs.iter().zip(&scene.settings.contacts);
             let master = pairs.find(|(pair, _)| pair.structure() == index).map(|(_, contact)| &contact.master);
             let all = scene.settings.structures.iter();
-            all.filter(|structure| Some(&structure.name) == master).any(|master| master.motion == Motion::Free)
+            all.filter(|structure| Some(&structure.name) == master).any(|master| master.motion == BodyMotion::Free)
         };
         let touching = structures.iter().enumerate().filter(|(_, structure)| structure.nodes() > 0);
         let unmoved = touching.map(|(index, structure)| Unmoved::of(structure, flies(index))).collect();
@@ -166,14 +166,14 @@ impl SceneRun {
     }
 }
 
-impl Run for SceneRun {
+impl TimedRun for SceneRun {
     fn advance(&mut self) -> Result<(), String> {
         let time = self.time();
         self.samples += 1;
         self.simulation.do_step(time, self.interval).map_err(|error| error.to_string())
     }
 
-    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+    fn watch(&mut self, seen: &mut StepExtremes) -> Result<(), String> {
         let time = self.time();
         self.samples += 1;
         self.simulation.begin_step(time, self.interval).map_err(|error| error.to_string())?;

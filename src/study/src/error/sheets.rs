@@ -7,11 +7,11 @@ use tiprub_figure::table::Table;
 use tiprub_shell::recording::shortest;
 
 use super::{
-    case::Case,
-    chart::{Chart, Points},
-    competitor::{Competitor, Family},
-    measure::{Figures, Measured, Row},
-    ranking::{self, Kind, TARGETS, seconds},
+    case::ErrorCase,
+    chart::{ErrorChart, Points},
+    competitor::{Competitor, EquationFamily},
+    measure::{Figures, Measured, MeasuredRow},
+    ranking::{self, ErrorKind, TARGETS, seconds},
 };
 use crate::Sheet;
 
@@ -24,17 +24,17 @@ pub fn step_name(competitor: Competitor) -> &'static str {
 }
 
 /// Chart of one kind of error, and its numbers: a row per configuration, its error in the column of the competitor.
-pub fn chart(case: &dyn Case, found: &Measured, kind: Kind) -> (Chart, Sheet) {
+pub fn chart(case: &dyn ErrorCase, found: &Measured, kind: ErrorKind) -> (ErrorChart, Sheet) {
     let rows = kind.rows(case, found);
-    let mut chart = Chart {
+    let mut chart = ErrorChart {
         error_label: match kind {
-            Kind::OfTime => "error of the steps, displacements (relative L2)".into(),
-            Kind::OfOwn => "error of the steps, displacements (relative L2), each to its own limit".into(),
-            Kind::Total => "total error, displacements (relative L2)".into(),
+            ErrorKind::OfTime => "error of the steps, displacements (relative L2)".into(),
+            ErrorKind::OfOwn => "error of the steps, displacements (relative L2), each to its own limit".into(),
+            ErrorKind::Total => "total error, displacements (relative L2)".into(),
         },
         all: Vec::new(),
-        joined: kind != Kind::Total,
-        readable: (kind != Kind::Total)
+        joined: kind != ErrorKind::Total,
+        readable: (kind != ErrorKind::Total)
             .then(|| (found.references[case.standard()].apart[0], "distance of the two references".into())),
     };
     let competitors: Vec<Competitor> = Competitor::all()
@@ -60,9 +60,9 @@ pub fn chart(case: &dyn Case, found: &Measured, kind: Kind) -> (Chart, Sheet) {
 }
 
 /// A figure of a run: its name, its key for programs, whether it is against a finer model than the case's own, and its value.
-type Named = (&'static str, &'static str, bool, fn(&Figures) -> Option<f64>);
+type NamedFigure = (&'static str, &'static str, bool, fn(&Figures) -> Option<f64>);
 
-const FIGURES: [Named; 11] = [
+const FIGURES: [NamedFigure; 11] = [
     ("time (s)", "seconds", false, |figures| Some(figures.seconds)),
     ("error of the steps", "error_of_steps", false, |figures| Some(figures.of_time)),
     ("error against the own limit", "error_of_own_limit", false, |figures| Some(figures.of_own)),
@@ -77,18 +77,18 @@ const FIGURES: [Named; 11] = [
 ];
 
 /// Whether a case has models finer than its own, or an exact solution: without them there are no total errors.
-pub fn has_total(case: &dyn Case) -> bool {
+pub fn has_total(case: &dyn ErrorCase) -> bool {
     case.sizes().len() > 1 || case.exact().is_some()
 }
 
 /// The figures that a case has.
-fn told(case: &dyn Case) -> impl Iterator<Item = &'static Named> {
+fn told(case: &dyn ErrorCase) -> impl Iterator<Item = &'static NamedFigure> {
     let has_total = has_total(case);
     FIGURES.iter().filter(move |(_, _, total, _)| has_total || !total)
 }
 
 /// Every configuration as comma-separated values; refusals with their reason.
-pub fn csv(case: &dyn Case, found: &Measured) -> String {
+pub fn csv(case: &dyn ErrorCase, found: &Measured) -> String {
     let names: Vec<&str> = told(case).map(|figure| figure.0).collect();
     let mut text = format!("competitor,{},{STEP},{},remark\n", case.size_name(), names.join(","));
     for row in &found.rows {
@@ -111,7 +111,7 @@ pub fn csv(case: &dyn Case, found: &Measured) -> String {
 }
 
 /// Every configuration, for the page.
-pub fn rows(case: &dyn Case, found: &Measured) -> Table {
+pub fn rows(case: &dyn ErrorCase, found: &Measured) -> Table {
     let mut columns = vec!["competitor".to_owned(), case.size_name().to_owned(), "step or tolerance".to_owned()];
     columns.extend(told(case).map(|figure| figure.0.to_owned()).chain(["remark".to_owned()]));
     let mut table = Table { caption: format!("All runs of {}", case.title()), columns, rows: Vec::new() };
@@ -121,7 +121,7 @@ pub fn rows(case: &dyn Case, found: &Measured) -> Table {
     table
 }
 
-fn cells(case: &dyn Case, row: &Row) -> Vec<String> {
+fn cells(case: &dyn ErrorCase, row: &MeasuredRow) -> Vec<String> {
     let mut cells = vec![row.competitor.name(), case.sizes()[row.size].to_string(), row.competitor.setting(row.step)];
     match &row.outcome {
         Ok(figures) => {
@@ -139,7 +139,7 @@ fn cells(case: &dyn Case, row: &Row) -> Vec<String> {
 }
 
 /// How far the references are apart, size by size.
-pub fn references(case: &dyn Case, found: &Measured) -> Table {
+pub fn references(case: &dyn ErrorCase, found: &Measured) -> Table {
     let caption = format!(
         "{}: references, {} and {}, and what the number of {} leaves out",
         case.title(),
@@ -167,7 +167,7 @@ pub fn references(case: &dyn Case, found: &Measured) -> Table {
             impulses,
             away(case.tolerant().family()),
             own.massless_apart.map_or_else(|| "-".into(), |apart| format!("{apart:.1e}")),
-            away(Family::STICKING),
+            away(EquationFamily::STICKING),
             truncation,
         ]);
     }
@@ -175,8 +175,8 @@ pub fn references(case: &dyn Case, found: &Measured) -> Table {
 }
 
 /// The cheapest of the steps alone for an error, where it can be read.
-fn cheapest(case: &dyn Case, found: &Measured, target: f64) -> Value {
-    let kind = Kind::of_steps(case);
+fn cheapest(case: &dyn ErrorCase, found: &Measured, target: f64) -> Value {
+    let kind = ErrorKind::of_steps(case);
     let rows = ranking::that_tell(case, found, kind, &kind.rows(case, found), target);
     match ranking::cheapest(&rows, kind, None, target) {
         None => json!({ "error": target }),
@@ -188,7 +188,7 @@ fn cheapest(case: &dyn Case, found: &Measured, target: f64) -> Value {
 }
 
 /// For programs.
-pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
+pub fn to_json(case: &dyn ErrorCase, found: &Measured) -> Value {
     let rows = found.rows.iter().map(|row| {
         let mut object = json!({
             "competitor": row.competitor.name(), "size": case.sizes()[row.size], step_name(row.competitor): row.step,
@@ -211,7 +211,7 @@ pub fn to_json(case: &dyn Case, found: &Measured) -> Value {
         "references_apart": found.references.iter().map(|own| own.apart).collect::<Vec<_>>(),
         "massless_boundary_away": found.references.iter().map(|own| own.away(case.tolerant().family())).collect::<Vec<_>>(),
         "massless_apart": found.references.iter().map(|own| own.massless_apart).collect::<Vec<_>>(),
-        "coulomb_away": found.references.iter().map(|own| own.away(Family::STICKING)).collect::<Vec<_>>(),
+        "coulomb_away": found.references.iter().map(|own| own.away(EquationFamily::STICKING)).collect::<Vec<_>>(),
         "reference_from_truth": found.truncation,
         "cheapest": TARGETS.map(|target| cheapest(case, found, target)),
         "rows": rows.collect::<Vec<_>>(),

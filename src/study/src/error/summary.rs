@@ -4,14 +4,14 @@
 use tiprub_figure::table::Table;
 
 use super::{
-    case::Case,
+    case::ErrorCase,
     competitor::{Competitor, PAPER},
-    measure::{Figures, Measured, Row},
-    ranking::{self, Kind, TARGETS, cheapest, that_tell},
+    measure::{Figures, Measured, MeasuredRow},
+    ranking::{self, ErrorKind, TARGETS, cheapest, that_tell},
 };
 
 /// A run that finished: its setting and its figures.
-type Finished<'a> = (&'a Row, &'a Figures);
+type Finished<'a> = (&'a MeasuredRow, &'a Figures);
 
 /// Processor time per simulated time (s/s) with three significant digits.
 pub fn rate(seconds: f64) -> String {
@@ -39,15 +39,16 @@ fn columns(error: &str) -> [&str; 8] {
 }
 
 /// Cheapest setting for each error of the steps. Every method is compared with the converged solution of its own equations.
-pub fn of_steps(scenes: &[(&dyn Case, &Measured)]) -> Table {
+pub fn of_steps(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let mut table = Table::new("Cheapest setting for an error of the steps", columns("error of the steps"));
     for &(case, measured) in scenes {
-        let rows = Kind::OfOwn.rows(case, measured);
+        let rows = ErrorKind::OfOwn.rows(case, measured);
         for target in TARGETS {
-            let readable = that_tell(case, measured, Kind::OfOwn, &rows, target);
-            let cells = cells(case, &readable, &rows, &|only| cheapest(&readable, Kind::OfOwn, only, target), |_| {
-                String::new()
-            });
+            let readable = that_tell(case, measured, ErrorKind::OfOwn, &rows, target);
+            let cells =
+                cells(case, &readable, &rows, &|only| cheapest(&readable, ErrorKind::OfOwn, only, target), |_| {
+                    String::new()
+                });
             table.rows.push(beside(case, target, cells));
         }
     }
@@ -55,15 +56,15 @@ pub fn of_steps(scenes: &[(&dyn Case, &Measured)]) -> Table {
 }
 
 /// Cheapest setting for each total error: steps, and the errors of the model (modes, patches, rows, mesh, elements).
-pub fn in_total(scenes: &[(&dyn Case, &Measured)]) -> Table {
+pub fn in_total(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let mut table = Table::new("Cheapest setting for a total error", columns("total error"));
     for &(case, measured) in scenes {
         let Some(error) = total_error(case) else { continue };
-        let rows = Kind::Total.rows(case, measured);
+        let rows = ErrorKind::Total.rows(case, measured);
         for target in TARGETS {
             let readable = match case.model_error() {
-                Some(_) => that_tell(case, measured, Kind::OfOwn, &rows, target),
-                None => that_tell(case, measured, Kind::Total, &rows, target),
+                Some(_) => that_tell(case, measured, ErrorKind::OfOwn, &rows, target),
+                None => that_tell(case, measured, ErrorKind::Total, &rows, target),
             };
             let best = |only: Option<Competitor>| {
                 let own = readable.iter().filter(|row| only.is_none_or(|competitor| row.competitor == competitor));
@@ -71,7 +72,7 @@ pub fn in_total(scenes: &[(&dyn Case, &Measured)]) -> Table {
                 let within = finished.filter(|(_, figures)| error(figures) <= target);
                 within.min_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds))
             };
-            let size = |row: &Row| match case.sizes().len() {
+            let size = |row: &MeasuredRow| match case.sizes().len() {
                 1 => String::new(),
                 _ => format!(", {} {}", case.sizes()[row.size], case.size_name()),
             };
@@ -91,24 +92,24 @@ pub fn in_total(scenes: &[(&dyn Case, &Measured)]) -> Table {
 type TotalError = Box<dyn Fn(&Figures) -> f64>;
 
 /// How the total error of a run follows from its figures; `None` where a case has no finer model and no known errors.
-fn total_error(case: &dyn Case) -> Option<TotalError> {
+fn total_error(case: &dyn ErrorCase) -> Option<TotalError> {
     if let Some(left) = case.model_error() {
         return Some(Box::new(move |figures| figures.of_own + left));
     }
     super::sheets::has_total(case).then(|| Box::new(|figures: &Figures| figures.total) as TotalError)
 }
 
-fn beside(case: &dyn Case, target: f64, cells: Vec<String>) -> Vec<String> {
+fn beside(case: &dyn ErrorCase, target: f64, cells: Vec<String>) -> Vec<String> {
     [case.title().to_owned(), format!("{target:.0e}")].into_iter().chain(cells).collect()
 }
 
 /// Cheapest method, its setting and time; the times of `galerkin` and of the paper's method; the factor between the first and the last.
 fn cells<'a>(
-    case: &dyn Case,
-    readable: &[&'a Row],
-    all: &[&'a Row],
+    case: &dyn ErrorCase,
+    readable: &[&'a MeasuredRow],
+    all: &[&'a MeasuredRow],
     best: &dyn Fn(Option<Competitor>) -> Option<Finished<'a>>,
-    size: impl Fn(&Row) -> String,
+    size: impl Fn(&MeasuredRow) -> String,
 ) -> Vec<String> {
     let simulated = case.interval() * case.samples() as f64;
     let time = |(_, figures): Finished| rate(figures.seconds / simulated);
@@ -134,10 +135,10 @@ fn cells<'a>(
 }
 
 /// Why the paper's method does not reach an error: rejected at every step that was tried, or its smallest error.
-fn paper_misses(rows: &[&Row]) -> String {
+fn paper_misses(rows: &[&MeasuredRow]) -> String {
     let own = || rows.iter().filter(|row| row.competitor == PAPER);
     let shortest = own().map(|row| row.step).fold(f64::INFINITY, f64::min);
-    let errors = own().filter_map(|row| row.outcome.as_ref().ok()).map(|figures| Kind::OfOwn.of(figures));
+    let errors = own().filter_map(|row| row.outcome.as_ref().ok()).map(|figures| ErrorKind::OfOwn.of(figures));
     match errors.reduce(f64::min) {
         _ if shortest.is_infinite() => "-".into(),
         Some(least) => format!("not reached, {least:.1e} at best"),
@@ -146,7 +147,7 @@ fn paper_misses(rows: &[&Row]) -> String {
 }
 
 /// Distances of the references, which limit the errors that can be read.
-pub fn limits(scenes: &[(&dyn Case, &Measured)]) -> Table {
+pub fn limits(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let mut table = Table::new(
         "Errors below these distances cannot be read",
         ["scene", "window (ms)", "first and second reference", "galerkin and massless-boundary"],
@@ -156,7 +157,7 @@ pub fn limits(scenes: &[(&dyn Case, &Measured)]) -> Table {
         table.rows.push(vec![
             case.title().to_owned(),
             format!("{:.2}", 1e3 * case.interval() * case.samples() as f64),
-            format!("{:.1e}", ranking::readable(case, measured, Kind::OfOwn)),
+            format!("{:.1e}", ranking::readable(case, measured, ErrorKind::OfOwn)),
             massless.map_or_else(|| "-".into(), |apart| format!("{apart:.1e}")),
         ]);
     }
@@ -168,7 +169,7 @@ mod tests {
     use super::*;
     use crate::error::competitor::TOLERANT;
 
-    fn row(competitor: Competitor, step: f64, outcome: Result<f64, &str>) -> Row {
+    fn row(competitor: Competitor, step: f64, outcome: Result<f64, &str>) -> MeasuredRow {
         let figures = |error: f64| Figures {
             seconds: 1e-3,
             total: error,
@@ -182,7 +183,7 @@ mod tests {
             adhesion: 0.0,
             release: None,
         };
-        Row { size: 0, competitor, step, outcome: outcome.map(figures).map_err(str::to_owned) }
+        MeasuredRow { size: 0, competitor, step, outcome: outcome.map(figures).map_err(str::to_owned) }
     }
 
     #[test]

@@ -12,26 +12,26 @@ use tiprub_core::{
 };
 use tiprub_shell::{
     Result,
-    forecast::{Forecast, Ledger},
+    forecast::{Forecast, WorkPlan},
 };
 
 use super::{
-    case::Case as _,
+    case::ErrorCase as _,
     clock,
     competitor::{Competitor, TOLERANT},
     measure::{kind, units},
-    own::Own,
-    run::Run as _,
+    own::UserScene,
+    run::TimedRun as _,
     scene::SceneRun,
 };
 use crate::{
     convergence::{
         Runner,
         coarsen::{coarsened, fewer_rows},
-        march::{Marched, Observed},
+        march::{Observed, RunSummary},
         refine::Again,
         refiner::Refiner,
-        truncate::{Form, truncated},
+        truncate::{Truncation, truncated},
     },
     estimate::{self, Estimate},
     master,
@@ -52,7 +52,7 @@ const MOST_RUNS: usize = 5;
 
 /// A model of the scene.
 #[derive(Debug)]
-pub struct Model {
+pub struct SceneModel {
     /// Contact nodes, or patches along the chord.
     pub points: usize,
     /// Rows of patches across the thickness.
@@ -64,11 +64,11 @@ pub struct Model {
     scene: Scene,
 }
 
-impl Model {
+impl SceneModel {
     fn of(scene: Scene, own: bool) -> Self {
         let rom = &scene.roms[master(&scene)];
         let rows = rom.rows();
-        Self { points: rom.contact_nodes.len() / rows, rows, modes: Form::of(rom).modes(rom), own, scene }
+        Self { points: rom.contact_nodes.len() / rows, rows, modes: Truncation::of(rom).modes(rom), own, scene }
     }
 
     /// "9 × 2 patches", "3 nodes".
@@ -80,7 +80,7 @@ impl Model {
 
 /// One setting and what became of it.
 #[derive(Debug)]
-pub struct Row {
+pub struct TotalRow {
     /// Index of the model.
     pub model: usize,
     /// Who.
@@ -97,9 +97,9 @@ pub struct Row {
 #[derive(Debug)]
 pub struct Total {
     /// The models that ran, the truth not among them.
-    pub models: Vec<Model>,
+    pub models: Vec<SceneModel>,
     /// All settings.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TotalRow>,
     /// What the truth is, in words.
     pub truth: String,
     /// What the last refinement on the way to the truth changed: errors below are not to be read. `None` where the truth is the scene's own model.
@@ -118,7 +118,7 @@ pub struct Total {
 /// Models that are held against each other, and the finest, which the truth is found with.
 pub struct Prepared<'a> {
     refiner: Refiner<'a>,
-    models: Vec<Model>,
+    models: Vec<SceneModel>,
     finer: Vec<Scene>,
     truth: Option<Scene>,
 }
@@ -127,7 +127,7 @@ pub struct Prepared<'a> {
 ///
 /// # Errors
 /// A model that is reduced again and does not give the scene's.
-pub fn prepare<'a>(case: &'a Own, again: &'a Again<'a>) -> Result<std::result::Result<Prepared<'a>, String>> {
+pub fn prepare<'a>(case: &'a UserScene, again: &'a Again<'a>) -> Result<std::result::Result<Prepared<'a>, String>> {
     let scene = case.scene();
     if let Err(several) = crate::one_rotor(&scene.settings) {
         return Ok(Err(several.to_string()));
@@ -149,7 +149,7 @@ const MESHES_RUN: f64 = 3.0;
 
 impl Prepared<'_> {
     /// Plan all runs.
-    pub fn plan(&self, case: &Own, quick: bool, ledger: &mut Ledger) {
+    pub fn plan(&self, case: &UserScene, quick: bool, ledger: &mut WorkPlan) {
         let own = (case.method(), case.own_division());
         let truth = self.truth.as_ref().unwrap_or(case.scene());
         ledger.plan(kind(0, own.0), work(case, truth, own.0, TRUE_SHARES[0].saturating_mul(own.1)));
@@ -168,7 +168,7 @@ impl Prepared<'_> {
 }
 
 /// Work of a run of a model, as internal steps of the scene's.
-fn work(case: &Own, scene: &Scene, competitor: Competitor, division: u32) -> f64 {
+fn work(case: &UserScene, scene: &Scene, competitor: Competitor, division: u32) -> f64 {
     let order = |scene: &Scene| scene.roms.iter().map(|rom| rom.total_order() as f64).sum::<f64>();
     units(case, 0, competitor, division) * order(scene) / order(case.scene())
 }
@@ -178,7 +178,7 @@ fn work(case: &Own, scene: &Scene, competitor: Competitor, division: u32) -> f64
 /// # Errors
 /// A mesh that cannot be reduced.
 pub fn measure(
-    case: &Own,
+    case: &UserScene,
     prepared: Prepared<'_>,
     again: &Again,
     forecast: &Forecast,
@@ -195,7 +195,7 @@ pub fn measure(
     let before = finer.last().unwrap_or(scene);
     let before = of_source.then(|| observed(case, before, case.method(), division)).and_then(std::result::Result::ok);
     let readable = before.and_then(|(_, run)| run.displacement_change(&truth));
-    models.extend(finer.into_iter().map(|scene| Model::of(scene, false)));
+    models.extend(finer.into_iter().map(|scene| SceneModel::of(scene, false)));
     let rows = rows(case, &models, &truth, forecast, again.quick);
     let mesh = mesh(case, &refiner, again)?;
     if !again.quick {
@@ -203,8 +203,8 @@ pub fn measure(
     }
     let touching =
         if scene.roms[master(scene)].contact_nodes.iter().all(|node| node.area > 0.0) { "patches" } else { "nodes" };
-    let own = Model::of(scene.clone(), true);
-    let finest = Model::of(truth_scene, false);
+    let own = SceneModel::of(scene.clone(), true);
+    let finest = SceneModel::of(truth_scene, false);
     let modes = finest.modes;
     let finer = [modes > own.modes, finest.points > own.points, finest.rows > own.rows || touching == "nodes"];
     let of_rom = estimate::of_rom(&scene.roms[master(scene)]);
@@ -216,7 +216,7 @@ pub fn measure(
 }
 
 /// The scene's model and coarser ones: patches and modes halved, and halved again, each with each; fewer rows with all patches along the chord.
-fn coarser(scene: &Scene, quick: bool) -> Vec<Model> {
+fn coarser(scene: &Scene, quick: bool) -> Vec<SceneModel> {
     let index = master(scene);
     let halvings = if quick { 1 } else { COARSER };
     let halved = (0..halvings).scan(scene.roms[index].clone(), |rom, _| {
@@ -227,17 +227,17 @@ fn coarser(scene: &Scene, quick: bool) -> Vec<Model> {
     tips.extend(halved);
     let own = &scene.roms[index];
     tips.extend((1..own.rows()).filter_map(|rows| fewer_rows(own, rows).ok()));
-    let own_modes = Form::of(&tips[0]).modes(&tips[0]);
+    let own_modes = Truncation::of(&tips[0]).modes(&tips[0]);
     let mut models = Vec::new();
     for (tip, rom) in tips.into_iter().enumerate() {
         for halving in 0..=halvings {
             // A coarser tip leaves its coordinates behind as modes.
             let kept = own_modes >> halving;
-            let found = if Form::of(&rom).modes(&rom) == kept { Ok(rom.clone()) } else { truncated(&rom, kept) };
+            let found = if Truncation::of(&rom).modes(&rom) == kept { Ok(rom.clone()) } else { truncated(&rom, kept) };
             if let (Ok(rom), true) = (found, kept > 0) {
                 let mut scene = scene.clone();
                 scene.roms[index] = rom;
-                models.push(Model::of(scene, (tip, halving) == (0, 0)));
+                models.push(SceneModel::of(scene, (tip, halving) == (0, 0)));
             }
         }
     }
@@ -245,7 +245,7 @@ fn coarser(scene: &Scene, quick: bool) -> Vec<Model> {
 }
 
 /// The truth with the longest of its steps that are accepted, and their number per communication step.
-fn true_run(case: &Own, scene: &Scene) -> std::result::Result<(u32, Marched), String> {
+fn true_run(case: &UserScene, scene: &Scene) -> std::result::Result<(u32, RunSummary), String> {
     let mut refused = String::new();
     for share in TRUE_SHARES {
         let division = share.saturating_mul(case.own_division());
@@ -258,7 +258,7 @@ fn true_run(case: &Own, scene: &Scene) -> std::result::Result<(u32, Marched), St
 }
 
 /// Who takes part: the schemes with the solver of the scene's law, and the paper's method.
-fn competitors(case: &Own) -> Vec<Competitor> {
+fn competitors(case: &UserScene) -> Vec<Competitor> {
     let Competitor::Core(_, solver) = case.method() else { return Vec::new() };
     let solvers = if solver == Solver::Coulomb { &[Solver::Coulomb][..] } else { &[Solver::Lcp, Solver::Film] };
     let all = Scheme::RECURRENCES.into_iter().flat_map(|scheme| solvers.iter().map(move |solver| (scheme, *solver)));
@@ -266,11 +266,17 @@ fn competitors(case: &Own) -> Vec<Competitor> {
 }
 
 /// Internal step (s), or tolerance.
-fn value(case: &Own, competitor: Competitor, division: u32) -> f64 {
+fn value(case: &UserScene, competitor: Competitor, division: u32) -> f64 {
     (if competitor.is_by_tolerance() { 1.0 } else { case.interval() }) / f64::from(division)
 }
 
-fn rows(case: &Own, models: &[Model], truth: &Marched, forecast: &Forecast, quick: bool) -> Vec<Row> {
+fn rows(
+    case: &UserScene,
+    models: &[SceneModel],
+    truth: &RunSummary,
+    forecast: &Forecast,
+    quick: bool,
+) -> Vec<TotalRow> {
     let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
     let own = case.own_division();
     let competitors = competitors(case);
@@ -284,7 +290,7 @@ fn rows(case: &Own, models: &[Model], truth: &Marched, forecast: &Forecast, quic
                     _ => Err("its displacements cannot be compared with the truth".into()),
                 });
                 let own = model.own && competitor == case.method() && division == own;
-                rows.push(Row { model: index, competitor, step: value(case, competitor, division), own, outcome });
+                rows.push(TotalRow { model: index, competitor, step: value(case, competitor, division), own, outcome });
                 forecast.done(kind(0, competitor), work(case, &model.scene, competitor, division));
             }
         }
@@ -294,11 +300,11 @@ fn rows(case: &Own, models: &[Model], truth: &Marched, forecast: &Forecast, quic
 
 /// Displacements of a run, and the processor time of its steps (s): the median of several where it is short.
 fn observed(
-    case: &Own,
+    case: &UserScene,
     scene: &Scene,
     competitor: Competitor,
     division: u32,
-) -> std::result::Result<(f64, Marched), String> {
+) -> std::result::Result<(f64, RunSummary), String> {
     let Competitor::Core(scheme, solver) = competitor else { return Err("not on a scene of one's own".into()) };
     let scene = SceneRun::by(scene, (scheme, solver), case.interval(), division, 0.0);
     let (observer, points) = Observed::of(&scene.roms[master(&scene)]);
@@ -315,13 +321,13 @@ fn observed(
         times.push(taken);
         if times.iter().sum::<f64>() >= LEAST_TIME || times.len() == MOST_RUNS {
             times.sort_by(f64::total_cmp);
-            return Ok((times[times.len() / 2], Marched::of_displacements(points, displacements)));
+            return Ok((times[times.len() / 2], RunSummary::of_displacements(points, displacements)));
         }
     }
 }
 
 /// Error of the scene by its mesh, from others.
-fn mesh(case: &Own, refiner: &Refiner, again: &Again) -> Result<std::result::Result<f64, String>> {
+fn mesh(case: &UserScene, refiner: &Refiner, again: &Again) -> Result<std::result::Result<f64, String>> {
     if again.quick {
         return Ok(Err("other meshes are left out of a quick study".into()));
     }
@@ -342,25 +348,25 @@ mod tests {
     use tiprub_shell::console::Console;
 
     use super::*;
-    use crate::convergence::rows::tests::{Blade, scene};
+    use crate::convergence::rows::tests::{PatchedBlade, scene};
 
     /// One row is held against more, two are taken apart into one, and where none can be added the error is not called total.
     #[test]
     fn rows_are_part_of_a_total_error() {
         let (console, cache) = (Console::new(true, false), RomCache::off());
-        let total = |rows: usize, source: Option<&dyn crate::convergence::refine::Source>| {
-            let case = Own::of("a blade", scene(rows), &[], (Some(1.2e-3), true), &console).unwrap();
+        let total = |rows: usize, source: Option<&dyn crate::convergence::refine::RomSource>| {
+            let case = UserScene::of("a blade", scene(rows), &[], (Some(1.2e-3), true), &console).unwrap();
             let again =
                 Again { source, cache: &cache, mesh: 1.0, finest_tip: 4, only: &[], quick: true, console: &console };
             let forecast = Forecast::new(&console, "total errors", case.ledger());
             measure(&case, prepare(&case, &again).unwrap().unwrap(), &again, &forecast).unwrap().unwrap()
         };
-        let one = total(1, Some(&Blade));
+        let one = total(1, Some(&PatchedBlade));
         assert!(one.truth.starts_with("5 × 2 patches and 12 modes") && one.is_total(), "{}", one.truth);
         assert_eq!(one.directions()[0], ["steps", "modes", "patches", "rows"]);
         let error =
             |total: &Total| total.rows.iter().find(|row| row.own).and_then(|row| row.outcome.clone().ok()).unwrap().1;
-        let three = total(3, Some(&Blade));
+        let three = total(3, Some(&PatchedBlade));
         assert!(!three.is_total() && three.name() == "error of steps, modes and patches", "{}", three.name());
         assert!(error(&three) < error(&one), "{} {}", error(&three), error(&one));
         assert_eq!(three.models.iter().map(|model| model.tip("")).collect::<std::collections::BTreeSet<_>>().len(), 4);

@@ -5,13 +5,13 @@ use tiprub_figure::table::Table;
 use tiprub_shell::recording::shortest;
 
 use super::{
-    chart::{Chart, Points, front},
+    chart::{ErrorChart, Points, front},
     competitor::{Competitor, PAPER},
     ranking::seconds,
     sheets::{STEP, step_name},
-    total::{Model, Row, Total},
+    total::{SceneModel, Total, TotalRow},
 };
-use crate::{Figure, Picture, Sheet, Statement, estimate};
+use crate::{Picture, Sheet, Statement, StudyFigure, estimate};
 
 /// Errors that are asked for.
 pub const TARGETS: [f64; 3] = [1e-1, 1e-2, 1e-3];
@@ -57,18 +57,18 @@ impl Total {
     }
 
     /// Settings that ran, with time (s) and error.
-    fn ran(&self) -> impl Iterator<Item = (&Row, f64, f64)> {
+    fn ran(&self) -> impl Iterator<Item = (&TotalRow, f64, f64)> {
         self.rows.iter().filter_map(|row| row.outcome.as_ref().ok().map(|(seconds, error)| (row, *seconds, *error)))
     }
 
     /// The setting of least time with at most this error.
-    pub fn cheapest(&self, error: f64, only: Option<Competitor>) -> Option<(&Row, f64, f64)> {
+    pub fn cheapest(&self, error: f64, only: Option<Competitor>) -> Option<(&TotalRow, f64, f64)> {
         let good = self.ran().filter(|(row, _, own)| *own <= error && only.is_none_or(|only| row.competitor == only));
         good.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// "5 patches, 40 modes, modal-exact + lcp, h = 1.000 µs".
-    fn setting(&self, row: &Row) -> String {
+    fn setting(&self, row: &TotalRow) -> String {
         let model = &self.models[row.model];
         let (tip, modes) = (model.tip(self.touching), model.modes);
         format!("{tip}, {modes} modes, {}, {}", row.competitor.name(), row.competitor.setting(row.step))
@@ -133,7 +133,7 @@ impl Total {
         table
     }
 
-    fn chart(&self) -> Chart {
+    fn chart(&self) -> ErrorChart {
         let mut all: Vec<Points> = Vec::new();
         for (row, time, error) in self.ran() {
             match all.iter_mut().find(|points| points.competitor == row.competitor) {
@@ -141,7 +141,7 @@ impl Total {
                 None => all.push(Points { competitor: row.competitor, points: vec![(time, error)] }),
             }
         }
-        Chart {
+        ErrorChart {
             error_label: format!("{}, displacements (relative L2)", self.name()),
             all,
             joined: false,
@@ -161,7 +161,7 @@ impl Total {
     }
 
     /// Picture and tables.
-    pub fn figure(&self, title: &str) -> Figure {
+    pub fn figure(&self, title: &str) -> StudyFigure {
         let chart = self.chart();
         let mut html = chart.to_svg();
         html.push_str(&self.winners(title).to_html(false));
@@ -171,7 +171,7 @@ impl Total {
             Ok(mesh) => format!("The mesh leaves {mesh:.1e} more, whatever the setting"),
             Err(why) => format!("What the mesh leaves is not in it ({why})"),
         };
-        Figure {
+        StudyFigure {
             name: if self.is_total() { "scene-total" } else { "scene-own-model" },
             caption: format!(
                 "{title}: {} (displacements) at other steps, schemes, numbers of {}{} and of modes, against {}; {}. {mesh}.",
@@ -231,7 +231,7 @@ impl Total {
         let mut text = format!("competitor,{},rows,modes,{STEP},time (s),{},remark\n", self.touching, self.name());
         for row in &self.rows {
             let model = &self.models[row.model];
-            let Model { points, rows, modes, .. } = model;
+            let SceneModel { points, rows, modes, .. } = model;
             let start = format!("\"{}\",{points},{rows},{modes},{}", row.competitor.name(), shortest(row.step));
             text.push_str(&match &row.outcome {
                 Ok((time, error)) => format!("{start},{time:.4e},{error:.4e},\n"),
@@ -246,7 +246,7 @@ impl Total {
         let Some((row, time, error)) = self.cheapest(target, None).filter(|_| !self.hidden(target)) else {
             return format!("{},{target:e},,,,,,,\n", self.key());
         };
-        let (Model { points, rows, modes, .. }, name) = (&self.models[row.model], row.competitor.name());
+        let (SceneModel { points, rows, modes, .. }, name) = (&self.models[row.model], row.competitor.name());
         let key = self.key();
         format!("{key},{target:e},\"{name}\",{points},{rows},{modes},{},{time:.4e},{error:.4e}\n", shortest(row.step))
     }
@@ -255,7 +255,7 @@ impl Total {
     pub fn to_json(&self) -> Value {
         let error_name = if self.is_total() { "total_error" } else { "error" };
         let [refined, not_refined] = self.directions();
-        let row = |row: &Row| {
+        let row = |row: &TotalRow| {
             let model = &self.models[row.model];
             let (time, error) = row.outcome.as_ref().map_or((None, None), |(time, error)| (Some(time), Some(error)));
             json!({

@@ -5,7 +5,7 @@ use std::{iter::zip, ops::Range};
 use tiprub_figure::table::Table;
 
 use super::{
-    case::Case,
+    case::ErrorCase,
     competitor::{Competitor, DEFAULT},
     measure::{STILL, parts_apart, worst},
     run::{self, Trace},
@@ -25,7 +25,7 @@ const FINE: u32 = 160;
 ///
 /// # Errors
 /// A run fails.
-pub fn parting(case: &dyn Case, division: u32, samples: usize) -> Result<Vec<f64>, String> {
+pub fn parting(case: &dyn ErrorCase, division: u32, samples: usize) -> Result<Vec<f64>, String> {
     let trace = |perturbation: f64| {
         let mut run = case.start(case.standard(), DEFAULT, division, perturbation)?;
         run::trace(run.as_mut(), samples)
@@ -56,7 +56,7 @@ pub fn samples(parting: &[f64], most: usize) -> usize {
 }
 
 /// Whether the window of a scene ends before its runs part.
-pub fn statement(case: &dyn Case) -> Option<Statement> {
+pub fn statement(case: &dyn ErrorCase) -> Option<Statement> {
     let parting = case.parting();
     let end = *parting.get(case.samples().checked_sub(1)?)?;
     let last = parting.last()?;
@@ -78,7 +78,7 @@ pub fn statement(case: &dyn Case) -> Option<Statement> {
 
 /// Effective displacement and mean force from the end of the window on, of every competitor at one step, against the
 /// product at a fine one; `None` for scenes that end with their window.
-pub fn statistics(case: &dyn Case) -> Option<Table> {
+pub fn statistics(case: &dyn ErrorCase) -> Option<Table> {
     let samples = case.parting().len();
     if samples <= case.samples() {
         return None;

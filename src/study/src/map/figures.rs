@@ -4,11 +4,11 @@ use tiprub_figure::plots::{Plot, Series};
 use tiprub_shell::Result;
 
 use super::{
-    MODES, Map, Response,
+    MODES, Map, SpeedResponse,
     findings::order_curve,
-    picture::{Column, HeatMap, Line, LineKind},
+    picture::{HeatMap, LineKind, MapLine, SpeedColumn},
 };
-use crate::{Figure, Picture, Sheet};
+use crate::{Picture, Sheet, StudyFigure};
 
 /// Decades of amplitude that have a colour.
 const DECADES: f64 = 4.0;
@@ -18,14 +18,14 @@ const POINTS: u32 = 24;
 const CURVES: usize = 3;
 
 /// All figures.
-pub fn figures(map: &Map) -> Result<Vec<Figure>> {
+pub fn figures(map: &Map) -> Result<Vec<StudyFigure>> {
     let mut figures = vec![heat_map(map), amplitudes(map)?];
     figures.extend(contact(map)?);
     figures.extend(spectrum(map)?);
     Ok(figures)
 }
 
-fn lines(map: &Map) -> Vec<Line> {
+fn lines(map: &Map) -> Vec<MapLine> {
     let range = [map.runs[0].speed, map.runs[map.runs.len() - 1].speed];
     let speed = |index: u32| range[0] + (range[1] - range[0]) * f64::from(index) / f64::from(POINTS);
     let mut lines = Vec::new();
@@ -33,7 +33,7 @@ fn lines(map: &Map) -> Vec<Line> {
     for order in most {
         let excited = map.prediction.excites(order as usize);
         let turns = |speed: f64| (speed, f64::from(order) * speed / std::f64::consts::TAU);
-        lines.push(Line {
+        lines.push(MapLine {
             points: vec![turns(range[0]), turns(range[1])],
             label: if excited { format!("{order}Ω") } else { String::new() },
             kind: if excited { LineKind::Excited } else { LineKind::Silent },
@@ -47,12 +47,12 @@ fn lines(map: &Map) -> Vec<Line> {
         .filter(|(_, mode)| *mode > 0.0 && *mode <= map.setup.top);
     for (index, _) in shown.take(MODES * 40) {
         let points = (0..=POINTS).map(|point| (speed(point), map.prediction.lines(speed(point))[index])).collect();
-        lines.push(Line { points, label: String::new(), kind: LineKind::Mode });
+        lines.push(MapLine { points, label: String::new(), kind: LineKind::Mode });
     }
     lines
 }
 
-fn heat_map(map: &Map) -> Figure {
+fn heat_map(map: &Map) -> StudyFigure {
     let micro: Vec<Option<Vec<f64>>> = map
         .runs
         .iter()
@@ -60,7 +60,7 @@ fn heat_map(map: &Map) -> Figure {
         .collect();
     let largest = micro.iter().flatten().flatten().copied().fold(f64::MIN_POSITIVE, f64::max);
     let resolution = |speed: f64| speed / std::f64::consts::TAU / map.setup.revolutions as f64;
-    let columns = map.runs.iter().zip(&micro).map(|(run, amplitudes)| Column {
+    let columns = map.runs.iter().zip(&micro).map(|(run, amplitudes)| SpeedColumn {
         speed: run.speed,
         resolution: resolution(run.speed),
         amplitudes: amplitudes.as_deref(),
@@ -73,7 +73,7 @@ fn heat_map(map: &Map) -> Figure {
         marks: map.coincidences.iter().map(|one| (one.crossing.speed, one.crossing.frequency)).collect(),
     };
     let svg = picture.to_svg();
-    Figure {
+    StudyFigure {
         name: "map",
         caption: format!(
             "Amplitude of the displacement of the leading edge, of the blade that has most, over angular velocity and frequency in \
@@ -122,7 +122,7 @@ fn strongest_orders(map: &Map) -> Vec<usize> {
     orders.into_iter().take(CURVES).map(|order| order.0).collect()
 }
 
-fn amplitudes(map: &Map) -> Result<Figure> {
+fn amplitudes(map: &Map) -> Result<StudyFigure> {
     let orders = strongest_orders(map);
     let deflection =
         |node: usize| map.answered().map(|(speed, response)| (speed, 1e6 * response.deflection[node])).collect();
@@ -156,11 +156,11 @@ fn amplitudes(map: &Map) -> Result<Figure> {
         let bin = |order: &usize| response.largest_blade[0].get(order * map.setup.revolutions).copied();
         let mut row = vec![run.speed, response.deflection[0], response.deflection[1]];
         row.extend(orders.iter().map(|order| bin(order).unwrap_or(f64::NAN)));
-        let Response { contact_share, normal_force, largest_force, penetration, drift, .. } = response;
+        let SpeedResponse { contact_share, normal_force, largest_force, penetration, drift, .. } = response;
         row.extend([*contact_share, *normal_force, *largest_force, *penetration, *drift]);
         sheet.rows.push(row);
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "amplitudes",
         caption: "Largest distance of the tip nodes from their mean position over all blades, and amplitudes of the strongest engine \
                   orders, against angular velocity."
@@ -176,17 +176,17 @@ fn against_speed(
     name: &'static str,
     [caption, column, axis]: [&str; 3],
     shown: f64,
-    value: impl Fn(&Response) -> f64,
-) -> Result<Figure> {
+    value: impl Fn(&SpeedResponse) -> f64,
+) -> Result<StudyFigure> {
     let points: Vec<(f64, f64)> = map.answered().map(|(speed, response)| (speed, value(response))).collect();
     let series = Series::line("", points.iter().map(|(speed, value)| (*speed, shown * value)).collect());
     let plot = Plot { height: 260, ..Plot::new("angular velocity (rad/s)", axis, vec![series]) };
     let mut sheet = Sheet::new(["speed (rad/s)", column]);
     sheet.rows = points.into_iter().map(|(speed, value)| vec![speed, value]).collect();
-    Ok(Figure { name, caption: caption.into(), picture: Picture::plot(&plot)?, sheet })
+    Ok(StudyFigure { name, caption: caption.into(), picture: Picture::plot(&plot)?, sheet })
 }
 
-fn contact(map: &Map) -> Result<[Figure; 2]> {
+fn contact(map: &Map) -> Result<[StudyFigure; 2]> {
     let time = [
         "Share of time in which a blade touches (mean of all blades) against angular velocity.",
         "share of time in contact",
@@ -204,7 +204,7 @@ fn contact(map: &Map) -> Result<[Figure; 2]> {
 }
 
 /// The spectrum at the speed of the largest response.
-fn spectrum(map: &Map) -> Result<Option<Figure>> {
+fn spectrum(map: &Map) -> Result<Option<StudyFigure>> {
     let largest = map.answered().max_by(|a, b| a.1.deflection[0].total_cmp(&b.1.deflection[0]));
     let Some((speed, response)) = largest else { return Ok(None) };
     let points = |spectrum: &[f64]| {
@@ -217,7 +217,7 @@ fn spectrum(map: &Map) -> Result<Option<Figure>> {
     let mut sheet = Sheet::new(["frequency (Hz)", "leading edge (m)", "trailing edge (m)"]);
     let rows = leading.iter().zip(trailing).enumerate();
     sheet.rows = rows.map(|(bin, (a, b))| vec![bin as f64 * response.resolution, *a, *b]).collect();
-    Ok(Some(Figure {
+    Ok(Some(StudyFigure {
         name: "spectrum",
         caption: format!("Spectrum of the first blade at {speed:.2} rad/s, where the leading edge swings most."),
         picture: Picture::plot(&plot)?,

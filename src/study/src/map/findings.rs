@@ -5,8 +5,8 @@ use tiprub_core::{Scene, dynamics::modal::ModalModel};
 use tiprub_shell::{Failure, Result};
 
 use super::{
-    prediction::{Crossing, Prediction},
-    run::Run,
+    prediction::{Crossing, FrequencyPrediction},
+    run::SpeedRun,
     spectrum, start,
 };
 use crate::Sheet;
@@ -52,7 +52,7 @@ impl MapPeak {
     }
 
     /// Whether it lies on an engine order that the casing excites, to within a bin.
-    pub fn on_order(&self, prediction: &Prediction) -> bool {
+    pub fn on_order(&self, prediction: &FrequencyPrediction) -> bool {
         let nearest = self.order.round();
         let excited = prediction.base_order > 0 && (nearest / prediction.base_order as f64).fract() == 0.0;
         excited && nearest > 0.0 && (self.order - nearest).abs() <= self.bin
@@ -83,7 +83,7 @@ impl Coincidence {
 }
 
 /// All peaks, speed by speed.
-pub fn peaks(runs: &[Run]) -> Vec<MapPeak> {
+pub fn peaks(runs: &[SpeedRun]) -> Vec<MapPeak> {
     let responses = || runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().ok()?)));
     let spectra = responses().flat_map(|(_, response)| response.largest_blade[0].iter().skip(spectrum::FIRST_BIN));
     let least = LEAST_PEAK * spectra.copied().fold(0.0, f64::max);
@@ -103,15 +103,15 @@ pub fn peaks(runs: &[Run]) -> Vec<MapPeak> {
 }
 
 /// Amplitude of one engine order at every speed (m), at the leading edge of the blade that swings most.
-pub fn order_curve(runs: &[Run], order: usize, revolutions: usize) -> Vec<(f64, f64)> {
-    let amplitude = |run: &Run| run.outcome.as_ref().ok()?.largest_blade[0].get(order * revolutions).copied();
+pub fn order_curve(runs: &[SpeedRun], order: usize, revolutions: usize) -> Vec<(f64, f64)> {
+    let amplitude = |run: &SpeedRun| run.outcome.as_ref().ok()?.largest_blade[0].get(order * revolutions).copied();
     runs.iter().filter_map(|run| Some((run.speed, amplitude(run)?))).collect()
 }
 
 /// The excited crossings with the response found between those of the same engine order beside them.
 pub fn coincidences(
-    runs: &[Run],
-    prediction: &Prediction,
+    runs: &[SpeedRun],
+    prediction: &FrequencyPrediction,
     crossings: &[Crossing],
     revolutions: usize,
 ) -> Vec<Coincidence> {
@@ -133,7 +133,7 @@ pub fn coincidences(
 
 /// Speeds (rad/s) at which the response to an engine order is that of this crossing. Contact stiffens, so that it leans
 /// upwards from the crossing, maybe far: it ends only where that of the next crossing of the same order may begin.
-fn window(prediction: &Prediction, crossing: &Crossing) -> [f64; 2] {
+fn window(prediction: &FrequencyPrediction, crossing: &Crossing) -> [f64; 2] {
     let Crossing { order, speed, .. } = *crossing;
     let all = || (0..prediction.modes(order, speed).len()).filter_map(|mode| prediction.meeting(order, mode));
     let below = all().filter(|other| *other < speed && *other > 0.0).max_by(f64::total_cmp);
@@ -179,7 +179,7 @@ pub fn static_displacement(scene: &Scene, depth: f64) -> Result<Option<f64>> {
 }
 
 /// The list of peaks as a table.
-pub fn peak_sheet(peaks: &[MapPeak], prediction: &Prediction) -> Sheet {
+pub fn peak_sheet(peaks: &[MapPeak], prediction: &FrequencyPrediction) -> Sheet {
     let mut sheet = Sheet::new([
         "speed (rad/s)",
         "frequency (Hz)",

@@ -11,22 +11,22 @@ mod start;
 mod statements;
 
 use findings::{Coincidence, MapPeak};
-use prediction::{Crossing, Prediction};
+use prediction::{Crossing, FrequencyPrediction};
 use serde_json::json;
 use tiprub_core::{Scene, settings::SpinSettings};
 use tiprub_gallery::scene_source;
 use tiprub_shell::{
     Failure, Result,
     console::Console,
-    forecast::{Forecast, Ledger},
+    forecast::{Forecast, WorkPlan},
     sweep,
 };
 
 use super::{Statement, Study};
 use crate::arguments::{MapArguments, Speeds};
 use crate::one_rotor_and_friction;
-pub use run::{Response, Run, Setup};
-use start::Start;
+pub use run::{MapSetup, SpeedResponse, SpeedRun};
+use start::MapStart;
 
 /// Angular velocities, relative to the one at which the second harmonic of the casing meets the first mode: a fifth to both
 /// sides, and above it room for what leans to higher speeds (see [`LEAN`]).
@@ -56,10 +56,10 @@ const HARMONIC: usize = 2;
 
 /// What was asked, and everything found.
 struct Map {
-    setup: Setup,
-    prediction: Prediction,
+    setup: MapSetup,
+    prediction: FrequencyPrediction,
     crossings: Vec<Crossing>,
-    runs: Vec<Run>,
+    runs: Vec<SpeedRun>,
     peaks: Vec<MapPeak>,
     coincidences: Vec<Coincidence>,
     /// How far the casing reaches beyond the tips at rest (m).
@@ -68,7 +68,7 @@ struct Map {
     depth: f64,
     /// Displacement of the leading edge when it is pushed back slowly by that much (m).
     static_displacement: Option<f64>,
-    start: Start,
+    start: MapStart,
 }
 
 /// The study: run all speeds, transform, draw, compare.
@@ -82,7 +82,7 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     start::master(&settings)?;
     one_rotor_and_friction(&settings)?;
     let scene = arguments.common.options.load(name, &arguments.common.cache.cache(), console)?;
-    let request = Request {
+    let request = MapRequest {
         quick: arguments.common.quick,
         speeds: arguments.speeds,
         revolutions: arguments.revolutions.map(std::num::NonZero::get),
@@ -92,7 +92,7 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
     let (study, warnings) = {
         // Nothing is known of its rate before the first run is done.
-        let forecast = Forecast::new(console, "Running the interaction map", Ledger::new(0.0));
+        let forecast = Forecast::new(console, "Running the interaction map", WorkPlan::new(0.0));
         let found = of_scene(scene, &request, threads, |done, all, steps| match done {
             0 => forecast.plan(0, steps),
             _ => forecast.done(0, steps / all as f64),
@@ -106,7 +106,7 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
 
 /// What is asked of a scene; `None` is the default of the study.
 #[derive(Debug, Clone, Default)]
-pub struct Request {
+pub struct MapRequest {
     /// Few short runs.
     pub quick: bool,
     /// Angular velocities.
@@ -126,7 +126,7 @@ pub struct Request {
 /// As [`study`].
 pub fn of_scene(
     scene: Scene,
-    request: &Request,
+    request: &MapRequest,
     threads: usize,
     progress: impl Fn(usize, usize, f64),
 ) -> Result<(Study, Vec<String>)> {
@@ -152,18 +152,18 @@ pub fn of_scene(
 
 impl Map {
     /// Everything before the runs, and the speeds to run.
-    fn prepare(scene: Scene, request: &Request) -> Result<(Self, Vec<f64>)> {
+    fn prepare(scene: Scene, request: &MapRequest) -> Result<(Self, Vec<f64>)> {
         if request.settings.iter().any(|(name, _)| name == "speed") {
             return Err(Failure::usage("--set speed", "the study sets the speed", "Use --speeds FROM:TO:COUNT"));
         }
         let mut setup =
-            Setup { scene, settings: request.settings.clone(), samples: 0, transient: 0, revolutions: 0, top: 0.0 };
+            MapSetup { scene, settings: request.settings.clone(), samples: 0, transient: 0, revolutions: 0, top: 0.0 };
         let master = start::master(&setup.scene.settings)?;
         let fastest = setup.scene.roms[master].extras.spin.as_ref().map_or(0.0, |spin| spin.largest_speed);
         // At its own speed: those of the study may be refused.
         let probe = setup.simulation(setup.scene.settings.structures[master].speed.abs())?;
-        let start = Start::of(&setup.scene, &probe)?;
-        let prediction = Prediction::new(&setup.scene, &start, fastest)?;
+        let start = MapStart::of(&setup.scene, &probe)?;
+        let prediction = FrequencyPrediction::new(&setup.scene, &start, fastest)?;
         let turns = setup.scene.settings.structures[master].spin != SpinSettings::default();
         let speeds = speeds(&prediction, request, if turns { fastest } else { f64::INFINITY })?;
         let range = [speeds[0], speeds[speeds.len() - 1]];
@@ -201,14 +201,14 @@ impl Map {
 
     /// How many internal steps the runs at these speeds (rad/s) will make.
     fn internal_steps(&self, speeds: &[f64]) -> f64 {
-        let Setup { samples, transient, revolutions, .. } = self.setup;
+        let MapSetup { samples, transient, revolutions, .. } = self.setup;
         let count = (transient as f64 + revolutions as f64) * samples as f64;
         let per_sample = |speed: &f64| std::f64::consts::TAU / (speed * samples as f64 * self.start.longest_step);
         speeds.iter().map(|speed| count * per_sample(speed).ceil().max(1.0)).sum()
     }
 
     /// The runs that were not refused.
-    fn answered(&self) -> impl Iterator<Item = (f64, &Response)> {
+    fn answered(&self) -> impl Iterator<Item = (f64, &SpeedResponse)> {
         self.runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().ok()?)))
     }
 
@@ -355,7 +355,7 @@ impl Map {
 
 /// The angular velocities asked for, or those around the resonance of the second harmonic of the casing, up to the `fastest`
 /// one (rad/s) that the model holds for.
-fn speeds(prediction: &Prediction, request: &Request, fastest: f64) -> Result<Vec<f64>> {
+fn speeds(prediction: &FrequencyPrediction, request: &MapRequest, fastest: f64) -> Result<Vec<f64>> {
     if let Some(speeds) = request.speeds {
         return Ok(speeds.values());
     }

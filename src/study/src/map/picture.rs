@@ -29,7 +29,7 @@ const VIRIDIS: [[f64; 3]; 9] = [
 
 /// Amplitudes of one speed.
 #[derive(Debug, Clone, Copy)]
-pub struct Column<'a> {
+pub struct SpeedColumn<'a> {
     /// Angular velocity (rad/s).
     pub speed: f64,
     /// Distance of the bins (Hz).
@@ -40,7 +40,7 @@ pub struct Column<'a> {
 
 /// A line on the map.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Line {
+pub struct MapLine {
     /// Points (speed in rad/s, frequency in Hz).
     pub points: Vec<(f64, f64)>,
     /// Text at the right end.
@@ -64,13 +64,13 @@ pub enum LineKind {
 #[derive(Debug, Clone)]
 pub struct HeatMap<'a> {
     /// Speeds ascending.
-    pub columns: Vec<Column<'a>>,
+    pub columns: Vec<SpeedColumn<'a>>,
     /// Highest frequency (Hz).
     pub top: f64,
     /// Amplitudes of the first and the last colour (µm).
     pub range: [f64; 2],
     /// Lines, drawn in this order.
-    pub lines: Vec<Line>,
+    pub lines: Vec<MapLine>,
     /// Marks: excited crossings as circles.
     pub marks: Vec<(f64, f64)>,
 }
@@ -129,7 +129,7 @@ impl HeatMap<'_> {
 
     /// Largest amplitude within a row of the picture, that of the nearest bin where none lies in it.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows and bins are few")]
-    fn row(&self, column: &Column<'_>, amplitudes: &[f64], row: usize) -> f64 {
+    fn row(&self, column: &SpeedColumn<'_>, amplitudes: &[f64], row: usize) -> f64 {
         let edge = |row: usize| self.top * row as f64 / ROWS as f64 / column.resolution;
         let (first, last) = (edge(row).ceil() as usize, edge(row + 1).ceil() as usize);
         let inside = amplitudes.get(first..last.min(amplitudes.len())).unwrap_or(&[]);
@@ -290,8 +290,8 @@ fn color(share: f64) -> String {
 mod tests {
     use super::*;
 
-    fn map<'a>(columns: Vec<Column<'a>>) -> HeatMap<'a> {
-        let line = |kind, label: &str| Line { points: vec![(90.0, 30.0), (110.0, 40.0)], label: label.into(), kind };
+    fn map<'a>(columns: Vec<SpeedColumn<'a>>) -> HeatMap<'a> {
+        let line = |kind, label: &str| MapLine { points: vec![(90.0, 30.0), (110.0, 40.0)], label: label.into(), kind };
         HeatMap {
             columns,
             top: 100.0,
@@ -305,7 +305,7 @@ mod tests {
     fn a_line_of_the_spectrum_is_one_rectangle_at_its_place() {
         let mut amplitudes = vec![0.0; 101];
         amplitudes[50] = 200.0;
-        let column = |speed| Column { speed, resolution: 1.0, amplitudes: Some(&amplitudes) };
+        let column = |speed| SpeedColumn { speed, resolution: 1.0, amplitudes: Some(&amplitudes) };
         let svg = map(vec![column(90.0), column(110.0)]).to_svg();
         let cells = svg.split(r#"<path fill=""#).nth(1).unwrap();
         let cells = cells.split(r#"d=""#).nth(1).unwrap().split('"').next().unwrap();
@@ -324,9 +324,9 @@ mod tests {
     fn refused_runs_are_marked_and_labels_are_there() {
         let amplitudes = vec![1.0; 101];
         let columns = vec![
-            Column { speed: 90.0, resolution: 1.0, amplitudes: Some(&amplitudes) },
-            Column { speed: 100.0, resolution: 1.0, amplitudes: None },
-            Column { speed: 110.0, resolution: 1.0, amplitudes: Some(&amplitudes) },
+            SpeedColumn { speed: 90.0, resolution: 1.0, amplitudes: Some(&amplitudes) },
+            SpeedColumn { speed: 100.0, resolution: 1.0, amplitudes: None },
+            SpeedColumn { speed: 110.0, resolution: 1.0, amplitudes: Some(&amplitudes) },
         ];
         let svg = map(columns).to_svg();
         assert_eq!(svg.matches("refused").count(), 1);

@@ -4,11 +4,11 @@ use realfft::RealFftPlanner;
 use tiprub_core::{
     Scene,
     dynamics::{cyclic::CyclicModel, modal::ModalModel},
-    gaps::shape::Surface,
+    gaps::shape::CompiledShape,
 };
 use tiprub_shell::{Failure, Result};
 
-use super::start::{Start, master};
+use super::start::{MapStart, master};
 
 /// The nodal diameter that an engine order excites among `sectors` blades, and whether the wave runs backwards.
 ///
@@ -28,7 +28,7 @@ const NOTHING: f64 = 1e-6;
 
 /// Natural frequencies of the master over a range of speeds, and what the casing excites.
 #[derive(Debug, Clone)]
-pub struct Prediction {
+pub struct FrequencyPrediction {
     /// Speeds of the grid (rad/s).
     speeds: Vec<f64>,
     /// `[speed][nodal diameter][mode]` (Hz); one nodal diameter where sectors are uncoupled, one speed where the modes do not
@@ -56,12 +56,12 @@ pub struct Crossing {
     pub excited: bool,
 }
 
-impl Prediction {
+impl FrequencyPrediction {
     /// Of the first master of a scene with its start values, at speeds up to `fastest` (rad/s).
     ///
     /// # Errors
     /// A ROM whose eigenproblem cannot be solved, a shape that cannot be evaluated.
-    pub fn new(scene: &Scene, start: &Start, fastest: f64) -> Result<Self> {
+    pub fn new(scene: &Scene, start: &MapStart, fastest: f64) -> Result<Self> {
         let master = master(&scene.settings)?;
         let (structure, rom) = (&scene.settings.structures[master], &scene.roms[master]);
         let in_rom = |error| Failure::from_core(format!("ROM `{}`", rom.name), error);
@@ -141,14 +141,14 @@ pub fn shape(scene: &Scene, factor: f64) -> Result<Vec<f64>> {
     let (Some(contact), Some(surface)) = (scene.settings.contacts.first(), scene.settings.surfaces.first()) else {
         return Ok(vec![0.0; ANGLES]);
     };
-    let shape = Surface::new(&surface.shape, contact.gap).map_err(|error| Failure::from_core("casing", error))?;
+    let shape = CompiledShape::new(&surface.shape, contact.gap).map_err(|error| Failure::from_core("casing", error))?;
     let angle = |index: usize| std::f64::consts::TAU * index as f64 / ANGLES as f64;
     Ok((0..ANGLES).map(|index| factor * shape.evaluate(angle(index)).0).collect())
 }
 
 /// Greatest common divisor of the orders in the shape of the casing and in what else acts. Contact makes harmonics of what
 /// is there, and nothing else as long as the motion repeats with it.
-fn base_order(scene: &Scene, start: &Start) -> Result<usize> {
+fn base_order(scene: &Scene, start: &MapStart) -> Result<usize> {
     let mut values = shape(scene, start.shape_factor)?;
     let transform = RealFftPlanner::new().plan_fft_forward(values.len());
     let mut harmonics = transform.make_output_vec();
@@ -168,7 +168,7 @@ pub(super) mod tests {
     use nalgebra::DMatrix;
     use tiprub_core::{
         Rom,
-        rom::{ContactNode, Frame, RomChecks, RomExtras, Spin},
+        rom::{ContactNode, DisplacementFrame, RomChecks, RomExtras, Spin},
         settings::Shape,
     };
 
@@ -187,7 +187,7 @@ pub(super) mod tests {
             name: "beam".into(),
             origin: "test".into(),
             sectors,
-            frame: Frame::Cylindrical,
+            frame: DisplacementFrame::Cylindrical,
             mass: DMatrix::identity(2, 2) * 0.1,
             stiffness: DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![
                 square(frequency),
@@ -209,14 +209,14 @@ pub(super) mod tests {
     #[test]
     fn two_lobes_excite_even_orders_and_what_acts_adds_its_own() {
         let mut scene = scene(100.0, 4);
-        let with = |scene: &Scene, start: &Start| Prediction::new(scene, start, 1.0).unwrap().base_order;
-        let base = |scene: &Scene| with(scene, &Start::default());
-        let acting = |orders: &[usize]| Start { orders: orders.to_vec(), ..Start::default() };
+        let with = |scene: &Scene, start: &MapStart| FrequencyPrediction::new(scene, start, 1.0).unwrap().base_order;
+        let base = |scene: &Scene| with(scene, &MapStart::default());
+        let acting = |orders: &[usize]| MapStart { orders: orders.to_vec(), ..MapStart::default() };
         assert_eq!(base(&scene), 2);
         assert_eq!(with(&scene, &acting(&[6])), 2);
         assert_eq!(with(&scene, &acting(&[3])), 1);
-        assert_eq!(with(&scene, &Start { shape_factor: 0.0, ..acting(&[]) }), 0);
-        assert_eq!(with(&scene, &Start { shape_factor: 0.0, ..acting(&[6, 9]) }), 3);
+        assert_eq!(with(&scene, &MapStart { shape_factor: 0.0, ..acting(&[]) }), 0);
+        assert_eq!(with(&scene, &MapStart { shape_factor: 0.0, ..acting(&[6, 9]) }), 3);
         scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 3, phase: 0.2 };
         assert_eq!(base(&scene), 3);
         scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -226,7 +226,7 @@ pub(super) mod tests {
 
     #[test]
     fn engine_orders_meet_modes_where_they_should() {
-        let prediction = Prediction::new(&scene(100.0, 4), &Start::default(), 1.0).unwrap();
+        let prediction = FrequencyPrediction::new(&scene(100.0, 4), &MapStart::default(), 1.0).unwrap();
         let found = prediction.crossings([140.0, 160.0], 1100.0);
         let of_first: Vec<_> = found.iter().filter(|crossing| crossing.mode == 0).collect();
         assert_eq!(of_first.len(), 1, "{found:?}");
@@ -249,7 +249,9 @@ pub(super) mod tests {
             centrifugal_load_speed4: vec![0.0; 2],
             largest_speed: 1000.0,
         });
-        let meeting = |scene: &Scene| Prediction::new(scene, &Start::default(), 400.0).unwrap().meeting(4, 0).unwrap();
+        let meeting = |scene: &Scene| {
+            FrequencyPrediction::new(scene, &MapStart::default(), 400.0).unwrap().meeting(4, 0).unwrap()
+        };
         assert!((meeting(&scene) - 50.0 * std::f64::consts::PI).abs() < 1e-9, "stiffening is not asked for");
         scene.settings.structures[0].spin.stiffening = true;
         let expected = std::f64::consts::TAU * 100.0 / (16.0 - campbell).sqrt();

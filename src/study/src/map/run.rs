@@ -24,7 +24,7 @@ const LEAST_FACTOR: f64 = 4.0;
 
 /// What all runs share.
 #[derive(Debug, Clone)]
-pub struct Setup {
+pub struct MapSetup {
     /// The scene, but for the size of its speed.
     pub scene: Scene,
     /// Start values replaced (name, value as text).
@@ -41,17 +41,17 @@ pub struct Setup {
 
 /// What came of one speed.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub struct SpeedRun {
     /// Angular velocity (rad/s).
     pub speed: f64,
     /// The response, or why there is none.
-    pub outcome: Result<Response, String>,
+    pub outcome: Result<SpeedResponse, String>,
 }
 
 /// Response in the window at one speed. Of the two ends of a blade tip the leading edge comes first; a structure with one
 /// contact node has it twice.
 #[derive(Debug, Clone)]
-pub struct Response {
+pub struct SpeedResponse {
     /// Distance of the bins (Hz).
     pub resolution: f64,
     /// Amplitude of the displacement vector per bin, first blade (m).
@@ -84,7 +84,7 @@ pub struct Response {
 
 /// Sums over the window.
 #[derive(Debug, Default)]
-struct Tally {
+struct WindowTally {
     steps: u64,
     touching: u64,
     force: f64,
@@ -92,7 +92,7 @@ struct Tally {
     penetration: f64,
 }
 
-impl Tally {
+impl WindowTally {
     fn add(&mut self, system: &System, touched: &mut [bool]) {
         touched.fill(false);
         for event in system.events() {
@@ -106,7 +106,7 @@ impl Tally {
     }
 }
 
-impl Setup {
+impl MapSetup {
     /// A simulation with its start values, not yet initialised, that turns with `speed` (rad/s) in the sense of the scene.
     ///
     /// # Errors
@@ -162,9 +162,9 @@ impl Setup {
     ///
     /// # Errors
     /// None but those of programming.
-    pub fn run(&self, speed: f64) -> Result<Run> {
+    pub fn run(&self, speed: f64) -> Result<SpeedRun> {
         let outcome = self.response(speed).map_err(|failure| failure.to_string());
-        Ok(Run { speed, outcome })
+        Ok(SpeedRun { speed, outcome })
     }
 
     /// Where a tolerance takes the place of the step, what is called that is how long blades may go unseen: at most `longest` (s).
@@ -181,7 +181,7 @@ impl Setup {
         Ok(())
     }
 
-    fn response(&self, speed: f64) -> Result<Response> {
+    fn response(&self, speed: f64) -> Result<SpeedResponse> {
         let mut simulation = self.simulation(speed)?;
         let start = self.scene.settings.experiment.start;
         // A whole number of samples per revolution: engine orders then lie in the middle of bins.
@@ -211,7 +211,7 @@ impl Setup {
 
 /// A simulation on its way.
 struct March<'a> {
-    setup: &'a Setup,
+    setup: &'a MapSetup,
     speed: f64,
     start: f64,
     /// Communication step (s).
@@ -223,11 +223,11 @@ struct March<'a> {
 }
 
 /// What the window leaves.
-struct Recording {
+struct WindowRecording {
     decimator: Decimator,
     /// Contact rows recorded per blade: two nodes, three components each.
     blades: Vec<usize>,
-    tally: Tally,
+    tally: WindowTally,
     factor: usize,
 }
 
@@ -260,7 +260,7 @@ impl March<'_> {
         (0..count).try_for_each(|_| self.advance(|_| {}))
     }
 
-    fn record(&mut self) -> Result<Recording> {
+    fn record(&mut self) -> Result<WindowRecording> {
         let bank = self.simulation.system().bank();
         let (sectors, nodes, count) = (bank.sectors(), bank.rows() / 3, self.setup.revolutions * self.setup.samples);
         let rows: Vec<usize> = [0, nodes - 1].into_iter().flat_map(|node| 3 * node..3 * node + 3).collect();
@@ -269,7 +269,7 @@ impl March<'_> {
         let factor = self.factor()?;
         let before = self.internal_steps;
         let mut decimator = Decimator::new(factor, blades.len() * rows.len(), count);
-        let (mut values, mut touched, mut tally) = (Vec::new(), vec![false; sectors], Tally::default());
+        let (mut values, mut touched, mut tally) = (Vec::new(), vec![false; sectors], WindowTally::default());
         for _ in 0..count + Decimator::TAIL {
             self.advance(|system| {
                 values.clear();
@@ -284,7 +284,7 @@ impl March<'_> {
             let problem = format!("{steps} internal steps in {count} samples of {factor}");
             return Err(Failure::new("sampling", problem, "Report this to the developers"));
         }
-        Ok(Recording { decimator, blades, tally, factor })
+        Ok(WindowRecording { decimator, blades, tally, factor })
     }
 
     /// Internal steps of one communication step.
@@ -294,9 +294,9 @@ impl March<'_> {
         Ok(usize::try_from(self.internal_steps - before).unwrap_or(usize::MAX))
     }
 
-    fn finish(self, recording: Recording, clock: Instant) -> Result<Response> {
+    fn finish(self, recording: WindowRecording, clock: Instant) -> Result<SpeedResponse> {
         let stepping = clock.elapsed();
-        let Recording { decimator, blades, tally, factor } = recording;
+        let WindowRecording { decimator, blades, tally, factor } = recording;
         let setup = self.setup;
         let count = setup.revolutions * setup.samples;
         let resolution = self.speed / (std::f64::consts::TAU * setup.revolutions as f64);
@@ -330,7 +330,7 @@ impl March<'_> {
         let residual = self.simulation.table().with_quantity(Quantity::EnergyResidualRelative);
         let residual = residual.map_or(Ok(0.0), |variable| self.simulation.real(variable.reference));
         let steps = tally.steps as f64;
-        Ok(Response {
+        Ok(SpeedResponse {
             resolution,
             first_blade,
             largest_blade,

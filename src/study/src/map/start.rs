@@ -2,14 +2,14 @@
 
 use tiprub_core::{
     Scene, Simulation,
-    settings::{Motion, SceneSettings},
+    settings::{BodyMotion, SceneSettings},
     variables::Quantity,
 };
 use tiprub_shell::{Failure, Result};
 
 /// Start values that the prediction and the facts depend on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Start {
+pub struct MapStart {
     /// Smallest and largest clearance of the tips from the round casing (m).
     pub clearance: [f64; 2],
     /// Factor on the casing's shape.
@@ -28,7 +28,7 @@ pub struct Start {
     pub longest_step: f64,
 }
 
-impl Default for Start {
+impl Default for MapStart {
     fn default() -> Self {
         Self {
             clearance: [0.0; 2],
@@ -43,7 +43,7 @@ impl Default for Start {
     }
 }
 
-impl Start {
+impl MapStart {
     /// Of a simulation that has its start values.
     ///
     /// # Errors
@@ -102,9 +102,9 @@ pub fn master(settings: &SceneSettings) -> Result<usize> {
     let found = settings.structures.iter().position(|structure| Some(&structure.name) == name);
     let master = found.ok_or_else(|| Failure::new(what(), "it has no contact with a master", "Add one"))?;
     let instead = match settings.structures[master].motion {
-        Motion::Rotating => return Ok(master),
-        Motion::Free => "flies freely",
-        Motion::Still => "stands still",
+        BodyMotion::Rotating => return Ok(master),
+        BodyMotion::Free => "flies freely",
+        BodyMotion::Still => "stands still",
     };
     let name = &settings.structures[master].name;
     Err(Failure::usage(
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn what_acts_is_told() {
-        let of = |acting: &[&'static str]| Start { acting: acting.to_vec(), ..Start::default() }.without();
+        let of = |acting: &[&'static str]| MapStart { acting: acting.to_vec(), ..MapStart::default() }.without();
         assert_eq!(of(&[]), "");
         assert_eq!(of(&["heat"]), ", without heat");
         assert_eq!(of(&["load", "heat", "growth"]), ", without load, heat and growth");

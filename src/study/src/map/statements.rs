@@ -1,7 +1,7 @@
 //! Whether the map shows what it should.
 
 use super::{
-    Map, Response,
+    Map, SpeedResponse,
     findings::{Coincidence, NEAR},
     prediction::Crossing,
 };
@@ -55,7 +55,8 @@ fn runs_end(map: &Map) -> Statement {
 
 fn contact(map: &Map) -> Vec<Statement> {
     let touching = map.answered().filter(|(_, response)| response.contact_share > 0.0).count();
-    let most = |value: fn(&Response) -> f64| map.answered().map(|(_, response)| value(response)).fold(0.0, f64::max);
+    let most =
+        |value: fn(&SpeedResponse) -> f64| map.answered().map(|(_, response)| value(response)).fold(0.0, f64::max);
     let (share, force) = (most(|response| response.contact_share), most(|response| response.normal_force));
     let depth = most(|response| response.penetration);
     let sum = format!(

@@ -10,18 +10,18 @@ const CROSSING: f64 = FIRST * std::f64::consts::TAU / 4.0;
 const BUMP: f64 = 0.2 * 3.56e-4;
 
 /// Damped enough for the free vibration to die out soon, without friction, and only `intrusion` (m) of the bumps.
-fn request(intrusion: f64, speeds: Speeds) -> Request {
+fn request(intrusion: f64, speeds: Speeds) -> MapRequest {
     let settings = [
         ("damping_ratio", 0.02),
         ("friction_coefficient", 0.0),
         ("gap_offset", BUMP - intrusion),
         ("internal_step_max", 1e-5),
     ];
-    Request {
+    MapRequest {
         speeds: Some(speeds),
         revolutions: Some(32),
         settings: settings.map(|(name, value)| (name.to_owned(), format!("{value:e}"))).to_vec(),
-        ..Request::default()
+        ..MapRequest::default()
     }
 }
 
@@ -30,7 +30,7 @@ fn around(crossing: f64, half: f64, count: usize) -> Speeds {
 }
 
 #[track_caller]
-fn run(scene: Scene, request: &Request, threads: usize) -> Study {
+fn run(scene: Scene, request: &MapRequest, threads: usize) -> Study {
     of_scene(scene, request, threads, |_, _, _| {}).unwrap().0
 }
 
@@ -46,7 +46,7 @@ fn blade37() -> Scene {
 }
 
 fn meeting(scene: &Scene) -> f64 {
-    Prediction::new(scene, &Start::default(), 0.0).unwrap().meeting(4, 0).unwrap()
+    FrequencyPrediction::new(scene, &MapStart::default(), 0.0).unwrap().meeting(4, 0).unwrap()
 }
 
 /// A casing as soft as nothing pushes without holding: the response is linear, and resonance where linear theory has it.
@@ -64,7 +64,8 @@ fn the_softest_contact_leaves_resonance_where_linear_theory_has_it() {
         cutting: None,
     });
     let crossing = meeting(&scene);
-    let request = Request { speeds: Some(around(crossing, 0.02, 9)), revolutions: Some(32), ..Request::default() };
+    let request =
+        MapRequest { speeds: Some(around(crossing, 0.02, 9)), revolutions: Some(32), ..MapRequest::default() };
     let study = run(scene, &request, 2);
     let coincidences = study.results["coincidences"].as_array().unwrap();
     let one = coincidences.iter().find(|one| one["engine_order"] == 4 && one["mode"] == 1).unwrap();
@@ -90,11 +91,11 @@ fn the_softest_contact_leaves_resonance_where_linear_theory_has_it() {
 fn rigid_contact_moves_the_response_above_the_crossing() {
     let scene = blade37();
     let crossing = meeting(&scene);
-    let request = Request {
+    let request = MapRequest {
         speeds: Some(around(crossing, 0.03, 2)),
         revolutions: Some(16),
         settings: vec![("gap_offset".into(), "7.1e-5".into())],
-        ..Request::default()
+        ..MapRequest::default()
     };
     let study = run(scene, &request, 2);
     let rows = &study.figure("amplitudes").unwrap().sheet.rows;
@@ -103,11 +104,11 @@ fn rigid_contact_moves_the_response_above_the_crossing() {
 }
 
 /// Runs in which only one engine order moves, by `amplitude` (m) at a speed.
-fn runs_of_order(order: usize, speeds: &[f64], amplitude: impl Fn(f64) -> f64) -> Vec<Run> {
+fn runs_of_order(order: usize, speeds: &[f64], amplitude: impl Fn(f64) -> f64) -> Vec<SpeedRun> {
     let response = |speed: f64| {
         let mut spectrum = vec![0.0; order + 2];
         spectrum[order] = amplitude(speed);
-        Response {
+        SpeedResponse {
             resolution: speed / std::f64::consts::TAU,
             first_blade: [spectrum.clone(), spectrum.clone()],
             largest_blade: [spectrum.clone(), spectrum],
@@ -124,7 +125,7 @@ fn runs_of_order(order: usize, speeds: &[f64], amplitude: impl Fn(f64) -> f64) -
             warnings: Vec::new(),
         }
     };
-    speeds.iter().map(|&speed| Run { speed, outcome: Ok(response(speed)) }).collect()
+    speeds.iter().map(|&speed| SpeedRun { speed, outcome: Ok(response(speed)) }).collect()
 }
 
 /// A bell of this height around a speed.
@@ -135,7 +136,7 @@ fn bell(speed: f64, middle: f64, height: f64) -> f64 {
 /// A branch that leans to +18 %, with a small maximum on the way, and another beyond the range.
 #[test]
 fn a_resonance_is_followed_as_far_as_it_leans() {
-    let prediction = Prediction::new(&scene(FIRST, 4), &Start::default(), 0.0).unwrap();
+    let prediction = FrequencyPrediction::new(&scene(FIRST, 4), &MapStart::default(), 0.0).unwrap();
     let speeds = around(CROSSING, 0.3, 61).values();
     let [low, high] = [speeds[0], speeds[60]];
     let crossings = prediction.crossings([low, high], 1.5 * FIRST);
@@ -159,7 +160,7 @@ fn neighbouring_resonances_are_told_apart() {
     let mut scene = scene(FIRST, 4);
     let rom = &mut scene.roms[0];
     rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.1_f64.powi(2);
-    let prediction = Prediction::new(&scene, &Start::default(), 0.0).unwrap();
+    let prediction = FrequencyPrediction::new(&scene, &MapStart::default(), 0.0).unwrap();
     let speeds = around(CROSSING, 0.3, 121).values();
     let crossings = prediction.crossings([speeds[0], speeds[120]], 1.5 * FIRST);
     // Half a percent below its own crossing the second one is still that of it.
@@ -178,7 +179,7 @@ fn neighbouring_resonances_are_told_apart() {
 fn the_speeds_chosen_leave_room_above_the_resonance() {
     let mut scene = scene(FIRST, 4);
     let chosen = |scene: &Scene, quick| {
-        let request = Request { quick, ..Request::default() };
+        let request = MapRequest { quick, ..MapRequest::default() };
         let (map, speeds) = Map::prepare(scene.clone(), &request).unwrap();
         let crossing = map.prediction.meeting(4, 0).unwrap();
         (speeds.iter().map(|speed| speed / crossing).collect::<Vec<_>>(), crossing)
@@ -227,12 +228,12 @@ fn a_master_that_does_not_turn_is_refused_before_anything_is_reduced() {
     assert!(failure.usage && failure.problem.contains("`cube`, flies freely"), "{failure}");
     assert!(failure.remedy.contains("builtin:rotor37"), "{failure}");
     let without = Scene { settings, roms: Vec::new() };
-    assert_eq!(of_scene(without, &Request::default(), 1, |_, _, _| {}).unwrap_err(), failure);
+    assert_eq!(of_scene(without, &MapRequest::default(), 1, |_, _, _| {}).unwrap_err(), failure);
 }
 
 #[test]
 fn numbers_do_not_depend_on_threads() {
-    let request = Request { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 5)) };
+    let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 5)) };
     let [one, three] = [1, 3].map(|threads| run(scene(FIRST, 4), &request, threads));
     assert_eq!(one.figures.len(), 5);
     // One unit on each axis.
@@ -260,7 +261,7 @@ fn refused_speeds_are_marked_and_all_refused_is_a_failure() {
     scene.settings.structures[0].spin.stiffening = true;
     scene.settings.structures[0].speed = 150.0;
     let speeds = |from, to| Speeds { from, to, count: 3 };
-    let request = |speeds| Request { revolutions: Some(4), transient: Some(3), ..request(BUMP, speeds) };
+    let request = |speeds| MapRequest { revolutions: Some(4), transient: Some(3), ..request(BUMP, speeds) };
     let study = run(scene.clone(), &request(speeds(150.0, 190.0)), 2);
     let refused = study.results["refused"].as_array().unwrap();
     assert_eq!(refused.len(), 2, "{refused:?}");
@@ -283,7 +284,7 @@ fn steps_too_coarse_for_the_filter_and_a_speed_set_are_refused() {
     coarse.settings.push(("internal_step_max".into(), "1e-4".into()));
     let failure = of_scene(scene(FIRST, 2), &coarse, 1, |_, _, _| {}).unwrap_err();
     assert!(failure.problem.contains("internal_step_max="), "{failure}");
-    let request = Request { settings: vec![("speed".into(), "1".into())], ..Request::default() };
+    let request = MapRequest { settings: vec![("speed".into(), "1".into())], ..MapRequest::default() };
     assert!(of_scene(scene(FIRST, 2), &request, 1, |_, _, _| {}).unwrap_err().usage);
 }
 
@@ -291,8 +292,8 @@ fn steps_too_coarse_for_the_filter_and_a_speed_set_are_refused() {
 #[test]
 fn the_rotor_turns_in_the_sense_of_the_scene() {
     let speeds = around(CROSSING, 0.1, 2);
-    let request = Request { revolutions: Some(2), transient: Some(1), ..request(BUMP, speeds) };
-    let request = Request {
+    let request = MapRequest { revolutions: Some(2), transient: Some(1), ..request(BUMP, speeds) };
+    let request = MapRequest {
         settings: request.settings.iter().filter(|(name, _)| name != "friction_coefficient").cloned().collect(),
         ..request
     };
@@ -321,34 +322,34 @@ fn the_rotor_turns_in_the_sense_of_the_scene() {
 
 #[test]
 fn what_does_not_fit_is_refused_before_the_work() {
-    let refused = |request: &Request| Map::prepare(scene(FIRST, 36), request).map(|_| ()).unwrap_err();
+    let refused = |request: &MapRequest| Map::prepare(scene(FIRST, 36), request).map(|_| ()).unwrap_err();
     for revolutions in [100_000_000, usize::MAX] {
-        let request = Request { revolutions: Some(revolutions), ..request(BUMP, around(CROSSING, 0.1, 5)) };
+        let request = MapRequest { revolutions: Some(revolutions), ..request(BUMP, around(CROSSING, 0.1, 5)) };
         let failure = refused(&request);
         assert!(failure.usage && failure.what.contains(&format!("--revolutions {revolutions}")), "{failure}");
         // As many as the remedy names do fit, one more does not.
         let most: usize = failure.remedy.split(' ').find_map(|word| word.parse().ok()).unwrap();
-        let with = |revolutions| Request { revolutions: Some(revolutions), ..request.clone() };
+        let with = |revolutions| MapRequest { revolutions: Some(revolutions), ..request.clone() };
         assert!(Map::prepare(scene(FIRST, 36), &with(most)).is_ok(), "{failure}");
         assert!(refused(&with(most + 1)).usage, "{failure}");
         assert!(most > 1000, "{failure}");
     }
     // Spectra of many runs are what does not fit.
-    let many = |count| Request { revolutions: Some(2000), ..request(BUMP, around(CROSSING, 0.1, count)) };
+    let many = |count| MapRequest { revolutions: Some(2000), ..request(BUMP, around(CROSSING, 0.1, count)) };
     assert!(Map::prepare(scene(FIRST, 36), &many(5)).is_ok());
     assert!(refused(&many(1000)).what.contains("--revolutions 2000"));
     let slow = request(BUMP, Speeds { from: 1e-3, to: 1.0, count: 5 });
     let failure = refused(&slow);
     assert!(failure.usage && failure.what == "--speeds" && failure.problem.contains("0.001 rad/s"), "{failure}");
     let least: f64 = failure.remedy.split(' ').find_map(|word| word.parse().ok()).unwrap();
-    let from = |from| Request { revolutions: Some(1), ..request(BUMP, Speeds { from, to: 1.0, count: 5 }) };
+    let from = |from| MapRequest { revolutions: Some(1), ..request(BUMP, Speeds { from, to: 1.0, count: 5 }) };
     assert!(Map::prepare(scene(FIRST, 36), &from(least)).is_ok(), "{failure}");
     assert!(refused(&from(0.9 * least)).usage, "{failure}");
 }
 
 #[test]
 fn the_cost_told_is_what_is_done() {
-    let request = Request { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 2)) };
+    let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 2)) };
     let told = std::cell::RefCell::new(Vec::new());
     let tell = |done: usize, all: usize, steps: f64| told.borrow_mut().push((done, all, steps));
     let (study, _) = of_scene(scene(FIRST, 4), &request, 1, tell).unwrap();
@@ -364,7 +365,7 @@ fn start_values_count_in_orders_and_facts() {
         scene.settings.surfaces[0].moving = true;
         change(&mut scene);
         let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
-        let request = Request { settings: set, speeds: Some(around(CROSSING, 0.1, 2)), ..Request::default() };
+        let request = MapRequest { settings: set, speeds: Some(around(CROSSING, 0.1, 2)), ..MapRequest::default() };
         Map::prepare(scene, &request).unwrap().0
     };
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} {b}");
@@ -389,7 +390,7 @@ fn start_values_count_in_orders_and_facts() {
 /// Where nothing touches nothing is said about the response.
 #[test]
 fn nothing_that_moves_is_no_verdict() {
-    let request = Request { revolutions: Some(4), transient: Some(3), ..request(-1e-4, around(CROSSING, 0.1, 2)) };
+    let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(-1e-4, around(CROSSING, 0.1, 2)) };
     let study = run(scene(FIRST, 2), &request, 1);
     let holds = |start: &str| study.statements.iter().find(|one| one.expected.starts_with(start)).unwrap().holds;
     assert_eq!(holds("The tips touch"), Some(false));
@@ -429,7 +430,7 @@ fn a_maximum_stays_in_its_window() {
     let mut scene = scene(FIRST, 4);
     let rom = &mut scene.roms[0];
     rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.25_f64.powi(2);
-    let prediction = Prediction::new(&scene, &Start::default(), 0.0).unwrap();
+    let prediction = FrequencyPrediction::new(&scene, &MapStart::default(), 0.0).unwrap();
     let speeds = [0.9, 1.0, 1.1, 1.2, 1.3].map(|share| share * CROSSING);
     let crossings = prediction.crossings([speeds[0], speeds[4]], 1.5 * FIRST);
     // The second mode's window begins at 1.1875 times the crossing of the first one, the top of the parabola is at 1.15.

@@ -14,7 +14,7 @@ pub type Method = (Scheme, Solver);
 
 /// Friction coefficient and speed; `None` leaves what the scene has, or has not.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct OperatingPoint {
     /// µ.
     pub friction: Option<f64>,
     /// rad/s.
@@ -22,11 +22,11 @@ pub struct Place {
 }
 
 /// Warnings, or the refusal.
-pub type Answer = Result<Vec<String>, String>;
+pub type ScreeningResult = Result<Vec<String>, String>;
 
 /// Values with which a scene starts, after those that were set.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Own {
+pub struct SceneStart {
     /// µ, where the scene has it.
     pub friction: Option<f64>,
     /// Speed (rad/s), where the master turns.
@@ -41,7 +41,7 @@ pub struct Own {
 
 /// A scene that can be asked.
 #[derive(Debug, Clone, Copy)]
-pub struct Asked<'a> {
+pub struct StabilityScene<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Start values that replace its own, as text.
@@ -64,12 +64,12 @@ pub fn divided(length: f64, largest: f64) -> f64 {
     if (step / largest - 1.0).abs() < 1e-9 { largest } else { step }
 }
 
-impl Asked<'_> {
+impl StabilityScene<'_> {
     /// With what it starts.
     ///
     /// # Errors
     /// A scene that is refused whatever is asked, and start values that are none.
-    pub fn own(&self) -> Result<Own> {
+    pub fn own(&self) -> Result<SceneStart> {
         let settings = &self.scene.settings;
         let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
         let mut simulation = Simulation::new(self.scene).map_err(in_scene)?;
@@ -78,7 +78,7 @@ impl Asked<'_> {
         }
         let largest = value(&simulation, Quantity::StepMax).unwrap_or(settings.time.step);
         let length = settings.experiment.communication_step;
-        Ok(Own {
+        Ok(SceneStart {
             friction: value(&simulation, Quantity::Friction),
             speed: value(&simulation, Quantity::Speed),
             damping_ratio: value(&simulation, Quantity::DampingRatio),
@@ -89,7 +89,7 @@ impl Asked<'_> {
 
     /// The answers at one internal step (s), place by place. The communication step is the internal one, so that the step asked
     /// for is the step taken.
-    pub fn at(&self, method: Method, step: f64, places: &[Place]) -> Vec<Answer> {
+    pub fn at(&self, method: Method, step: f64, places: &[OperatingPoint]) -> Vec<ScreeningResult> {
         let mut scene = SceneRun::changed(self.scene, method, step, 0.0);
         scene.settings.experiment.communication_step = step;
         let mut simulation = match Simulation::new(&scene) {
@@ -99,7 +99,7 @@ impl Asked<'_> {
         places.iter().map(|place| self.answer(&mut simulation, *place)).collect()
     }
 
-    fn answer(&self, simulation: &mut Simulation, place: Place) -> Answer {
+    fn answer(&self, simulation: &mut Simulation, place: OperatingPoint) -> ScreeningResult {
         simulation.reset();
         for (name, value) in self.settings {
             native::set(simulation, name, value).map_err(|failure| failure.to_string())?;

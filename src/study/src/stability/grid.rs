@@ -2,8 +2,8 @@
 
 use tiprub_shell::{Failure, Result};
 
-use super::asked::{Own, Place};
-use crate::arguments::{Range, StabilityArguments};
+use super::asked::{OperatingPoint, SceneStart};
+use crate::arguments::{NumberRange, StabilityArguments};
 
 /// Friction coefficients go at least this far where none are asked for.
 const FRICTION: f64 = 1.0;
@@ -18,7 +18,7 @@ const COUPLED_STEPS: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// What is asked; values that the scene has no variable for are `None`, and alone.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Grid {
+pub struct StabilityGrid {
     /// Ascending.
     pub frictions: Vec<Option<f64>>,
     /// Ascending (rad/s).
@@ -27,13 +27,13 @@ pub struct Grid {
     pub steps: Vec<f64>,
 }
 
-impl Grid {
+impl StabilityGrid {
     /// What the command line asks for, and the scene's own values always; where the largest `usable` step (s) lies below, steps go
     /// down to half of it.
     ///
     /// # Errors
     /// A range of what the scene has no variable for.
-    pub fn new(arguments: &StabilityArguments, own: &Own, coupled: bool, usable: Option<f64>) -> Result<Self> {
+    pub fn new(arguments: &StabilityArguments, own: &SceneStart, coupled: bool, usable: Option<f64>) -> Result<Self> {
         let quick = arguments.common.quick;
         let refuse = |option: &str, what: &str| {
             Err(Failure::usage(option, format!("the scene has no {what} that could be changed"), "Leave it out"))
@@ -45,7 +45,7 @@ impl Grid {
             (Some(own), None) if coupled => with(vec![0.0, 2.0 * own], own),
             (Some(own), None) => {
                 let to = FRICTION.max(2.0 * own);
-                with(Range { from: 0.0, to, count: if quick { 5 } else { 11 } }.values(), own)
+                with(NumberRange { from: 0.0, to, count: if quick { 5 } else { 11 } }.values(), own)
             }
         };
         let speeds = match (own.speed, arguments.speeds) {
@@ -73,7 +73,7 @@ impl Grid {
         let steps = match (arguments.steps, usable.map(|step| 0.5 * step)) {
             (Some(range), _) => range.geometric(),
             (None, Some(from)) if from < factors[0] * own.step => {
-                Range { from, to: factors[factors.len() - 1] * own.step, count: factors.len() + 2 }.geometric()
+                NumberRange { from, to: factors[factors.len() - 1] * own.step, count: factors.len() + 2 }.geometric()
             }
             _ => factors.iter().map(|factor| factor * own.step).collect(),
         };
@@ -82,8 +82,10 @@ impl Grid {
     }
 
     /// All pairs of friction and speed: speed by speed.
-    pub fn places(&self) -> Vec<Place> {
-        let at = |speed: Option<f64>| self.frictions.iter().map(move |friction| Place { friction: *friction, speed });
+    pub fn places(&self) -> Vec<OperatingPoint> {
+        let at = |speed: Option<f64>| {
+            self.frictions.iter().map(move |friction| OperatingPoint { friction: *friction, speed })
+        };
         self.speeds.iter().flat_map(|speed| at(*speed)).collect()
     }
 }

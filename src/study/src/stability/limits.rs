@@ -8,7 +8,7 @@ use tiprub_core::{
 use tiprub_shell::{Result, forecast::Forecast, sweep};
 
 use super::{
-    asked::{Answer, Asked, Method, Own, Place},
+    asked::{Method, OperatingPoint, SceneStart, ScreeningResult, StabilityScene},
     seek::{Sought, TRIED, seek},
 };
 
@@ -52,7 +52,7 @@ impl Usable {
 }
 
 /// Highest angular frequency of all structures (rad/s).
-fn highest(asked: &Asked) -> f64 {
+fn highest(asked: &StabilityScene) -> f64 {
     let of = |rom: &tiprub_core::Rom| {
         if rom.is_cyclic() {
             CyclicModel::from_rom(rom, 0.0).map(|model| model.largest_frequency())
@@ -68,14 +68,21 @@ fn highest(asked: &Asked) -> f64 {
 ///
 /// # Errors
 /// A thread that is lost.
-pub fn of(asked: &Asked, own: &Own, threads: usize, quick: bool, forecast: &Forecast) -> Result<Vec<Usable>> {
-    let place = [Place { friction: own.friction, speed: own.speed }];
+pub fn of(
+    asked: &StabilityScene,
+    own: &SceneStart,
+    threads: usize,
+    quick: bool,
+    forecast: &Forecast,
+) -> Result<Vec<Usable>> {
+    let place = [OperatingPoint { friction: own.friction, speed: own.speed }];
     let highest = highest(asked);
     let range = TRIED.map(|product| product / highest);
     // Quickly: from the scene's own step or the resolved one, whichever is longer; below it nothing is looked at.
     let range = if quick { [range[0].max(own.step).min(range[1]), range[1]] } else { range };
     let of_scheme = |scheme: &Scheme| {
-        let ask = |solver: Solver, step: f64| -> Answer { asked.at((*scheme, solver), step, &place).remove(0) };
+        let ask =
+            |solver: Solver, step: f64| -> ScreeningResult { asked.at((*scheme, solver), step, &place).remove(0) };
         let known = (*scheme == Scheme::CentralDifference).then(|| 2.0 / highest);
         let sought = |solver: Solver, range: [f64; 2]| seek(range, known, |step| ask(solver, step).map(drop));
         let mut found: Vec<Usable> = Vec::new();
@@ -99,7 +106,7 @@ pub fn of(asked: &Asked, own: &Own, threads: usize, quick: bool, forecast: &Fore
 }
 
 /// Whether another solver answers the same just below and just above a limit, and in the same words.
-fn alike(other: &Usable, ask: &dyn Fn(f64) -> Answer) -> bool {
+fn alike(other: &Usable, ask: &dyn Fn(f64) -> ScreeningResult) -> bool {
     let Sought::Below(step, why) = &other.sought else { return false };
     // Twice the width of the last interval.
     ask(step * (1.0 - 1e-6)).is_ok() && ask(step * 1.02).is_err_and(|refusal| same_reason(&refusal, why))

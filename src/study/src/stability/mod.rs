@@ -11,18 +11,18 @@ pub mod page;
 pub mod seek;
 pub mod structure;
 
-use asked::{Answer, Asked, Own, Place};
-use grid::Grid;
-use structure::{Rates, Sliding, Structure};
+use asked::{OperatingPoint, SceneStart, ScreeningResult, StabilityScene};
+use grid::StabilityGrid;
+use structure::{KnownContact, Rates, SingleStructure};
 use tiprub_core::{
     Scene, Simulation,
-    rom::Frame,
-    settings::{Meridian, Motion, Scheme},
+    rom::DisplacementFrame,
+    settings::{BodyMotion, Meridian, Scheme},
 };
 use tiprub_shell::{
     Failure, Result,
     console::Console,
-    forecast::{Forecast, Ledger},
+    forecast::{Forecast, WorkPlan},
     sweep,
 };
 
@@ -34,20 +34,20 @@ const SOME_FRICTION: f64 = 0.1;
 
 /// The answer at one place and step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct StabilityPoint {
     /// Friction and speed.
-    pub place: Place,
+    pub place: OperatingPoint,
     /// Internal step (s).
     pub step: f64,
     /// What the core says.
-    pub answer: Answer,
+    pub answer: ScreeningResult,
     /// How sliding contact grows there, where that can be told.
     pub rates: Option<Rates>,
 }
 
 /// Kinds of answers, the better first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Verdict {
+pub enum AnswerKind {
     /// Accepted without a word.
     Right,
     /// Accepted with warnings.
@@ -58,15 +58,15 @@ pub enum Verdict {
     Refused,
 }
 
-impl Point {
+impl StabilityPoint {
     /// The kind of the answer.
-    pub fn verdict(&self) -> Verdict {
+    pub fn verdict(&self) -> AnswerKind {
         let flutters = self.rates.as_ref().is_some_and(structure::Rates::is_flutter);
         match &self.answer {
-            Err(_) => Verdict::Refused,
-            Ok(_) if flutters => Verdict::Flutter,
-            Ok(warnings) if warnings.is_empty() => Verdict::Right,
-            Ok(_) => Verdict::Warned,
+            Err(_) => AnswerKind::Refused,
+            Ok(_) if flutters => AnswerKind::Flutter,
+            Ok(warnings) if warnings.is_empty() => AnswerKind::Right,
+            Ok(_) => AnswerKind::Warned,
         }
     }
 
@@ -81,17 +81,17 @@ impl Point {
 
 /// Everything that was found of a scene.
 #[derive(Debug)]
-pub struct Found {
+pub struct StabilityResult {
     /// The scene.
     pub scene: Scene,
     /// How it was named on the command line.
     pub name: String,
     /// With what it starts.
-    pub own: Own,
+    pub own: SceneStart,
     /// What was asked.
-    pub grid: Grid,
+    pub grid: StabilityGrid,
     /// All answers: step by step, in each speed by speed, in each by friction.
-    pub points: Vec<Point>,
+    pub points: Vec<StabilityPoint>,
     /// Largest accepted steps.
     pub limits: Vec<limits::Usable>,
     /// Why growth rates cannot be told, where they cannot.
@@ -107,28 +107,29 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     let scene = arguments.common.options.load(&arguments.scene, &arguments.common.cache.cache(), console)?;
     one_rotor_and_friction(&scene.settings)?;
     let (scene, frictionless) = with_friction(scene);
-    let asked = Asked { scene: &scene, settings: &arguments.set };
+    let asked = StabilityScene { scene: &scene, settings: &arguments.set };
     let mut own = asked.own()?;
     if frictionless && !arguments.set.iter().any(|(name, _)| name == "friction_coefficient") {
         own.friction = Some(0.0);
     }
     let coupled = scene.roms[master(&scene)].is_cyclic();
     // Ranges that are wrong are refused before the work.
-    let first = Grid::new(arguments, &own, coupled, None)?;
+    let first = StabilityGrid::new(arguments, &own, coupled, None)?;
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
-    let mut ledger = Ledger::new(seconds_per_answer(&asked, &own) / threads as f64);
+    let mut ledger = WorkPlan::new(seconds_per_answer(&asked, &own) / threads as f64);
     ledger.plan(LIMITS, limits::ANSWERS as f64);
     ledger.plan(GRID, (first.places().len() * first.steps.len()) as f64);
     let forecast = Forecast::new(console, &format!("Asking {}", scene.settings.name), ledger);
     let limits = limits::of(&asked, &own, threads, arguments.common.quick, &forecast)?;
     let usable = limits.iter().find(|usable| usable.method == own.method).and_then(limits::Usable::step);
-    let grid = Grid::new(arguments, &own, coupled, usable)?;
+    let grid = StabilityGrid::new(arguments, &own, coupled, usable)?;
     let structures = structures(&scene, &own, &grid)?;
     let no_rates = structures.as_ref().err().copied();
     let structures = structures.unwrap_or_default();
     let points = points(&asked, &own, &grid, &structures, threads, &forecast)?;
     forecast.finish();
-    let found = Found { name: arguments.scene.clone(), own, grid, points, limits, no_rates, scene: scene.clone() };
+    let found =
+        StabilityResult { name: arguments.scene.clone(), own, grid, points, limits, no_rates, scene: scene.clone() };
     page::study(&found)
 }
 
@@ -137,9 +138,9 @@ pub(super) const LIMITS: usize = 0;
 const GRID: usize = 1;
 
 /// Time of the answer to the scene as it stands (s).
-fn seconds_per_answer(asked: &Asked, own: &Own) -> f64 {
+fn seconds_per_answer(asked: &StabilityScene, own: &SceneStart) -> f64 {
     let clock = std::time::Instant::now();
-    asked.at(own.method, own.step, &[Place { friction: own.friction, speed: own.speed }]);
+    asked.at(own.method, own.step, &[OperatingPoint { friction: own.friction, speed: own.speed }]);
     clock.elapsed().as_secs_f64()
 }
 
@@ -156,10 +157,14 @@ fn with_friction(scene: Scene) -> (Scene, bool) {
 }
 
 /// The master at every speed of the grid; or why its growth cannot be told.
-fn structures<'a>(scene: &'a Scene, own: &Own, grid: &Grid) -> Result<Result<Vec<Structure<'a>>, &'static str>> {
+fn structures<'a>(
+    scene: &'a Scene,
+    own: &SceneStart,
+    grid: &StabilityGrid,
+) -> Result<Result<Vec<SingleStructure<'a>>, &'static str>> {
     let index = master(scene);
     let (settings, rom) = (&scene.settings.structures[index], &scene.roms[index]);
-    if settings.motion == Motion::Free || rom.frame == Frame::Cartesian {
+    if settings.motion == BodyMotion::Free || rom.frame == DisplacementFrame::Cartesian {
         return Ok(Err(
             "the master flies freely: which contacts are closed, where and how long is not known beforehand",
         ));
@@ -169,33 +174,39 @@ fn structures<'a>(scene: &'a Scene, own: &Own, grid: &Grid) -> Result<Result<Vec
     let radial = scene.settings.contacts[0].meridian != Meridian::Contour;
     let at = |speed: &Option<f64>| {
         let speed = speed.filter(|_| settings.spin.stiffening).unwrap_or(0.0);
-        let structure = Structure::new(rom, damping, speed).map(|structure| structure.stiffened(factor));
+        let structure = SingleStructure::new(rom, damping, speed).map(|structure| structure.stiffened(factor));
         structure.map(|structure| if radial { structure.radial() } else { structure })
     };
     // A speed that the structure does not take is refused by the core, place by place.
-    let found: Vec<Structure> = grid.speeds.iter().map(at).collect::<tiprub_core::Result<_>>().unwrap_or_default();
+    let found: Vec<SingleStructure> =
+        grid.speeds.iter().map(at).collect::<tiprub_core::Result<_>>().unwrap_or_default();
     Ok(if found.is_empty() { Err("its modes cannot be found at every speed") } else { Ok(found) })
 }
 
 /// All answers.
 fn points(
-    asked: &Asked,
-    own: &Own,
-    grid: &Grid,
-    structures: &[Structure],
+    asked: &StabilityScene,
+    own: &SceneStart,
+    grid: &StabilityGrid,
+    structures: &[SingleStructure],
     threads: usize,
     forecast: &Forecast,
-) -> Result<Vec<Point>> {
+) -> Result<Vec<StabilityPoint>> {
     let places = grid.places();
     let of_step = |step: &f64| {
         let answers = asked.at(own.method, *step, &places);
-        let rates = |index: usize, place: &Place| {
+        let rates = |index: usize, place: &OperatingPoint| {
             let structure = structures.get(index / grid.frictions.len())?;
             rates(structure, own.method.0, *step, *place)
         };
         let points = places.iter().zip(answers).enumerate();
         Ok(points
-            .map(|(index, (place, answer))| Point { place: *place, step: *step, answer, rates: rates(index, place) })
+            .map(|(index, (place, answer))| StabilityPoint {
+                place: *place,
+                step: *step,
+                answer,
+                rates: rates(index, place),
+            })
             .collect::<Vec<_>>())
     };
     let progress = |_| forecast.done(GRID, places.len() as f64);
@@ -204,7 +215,7 @@ fn points(
     if found.is_empty() { Err(Failure::new("stability", "nothing was asked", "")) } else { Ok(found) }
 }
 
-fn rates(structure: &Structure, scheme: Scheme, step: f64, place: Place) -> Option<Rates> {
-    let sliding = Sliding { friction: place.friction?, speed: place.speed.unwrap_or(0.0) };
+fn rates(structure: &SingleStructure, scheme: Scheme, step: f64, place: OperatingPoint) -> Option<Rates> {
+    let sliding = KnownContact { friction: place.friction?, speed: place.speed.unwrap_or(0.0) };
     structure.rates(scheme, step, sliding)
 }

@@ -3,16 +3,16 @@
 use serde_json::{Value, json};
 use tiprub_core::shown;
 use tiprub_figure::{
-    cells::{Cell, Cells, Kind, Panel},
+    cells::{Cell, CellKind, CellPanel, Cells},
     plots::{Plot, Series},
     table::Table,
 };
 use tiprub_shell::Result;
 
-use super::{Found, Point, Verdict, seek::Sought};
-use crate::{Figure, Picture, Sheet, Statement, Study, error::competitor::method_name};
+use super::{AnswerKind, StabilityPoint, StabilityResult, seek::Sought};
+use crate::{Picture, Sheet, Statement, Study, StudyFigure, error::competitor::method_name};
 
-const VERDICTS: [Verdict; 4] = [Verdict::Right, Verdict::Warned, Verdict::Flutter, Verdict::Refused];
+const VERDICTS: [AnswerKind; 4] = [AnswerKind::Right, AnswerKind::Warned, AnswerKind::Flutter, AnswerKind::Refused];
 
 const HOW_TO_READ: &str = "Every cell is the answer to a run with that friction, speed and internal step: the refusal or the warnings that \
     `tiprub run` would give, here without the run. Read a column from the bottom up: where it turns to refused is the longest step for that \
@@ -21,15 +21,15 @@ const HOW_TO_READ: &str = "Every cell is the answer to a run with that friction,
     a shorter step does not help; a frequency of 0 Hz is divergence, which grows without swinging. The framed cell is the scene as it stands; the words of a cell show where the pointer rests on it, and stand \
     in the table and in answers-in-words.csv.";
 
-impl Verdict {
-    fn kind(self) -> Kind {
+impl AnswerKind {
+    fn kind(self) -> CellKind {
         let (label, color, sign) = match self {
             Self::Right => ("right", "#c5e0d2", ""),
             Self::Warned => ("accepted with warnings", "#f4e3a1", "!"),
             Self::Flutter => ("accepted, flutters by friction", "#f2b98c", "~"),
             Self::Refused => ("refused", "#cf8a98", "×"),
         };
-        Kind { label: label.into(), color, sign }
+        CellKind { label: label.into(), color, sign }
     }
 
     fn name(self) -> &'static str {
@@ -41,7 +41,7 @@ impl Verdict {
 ///
 /// # Errors
 /// A plot cannot be drawn.
-pub fn study(found: &Found) -> Result<Study> {
+pub fn study(found: &StabilityResult) -> Result<Study> {
     let mut figures = vec![answers(found)];
     figures.extend(growth(found)?);
     Ok(Study {
@@ -81,7 +81,7 @@ fn micro(step: f64) -> String {
     if (0.01..1e5).contains(&value) { short(value) } else { format!("{value:.2e}") }
 }
 
-fn facts(found: &Found) -> Vec<(String, String)> {
+fn facts(found: &StabilityResult) -> Vec<(String, String)> {
     let (settings, own) = (&found.scene.settings, &found.own);
     let range = |values: &[Option<f64>]| match values {
         [Some(low), .., Some(high)] => format!("{} from {} to {}", values.len(), short(*low), short(*high)),
@@ -109,9 +109,9 @@ fn facts(found: &Found) -> Vec<(String, String)> {
 }
 
 /// The point of the scene as it stands.
-fn own(found: &Found) -> Option<&Point> {
+fn own(found: &StabilityResult) -> Option<&StabilityPoint> {
     let own = &found.own;
-    let is = |point: &&Point| {
+    let is = |point: &&StabilityPoint| {
         point.place.friction == own.friction
             && point.place.speed == own.speed
             && point.step.to_bits() == own.step.to_bits()
@@ -119,7 +119,7 @@ fn own(found: &Found) -> Option<&Point> {
     found.points.iter().find(is)
 }
 
-fn statements(found: &Found) -> Vec<Statement> {
+fn statements(found: &StabilityResult) -> Vec<Statement> {
     let mut all = Vec::new();
     if let Some(point) = own(found) {
         let words = match (&point.answer, point.words()) {
@@ -139,14 +139,14 @@ fn statements(found: &Found) -> Vec<Statement> {
             format!("{} s of {}", shown(found.own.step), usable.to_text()),
         ));
     }
-    let count = |verdict: Verdict| found.points.iter().filter(|point| point.verdict() == verdict).count();
+    let count = |verdict: AnswerKind| found.points.iter().filter(|point| point.verdict() == verdict).count();
     let counts: Vec<String> =
         VERDICTS.iter().map(|verdict| format!("{} {}", count(*verdict), verdict.kind().label)).collect();
     all.push(Statement::remark(format!("Answers at {} places", found.points.len()), counts.join(", ")));
     all
 }
 
-fn flutter(found: &Found, point: &Point) -> Option<Statement> {
+fn flutter(found: &StabilityResult, point: &StabilityPoint) -> Option<Statement> {
     let expected = "At the scene's friction sliding contact does not grow by itself (flutter)";
     if let Some(why) = found.no_rates {
         return Some(Statement::remark(expected, format!("not known: {why}")));
@@ -164,13 +164,13 @@ fn title(speed: Option<f64>) -> String {
 }
 
 /// The map, with the tables below it.
-fn answers(found: &Found) -> Figure {
+fn answers(found: &StabilityResult) -> StudyFigure {
     let (grid, count) = (&found.grid, found.grid.frictions.len());
     let of = |speed: usize, step: usize| {
         let places = count * grid.speeds.len();
         &found.points[step * places + speed * count..][..count]
     };
-    let cell = |point: &Point| Cell {
+    let cell = |point: &StabilityPoint| Cell {
         kind: point.verdict() as usize,
         words: format!(
             "µ {}, h {} µs: {}",
@@ -181,7 +181,7 @@ fn answers(found: &Found) -> Figure {
     };
     let at = |values: &[Option<f64>], own: Option<f64>| values.iter().position(|value| *value == own);
     let row = grid.steps.iter().rev().position(|step| step.to_bits() == found.own.step.to_bits());
-    let panel = |(index, speed): (usize, &Option<f64>)| Panel {
+    let panel = |(index, speed): (usize, &Option<f64>)| CellPanel {
         title: title(*speed),
         cells: (0..grid.steps.len()).rev().map(|step| of(index, step).iter().map(cell).collect()).collect(),
         framed: row.zip(at(&grid.frictions, found.own.friction)).filter(|_| *speed == found.own.speed),
@@ -196,7 +196,7 @@ fn answers(found: &Found) -> Figure {
     };
     let svg = cells.to_svg();
     let html = format!("{svg}{}{}", limits_table(found).to_html(false), points_table(found).to_html(true));
-    Figure {
+    StudyFigure {
         name: "answers",
         caption: format!(
             "Answers of {} with {}, a panel per speed.",
@@ -219,7 +219,7 @@ const COLUMNS: [&str; 7] = [
 ];
 
 /// NaN where the scene has no such value, or a rate cannot be told.
-fn sheet(found: &Found) -> Sheet {
+fn sheet(found: &StabilityResult) -> Sheet {
     let mut sheet = Sheet::new(COLUMNS);
     let known = |value: Option<f64>| value.unwrap_or(f64::NAN);
     for point in &found.points {
@@ -238,7 +238,7 @@ fn sheet(found: &Found) -> Sheet {
 }
 
 /// Cells of the tables for one point.
-fn row(point: &Point) -> Vec<String> {
+fn row(point: &StabilityPoint) -> Vec<String> {
     let growth = point.rates.as_ref().map(|rates| rates.growth);
     let rate = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.3e}"));
     let frequency = point.rates.as_ref().and_then(|rates| rates.frequency());
@@ -265,7 +265,7 @@ const HEADINGS: [&str; 8] = [
     "words",
 ];
 
-fn points_table(found: &Found) -> Table {
+fn points_table(found: &StabilityResult) -> Table {
     let caption = format!("All {} answers in words", found.points.len());
     Table { rows: found.points.iter().map(row).collect(), ..Table::new(caption, HEADINGS) }
 }
@@ -280,15 +280,15 @@ fn csv(table: &Table) -> String {
     std::iter::once(&table.columns).chain(&table.rows).map(|cells| line(cells)).collect()
 }
 
-fn words(found: &Found) -> String {
+fn words(found: &StabilityResult) -> String {
     csv(&points_table(found))
 }
 
-fn limits_csv(found: &Found) -> String {
+fn limits_csv(found: &StabilityResult) -> String {
     csv(&limits_table(found))
 }
 
-fn limits_table(found: &Found) -> Table {
+fn limits_table(found: &StabilityResult) -> Table {
     let (friction, speed) = (or_none(found.own.friction), or_none(found.own.speed));
     let caption = format!(
         "Largest internal step that the start of a run accepts at the scene's friction ({friction}) and speed ({speed} rad/s), to within 1 %: all shorter ones that were tried are accepted"
@@ -306,9 +306,9 @@ fn limits_table(found: &Found) -> Table {
 }
 
 /// Growth rates over friction at the scene's speed: of the equations, and of the steps.
-fn growth(found: &Found) -> Result<Option<Figure>> {
-    let here: Vec<&Point> = found.points.iter().filter(|point| point.place.speed == found.own.speed).collect();
-    let rate = |point: &Point, value: &dyn Fn(&super::Rates) -> f64| {
+fn growth(found: &StabilityResult) -> Result<Option<StudyFigure>> {
+    let here: Vec<&StabilityPoint> = found.points.iter().filter(|point| point.place.speed == found.own.speed).collect();
+    let rate = |point: &StabilityPoint, value: &dyn Fn(&super::Rates) -> f64| {
         Some((point.place.friction?, point.rates.as_ref().map(value)?))
     };
     let at = |step: f64, value: &dyn Fn(&super::Rates) -> f64| -> Vec<(f64, f64)> {
@@ -336,7 +336,7 @@ fn growth(found: &Found) -> Result<Option<Figure>> {
         sheet.rows.push([*friction].into_iter().chain(values).collect());
     }
     let plot = Plot { height: 320, marked: true, ..Plot::new("friction coefficient µ", "growth rate (1/s)", series) };
-    Ok(Some(Figure {
+    Ok(Some(StudyFigure {
         name: "growth",
         caption: format!(
             "Growth of closed sliding contact at {}, of all sets of closed nodes the one that grows most: above 0 without time \
@@ -350,9 +350,9 @@ fn growth(found: &Found) -> Result<Option<Figure>> {
     }))
 }
 
-fn results(found: &Found) -> Value {
-    let count = |verdict: Verdict| found.points.iter().filter(|point| point.verdict() == verdict).count();
-    let point = |point: &Point| {
+fn results(found: &StabilityResult) -> Value {
+    let count = |verdict: AnswerKind| found.points.iter().filter(|point| point.verdict() == verdict).count();
+    let point = |point: &StabilityPoint| {
         json!({
             "speed": point.place.speed, "friction": point.place.friction, "internal_step": point.step,
             "answer": point.verdict().name(),

@@ -5,10 +5,10 @@
 use tiprub_core::{
     Result, Rom,
     dynamics::{cyclic::CyclicModel, modal::ModalModel},
-    rom::Frame,
+    rom::DisplacementFrame,
     settings::Scheme,
     shown,
-    stability::{self, ContactDirections, Fastest, Growth, digging, judged::Judged, massless::MasslessCheck},
+    stability::{self, ContactDirections, Fastest, GrowthRates, digging, judged::SetGrowth, massless::MasslessCheck},
 };
 
 use super::seek::{Sought, TRIED, seek};
@@ -21,14 +21,14 @@ const FRICTION_STEPS_PER_UNIT: f64 = 20.0;
 
 /// What is known of the contact from a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sliding {
+pub struct KnownContact {
     /// Friction coefficient µ.
     pub friction: f64,
     /// Speed at the start (rad/s), whose sign is the sense of slip; both senses where it is 0.
     pub speed: f64,
 }
 
-impl Sliding {
+impl KnownContact {
     /// Senses of slip: 0 along +θ, 1 along −θ.
     fn senses(&self) -> impl Iterator<Item = usize> + use<> {
         let slides = [self.speed >= 0.0, self.speed <= 0.0];
@@ -38,7 +38,7 @@ impl Sliding {
 
 /// How far a scheme goes.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Limit {
+pub enum SchemeLimit {
     /// Steps below this (s) are accepted.
     Below(f64),
     /// Nothing is refused, tried up to this step (s).
@@ -53,23 +53,23 @@ pub struct StepLimit {
     /// Name as in a scene.
     pub scheme: &'static str,
     /// How far it goes.
-    pub limit: Limit,
+    pub limit: SchemeLimit,
 }
 
 impl StepLimit {
     /// For people.
     pub fn to_text(&self) -> String {
         match &self.limit {
-            Limit::Below(step) => format!("{step:.4e} s"),
-            Limit::Tried(step) => format!("none found up to {step:.1e} s"),
-            Limit::Refused(why) => format!("refused: {why}"),
+            SchemeLimit::Below(step) => format!("{step:.4e} s"),
+            SchemeLimit::Tried(step) => format!("none found up to {step:.1e} s"),
+            SchemeLimit::Refused(why) => format!("refused: {why}"),
         }
     }
 
     /// The limit (s), where there is one.
     pub fn below(&self) -> Option<f64> {
         match self.limit {
-            Limit::Below(step) => Some(step),
+            SchemeLimit::Below(step) => Some(step),
             _ => None,
         }
     }
@@ -79,7 +79,7 @@ impl StepLimit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rates {
     /// Growth of the model and of the scheme's steps.
-    pub growth: Growth,
+    pub growth: GrowthRates,
     /// What grows fastest in the equations, without the mass of the contact nodes where the model allows.
     pub physical: Fastest,
     /// Names of the closed nodes, of coupled sectors with the nodal diameter.
@@ -111,7 +111,7 @@ pub struct Digging {
 
 /// A structure by itself.
 #[derive(Debug)]
-pub struct Structure<'a> {
+pub struct SingleStructure<'a> {
     rom: &'a Rom,
     /// Its sector, or all nodal diameters of coupled sectors.
     pub models: Vec<ModalModel>,
@@ -121,7 +121,7 @@ pub struct Structure<'a> {
     closed: [ContactDirections; 2],
 }
 
-impl<'a> Structure<'a> {
+impl<'a> SingleStructure<'a> {
     /// The structure with a damping ratio, its modes at a speed (rad/s) that stiffens it, 0 where it does not.
     ///
     /// # Errors
@@ -162,8 +162,8 @@ impl<'a> Structure<'a> {
 
     /// Growth of sliding contact: of all sets of closed nodes and senses that of the largest rate of the steps. `None` without
     /// friction, and where it cannot be told.
-    pub fn rates(&self, scheme: Scheme, step: f64, sliding: Sliding) -> Option<Rates> {
-        let mut most: Option<Growth> = None;
+    pub fn rates(&self, scheme: Scheme, step: f64, sliding: KnownContact) -> Option<Rates> {
+        let mut most: Option<GrowthRates> = None;
         let mut physical: Option<(Fastest, String)> = None;
         for sense in sliding.senses() {
             for nodes in self.combinations() {
@@ -189,11 +189,11 @@ impl<'a> Structure<'a> {
     /// The least friction with which closed contact that slides digs in, of all sets of closed nodes and of the senses of a speed (rad/s), both
     /// where it is 0. `None` where no friction does, of what flies freely, and of a ROM that does not say where the other body is.
     pub fn digs_in(&self, speed: f64) -> Option<Digging> {
-        if self.rom.frame == Frame::Cartesian {
+        if self.rom.frame == DisplacementFrame::Cartesian {
             return None;
         }
         let mut least: Option<Digging> = None;
-        for sense in (Sliding { friction: 1.0, speed }).senses() {
+        for sense in (KnownContact { friction: 1.0, speed }).senses() {
             for nodes in self.combinations() {
                 for model in 0..self.models.len() {
                     let (seen, directions) = self.seen(model, &nodes, sense);
@@ -215,7 +215,7 @@ impl<'a> Structure<'a> {
         step: f64,
         friction: f64,
         directions: &ContactDirections,
-        found: &Growth,
+        found: &GrowthRates,
     ) -> Fastest {
         let own = Fastest { rate: found.continuous, frequency: found.frequency };
         let without = || stability::without_node_mass(seen, step, friction, directions);
@@ -258,29 +258,29 @@ impl<'a> Structure<'a> {
 
     /// Limits of every scheme; `sliding` is the contact where it is known. With coupled sectors, growth by friction is left to the
     /// scene.
-    pub fn step_limits(&self, sliding: Option<Sliding>) -> Vec<StepLimit> {
-        let sliding = sliding.unwrap_or(Sliding { friction: 0.0, speed: 0.0 });
+    pub fn step_limits(&self, sliding: Option<KnownContact>) -> Vec<StepLimit> {
+        let sliding = sliding.unwrap_or(KnownContact { friction: 0.0, speed: 0.0 });
         // A Cartesian ROM flies freely or stands still, where massless-boundary is not made or not asked for.
-        let massless = self.rom.frame != Frame::Cartesian;
+        let massless = self.rom.frame != DisplacementFrame::Cartesian;
         let schemes = Scheme::RECURRENCES.into_iter().filter(|scheme| massless || *scheme != Scheme::MasslessBoundary);
         schemes.map(|scheme| StepLimit { scheme: scheme.name(), limit: self.limit(scheme, sliding) }).collect()
     }
 
-    fn limit(&self, scheme: Scheme, sliding: Sliding) -> Limit {
+    fn limit(&self, scheme: Scheme, sliding: KnownContact) -> SchemeLimit {
         let [low, high] = TRIED.map(|product| product / self.highest());
         let usable = match self.massless(scheme, high) {
             Ok(usable) => usable.min(self.resolved(scheme)),
-            Err(why) => return Limit::Refused(why),
+            Err(why) => return SchemeLimit::Refused(why),
         };
         let accepted = |step: f64| step < usable && self.accepts(scheme, step, sliding);
         // Where nothing else stands in the way the limit is known.
         let exact = if scheme == Scheme::CentralDifference { 2.0 / self.highest() } else { usable };
         match seek([low, high], Some(exact), |step| if accepted(step) { Ok(()) } else { Err(()) }) {
-            Sought::All(step) => Limit::Tried(step),
-            Sought::Below(step, ()) => Limit::Below(step),
+            Sought::All(step) => SchemeLimit::Tried(step),
+            Sought::Below(step, ()) => SchemeLimit::Below(step),
             Sought::None(()) => {
                 let step = shown((low * 1e9).round() / 1e9);
-                Limit::Refused(format!("a step of {step} s is refused, at which every mode is resolved"))
+                SchemeLimit::Refused(format!("a step of {step} s is refused, at which every mode is resolved"))
             }
         }
     }
@@ -291,8 +291,8 @@ impl<'a> Structure<'a> {
             return f64::INFINITY;
         }
         let limit = |model: &ModalModel| match self.rom.frame {
-            Frame::Cartesian => stability::unresolved::limit_along_axes(model),
-            Frame::Cylindrical => {
+            DisplacementFrame::Cartesian => stability::unresolved::limit_along_axes(model),
+            DisplacementFrame::Cylindrical => {
                 stability::unresolved::limit(model, &vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3])
             }
         };
@@ -317,7 +317,7 @@ impl<'a> Structure<'a> {
         Ok(usable)
     }
 
-    fn accepts(&self, scheme: Scheme, step: f64, sliding: Sliding) -> bool {
+    fn accepts(&self, scheme: Scheme, step: f64, sliding: KnownContact) -> bool {
         if stability::check_step_allowed(self.highest(), scheme, step).is_err() {
             return false;
         }
@@ -328,7 +328,7 @@ impl<'a> Structure<'a> {
         let grows = |nodes: &Vec<usize>, sense: usize| {
             let (seen, directions) = self.seen(0, nodes, sense);
             let found = stability::growth(&seen, scheme, step, sliding.friction, &directions);
-            found.is_some_and(|found| Judged::new(&seen, scheme, step, &directions, found).allowed().is_finite())
+            found.is_some_and(|found| SetGrowth::new(&seen, scheme, step, &directions, found).allowed().is_finite())
         };
         self.combinations().iter().all(|nodes| !sliding.senses().any(|sense| grows(nodes, sense)))
     }
@@ -338,7 +338,7 @@ impl<'a> Structure<'a> {
     ///
     /// A Cartesian ROM does not say where the other body is: what can be solved is checked with the scene.
     pub fn solvable_friction(&self) -> Option<f64> {
-        if self.rom.frame == Frame::Cartesian {
+        if self.rom.frame == DisplacementFrame::Cartesian {
             return None;
         }
         let step = 1.0 / self.highest();
@@ -376,7 +376,7 @@ mod tests {
     use tiprub_model::{
         cyclic::ModeSelection,
         reduce::ReductionKind,
-        rotor37::Tip,
+        rotor37::TipContact,
         stage::{StageOptions, reduce_stage},
     };
 
@@ -386,13 +386,13 @@ mod tests {
     #[test]
     fn a_tip_digs_in_with_the_friction_that_a_run_warns_of() {
         let options = StageOptions {
-            tip: Tip::Patches(3),
+            tip: TipContact::Patches(3),
             kind: ReductionKind::FreeInterface,
             modes: ModeSelection::Count(4),
             ..StageOptions::coarse()
         };
         let rom = reduce_stage(&options, &|_| {}).unwrap().rom;
-        let found = Structure::new(&rom, rom.damping_ratio, 0.0).unwrap().digs_in(1000.0).unwrap();
+        let found = SingleStructure::new(&rom, rom.damping_ratio, 0.0).unwrap().digs_in(1000.0).unwrap();
         let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
         let mut warned = |share: f64| {
             scene.settings.contacts[0].friction = share * found.friction;

@@ -5,7 +5,7 @@ mod run;
 
 use std::fmt::Write as _;
 
-pub(crate) use run::{Feature, Seen, Side, run};
+pub(crate) use run::{ConjugacyRun, SurfaceFeature, WrenchSide, run};
 use serde_json::json;
 use tiprub_core::{
     Scene,
@@ -13,7 +13,7 @@ use tiprub_core::{
 };
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_shell::{Failure, Result, sweep};
-use tiprub_study::{Figure, Picture, Sheet, Statement, Study};
+use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure};
 
 use crate::stability::models::SOLVERS;
 
@@ -29,8 +29,8 @@ pub(crate) const TABLE: &str = "table.md";
 
 /// One row of the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Case {
-    feature: Feature,
+struct ConjugacyCase {
+    feature: SurfaceFeature,
     scheme: (Scheme, &'static str),
     solver: (Solver, &'static str),
     friction: f64,
@@ -38,15 +38,15 @@ struct Case {
 
 /// What its runs showed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Row {
-    case: Case,
+struct ConjugacyRow {
+    case: ConjugacyCase,
     /// With steps h and h/2.
-    seen: [Seen; 2],
+    seen: [ConjugacyRun; 2],
     /// Without friction in a round rigid casing.
     round: Option<f64>,
 }
 
-impl Case {
+impl ConjugacyCase {
     fn exists(&self, quick: bool) -> bool {
         let shown = match self.scheme.0 {
             Scheme::CentralDifference => self.solver.0 == Solver::Film,
@@ -65,7 +65,7 @@ impl Case {
         scene
     }
 
-    fn row(&self) -> Result<Row> {
+    fn row(&self) -> Result<ConjugacyRow> {
         let named = |error: tiprub_core::Error| {
             Failure::new(
                 format!("{}, {}, {}, µ = {}", self.feature.name(), self.scheme.1, self.solver.1, self.friction),
@@ -75,21 +75,23 @@ impl Case {
         };
         let scene = self.scene(self.friction, false);
         let seen = [run(&scene, STEP).map_err(named)?, run(&scene, 0.5 * STEP).map_err(named)?];
-        let stays_round =
-            matches!(self.feature, Feature::Revolution | Feature::Spline | Feature::Disk | Feature::Coating);
+        let stays_round = matches!(
+            self.feature,
+            SurfaceFeature::Revolution | SurfaceFeature::Spline | SurfaceFeature::Disk | SurfaceFeature::Coating
+        );
         let free_of_friction = self.solver.0 != Solver::Coulomb && stays_round;
         let round = free_of_friction.then(|| run(&self.scene(0.0, true), STEP).map_err(named)).transpose()?;
-        Ok(Row { case: *self, seen, round: round.map(|seen| seen.axis_moment) })
+        Ok(ConjugacyRow { case: *self, seen, round: round.map(|seen| seen.axis_moment) })
     }
 }
 
-fn cases(quick: bool) -> Vec<Case> {
+fn cases(quick: bool) -> Vec<ConjugacyCase> {
     let mut cases = Vec::new();
-    for feature in Feature::ALL {
+    for feature in SurfaceFeature::ALL {
         for scheme in SCHEMES {
             for solver in SOLVERS {
                 for friction in [0.0, 0.15] {
-                    cases.push(Case { feature, scheme, solver, friction });
+                    cases.push(ConjugacyCase { feature, scheme, solver, friction });
                 }
             }
         }
@@ -103,7 +105,7 @@ fn cases(quick: bool) -> Vec<Case> {
 /// # Errors
 /// A run is refused or fails.
 pub(crate) fn study(quick: bool) -> Result<Study> {
-    let rows = sweep::sweep(&cases(quick), sweep::processors(), Case::row, |_| ())?;
+    let rows = sweep::sweep(&cases(quick), sweep::processors(), ConjugacyCase::row, |_| ())?;
     let figure = curvature(if quick { 2 } else { HALVINGS })?;
     Ok(Study {
         name: "conjugacy",
@@ -118,26 +120,27 @@ pub(crate) fn study(quick: bool) -> Result<Study> {
             ("largest internal step".into(), format!("{STEP:e} s")),
         ],
         statements: statements(&rows),
-        results: json!({ "rows": rows.iter().copied().map(Row::to_json).collect::<Vec<_>>() }),
+        results: json!({ "rows": rows.iter().copied().map(ConjugacyRow::to_json).collect::<Vec<_>>() }),
         files: vec![(TABLE.into(), "the table".into(), table(&rows).into_bytes())],
         figures: vec![figure],
     })
 }
 
 /// Largest of something over the rows.
-fn worst(rows: &[Row], value: impl Fn(&Row) -> f64) -> f64 {
+fn worst(rows: &[ConjugacyRow], value: impl Fn(&ConjugacyRow) -> f64) -> f64 {
     rows.iter().map(value).fold(0.0, |worst, value| if value > worst || value.is_nan() { value } else { worst })
 }
 
-fn statements(rows: &[Row]) -> Vec<Statement> {
+fn statements(rows: &[ConjugacyRow]) -> Vec<Statement> {
     let below = |expected: &str, bound: f64, found: f64| {
         Statement::tested(format!("{expected}, at most {bound:.0e}"), found <= bound, format!("{found:.1e}"))
     };
-    let is_spline = |row: &Row| row.case.feature == Feature::Spline;
+    let is_spline = |row: &ConjugacyRow| row.case.feature == SurfaceFeature::Spline;
     let round = |spline: bool| worst(rows, |row| if is_spline(row) == spline { row.round.unwrap_or(0.0) } else { 0.0 });
     let touching = rows.iter().map(|row| row.seen[0].contacts).min().unwrap_or(0);
-    let of = |side: Side| worst(rows, |row| if row.case.feature.side() == side { row.seen[0].moment } else { 0.0 });
-    let massless = |row: &Row| row.case.scheme.0 == Scheme::MasslessBoundary;
+    let of =
+        |side: WrenchSide| worst(rows, |row| if row.case.feature.side() == side { row.seen[0].moment } else { 0.0 });
+    let massless = |row: &ConjugacyRow| row.case.scheme.0 == Scheme::MasslessBoundary;
     let curved = |step: usize| worst(rows, |row| if massless(row) { 0.0 } else { row.seen[step].curvature.abs() });
     vec![
         Statement::tested("every run has contacts", touching > 0, format!("{touching} in the run with the fewest")),
@@ -153,12 +156,12 @@ fn statements(rows: &[Row]) -> Vec<Statement> {
         below(
             "moments on master and slave about one point where the slave has control points, of |F| r",
             1e-13,
-            of(Side::ControlPoints),
+            of(WrenchSide::ControlPoints),
         ),
         below(
             "the same on surfaces of revolution, whose nodes stand off by the penetration of a step",
             1e-4,
-            of(Side::Surface),
+            of(WrenchSide::Surface),
         ),
         below(
             "modal forces on carriers from the forces on control points",
@@ -173,9 +176,9 @@ fn statements(rows: &[Row]) -> Vec<Statement> {
     ]
 }
 
-impl Row {
+impl ConjugacyRow {
     fn to_json(self) -> serde_json::Value {
-        let Case { feature, scheme, solver, friction } = self.case;
+        let ConjugacyCase { feature, scheme, solver, friction } = self.case;
         let [first, second] = self.seen;
         json!({
             "feature": feature.name(), "scheme": scheme.1, "solver": solver.1, "friction": friction,
@@ -187,18 +190,18 @@ impl Row {
 }
 
 /// The table in Markdown.
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[ConjugacyRow]) -> String {
     let mut text = String::from(
         "| scene | scheme | solver | µ | contacts | moment about the axis, µ = 0, round | torque·speed + shaft work | ledger | force \
          | moment | curvature work, h | h/2 |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    for Row { case, seen: [first, second], round } in rows {
-        let Case { feature, scheme, solver, friction } = case;
+    for ConjugacyRow { case, seen: [first, second], round } in rows {
+        let ConjugacyCase { feature, scheme, solver, friction } = case;
         let told = |there: bool, value: f64| if there { format!("{value:.0e}") } else { "-".to_owned() };
         let round = told(round.is_some(), round.unwrap_or_default());
-        let shaft = told(*feature != Feature::Free, first.shaft);
-        let force = told(feature.side() == Side::ControlPoints, first.force);
-        let moment = told(feature.side() != Side::Dented, first.moment);
+        let shaft = told(*feature != SurfaceFeature::Free, first.shaft);
+        let force = told(feature.side() == WrenchSide::ControlPoints, first.force);
+        let moment = told(feature.side() != WrenchSide::Dented, first.moment);
         let _ = writeln!(
             text,
             "| {} | {} | {} | {friction} | {} | {round} | {shaft} | {:.0e} | {force} | {moment} | {:.1e} | {:.1e} |",
@@ -215,12 +218,13 @@ fn table(rows: &[Row]) -> String {
 }
 
 /// Curvature work over the step.
-fn curvature(halvings: i32) -> Result<Figure> {
-    let features = [Feature::Revolution, Feature::Spline, Feature::Casing];
+fn curvature(halvings: i32) -> Result<StudyFigure> {
+    let features = [SurfaceFeature::Revolution, SurfaceFeature::Spline, SurfaceFeature::Casing];
     let steps: Vec<f64> = (0..halvings).rev().map(|halving| STEP * 0.5_f64.powi(halving)).collect();
     let mut sheet = Sheet::new(["step (s)", "surface of revolution (-)", "rigid spline (-)", "flexible casing (-)"]);
-    let tasks: Vec<(f64, Feature)> = steps.iter().flat_map(|step| features.map(|feature| (*step, feature))).collect();
-    let run = |(step, feature): &(f64, Feature)| {
+    let tasks: Vec<(f64, SurfaceFeature)> =
+        steps.iter().flat_map(|step| features.map(|feature| (*step, feature))).collect();
+    let run = |(step, feature): &(f64, SurfaceFeature)| {
         run(&feature.scene(0.15, true, false), *step)
             .map_err(|error| Failure::new("study conjugacy", error.to_string(), ""))
     };
@@ -237,7 +241,7 @@ fn curvature(halvings: i32) -> Result<Figure> {
         marked: true,
         ..Plot::new("internal step (s)", "curvature work, of all work", series.collect())
     };
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "curvature",
         caption:
             "Work of normals that turn and surfaces that curve within an internal step (modal-exact, lcp, µ = 0.15)."

@@ -3,14 +3,14 @@
 use tiprub_core::{
     Result, Scene, Simulation,
     dynamics::sectors::Sectors,
-    gaps::{shape::Surface, surface_spline::SurfaceSpline, wrench::Wrench},
+    gaps::{shape::CompiledShape, surface_spline::SurfaceSpline, wrench::Wrench},
     settings::{Shape, Solver, SplineSettings},
     system::{ContactEvent, Structure, System},
 };
 
 use crate::stability::{
-    bodies::{Body, HALF, Plate, Throw},
-    models::{GAP, Method, RADIUS, Tower, blade, bumps, on_ring},
+    bodies::{HALF, LumpChain, Plate, Throw},
+    models::{GAP, RADIUS, StabilityMethod, Tower, blade, bumps, on_ring},
     observe::{real, worse},
 };
 
@@ -24,7 +24,7 @@ const RAMP: f64 = 4e4;
 
 /// What the contact nodes meet, and what moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Feature {
+pub(crate) enum SurfaceFeature {
     /// Rigid surface of revolution.
     Revolution,
     /// Rigid surface through data points.
@@ -41,7 +41,7 @@ pub(crate) enum Feature {
     Free,
 }
 
-impl Feature {
+impl SurfaceFeature {
     /// All of them.
     pub(crate) const ALL: [Self; 7] =
         [Self::Revolution, Self::Spline, Self::Casing, Self::Disk, Self::DiskInCasing, Self::Coating, Self::Free];
@@ -60,11 +60,11 @@ impl Feature {
     }
 
     /// What is known of the other side.
-    pub(crate) fn side(self) -> Side {
+    pub(crate) fn side(self) -> WrenchSide {
         match self {
-            Self::Revolution | Self::Disk => Side::Surface,
-            Self::Coating => Side::Dented,
-            _ => Side::ControlPoints,
+            Self::Revolution | Self::Disk => WrenchSide::Surface,
+            Self::Coating => WrenchSide::Dented,
+            _ => WrenchSide::ControlPoints,
         }
     }
 
@@ -91,11 +91,11 @@ impl Feature {
             let left = Plate { stiffness: 1e7, ..Plate::left(HALF + 2e-4) };
             let right = Plate { stiffness: 0.0, radius: 0.18, ..Plate::right(HALF + 3e-4) };
             let throw = Throw {
-                body: Body::elastic(&[0.1, 0.15, 0.05], 2e7),
+                body: LumpChain::elastic(&[0.1, 0.15, 0.05], 2e7),
                 velocity: [-5.0, 2.5, 0.5],
                 plates: vec![left, right],
                 friction,
-                method: Method::exact(Solver::Lcp),
+                method: StabilityMethod::exact(Solver::Lcp),
                 step: 1e-6,
             };
             let mut scene = throw.scene();
@@ -115,7 +115,7 @@ impl Feature {
 
 /// What forces and moments on the slave follow from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Side {
+pub(crate) enum WrenchSide {
     /// Forces on control points, where they stand.
     ControlPoints,
     /// The same force where the surface of revolution is.
@@ -126,7 +126,7 @@ pub(crate) enum Side {
 
 /// What a run showed; residuals are relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Seen {
+pub(crate) struct ConjugacyRun {
     /// Contacts, summed over the steps.
     pub contacts: usize,
     /// Largest moment of a step about the axis of the casing, of Σ|F| r.
@@ -151,12 +151,12 @@ pub(crate) struct Seen {
 ///
 /// # Errors
 /// The scene is refused, or fails.
-pub(crate) fn run(scene: &Scene, step: f64) -> Result<Seen> {
+pub(crate) fn run(scene: &Scene, step: f64) -> Result<ConjugacyRun> {
     let mut scene = scene.clone();
     scene.settings.time.step = step;
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
-    let (mut seen, mut supplied) = (Seen::default(), 0.0);
+    let (mut seen, mut supplied) = (ConjugacyRun::default(), 0.0);
     for _ in 0..COUNT {
         let begin = simulation.time();
         let speed = drive(&mut simulation, begin)?;
@@ -203,7 +203,7 @@ fn drive(simulation: &mut Simulation, time: f64) -> Result<f64> {
 }
 
 /// Forces and moments of the internal step just done.
-fn look(scene: &Scene, simulation: &Simulation, seen: &mut Seen) {
+fn look(scene: &Scene, simulation: &Simulation, seen: &mut ConjugacyRun) {
     let system = simulation.system();
     let events = system.events();
     if events.is_empty() {
@@ -288,7 +288,7 @@ fn on_revolution(scene: &Scene, simulation: &Simulation, event: &ContactEvent) -
     let (settings, drive) = (&scene.settings, simulation.system().pairs()[event.pair].drive_now());
     let node = &scene.roms[0].contact_nodes[event.node];
     let angle = y.atan2(x);
-    let shape = Surface::new(&settings.surfaces[0].shape, GAP)
+    let shape = CompiledShape::new(&settings.surfaces[0].shape, GAP)
         .map_or(0.0, |shape| shape.evaluate(angle - drive.shape_rotation).0);
     let radius = node.position[0]
         + GAP

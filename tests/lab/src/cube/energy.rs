@@ -20,7 +20,7 @@ const RECORD: f64 = 1e-6;
 
 /// Shares of the energy at the start.
 #[derive(Debug, Clone, Copy)]
-struct Loss {
+struct EnergyShares {
     step: f64,
     /// Up to the lowest total energy.
     lost: f64,
@@ -30,7 +30,7 @@ struct Loss {
 
 /// Losses with smaller and smaller steps.
 #[derive(Debug)]
-pub(crate) struct Losses(Vec<Loss>);
+pub(crate) struct Losses(Vec<EnergyShares>);
 
 impl Losses {
     /// Fly with every step.
@@ -73,7 +73,7 @@ impl Losses {
             "## Energy at 50 m/s without friction\n\nlcp, modal-exact; lost up to the lowest total energy.\n\n| h (µs) | lost | without \
              curvature work |\n|---|---|---|\n",
         );
-        for Loss { step, lost, without_gain } in &self.0 {
+        for EnergyShares { step, lost, without_gain } in &self.0 {
             let _ = writeln!(text, "| {} | {:.3} % | {:.3} % |", 1e6 * step, 100.0 * lost, 100.0 * without_gain);
         }
         let _ = writeln!(text, "| → 0 | {:.3} % | |", 100.0 * self.limit());
@@ -88,7 +88,7 @@ impl Losses {
     }
 }
 
-fn loss(scene: &Scene, step: f64) -> Result<Loss> {
+fn loss(scene: &Scene, step: f64) -> Result<EnergyShares> {
     let product =
         Product { solver: Solver::Lcp, scheme: Scheme::ModalExact, step, interpolation: Interpolation::Spline };
     let run = product
@@ -96,7 +96,7 @@ fn loss(scene: &Scene, step: f64) -> Result<Loss> {
         .map_err(|error| Failure::new(format!("study cube, h = {step} s"), error.to_string(), ""))?;
     let total = run.history.total();
     let lost = |energies: &mut dyn Iterator<Item = f64>| 1.0 - energies.fold(f64::INFINITY, f64::min) / total[0];
-    Ok(Loss {
+    Ok(EnergyShares {
         step,
         lost: lost(&mut total.iter().copied()),
         without_gain: lost(&mut total.iter().zip(&run.curvature).map(|(total, gain)| total - gain)),

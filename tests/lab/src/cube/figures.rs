@@ -1,17 +1,17 @@
 //! The paper's figures 1 and 3 to 6 with the curves of all methods.
 
 use tiprub_figure::{
-    picture::{self, Frame, Surface, View, surface_of},
-    plots::{Form, Plot, Series},
+    picture::{self, MeshSurface, ProjectionFrame, ViewPoint, surface_of},
+    plots::{Plot, Series, SeriesForm},
 };
-use tiprub_model::cube::{Side, cube_mesh, ring_mesh};
-use tiprub_reference::{compare::windowed, cube::history::History};
+use tiprub_model::cube::{RingSide, cube_mesh, ring_mesh};
+use tiprub_reference::{compare::windowed, cube::history::CubeHistory};
 use tiprub_shell::{Failure, Result};
-use tiprub_study::{Figure, Picture, Sheet};
+use tiprub_study::{Picture, Sheet, StudyFigure};
 
 use super::{
-    pairs::{self, Pair},
-    runs::Outcome,
+    pairs::{self, RunPair},
+    runs::CubeRun,
 };
 
 /// Forces are drawn as means over this time (s): the impact of a node with mass takes one step.
@@ -21,11 +21,11 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 const TIME: &str = "time (ms)";
 
 /// The three meshes at the start.
-pub(super) fn scene() -> Figure {
-    let mut whole = Surface::default();
+pub(super) fn scene() -> StudyFigure {
+    let mut whole = MeshSurface::default();
     let mut marks = Vec::new();
     let cube = cube_mesh();
-    for mesh in [&cube, &ring_mesh(Side::Left), &ring_mesh(Side::Right)] {
+    for mesh in [&cube, &ring_mesh(RingSide::Left), &ring_mesh(RingSide::Right)] {
         let surface = surface_of(mesh);
         let first = whole.points.len();
         whole.points.extend(surface.points);
@@ -34,11 +34,11 @@ pub(super) fn scene() -> Figure {
     for set in ["CORNERS_LEFT", "CORNERS_RIGHT"] {
         marks.extend(cube.sets[set].iter().map(|&node| cube.nodes[node]));
     }
-    let view = View::of_blade(&whole, 1.1, 0.45);
-    let svg = picture::draw(&whole, None, &marks, &Frame::around(&whole, &view, 0.05), &view);
+    let view = ViewPoint::of_blade(&whole, 1.1, 0.45);
+    let svg = picture::draw(&whole, None, &marks, &ProjectionFrame::around(&whole, &view, 0.05), &view);
     let mut sheet = Sheet::new(["x (m)", "y (m)", "z (m)"]);
     sheet.rows = marks.iter().map(|place| place.to_vec()).collect();
-    Figure {
+    StudyFigure {
         name: "scene",
         caption:
             "The cube before it enters, and the two rings; dots are the corners of its contact faces, circles those behind \
@@ -74,14 +74,19 @@ fn sheet(series: &[(String, Vec<(f64, f64)>)]) -> Sheet {
     sheet
 }
 
-fn figure(name: &'static str, caption: String, unit: &str, curves: Vec<(String, Vec<(f64, f64)>)>) -> Result<Figure> {
+fn figure(
+    name: &'static str,
+    caption: String,
+    unit: &str,
+    curves: Vec<(String, Vec<(f64, f64)>)>,
+) -> Result<StudyFigure> {
     let series = curves.iter().map(|(label, points)| Series::line(label.clone(), points.clone()));
     let plot = Plot { height: 340, ..Plot::new(TIME, unit, series.collect()) };
-    Ok(Figure { name, caption, picture: Picture::plot(&plot)?, sheet: sheet(&curves) })
+    Ok(StudyFigure { name, caption, picture: Picture::plot(&plot)?, sheet: sheet(&curves) })
 }
 
 /// Fig. 3: corners of both faces of one run.
-pub(super) fn symmetry(name: &str, history: &History) -> Result<Vec<Figure>> {
+pub(super) fn symmetry(name: &str, history: &CubeHistory) -> Result<Vec<StudyFigure>> {
     let end = f64::MAX;
     let moved = (0..8).map(|corner| {
         let values = history.corners.iter().map(move |corners| 1e3 * corners[corner][0]);
@@ -103,12 +108,12 @@ pub(super) fn symmetry(name: &str, history: &History) -> Result<Vec<Figure>> {
 }
 
 /// Fig. 4: node 1 over the whole run, and fig. 5: λ1 while it touches (to `touching`, s).
-pub(super) fn node_1(outcomes: &[Outcome], speed: f64, touching: f64) -> Result<Vec<Figure>> {
+pub(super) fn node_1(outcomes: &[CubeRun], speed: f64, touching: f64) -> Result<Vec<StudyFigure>> {
     let runs: Vec<_> = outcomes.iter().filter_map(|outcome| Some((outcome.name, outcome.history()?))).collect();
     let mut figures = Vec::new();
     let files = ["fig4a-u1x", "fig4b-u1y", "fig4c-u1z"];
     for (axis, name) in files.into_iter().enumerate() {
-        let curve = |(label, history): &(&str, &History)| {
+        let curve = |(label, history): &(&str, &CubeHistory)| {
             let values = history.first(axis).into_iter().map(|value| 1e3 * value);
             ((*label).to_owned(), line(&history.times, values, f64::MAX))
         };
@@ -117,7 +122,7 @@ pub(super) fn node_1(outcomes: &[Outcome], speed: f64, touching: f64) -> Result<
         figures.push(figure(name, caption, &unit, runs.iter().map(curve).collect())?);
     }
     let force = |end: f64| {
-        let curve = |(label, history): &(&str, &History)| {
+        let curve = |(label, history): &(&str, &CubeHistory)| {
             let points = means(&history.times, &history.first_force());
             ((*label).to_owned(), points.into_iter().filter(|(time, _)| *time <= 1e3 * end).collect())
         };
@@ -131,7 +136,7 @@ pub(super) fn node_1(outcomes: &[Outcome], speed: f64, touching: f64) -> Result<
 }
 
 /// Fig. 6: energies of one run.
-pub(super) fn energies(name: &'static str, label: &str, history: &History) -> Result<Figure> {
+pub(super) fn energies(name: &'static str, label: &str, history: &CubeHistory) -> Result<StudyFigure> {
     let curve = |label: &str, values: Vec<f64>| (label.to_owned(), line(&history.times, values.into_iter(), f64::MAX));
     let curves = vec![
         curve("total", history.total()),
@@ -142,7 +147,7 @@ pub(super) fn energies(name: &'static str, label: &str, history: &History) -> Re
 }
 
 /// All pairs: picture on a logarithmic axis, table below.
-pub(super) fn agreement(pairs: &[Pair]) -> Result<Figure> {
+pub(super) fn agreement(pairs: &[RunPair]) -> Result<StudyFigure> {
     let mut sheet = Sheet::new(["pair", "u1x (%)", "slowing (%)", "u1z (%)", "lambda1 in windows (%)"]);
     let places = [0, 1, 2, 4];
     for (index, pair) in pairs.iter().enumerate() {
@@ -155,7 +160,7 @@ pub(super) fn agreement(pairs: &[Pair]) -> Result<Figure> {
     let names = ["u1x", "slowing", "u1z", "λ1 in windows"];
     let series = names.iter().enumerate().map(|(column, name)| {
         let points = sheet.rows.iter().map(|row| (row[0], row[column + 1])).collect();
-        Series::line(*name, points).drawn(Form::Dots, column)
+        Series::line(*name, points).drawn(SeriesForm::Dots, column)
     });
     let plot = Plot {
         logarithmic: true,
@@ -164,7 +169,7 @@ pub(super) fn agreement(pairs: &[Pair]) -> Result<Figure> {
     };
     let mut picture = Picture::plot(&plot)?;
     picture.html.push_str(&pairs::html(pairs));
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "pairs",
         caption: "Every two methods: relative L2 differences of node 1 while it touches, of its force in windows of 20 µs; the other columns \
                   are ratios less one."

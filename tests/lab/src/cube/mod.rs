@@ -9,11 +9,11 @@ mod product;
 mod runs;
 mod sizes;
 
-use pairs::Pair;
-use patches::Patches;
-use runs::{A, B, BEST, C, Flight, Outcome, PAPER, STICKING, competitors, released};
+use pairs::RunPair;
+use patches::PatchStudy;
+use runs::{A, B, BEST, C, CubeFlight, CubeRun, PAPER, STICKING, competitors, released};
 use serde_json::json;
-use sizes::Sizes;
+use sizes::SizeStudy;
 use tiprub_core::Scene;
 use tiprub_gallery::scene_source;
 use tiprub_reference::compare::{asymmetry, exit_speed};
@@ -23,13 +23,13 @@ use tiprub_shell::{
 };
 use tiprub_study::{Statement, Study, machine};
 
-use crate::cli::CubeArguments;
+use crate::cli::LabCubeArguments;
 
 /// The paper's flight, and the slower one of its energies.
 const FAST: f64 = 100.0;
 const SLOW: f64 = 50.0;
 const FRICTION: f64 = 0.15;
-const FRICTIONLESS: Flight = Flight { speed: SLOW, friction: 0.0 };
+const FRICTIONLESS: CubeFlight = CubeFlight { speed: SLOW, friction: 0.0 };
 /// End of the runs (s), and of the quick ones.
 const END: f64 = 3e-3;
 const QUICK_END: f64 = 2e-4;
@@ -44,18 +44,18 @@ const AT_REST: f64 = 0.03;
 
 /// All runs of one flight.
 struct Flown {
-    flight: Flight,
-    outcomes: Vec<Outcome>,
-    pairs: Vec<Pair>,
+    flight: CubeFlight,
+    outcomes: Vec<CubeRun>,
+    pairs: Vec<RunPair>,
 }
 
 impl Flown {
-    fn outcome(&self, name: &str) -> Result<&Outcome> {
+    fn outcome(&self, name: &str) -> Result<&CubeRun> {
         let missing = || Failure::new("study cube", format!("no run `{name}`"), "");
         self.outcomes.iter().find(|outcome| outcome.name == name).ok_or_else(missing)
     }
 
-    fn pair(&self, first: &str, second: &str) -> Option<&Pair> {
+    fn pair(&self, first: &str, second: &str) -> Option<&RunPair> {
         self.pairs.iter().find(|pair| pair.first == first && pair.second == second)
     }
 
@@ -68,17 +68,22 @@ impl Flown {
 ///
 /// # Errors
 /// The models cannot be made. A method that fails is a result.
-pub(crate) fn study(arguments: &CubeArguments, console: &Console) -> Result<Study> {
-    let CubeArguments { patches_only, common: arguments } = arguments;
+pub(crate) fn study(arguments: &LabCubeArguments, console: &Console) -> Result<Study> {
+    let LabCubeArguments { patches_only, common: arguments } = arguments;
     let quick = arguments.quick;
     let scene = scene_source::load("builtin:cube-between-rings", &arguments.cache.cache(), console)?;
     if *patches_only {
-        let fast = Flight { speed: FAST, friction: FRICTION };
+        let fast = CubeFlight { speed: FAST, friction: FRICTION };
         let end = quick.then_some(QUICK_END);
-        return Ok(of_patches(&Patches::new(&scene, (&fast, FRICTIONLESS), end, (&arguments.cache.cache(), console))?));
+        return Ok(of_patches(&PatchStudy::new(
+            &scene,
+            (&fast, FRICTIONLESS),
+            end,
+            (&arguments.cache.cache(), console),
+        )?));
     }
     let all = [(FAST, FRICTION), (FAST, 0.0), (SLOW, FRICTION), (SLOW, 0.0)]
-        .map(|(speed, friction)| Flight { speed, friction });
+        .map(|(speed, friction)| CubeFlight { speed, friction });
     let flights = if quick { &all[..1] } else { &all[..] };
     let planned: usize = flights.iter().map(|flight| competitors(flight, quick, *flight == all[0]).len()).sum();
     let task = console.task("Flying", Some(planned as u64));
@@ -89,14 +94,14 @@ pub(crate) fn study(arguments: &CubeArguments, console: &Console) -> Result<Stud
     }
     drop(task);
     let a = flown[0].outcome(A)?.history().ok_or_else(|| Failure::new("study cube", "method a failed", ""))?;
-    let sizes = Sizes::new(&scene, &all[0], a, quick, (&arguments.cache.cache(), console))?;
+    let sizes = SizeStudy::new(&scene, &all[0], a, quick, (&arguments.cache.cache(), console))?;
     let end = quick.then_some(QUICK_END);
-    let patches = Patches::new(&scene, (&all[0], FRICTIONLESS), end, (&arguments.cache.cache(), console))?;
+    let patches = PatchStudy::new(&scene, (&all[0], FRICTIONLESS), end, (&arguments.cache.cache(), console))?;
     report(&scene, &flown, &sizes, &patches, quick)
 }
 
 /// The study of patches alone.
-fn of_patches(patches: &Patches) -> Study {
+fn of_patches(patches: &PatchStudy) -> Study {
     Study {
         name: "cube",
         title: "A cube between two rings, its faces as patches".into(),
@@ -109,7 +114,13 @@ fn of_patches(patches: &Patches) -> Study {
     }
 }
 
-fn fly(flight: &Flight, scene: &Scene, quick: bool, facets: bool, (task, done): (&Task, &mut u64)) -> Result<Flown> {
+fn fly(
+    flight: &CubeFlight,
+    scene: &Scene,
+    quick: bool,
+    facets: bool,
+    (task, done): (&Task, &mut u64),
+) -> Result<Flown> {
     let mut outcomes = Vec::new();
     for competitor in competitors(flight, quick, facets) {
         task.now(&format!("{} m/s, µ = {}: {}", flight.speed, flight.friction, competitor.0));
@@ -121,7 +132,7 @@ fn fly(flight: &Flight, scene: &Scene, quick: bool, facets: bool, (task, done): 
     Ok(Flown { flight: *flight, outcomes, pairs })
 }
 
-fn report(scene: &Scene, flown: &[Flown], sizes: &Sizes, patches: &Patches, quick: bool) -> Result<Study> {
+fn report(scene: &Scene, flown: &[Flown], sizes: &SizeStudy, patches: &PatchStudy, quick: bool) -> Result<Study> {
     let main = flown.first().ok_or_else(|| Failure::new("study cube", "no flight", ""))?;
     let best = main.outcome(BEST)?;
     let mut figures = vec![figures::scene()];
@@ -212,7 +223,7 @@ fn meeting(main: &Flown) -> Vec<Statement> {
 }
 
 /// What is left out by reducing the rings.
-fn truncation(sizes: &Sizes) -> Statement {
+fn truncation(sizes: &SizeStudy) -> Statement {
     let modal: Vec<_> = sizes.rings.iter().filter(|size| size.static_responses == 0).collect();
     let falls = modal.windows(2).all(|pair| (0..3).all(|i| pair[1].apart[i] < pair[0].apart[i]));
     let told = modal.iter().map(|size| {
@@ -296,7 +307,7 @@ fn slow(flown: &[Flown]) -> Result<Vec<Statement>> {
         product.clone().count() > 0 && product.clone().all(|(.., exit)| *exit > 45.0),
         format!("largest loss at the steps of these runs and exit speed: {}", listed.collect::<Vec<_>>().join("; ")),
     ));
-    let rest = |outcome: &Outcome| {
+    let rest = |outcome: &CubeRun| {
         let history = outcome.history()?;
         let (kinetic, strain) = (history.kinetic.last().copied()?, history.strain.last().copied()?);
         Some((kinetic, strain, asymmetry(history, f64::MAX)[0]))

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 use tiprub_figure::escape;
-use tiprub_reference::compare::{Agreement, WINDOW, agreement, asymmetry, exit_speed, windowed};
+use tiprub_reference::compare::{HistoryDifference, WINDOW, agreement, asymmetry, exit_speed, windowed};
 
-use super::runs::{Flight, Outcome, released};
+use super::runs::{CubeFlight, CubeRun, released};
 
 /// Headings of the pairs.
 const PAIR: [&str; 10] = [
@@ -36,16 +36,16 @@ const RUN: [&str; 9] = [
 
 /// Two runs compared.
 #[derive(Debug, Clone)]
-pub(super) struct Pair {
+pub(super) struct RunPair {
     pub first: &'static str,
     pub second: &'static str,
-    pub found: Agreement,
+    pub found: HistoryDifference,
 }
 
-impl Pair {
+impl RunPair {
     /// Shares as in [`PAIR`].
     pub(super) fn shares(&self) -> [f64; 10] {
-        let Agreement { touching, contact, path, windows, peak, impulse, left_impulse, exit } = self.found;
+        let HistoryDifference { touching, contact, path, windows, peak, impulse, left_impulse, exit } = self.found;
         let [x, slowing, z] = touching;
         [x, slowing, z, path, windows, peak, impulse, left_impulse, exit, contact[0]]
     }
@@ -59,7 +59,7 @@ impl Pair {
 }
 
 /// Every two runs that ended well, windows as those of `a`, the first of them.
-pub(super) fn pairs(outcomes: &[Outcome], flight: &Flight) -> Vec<Pair> {
+pub(super) fn pairs(outcomes: &[CubeRun], flight: &CubeFlight) -> Vec<RunPair> {
     let runs: Vec<_> = outcomes.iter().filter_map(|outcome| Some((outcome.name, outcome.history()?))).collect();
     let Some((_, a)) = runs.first() else { return Vec::new() };
     let end = a.times.last().copied().unwrap_or(0.0);
@@ -69,14 +69,14 @@ pub(super) fn pairs(outcomes: &[Outcome], flight: &Flight) -> Vec<Pair> {
     for (index, (first, b)) in runs.iter().enumerate() {
         for (second, a) in &runs[index + 1..] {
             let found = agreement(a, b, flight.speed, touching, contact);
-            pairs.push(Pair { first, second, found });
+            pairs.push(RunPair { first, second, found });
         }
     }
     pairs
 }
 
 /// What one reads off a run.
-fn readings(outcome: &Outcome) -> Vec<String> {
+fn readings(outcome: &CubeRun) -> Vec<String> {
     let Ok(run) = &outcome.result else { return vec![String::new(); RUN.len()] };
     let history = &run.history;
     let span = |component: usize| {
@@ -104,7 +104,7 @@ fn readings(outcome: &Outcome) -> Vec<String> {
 }
 
 /// Both tables as Markdown.
-pub(super) fn markdown(outcomes: &[Outcome], pairs: &[Pair]) -> String {
+pub(super) fn markdown(outcomes: &[CubeRun], pairs: &[RunPair]) -> String {
     let mut text = String::new();
     let heading = |first: &str, columns: &[&str]| {
         format!("| {first} | {} |\n|---|{}\n", columns.join(" | "), "---|".repeat(columns.len()))
@@ -125,7 +125,7 @@ pub(super) fn markdown(outcomes: &[Outcome], pairs: &[Pair]) -> String {
 }
 
 /// The pairs for the page.
-pub(super) fn html(pairs: &[Pair]) -> String {
+pub(super) fn html(pairs: &[RunPair]) -> String {
     let mut html = String::from("<table><thead><tr><th>pair</th>");
     for name in PAIR {
         let _ = write!(html, "<th>{name}</th>");
@@ -140,7 +140,7 @@ pub(super) fn html(pairs: &[Pair]) -> String {
 }
 
 /// Runs and pairs for programs.
-pub(super) fn json(outcomes: &[Outcome], pairs: &[Pair], flight: &Flight) -> Value {
+pub(super) fn json(outcomes: &[CubeRun], pairs: &[RunPair], flight: &CubeFlight) -> Value {
     json!({
         "speed": flight.speed,
         "friction": flight.friction,

@@ -7,10 +7,10 @@ use tiprub_core::{
     settings::{Interpolation, Scheme, Solver},
 };
 use tiprub_gallery::{reduction, rom_cache::RomCache};
-use tiprub_model::cube::{CubeOptions, MassMatrix, RingOptions, Side};
+use tiprub_model::cube::{CubeOptions, MassMatrix, RingOptions, RingSide};
 use tiprub_reference::{
     compare::{asymmetry, exit_speed, windowed},
-    cube::{history::History, outside},
+    cube::{history::CubeHistory, outside},
 };
 use tiprub_shell::{Failure, Result, console::Console};
 use tiprub_study::Statement;
@@ -18,7 +18,7 @@ use tiprub_study::Statement;
 use super::{
     LEDGER, SYMMETRIC,
     product::{Product, ProductRun},
-    runs::{Flight, RECORD},
+    runs::{CubeFlight, RECORD},
 };
 
 /// GetFEM's flight: facets, consistent mass, forces that hold the gaps of nodes.
@@ -64,28 +64,28 @@ pub(super) struct Patched {
 
 /// All of them.
 #[derive(Debug, Clone)]
-pub(super) struct Patches(Vec<Patched>);
+pub(super) struct PatchStudy(Vec<Patched>);
 
-struct Work<'a> {
+struct PatchRuns<'a> {
     scene: &'a Scene,
-    fast: &'a Flight,
-    slow: Flight,
+    fast: &'a CubeFlight,
+    slow: CubeFlight,
     end: Option<f64>,
     tools: (&'a RomCache, &'a Console),
 }
 
-impl Patches {
+impl PatchStudy {
     /// Reduce, fly. Quick ones end early (`end`, s) and have the fast flight only.
     ///
     /// # Errors
     /// A reduction or a run that is refused; never with what ships.
     pub(super) fn new(
         scene: &Scene,
-        (fast, slow): (&Flight, Flight),
+        (fast, slow): (&CubeFlight, CubeFlight),
         end: Option<f64>,
         tools: (&RomCache, &Console),
     ) -> Result<Self> {
-        let work = Work { scene, fast, slow, end, tools };
+        let work = PatchRuns { scene, fast, slow, end, tools };
         let cases = if end.is_some() { &QUICK_CASES[..] } else { &CASES[..] };
         Ok(Self(cases.iter().map(|(elements, patches)| work.patched(*elements, *patches)).collect::<Result<_>>()?))
     }
@@ -150,7 +150,7 @@ impl Patches {
     }
 }
 
-impl Work<'_> {
+impl PatchRuns<'_> {
     fn patched(&self, elements: usize, patches: Option<usize>) -> Result<Patched> {
         let lumped = self.with(elements, patches, MassMatrix::Lumped)?;
         let fast = self.run(&lumped, self.fast, Interpolation::Spline, self.end.unwrap_or(FAST_END))?;
@@ -182,7 +182,7 @@ impl Work<'_> {
             outside::read(GETFEM, self.fast.speed).map_err(|error| Failure::from_below("study cube", error))?;
         let end = theirs.times[theirs.times.len() - 1];
         let mut scene = self.with(5, patches, MassMatrix::Consistent)?;
-        for side in Side::BOTH {
+        for side in RingSide::BOTH {
             let options = RingOptions { mass: MassMatrix::Consistent, ..RingOptions::new(side) };
             let rom = self.tools.0.get(
                 &format!("{}-study-consistent", options.name.replace('_', "-")),
@@ -194,7 +194,8 @@ impl Work<'_> {
         }
         let own = self.run(&scene, self.fast, Interpolation::Facets, end)?.history;
         let times: Vec<f64> = (1..=100).map(|sample| end * f64::from(sample) / 100.0).collect();
-        let lost = |history: &History| history.velocity.iter().map(|v| v[1] + self.fast.speed).collect::<Vec<f64>>();
+        let lost =
+            |history: &CubeHistory| history.velocity.iter().map(|v| v[1] + self.fast.speed).collect::<Vec<f64>>();
         let lost =
             tiprub_reference::compare::relative_l2((&own.times, &lost(&own)), (&theirs.times, &lost(&theirs)), &times);
         Ok([impulse(&own, end) / impulse(&theirs, end) - 1.0, lost])
@@ -213,14 +214,14 @@ impl Work<'_> {
         Ok(scene)
     }
 
-    fn run(&self, scene: &Scene, flight: &Flight, interpolation: Interpolation, end: f64) -> Result<ProductRun> {
+    fn run(&self, scene: &Scene, flight: &CubeFlight, interpolation: Interpolation, end: f64) -> Result<ProductRun> {
         let run = product(interpolation).run(scene, flight, end, RECORD);
         run.map_err(|error| Failure::from_below("study cube", error))
     }
 }
 
 /// Impulse of the left face up to a time (s).
-fn impulse(history: &History, end: f64) -> f64 {
+fn impulse(history: &CubeHistory, end: f64) -> f64 {
     let left: Vec<f64> = history.forces.iter().map(|sides| sides[0]).collect();
     windowed(&history.times, &left, end, end)[0] * end
 }

@@ -7,9 +7,9 @@ use tiprub_core::{
     settings::{Interpolation, Scheme, Solver, SplineSettings},
     variables::Quantity,
 };
-use tiprub_reference::cube::history::{History, processor_time};
+use tiprub_reference::cube::history::{CubeHistory, processor_time};
 
-use super::Flight;
+use super::CubeFlight;
 
 /// Corners 1, 6, 85, 90 and 31, 36, 91, 96 of the paper's figure 2 among the contact nodes of two faces, each a square of `face` nodes.
 fn corners(face: usize) -> [usize; 8] {
@@ -31,7 +31,7 @@ pub(crate) struct Product {
 /// A history and what only the product tells.
 #[derive(Debug, Clone)]
 pub(crate) struct ProductRun {
-    pub history: History,
+    pub history: CubeHistory,
     /// Curvature work at every record (J).
     pub curvature: Vec<f64>,
     /// Largest closure residual of the energy ledger, relative.
@@ -46,13 +46,13 @@ impl Product {
     ///
     /// # Errors
     /// A scene that is refused, a state that is.
-    pub(super) fn run(&self, scene: &Scene, flight: &Flight, end: f64, record: f64) -> Result<ProductRun> {
+    pub(super) fn run(&self, scene: &Scene, flight: &CubeFlight, end: f64, record: f64) -> Result<ProductRun> {
         let started = processor_time();
         let mut simulation = Simulation::new(&self.scene(scene, flight))?;
         simulation.initialise(0.0)?;
         let columns = Columns::new(&simulation, scene.roms[0].contact_nodes.len() / 2);
         let mut run = ProductRun {
-            history: History { method: "product".into(), step: self.step, ..History::default() },
+            history: CubeHistory { method: "product".into(), step: self.step, ..CubeHistory::default() },
             curvature: Vec::new(),
             residual: 0.0,
             stepping: Duration::ZERO,
@@ -78,7 +78,7 @@ impl Product {
         Ok(run)
     }
 
-    fn scene(&self, scene: &Scene, flight: &Flight) -> Scene {
+    fn scene(&self, scene: &Scene, flight: &CubeFlight) -> Scene {
         let mut scene = scene.clone();
         let settings = &mut scene.settings;
         settings.structures[0].velocity = [0.0, -flight.speed, 0.0];

@@ -6,10 +6,10 @@ use tiprub_core::{
 };
 use tiprub_reference::{
     cube::{
-        history::History,
-        scene::{Mass, Scene as FullScene, Setting},
+        history::CubeHistory,
+        scene::{CubeScene as FullScene, CubeSetting, Mass},
     },
-    methods::{Method, Run},
+    methods::{CubeMethod, MethodRun},
     surface::SurfaceKind,
 };
 use tiprub_shell::{Failure, Result};
@@ -18,7 +18,7 @@ use super::product::{Product, ProductRun};
 
 /// How the cube flies.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Flight {
+pub(crate) struct CubeFlight {
     /// Speed along −y (m/s).
     pub speed: f64,
     pub friction: f64,
@@ -26,35 +26,35 @@ pub(crate) struct Flight {
 
 /// A method of either kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Competitor {
+pub(super) enum CubeCompetitor {
     Product(Product),
-    Reference { method: Method, surface: SurfaceKind, step: f64, stride: usize },
+    Reference { method: CubeMethod, surface: SurfaceKind, step: f64, stride: usize },
 }
 
 /// One run; failures are results.
 #[derive(Debug, Clone)]
-pub(super) struct Outcome {
+pub(super) struct CubeRun {
     pub name: &'static str,
-    pub competitor: Competitor,
+    pub competitor: CubeCompetitor,
     pub result: std::result::Result<ProductRun, String>,
 }
 
-impl Outcome {
-    pub(super) fn history(&self) -> Option<&History> {
+impl CubeRun {
+    pub(super) fn history(&self) -> Option<&CubeHistory> {
         self.result.as_ref().ok().map(|run| &run.history)
     }
 
     pub(crate) fn is_product(&self) -> bool {
-        matches!(self.competitor, Competitor::Product(_))
+        matches!(self.competitor, CubeCompetitor::Product(_))
     }
 }
 
-const fn product(solver: Solver, scheme: Scheme) -> Competitor {
-    Competitor::Product(Product { solver, scheme, step: 5e-7, interpolation: Interpolation::Spline })
+const fn product(solver: Solver, scheme: Scheme) -> CubeCompetitor {
+    CubeCompetitor::Product(Product { solver, scheme, step: 5e-7, interpolation: Interpolation::Spline })
 }
 
-fn reference(method: Method, surface: SurfaceKind, step: f64, stride: usize) -> Competitor {
-    Competitor::Reference { method, surface, step, stride }
+fn reference(method: CubeMethod, surface: SurfaceKind, step: f64, stride: usize) -> CubeCompetitor {
+    CubeCompetitor::Reference { method, surface, step, stride }
 }
 
 /// Names of the product's runs that statements are about.
@@ -67,12 +67,12 @@ pub(super) const B: &str = "b, bi-potential";
 pub(super) const C: &str = "c, augmented Lagrangian";
 
 /// All methods of a flight; on facets as well where `facets`.
-pub(super) fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'static str, Competitor)> {
+pub(super) fn competitors(flight: &CubeFlight, quick: bool, facets: bool) -> Vec<(&'static str, CubeCompetitor)> {
     let (film, augmented, spline) =
-        (Method::Film(Default::default()), Method::Augmented(Default::default()), SurfaceKind::Spline);
+        (CubeMethod::Film(Default::default()), CubeMethod::Augmented(Default::default()), SurfaceKind::Spline);
     let mut list = vec![
         (A, reference(film, spline, 5e-7, 2)),
-        (B, reference(Method::Bipotential, spline, 1e-6, 1)),
+        (B, reference(CubeMethod::Bipotential, spline, 1e-6, 1)),
         (PAPER, product(Solver::Film, Scheme::CentralDifference)),
         (BEST, product(Solver::Lcp, Scheme::ModalExact)),
     ];
@@ -84,7 +84,7 @@ pub(super) fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'
         list.push((STICKING, product(Solver::Coulomb, Scheme::ModalExact)));
     }
     list.push((C, reference(augmented, spline, 1e-6, 1)));
-    list.push(("d, penalty", reference(Method::Penalty(Default::default()), spline, 1e-7, 10)));
+    list.push(("d, penalty", reference(CubeMethod::Penalty(Default::default()), spline, 1e-7, 10)));
     if facets {
         let flat = Product {
             solver: Solver::Lcp,
@@ -92,9 +92,9 @@ pub(super) fn competitors(flight: &Flight, quick: bool, facets: bool) -> Vec<(&'
             step: 5e-7,
             interpolation: Interpolation::Facets,
         };
-        list.push(("b, facets", reference(Method::Bipotential, SurfaceKind::Facets, 1e-6, 1)));
+        list.push(("b, facets", reference(CubeMethod::Bipotential, SurfaceKind::Facets, 1e-6, 1)));
         list.push(("c, facets", reference(augmented, SurfaceKind::Facets, 1e-6, 1)));
-        list.push(("product, lcp, modal-exact, facets", Competitor::Product(flat)));
+        list.push(("product, lcp, modal-exact, facets", CubeCompetitor::Product(flat)));
     }
     list
 }
@@ -107,17 +107,17 @@ pub(crate) const RECORD: f64 = 1e-6;
 /// # Errors
 /// The full model cannot be assembled.
 pub(super) fn run(
-    (name, competitor): (&'static str, Competitor),
+    (name, competitor): (&'static str, CubeCompetitor),
     scene: &Scene,
-    flight: &Flight,
+    flight: &CubeFlight,
     end: f64,
-) -> Result<Outcome> {
+) -> Result<CubeRun> {
     let result = match competitor {
-        Competitor::Product(product) => product.run(scene, flight, end, RECORD).map_err(|error| error.to_string()),
-        Competitor::Reference { method, surface, step, stride } => {
-            let setting = Setting { speed: flight.speed, friction: flight.friction, surface, mass: Mass::Lumped };
+        CubeCompetitor::Product(product) => product.run(scene, flight, end, RECORD).map_err(|error| error.to_string()),
+        CubeCompetitor::Reference { method, surface, step, stride } => {
+            let setting = CubeSetting { speed: flight.speed, friction: flight.friction, surface, mass: Mass::Lumped };
             let full = FullScene::new(setting).map_err(|error| Failure::from_below("study cube", error))?;
-            let history = method.run(&full, &Run { step, end, stride, snapshots: Vec::new() });
+            let history = method.run(&full, &MethodRun { step, end, stride, snapshots: Vec::new() });
             history.map_err(|error| error.to_string()).map(|history| ProductRun {
                 internal_steps: (history.times.len() * stride) as u64,
                 history,
@@ -127,11 +127,11 @@ pub(super) fn run(
             })
         }
     };
-    Ok(Outcome { name, competitor, result })
+    Ok(CubeRun { name, competitor, result })
 }
 
 /// Last time of contact of node 1 (s), as far as it has one contact: until it is free for 50 µs.
-pub(super) fn released(history: &History) -> f64 {
+pub(super) fn released(history: &CubeHistory) -> f64 {
     let mut last = None;
     for (time, force) in history.times.iter().zip(history.first_force()) {
         if force > 0.0 {

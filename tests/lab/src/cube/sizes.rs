@@ -3,14 +3,14 @@
 use serde_json::{Value, json};
 use tiprub_core::{Scene, settings::Interpolation, settings::Scheme, settings::Solver};
 use tiprub_gallery::{reduction, rom_cache::RomCache};
-use tiprub_model::cube::{CubeOptions, RingOptions, Side};
-use tiprub_reference::{compare::agreement, cube::history::History};
+use tiprub_model::cube::{CubeOptions, RingOptions, RingSide};
+use tiprub_reference::{compare::agreement, cube::history::CubeHistory};
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
     patches::replace,
     product::{Product, ProductRun},
-    runs::{Flight, RECORD, released},
+    runs::{CubeFlight, RECORD, released},
 };
 
 /// Modes and static responses of the rings.
@@ -30,7 +30,7 @@ const PRODUCT: Product = Product {
 
 /// A run with one body reduced otherwise.
 #[derive(Debug, Clone)]
-pub(crate) struct Size {
+pub(crate) struct CubeSize {
     pub modes: usize,
     pub static_responses: usize,
     /// Size of the ROM file (bytes).
@@ -43,25 +43,25 @@ pub(crate) struct Size {
 
 /// Rings against method a, and the cube against all its modes.
 #[derive(Debug, Clone)]
-pub(crate) struct Sizes {
-    pub rings: Vec<Size>,
-    pub cube: Vec<Size>,
+pub(crate) struct SizeStudy {
+    pub rings: Vec<CubeSize>,
+    pub cube: Vec<CubeSize>,
 }
 
-impl Sizes {
+impl SizeStudy {
     /// Reduce (or take from the cache), run, compare; `a` is the flight of method a.
     ///
     /// # Errors
     /// A reduction or a run that is refused; never with what ships.
     pub(super) fn new(
         scene: &Scene,
-        flight: &Flight,
-        a: &History,
+        flight: &CubeFlight,
+        a: &CubeHistory,
         quick: bool,
         tools: (&RomCache, &Console),
     ) -> Result<Self> {
         let last = a.times.last().copied().unwrap_or(0.0);
-        let work = Work { scene, flight, end: END.min(last), touching: released(a), tools };
+        let work = SizeRuns { scene, flight, end: END.min(last), touching: released(a), tools };
         let mut rings = Vec::new();
         for [modes, static_responses] in if quick { &QUICK_RINGS[..] } else { &RINGS[..] } {
             rings.push(work.rings(*modes, *static_responses, a)?);
@@ -71,8 +71,8 @@ impl Sizes {
 
     /// For programs.
     pub(super) fn json(&self) -> Value {
-        let rows = |sizes: &[Size]| -> Vec<Value> {
-            let row = |size: &Size| {
+        let rows = |sizes: &[CubeSize]| -> Vec<Value> {
+            let row = |size: &CubeSize| {
                 json!({
                     "modes": size.modes, "static_responses": size.static_responses, "rom_bytes": size.bytes,
                     "apart": size.apart, "processor_seconds": size.seconds,
@@ -90,7 +90,7 @@ impl Sizes {
             "## Reduced models\n\nRings against method a:\n\n| modes | static responses | ROM file (MB) | u1x | slowing | u1z | λ1, windows | \
              steps (CPU s) |\n|---|---|---|---|---|---|---|---|\n",
         );
-        for Size { modes, static_responses, bytes, apart, seconds } in &self.rings {
+        for CubeSize { modes, static_responses, bytes, apart, seconds } in &self.rings {
             let shares = apart.map(percent).join(" | ");
             let megabytes = *bytes as f64 / 1e6;
             text.push_str(&format!("| {modes} | {static_responses} | {megabytes:.1} | {shares} | {seconds:.2} |\n"));
@@ -107,21 +107,21 @@ impl Sizes {
     }
 }
 
-struct Work<'a> {
+struct SizeRuns<'a> {
     scene: &'a Scene,
-    flight: &'a Flight,
+    flight: &'a CubeFlight,
     end: f64,
     /// While node 1 touches (s).
     touching: f64,
     tools: (&'a RomCache, &'a Console),
 }
 
-impl Work<'_> {
-    fn rings(&self, modes: usize, static_responses: usize, a: &History) -> Result<Size> {
+impl SizeRuns<'_> {
+    fn rings(&self, modes: usize, static_responses: usize, a: &CubeHistory) -> Result<CubeSize> {
         let (cache, console) = self.tools;
         let mut scene = self.scene.clone();
         let mut bytes = 0;
-        for (side, name) in [(Side::Left, "left"), (Side::Right, "right")] {
+        for (side, name) in [(RingSide::Left, "left"), (RingSide::Right, "right")] {
             let options = RingOptions { modes, static_responses, ..RingOptions::new(side) };
             let file = format!("ring-{name}-study-{modes}-{static_responses}");
             let rom = cache.get(&file, &options, console, &|| Ok(reduction::cube_ring(&options, console)?.rom))?;
@@ -132,7 +132,7 @@ impl Work<'_> {
         Ok(self.size([modes, static_responses], bytes, &run, a))
     }
 
-    fn cubes(&self) -> Result<Vec<Size>> {
+    fn cubes(&self) -> Result<Vec<CubeSize>> {
         let (cache, console) = self.tools;
         let mut runs = Vec::new();
         for modes in CUBE {
@@ -153,10 +153,16 @@ impl Work<'_> {
         run.map_err(|error| Failure::from_below("study cube", error))
     }
 
-    fn size(&self, [modes, static_responses]: [usize; 2], bytes: usize, run: &ProductRun, other: &History) -> Size {
+    fn size(
+        &self,
+        [modes, static_responses]: [usize; 2],
+        bytes: usize,
+        run: &ProductRun,
+        other: &CubeHistory,
+    ) -> CubeSize {
         let found = agreement(&run.history, other, self.flight.speed, self.touching, self.end);
         let [x, slowing, z] = found.touching;
         let seconds = run.history.processor_time;
-        Size { modes, static_responses, bytes, apart: [x, slowing, z, found.windows], seconds }
+        CubeSize { modes, static_responses, bytes, apart: [x, slowing, z, found.windows], seconds }
     }
 }

@@ -3,16 +3,16 @@
 use tiprub_reference::{
     carpenter,
     closed::bouncing_bar,
-    reduced::bars::{self, Rod, RodScene},
+    reduced::bars::{self, RodModel, RodScene},
 };
 
 use super::{
-    case::Case,
-    competitor::{Competitor, Family, TOLERANCES, TOLERANT},
+    case::ErrorCase,
+    competitor::{Competitor, EquationFamily, TOLERANCES, TOLERANT},
     marched::RodMarch,
     outside::{OutsideRun, Softness},
     rods::CoreRod,
-    run::{Run, Trace},
+    run::{TimedRun, Trace},
 };
 
 /// Share of its mass that a contact node keeps where it should have none: one mode then stands for its flexibility alone.
@@ -23,7 +23,7 @@ const COURANT: [f64; 9] = [4.0, 1.6, 1.02, 0.9, 0.5, 0.25, 0.125, 0.0625, 0.0312
 const REFERENCE_COURANT: f64 = 1.0 / 256.0;
 
 /// A rod at one number of elements, for everyone.
-struct Size {
+struct BarSize {
     elements: usize,
     outside: RodScene,
     core: CoreRod,
@@ -34,7 +34,7 @@ struct Size {
 
 /// Which problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Problem {
+enum BarProblem {
     Carpenter,
     Bouncing,
     /// Never touching, or never lifting off.
@@ -45,8 +45,8 @@ enum Problem {
 
 /// A problem of rods at several numbers of elements.
 pub(crate) struct Bars {
-    problem: Problem,
-    sizes: Vec<Size>,
+    problem: BarProblem,
+    sizes: Vec<BarSize>,
     standard: usize,
     interval: f64,
     samples: usize,
@@ -63,7 +63,7 @@ impl Bars {
     pub(crate) fn carpenter(quick: bool) -> Result<Self, String> {
         let elements = if quick { vec![10, 20, 40] } else { vec![20, 40, 80, 160] };
         let passage = carpenter::LENGTH / carpenter::wave_speed();
-        Self::new(Problem::Carpenter, &elements, 10e-6, 22, passage, quick)
+        Self::new(BarProblem::Carpenter, &elements, 10e-6, 22, passage, quick)
     }
 
     /// Scene 2, over its period with two contacts.
@@ -73,7 +73,7 @@ impl Bars {
     pub(crate) fn bouncing(quick: bool) -> Result<Self, String> {
         let elements = if quick { vec![10, 20, 40] } else { vec![20, 40, 80, 160] };
         let passage = bouncing_bar::LENGTH / bouncing_bar::wave_speed();
-        Self::new(Problem::Bouncing, &elements, bouncing_bar::PERIOD / 64.0, 64, passage, quick)
+        Self::new(BarProblem::Bouncing, &elements, bouncing_bar::PERIOD / 64.0, 64, passage, quick)
     }
 
     /// A bar of twenty elements that is shaken without a change of contact.
@@ -82,20 +82,21 @@ impl Bars {
     /// Never.
     pub(crate) fn shaken(touching: bool) -> Result<Self, String> {
         let passage = bouncing_bar::LENGTH / bouncing_bar::wave_speed();
-        let mut bars = Self::new(Problem::Shaken { touching }, &[20], bouncing_bar::PERIOD / 64.0, 16, passage, false)?;
+        let mut bars =
+            Self::new(BarProblem::Shaken { touching }, &[20], bouncing_bar::PERIOD / 64.0, 16, passage, false)?;
         bars.courant = vec![0.5, 0.25, 0.125, 0.0625, 0.03125];
         Ok(bars)
     }
 
     fn new(
-        problem: Problem,
+        problem: BarProblem,
         elements: &[usize],
         interval: f64,
         samples: usize,
         passage: f64,
         quick: bool,
     ) -> Result<Self, String> {
-        let sizes = elements.iter().map(|count| Size::new(problem, *count)).collect::<Result<Vec<_>, String>>()?;
+        let sizes = elements.iter().map(|count| BarSize::new(problem, *count)).collect::<Result<Vec<_>, String>>()?;
         let courant = if quick { COURANT[..7].to_vec() } else { COURANT.to_vec() };
         Ok(Self { problem, standard: 1.min(sizes.len() - 1), sizes, interval, samples, passage, courant })
     }
@@ -109,7 +110,7 @@ impl Bars {
 
     fn exact_at(&self, time: f64) -> f64 {
         match self.problem {
-            Problem::Carpenter => bars::carpenter_exact(time),
+            BarProblem::Carpenter => bars::carpenter_exact(time),
             _ => -bouncing_bar::displacement(0.0, time) + bouncing_bar::HEIGHT,
         }
     }
@@ -117,27 +118,27 @@ impl Bars {
     fn exact_force(&self, time: f64) -> f64 {
         let exact = carpenter::exact();
         match self.problem {
-            Problem::Carpenter if time > exact.touch && time < exact.release => exact.force,
-            Problem::Carpenter => 0.0,
+            BarProblem::Carpenter if time > exact.touch && time < exact.release => exact.force,
+            BarProblem::Carpenter => 0.0,
             _ => bouncing_bar::pressure(time),
         }
     }
 }
 
-impl Size {
-    fn new(problem: Problem, elements: usize) -> Result<Self, String> {
-        let rod = |end_mass: f64| -> Rod {
+impl BarSize {
+    fn new(problem: BarProblem, elements: usize) -> Result<Self, String> {
+        let rod = |end_mass: f64| -> RodModel {
             match problem {
-                Problem::Carpenter => bars::carpenter(elements, end_mass),
-                Problem::Bouncing => bars::bouncing(elements, end_mass),
-                Problem::Shaken { touching } => bars::shaken(elements, end_mass, touching),
+                BarProblem::Carpenter => bars::carpenter(elements, end_mass),
+                BarProblem::Bouncing => bars::bouncing(elements, end_mass),
+                BarProblem::Shaken { touching } => bars::shaken(elements, end_mass, touching),
             }
         };
-        let whole = matches!(problem, Problem::Shaken { .. });
-        let ends = if problem == Problem::Carpenter { 2 } else { 1 };
+        let whole = matches!(problem, BarProblem::Shaken { .. });
+        let ends = if problem == BarProblem::Carpenter { 2 } else { 1 };
         // As stiff as two elements; a hundredth of an element is what commercial codes let pass.
         let (stiffness, length) = match problem {
-            Problem::Carpenter => (carpenter::YOUNG * carpenter::AREA / carpenter::LENGTH, carpenter::LENGTH),
+            BarProblem::Carpenter => (carpenter::YOUNG * carpenter::AREA / carpenter::LENGTH, carpenter::LENGTH),
             _ => (bouncing_bar::YOUNG / bouncing_bar::LENGTH, bouncing_bar::LENGTH),
         };
         let (stiffness, tolerance) = (2.0 * stiffness * elements as f64, 0.01 * length / elements as f64);
@@ -151,43 +152,43 @@ impl Size {
     }
 }
 
-impl Case for Bars {
+impl ErrorCase for Bars {
     fn name(&self) -> &'static str {
         match self.problem {
-            Problem::Carpenter => "carpenter",
-            Problem::Bouncing => "bouncing-bar",
-            Problem::Shaken { touching: false } => "free-vibration",
-            Problem::Shaken { touching: true } => "sustained-contact",
+            BarProblem::Carpenter => "carpenter",
+            BarProblem::Bouncing => "bouncing-bar",
+            BarProblem::Shaken { touching: false } => "free-vibration",
+            BarProblem::Shaken { touching: true } => "sustained-contact",
         }
     }
 
     fn figures(&self) -> [&'static str; 2] {
         match self.problem {
-            Problem::Carpenter => ["carpenter-steps", "carpenter-total"],
-            Problem::Bouncing => ["bouncing-bar-steps", "bouncing-bar-total"],
-            Problem::Shaken { touching: false } => ["free-steps", "free-total"],
-            Problem::Shaken { touching: true } => ["sustained-steps", "sustained-total"],
+            BarProblem::Carpenter => ["carpenter-steps", "carpenter-total"],
+            BarProblem::Bouncing => ["bouncing-bar-steps", "bouncing-bar-total"],
+            BarProblem::Shaken { touching: false } => ["free-steps", "free-total"],
+            BarProblem::Shaken { touching: true } => ["sustained-steps", "sustained-total"],
         }
     }
 
     fn title(&self) -> &'static str {
         match self.problem {
-            Problem::Carpenter => "Carpenter's bars",
-            Problem::Bouncing => "Bouncing bar",
-            Problem::Shaken { touching: false } => "Free vibration",
-            Problem::Shaken { touching: true } => "Sustained contact",
+            BarProblem::Carpenter => "Carpenter's bars",
+            BarProblem::Bouncing => "Bouncing bar",
+            BarProblem::Shaken { touching: false } => "Free vibration",
+            BarProblem::Shaken { touching: true } => "Sustained contact",
         }
     }
 
     fn description(&self) -> String {
         match self.problem {
-            Problem::Carpenter => "Two elastic bars meet head-on (N. J. Carpenter, R. L. Taylor, M. G. Katona, 1991); linear elements, lumped \
+            BarProblem::Carpenter => "Two elastic bars meet head-on (N. J. Carpenter, R. L. Taylor, M. G. Katona, 1991); linear elements, lumped \
                                    mass. The truth is the exact solution: relative displacement of the ends, force, release."
                 .into(),
-            Problem::Bouncing => "A bar bounces on rigid ground under gravity (D. Doyen, A. Ern, S. Piperno, 2011), one period with two \
+            BarProblem::Bouncing => "A bar bounces on rigid ground under gravity (D. Doyen, A. Ern, S. Piperno, 2011), one period with two \
                                   contacts; linear elements, lumped mass. The truth is the exact series."
                 .into(),
-            Problem::Shaken { .. } => "A bar held at its top, shaken without a change of contact.".into(),
+            BarProblem::Shaken { .. } => "A bar held at its top, shaken without a change of contact.".into(),
         }
     }
 
@@ -240,7 +241,7 @@ impl Case for Bars {
         competitor: Competitor,
         division: u32,
         perturbation: f64,
-    ) -> Result<Box<dyn Run + 'a>, String> {
+    ) -> Result<Box<dyn TimedRun + 'a>, String> {
         let (size, interval) = (&self.sizes[size], self.interval);
         Ok(match competitor {
             TOLERANT => {
@@ -259,7 +260,7 @@ impl Case for Bars {
     fn exact(&self) -> Option<Trace> {
         /// Points per sample at which the force is looked at.
         const POINTS: u32 = 2000;
-        if matches!(self.problem, Problem::Shaken { .. }) {
+        if matches!(self.problem, BarProblem::Shaken { .. }) {
             return None;
         }
         let time = |sample: usize| (sample + 1) as f64 * self.interval;
@@ -270,13 +271,13 @@ impl Case for Bars {
         };
         let last = |sample: usize| {
             let ends = match self.problem {
-                Problem::Carpenter => vec![carpenter::exact().release],
+                BarProblem::Carpenter => vec![carpenter::exact().release],
                 _ => bouncing_bar::CONTACTS.iter().map(|contact| contact[1]).collect(),
             };
             ends.into_iter().filter(|end| *end <= time(sample)).fold(f64::NAN, |_, end| end)
         };
         let energy = match self.problem {
-            Problem::Carpenter => carpenter::exact().energy,
+            BarProblem::Carpenter => carpenter::exact().energy,
             // The potential is counted from where the bar starts.
             _ => 0.0,
         };
@@ -295,8 +296,8 @@ impl Case for Bars {
     }
 
     /// Without friction nothing sticks.
-    fn families(&self, _: usize) -> Vec<Family> {
-        vec![Family::MASSLESS]
+    fn families(&self, _: usize) -> Vec<EquationFamily> {
+        vec![EquationFamily::MASSLESS]
     }
 
     fn several_nodes(&self) -> bool {
@@ -304,14 +305,16 @@ impl Case for Bars {
     }
 
     fn energy_scale(&self) -> Option<f64> {
-        (self.problem == Problem::Bouncing).then(bouncing_bar::energy)
+        (self.problem == BarProblem::Bouncing).then(bouncing_bar::energy)
     }
 
     fn releases(&self) -> Vec<[f64; 2]> {
         match self.problem {
-            Problem::Carpenter => vec![[carpenter::exact().touch, 2.2e-4]],
-            Problem::Bouncing => bouncing_bar::CONTACTS.iter().map(|contact| [contact[0], contact[1] + 1.0]).collect(),
-            Problem::Shaken { .. } => Vec::new(),
+            BarProblem::Carpenter => vec![[carpenter::exact().touch, 2.2e-4]],
+            BarProblem::Bouncing => {
+                bouncing_bar::CONTACTS.iter().map(|contact| [contact[0], contact[1] + 1.0]).collect()
+            }
+            BarProblem::Shaken { .. } => Vec::new(),
         }
     }
 }

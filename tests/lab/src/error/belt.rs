@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use tiprub_core::{
     dynamics::{bank::BankOptions, modal::ModalModel, sectors::SectorModel},
-    gaps::{Drive, FixedGap, GapLaw},
+    gaps::{FixedGap, GapLaw, PrescribedMotion},
     settings::{Scheme, Solver},
     stability::{self, massless},
     system::{System, SystemSettings},
@@ -11,9 +11,9 @@ use tiprub_core::{
 use tiprub_reference::closed::belt::ThrownBlock;
 
 use super::{
-    case::Case,
-    competitor::{Competitor, Family, TOLERANCES},
-    run::{Run, Seen, Trace},
+    case::ErrorCase,
+    competitor::{Competitor, EquationFamily, TOLERANCES},
+    run::{StepExtremes, TimedRun, Trace},
 };
 
 const BLOCK: ThrownBlock = ThrownBlock { mass: 2.0, omega: 50.0, flexibility: 4e-6, friction: 2.0, velocity: 0.5 };
@@ -36,13 +36,13 @@ const DIVISIONS: [u32; 7] = [1, 4, 20, 80, 200, 800, 3200];
 const REFERENCE: [u32; 2] = [12_800, 6400];
 
 /// The block on the belt.
-pub(crate) struct Belt {
+pub(crate) struct BeltCase {
     model: ModalModel,
     massless_limit: massless::MasslessLimit,
     quick: bool,
 }
 
-impl Belt {
+impl BeltCase {
     /// The block as modes: the spring, and six that stand for the flexibility of two contact nodes.
     pub(crate) fn new(quick: bool) -> Self {
         let rows = 3 * NODES;
@@ -97,7 +97,7 @@ impl Belt {
             let amplitude = Self::pressed() / self.model.contact_modes[(normal - 1, normal)];
             system.bank_mut().set_modal_state(normal, 0, amplitude, 0.0);
         }
-        system.start(&[Drive::default()]);
+        system.start(&[PrescribedMotion::default()]);
         Ok(BeltRun { system, step, count: if by_tolerance { 1 } else { division } })
     }
 
@@ -106,7 +106,7 @@ impl Belt {
     }
 }
 
-impl Case for Belt {
+impl ErrorCase for BeltCase {
     fn name(&self) -> &'static str {
         "belt"
     }
@@ -186,7 +186,7 @@ impl Case for Belt {
         competitor: Competitor,
         division: u32,
         perturbation: f64,
-    ) -> Result<Box<dyn Run + 'a>, String> {
+    ) -> Result<Box<dyn TimedRun + 'a>, String> {
         match competitor {
             Competitor::Core(scheme, solver) => Ok(Box::new(self.run((scheme, solver), division, perturbation)?)),
             _ => Err("only the product's own methods run on the belt".into()),
@@ -214,8 +214,8 @@ impl Case for Belt {
         })
     }
 
-    fn families(&self, _: usize) -> Vec<Family> {
-        vec![Family::STICKING, Family::BOTH]
+    fn families(&self, _: usize) -> Vec<EquationFamily> {
+        vec![EquationFamily::STICKING, EquationFamily::BOTH]
     }
 
     fn several_nodes(&self) -> bool {
@@ -233,18 +233,18 @@ struct BeltRun {
 
 impl BeltRun {
     fn one(&mut self) -> Result<(), String> {
-        let stepped = self.system.step(&[Drive::default()]);
+        let stepped = self.system.step(&[PrescribedMotion::default()]);
         stepped.map_err(|failure| format!("step {} failed: {failure:?}", self.system.steps()))
     }
 }
 
-impl Run for BeltRun {
+impl TimedRun for BeltRun {
     fn advance(&mut self) -> Result<(), String> {
         (0..self.count).try_for_each(|_| self.one())
     }
 
     #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
-    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+    fn watch(&mut self, seen: &mut StepExtremes) -> Result<(), String> {
         for _ in 0..self.count {
             self.one()?;
             let forces = self.system.events().iter().map(|event| event.normal);

@@ -8,9 +8,9 @@ use tiprub_gallery::{rom_cache::RomCache, scene_source};
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
-    case::Case,
-    competitor::{Competitor, DEFAULT, Family, PAPER, TOLERANCES, TOLERANT},
-    run::Run,
+    case::ErrorCase,
+    competitor::{Competitor, DEFAULT, EquationFamily, PAPER, TOLERANCES, TOLERANT},
+    run::TimedRun,
     scene::SceneRun,
     window,
 };
@@ -25,7 +25,7 @@ const IMPULSE_WINDOW: usize = 4;
 const PARTING_DIVISIONS: [u32; 4] = [80, 160, 320, 640];
 
 /// A built-in scene and the steps that are compared on it.
-pub(crate) struct Facts {
+pub(crate) struct BuiltInFacts {
     pub name: &'static str,
     /// File names of the two pictures.
     pub figures: [&'static str; 2],
@@ -46,7 +46,7 @@ pub(crate) struct Facts {
 const BLADES: [&[u32]; 3] = [&[80, 320, 1280, 2000, 4000], &[80, 160, 320, 640], &[40, 80, 160, 320, 640]];
 const COUPLED: [&[u32]; 3] = [&[80, 320, 1280], &[40, 80, 160, 320], &[10, 20, 40, 80, 160]];
 
-pub(crate) const LIGHT: Facts = Facts {
+pub(crate) const LIGHT: BuiltInFacts = BuiltInFacts {
     name: "rotor37-light",
     figures: ["rotor37-light-steps", "rotor37-light-total"],
     title: "Rotor 37, light rub",
@@ -59,7 +59,7 @@ pub(crate) const LIGHT: Facts = Facts {
     reference: 4000,
 };
 
-pub(crate) const HEAVY: Facts = Facts {
+pub(crate) const HEAVY: BuiltInFacts = BuiltInFacts {
     name: "rotor37-heavy",
     figures: ["rotor37-heavy-steps", "rotor37-heavy-total"],
     title: "Rotor 37, heavy rub",
@@ -68,7 +68,7 @@ pub(crate) const HEAVY: Facts = Facts {
     ..LIGHT
 };
 
-pub(crate) const CASING: Facts = Facts {
+pub(crate) const CASING: BuiltInFacts = BuiltInFacts {
     name: "flexible-casing",
     figures: ["flexible-casing-steps", "flexible-casing-total"],
     title: "Rotor 37 in an elastic casing",
@@ -80,7 +80,7 @@ pub(crate) const CASING: Facts = Facts {
     reference: 1600,
 };
 
-pub(crate) const STAGE: Facts = Facts {
+pub(crate) const STAGE: BuiltInFacts = BuiltInFacts {
     name: "stage",
     figures: ["stage-steps", "stage-total"],
     title: "Stage",
@@ -92,7 +92,7 @@ pub(crate) const STAGE: Facts = Facts {
 
 /// One scene, one model: errors of the steps only.
 pub(crate) struct BuiltIn {
-    facts: Facts,
+    facts: BuiltInFacts,
     scene: Scene,
     samples: usize,
     quick: bool,
@@ -104,7 +104,7 @@ impl BuiltIn {
     ///
     /// # Errors
     /// The model cannot be reduced or a run fails; never with the built-in scenes.
-    pub(crate) fn new(facts: Facts, quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
+    pub(crate) fn new(facts: BuiltInFacts, quick: bool, cache: &RomCache, console: &Console) -> Result<Self> {
         let mut scene = scene_source::load(facts.scene, cache, console)?;
         scene.settings.preset = Preset::None;
         scene.settings.experiment.communication_step = INTERVAL;
@@ -132,7 +132,7 @@ impl BuiltIn {
     }
 }
 
-impl Case for BuiltIn {
+impl ErrorCase for BuiltIn {
     fn name(&self) -> &'static str {
         self.facts.name
     }
@@ -215,7 +215,7 @@ impl Case for BuiltIn {
         competitor: Competitor,
         division: u32,
         perturbation: f64,
-    ) -> std::result::Result<Box<dyn Run + 'a>, String> {
+    ) -> std::result::Result<Box<dyn TimedRun + 'a>, String> {
         let Competitor::Core(scheme, solver) = competitor else {
             return Err("only the product's own methods run on a built-in scene".into());
         };
@@ -227,7 +227,7 @@ impl Case for BuiltIn {
         &self.parting
     }
 
-    fn families(&self, _: usize) -> Vec<Family> {
-        vec![Family::MASSLESS]
+    fn families(&self, _: usize) -> Vec<EquationFamily> {
+        vec![EquationFamily::MASSLESS]
     }
 }

@@ -6,7 +6,7 @@ use tiprub_core::{
 };
 use tiprub_figure::table::Table;
 use tiprub_shell::{Failure, Result, console::Console};
-use tiprub_study::error::{case::Case, clock, measure::parts_apart, summary::rate};
+use tiprub_study::error::{case::ErrorCase, clock, measure::parts_apart, summary::rate};
 
 use super::built_in::BuiltIn;
 
@@ -20,13 +20,18 @@ const FINEST: f64 = 1e-6;
 const REPETITIONS: usize = 3;
 
 /// Displacements at the end of every 0.1 ms, or of every communication step where that is longer (m), and processor time of the steps (s).
-struct Recording {
+struct DisplacementSamples {
     displacements: Vec<Vec<f64>>,
     seconds: f64,
 }
 
 /// Runs `milliseconds` of the scene with communication steps of `multiple` times the shortest.
-fn record(scene: &Scene, tolerance: f64, multiple: usize, milliseconds: usize) -> tiprub_core::Result<Recording> {
+fn record(
+    scene: &Scene,
+    tolerance: f64,
+    multiple: usize,
+    milliseconds: usize,
+) -> tiprub_core::Result<DisplacementSamples> {
     let mut scene = scene.clone();
     let interval = SHORTEST * multiple as f64;
     scene.settings.experiment.communication_step = interval;
@@ -36,7 +41,7 @@ fn record(scene: &Scene, tolerance: f64, multiple: usize, milliseconds: usize) -
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
     let (steps, sampled) = (milliseconds * 1000 / multiple, (100 / multiple).max(1));
-    let mut recording = Recording { displacements: Vec::new(), seconds: 0.0 };
+    let mut recording = DisplacementSamples { displacements: Vec::new(), seconds: 0.0 };
     for step in 0..steps {
         let before = clock::now();
         simulation.do_step(step as f64 * interval, interval)?;
@@ -49,7 +54,7 @@ fn record(scene: &Scene, tolerance: f64, multiple: usize, milliseconds: usize) -
 }
 
 /// Relative error at the instants that a coarser recording shares with the finest one.
-fn error(found: &Recording, finest: &Recording) -> f64 {
+fn error(found: &DisplacementSamples, finest: &DisplacementSamples) -> f64 {
     let every = finest.displacements.len() / found.displacements.len();
     let shared: Vec<Vec<f64>> = finest.displacements.iter().skip(every - 1).step_by(every).cloned().collect();
     let length = shared.first().map_or(0, Vec::len);

@@ -2,19 +2,19 @@
 
 use tiprub_core::Scene;
 use tiprub_gallery::{reduction, rom_cache::RomCache, scene_source};
-use tiprub_model::cube::{RingOptions, Side};
+use tiprub_model::cube::{RingOptions, RingSide};
 use tiprub_reference::{
-    cube::scene::{Mass, Scene as FullScene, Setting},
+    cube::scene::{CubeScene as FullScene, CubeSetting, Mass},
     surface::SurfaceKind,
 };
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
-    case::Case,
-    competitor::{Competitor, Family, Full, TOLERANCES, TOLERANT},
+    case::ErrorCase,
+    competitor::{Competitor, EquationFamily, Full, TOLERANCES, TOLERANT},
     full::{FullRun, without_flight},
     measure::apart,
-    run::{self, Run, Seen, Trace},
+    run::{self, StepExtremes, TimedRun, Trace},
     scene::SceneRun,
     window,
 };
@@ -63,7 +63,7 @@ impl Cube {
         let mut sizes = Vec::new();
         for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {
             let mut scene = shipped.clone();
-            for (rom, side) in scene.roms[1..].iter_mut().zip(Side::BOTH) {
+            for (rom, side) in scene.roms[1..].iter_mut().zip(RingSide::BOTH) {
                 let options = RingOptions { modes, ..RingOptions::new(side) };
                 let name = format!("{}-study-{modes}", options.name);
                 *rom = cache.get(&name, &options, console, &|| Ok(reduction::cube_ring(&options, console)?.rom))?;
@@ -72,7 +72,7 @@ impl Cube {
         }
         let speed = shipped.settings.structures[0].velocity[1].abs();
         let friction = shipped.settings.contacts[0].friction;
-        let setting = Setting { speed, friction, surface: SurfaceKind::Spline, mass: Mass::Lumped };
+        let setting = CubeSetting { speed, friction, surface: SurfaceKind::Spline, mass: Mass::Lumped };
         let full = FullScene::new(setting).map_err(|error| Failure::from_below("study error", error))?;
         let samples = if quick { QUICK_SAMPLES } else { SAMPLES };
         let mut cube = Self { sizes, full, quick, samples, speed, references: Vec::new(), parting: Vec::new() };
@@ -97,7 +97,7 @@ impl Cube {
     }
 }
 
-impl Case for Cube {
+impl ErrorCase for Cube {
     fn name(&self) -> &'static str {
         "cube"
     }
@@ -197,12 +197,12 @@ impl Case for Cube {
         competitor: Competitor,
         division: u32,
         perturbation: f64,
-    ) -> std::result::Result<Box<dyn Run + 'a>, String> {
+    ) -> std::result::Result<Box<dyn TimedRun + 'a>, String> {
         Ok(match competitor {
             Competitor::Core(scheme, solver) => {
                 let scene = SceneRun::by(&self.sizes[size].1, (scheme, solver), INTERVAL, division, perturbation);
                 let run = SceneRun::with_start_values(&scene, INTERVAL, division, &[])?;
-                Box::new(Flight { run, speed: self.speed })
+                Box::new(FlightRemoved { run, speed: self.speed })
             }
             Competitor::Full(method) => Box::new(FullRun::new(&self.full, method, (INTERVAL, self.samples), division)?),
             _ => return Err("this method knows no free master".into()),
@@ -222,23 +222,23 @@ impl Case for Cube {
     }
 
     /// Massless-boundary is refused, and at this speed nothing sticks.
-    fn families(&self, _: usize) -> Vec<Family> {
+    fn families(&self, _: usize) -> Vec<EquationFamily> {
         Vec::new()
     }
 }
 
 /// A run of the product, its displacements without the flight.
-struct Flight {
+struct FlightRemoved {
     run: SceneRun,
     speed: f64,
 }
 
-impl Run for Flight {
+impl TimedRun for FlightRemoved {
     fn advance(&mut self) -> std::result::Result<(), String> {
         self.run.advance()
     }
 
-    fn watch(&mut self, seen: &mut Seen) -> std::result::Result<(), String> {
+    fn watch(&mut self, seen: &mut StepExtremes) -> std::result::Result<(), String> {
         self.run.watch(seen)
     }
 

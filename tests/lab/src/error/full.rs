@@ -1,18 +1,18 @@
 //! Runs of the methods of `tiprub-reference` on the full finite-element model of the cube and its rings.
 
 use tiprub_reference::{
-    cube::{history::History, scene::Scene},
-    methods::{self, Method},
+    cube::{history::CubeHistory, scene::CubeScene},
+    methods::{self, CubeMethod},
 };
 
 use super::{
     competitor::Full,
-    run::{Run, Seen},
+    run::{StepExtremes, TimedRun},
 };
 
 /// A run that is over: the methods run to the end in one go and keep a history, which is then walked through.
 pub(crate) struct FullRun {
-    history: History,
+    history: CubeHistory,
     step: f64,
     speed: f64,
     interval: f64,
@@ -27,21 +27,21 @@ impl FullRun {
     /// # Errors
     /// What the method refuses.
     pub(crate) fn new(
-        scene: &Scene,
+        scene: &CubeScene,
         method: Full,
         (interval, samples): (f64, usize),
         division: u32,
     ) -> Result<Self, String> {
         let method = match method {
-            Full::Film => Method::Film(Default::default()),
-            Full::Bipotential => Method::Bipotential,
-            Full::Augmented => Method::Augmented(Default::default()),
-            Full::Penalty => Method::Penalty(Default::default()),
+            Full::Film => CubeMethod::Film(Default::default()),
+            Full::Bipotential => CubeMethod::Bipotential,
+            Full::Augmented => CubeMethod::Augmented(Default::default()),
+            Full::Penalty => CubeMethod::Penalty(Default::default()),
         };
         let step = interval / f64::from(division);
         let end = |sample: usize| (sample + 1) as f64 * interval;
         let snapshots = (0..samples).map(end).collect();
-        let run = methods::Run { step, end: end(samples - 1), stride: 1, snapshots };
+        let run = methods::MethodRun { step, end: end(samples - 1), stride: 1, snapshots };
         let history = method.run(scene, &run).map_err(|error| error.to_string())?;
         if history.snapshots.len() < samples {
             return Err("the run has ended early".into());
@@ -57,12 +57,12 @@ pub(crate) fn without_flight(displacements: impl IntoIterator<Item = f64>, flown
     all.map(|(index, value)| if index % 3 == 1 { value + flown } else { value }).collect()
 }
 
-impl Run for FullRun {
+impl TimedRun for FullRun {
     fn advance(&mut self) -> Result<(), String> {
-        self.watch(&mut Seen::nothing())
+        self.watch(&mut StepExtremes::nothing())
     }
 
-    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+    fn watch(&mut self, seen: &mut StepExtremes) -> Result<(), String> {
         self.samples += 1;
         let end = self.samples as f64 * self.interval + 0.5 * self.step;
         let history = &self.history;

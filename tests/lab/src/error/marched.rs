@@ -6,17 +6,17 @@ use nalgebra::{DMatrix, DVector};
 use tiprub_core::{
     dynamics::modal::ModalModel,
     galerkin::{
-        level::{Level, Modes},
-        sector::{Demand, Effort, Marcher, Tables, Taken, Witness},
+        level::{ContactModes, StepTables},
+        sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness},
         state::SectorState,
-        trial::{Kind, Obstacle, Sliding},
+        trial::{ForceInterpolation, Obstacle, SlidingState},
     },
     settings::Scheme,
 };
 
 use super::{
     rods::{CoreRod, NORMAL},
-    run::{Run, Seen},
+    run::{StepExtremes, TimedRun},
 };
 
 /// Gaps of contacts count as closed within this share of the tolerance, and what rounding leaves of lengths (m).
@@ -25,38 +25,38 @@ const PRECISION: [f64; 2] = [1e-4, 1e-15];
 const POINTS: usize = 4;
 
 /// The obstacle, and what has touched it.
-struct Ground {
+struct RigidObstacle {
     gap: f64,
     /// Displacement of the contact by loads alone: at the start (m), and its acceleration (m/s²).
     loaded: [f64; 2],
     /// Where the span begins, and how long it is (s).
     span: [f64; 2],
     times: [f64; POINTS],
-    seen: Seen,
+    seen: StepExtremes,
 }
 
-impl Ground {
+impl RigidObstacle {
     fn gap_at(&self, time: f64, moved: f64) -> f64 {
         self.gap - (moved + self.loaded[0] + 0.5 * self.loaded[1] * time * time)
     }
 }
 
-impl Obstacle for Ground {
+impl Obstacle for RigidObstacle {
     fn gap(&mut self, _: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         (self.gap_at(self.times[point], moved[0]), NORMAL)
     }
 
-    fn direction(&mut self, _: usize, _: usize, _: &Sliding) -> [f64; 3] {
+    fn direction(&mut self, _: usize, _: usize, _: &SlidingState) -> [f64; 3] {
         NORMAL
     }
 }
 
-impl Witness for Ground {
-    fn go(&mut self, from: f64, length: f64, level: &Level, kind: Kind) {
+impl Witness for RigidObstacle {
+    fn go(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
         for (point, time) in self.times.iter_mut().enumerate() {
             let theta = match kind {
-                Kind::Constant => f64::from(u8::from(point > 0)),
-                Kind::Polynomial => level.basis.points.get(point).copied().unwrap_or(1.0),
+                ForceInterpolation::Constant => f64::from(u8::from(point > 0)),
+                ForceInterpolation::Polynomial => level.basis.points.get(point).copied().unwrap_or(1.0),
             };
             *time = self.span[0] + self.span[1] * (from + length * theta);
         }
@@ -68,13 +68,13 @@ impl Witness for Ground {
 
     fn flew(&mut self, _: f64) {}
 
-    fn took(&mut self, step: &Taken) {
+    fn took(&mut self, step: &AcceptedStep) {
         let length = step.level.step;
         for point in 0..=step.trial.points() {
             let force = step.trial.multiplier(point, 0);
             let weight = match step.kind {
-                Kind::Constant => f64::from(u8::from(point == 1)),
-                Kind::Polynomial => step.level.basis.weights[point],
+                ForceInterpolation::Constant => f64::from(u8::from(point == 1)),
+                ForceInterpolation::Polynomial => step.level.basis.weights[point],
             };
             self.seen.impulse += weight * length * force;
             self.seen.adhesion = self.seen.adhesion.min(force);
@@ -94,9 +94,9 @@ pub(crate) struct RodMarch<'a> {
     dynamic: usize,
     tables: Tables,
     state: SectorState,
-    marcher: Marcher,
-    ground: Ground,
-    demand: Demand,
+    marcher: SectorIntegrator,
+    ground: RigidObstacle,
+    demand: StepGoal,
     effort: Effort,
 }
 
@@ -115,12 +115,12 @@ impl<'a> RodMarch<'a> {
         let loaded = (0..model.len()).map(|mode| seen_by(mode) * rod.loaded(mode, 0.0)[0]).sum();
         let rigid = (0..model.len()).filter(|mode| model.frequencies[*mode] == 0.0);
         let acceleration = rigid.map(|mode| seen_by(mode) * rod.load[mode]).sum();
-        let ground = Ground {
+        let ground = RigidObstacle {
             gap: rod.gap * (1.0 + perturbation),
             loaded: [loaded, acceleration],
             span: [0.0, interval],
             times: [0.0; POINTS],
-            seen: Seen::nothing(),
+            seen: StepExtremes::nothing(),
         };
         // What is closed at the start is carried from then on.
         let moved: f64 = (0..dynamic).map(|mode| seen_by(mode) * state.position[mode]).sum();
@@ -140,9 +140,9 @@ impl<'a> RodMarch<'a> {
             dynamic,
             tables,
             state,
-            marcher: Marcher::new(dynamic, 1),
+            marcher: SectorIntegrator::new(dynamic, 1),
             ground,
-            demand: Demand { tolerance, precision, most: u64::MAX },
+            demand: StepGoal { tolerance, precision, most: u64::MAX },
             effort: Effort::default(),
         }
     }
@@ -163,13 +163,13 @@ impl<'a> RodMarch<'a> {
 }
 
 /// Modes with inertia, and what the others give way by.
-fn modes_of(model: &ModalModel, dynamic: usize) -> Modes {
+fn modes_of(model: &ModalModel, dynamic: usize) -> ContactModes {
     let mut residual = DMatrix::zeros(3, 3);
     for mode in dynamic..model.len() {
         let shape = model.contact_modes.column(mode);
         residual += shape * shape.transpose() / model.frequencies[mode].powi(2);
     }
-    Modes {
+    ContactModes {
         frequencies: model.frequencies[..dynamic].to_vec(),
         damping_ratios: vec![0.0; dynamic],
         shapes: model.contact_modes.columns(0, dynamic).into_owned(),
@@ -177,7 +177,7 @@ fn modes_of(model: &ModalModel, dynamic: usize) -> Modes {
     }
 }
 
-impl Run for RodMarch<'_> {
+impl TimedRun for RodMarch<'_> {
     fn advance(&mut self) -> Result<(), String> {
         let Self { tables, state, marcher, ground, demand, effort, .. } = self;
         let marched = marcher.march(tables, state, ground, *demand, effort);
@@ -185,7 +185,7 @@ impl Run for RodMarch<'_> {
         marched.map_err(|stopped| format!("{stopped:?} at t = {} s", ground.span[0]))
     }
 
-    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+    fn watch(&mut self, seen: &mut StepExtremes) -> Result<(), String> {
         self.ground.seen.next();
         self.advance()?;
         *seen = self.ground.seen.clone();

@@ -15,11 +15,11 @@ pub(crate) mod stage;
 mod turning;
 
 use bars::Bars;
-use belt::Belt;
+use belt::BeltCase;
 use built_in::BuiltIn;
-use case::Case;
+use case::ErrorCase;
 use cube::Cube;
-use rotor::{Rub, rotor};
+use rotor::{BumpDepth, rotor};
 use tiprub_figure::table::Table;
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_shell::{Failure, Result, console::Console, forecast::Forecast};
@@ -28,7 +28,7 @@ use tiprub_study::{
     error::{case, clock, competitor, measure, of_cases, planned, run, scene, window},
 };
 
-use crate::cli::{ErrorArguments, ErrorScene};
+use crate::cli::{ErrorScene, LabErrorArguments};
 
 /// Time and error by the length of the communication step, as Markdown.
 const COMMUNICATION: &str = "communication-steps.md";
@@ -37,7 +37,7 @@ const COMMUNICATION: &str = "communication-steps.md";
 ///
 /// # Errors
 /// A reference fails, which does not happen with built-in scenes, or the guide cannot be written.
-pub(crate) fn study(arguments: &ErrorArguments, console: &Console) -> Result<Study> {
+pub(crate) fn study(arguments: &LabErrorArguments, console: &Console) -> Result<Study> {
     let guide = arguments.guide.as_deref();
     if guide.is_some() && (arguments.common.quick || !arguments.scenes.is_empty()) {
         return Err(Failure::new(
@@ -50,12 +50,12 @@ pub(crate) fn study(arguments: &ErrorArguments, console: &Console) -> Result<Stu
     let quick = arguments.common.quick;
     let cache = arguments.common.cache.cache();
     let mut communication = None;
-    let mut cases: Vec<Box<dyn Case>> = Vec::new();
+    let mut cases: Vec<Box<dyn ErrorCase>> = Vec::new();
     for scene in scenes {
         cases.push(case_of(scene, (quick, &cache), console, &mut communication)?);
     }
     let shaken = [Bars::shaken(false).map_err(never)?, Bars::shaken(true).map_err(never)?];
-    let smooth = shaken.each_ref().map(|bars| bars as &dyn Case);
+    let smooth = shaken.each_ref().map(|bars| bars as &dyn ErrorCase);
     let summary = "Adaptive steps, fixed steps and the paper's method on built-in scenes; every scheme and solver on standard problems, beside \
                    methods that share no code with them."
         .to_owned();
@@ -84,8 +84,8 @@ fn case_of(
     (quick, cache): (bool, &RomCache),
     console: &Console,
     communication: &mut Option<Table>,
-) -> Result<Box<dyn Case>> {
-    let mut built_in = |facts: built_in::Facts| -> Result<Box<dyn Case>> {
+) -> Result<Box<dyn ErrorCase>> {
+    let mut built_in = |facts: built_in::BuiltInFacts| -> Result<Box<dyn ErrorCase>> {
         let case = BuiltIn::new(facts, quick, cache, console)?;
         let mut table = communication::table(&case, quick, console)?;
         match communication {
@@ -99,12 +99,12 @@ fn case_of(
         ErrorScene::Rotor37Heavy => built_in(built_in::HEAVY),
         ErrorScene::FlexibleCasing => built_in(built_in::CASING),
         ErrorScene::Stage => built_in(built_in::STAGE),
-        ErrorScene::Rotor37PaperLight => Ok(Box::new(rotor(Rub::Light, quick, cache, console)?)),
-        ErrorScene::Rotor37PaperHeavy => Ok(Box::new(rotor(Rub::Heavy, quick, cache, console)?)),
+        ErrorScene::Rotor37PaperLight => Ok(Box::new(rotor(BumpDepth::Light, quick, cache, console)?)),
+        ErrorScene::Rotor37PaperHeavy => Ok(Box::new(rotor(BumpDepth::Heavy, quick, cache, console)?)),
         ErrorScene::StageCoarse => Ok(Box::new(stage::stage(quick, cache, console)?)),
         ErrorScene::Cube => Ok(Box::new(Cube::new(quick, cache, console)?)),
         ErrorScene::Carpenter => Ok(Box::new(Bars::carpenter(quick).map_err(never)?)),
-        ErrorScene::Belt => Ok(Box::new(Belt::new(quick))),
+        ErrorScene::Belt => Ok(Box::new(BeltCase::new(quick))),
         ErrorScene::BouncingBar => Ok(Box::new(Bars::bouncing(quick).map_err(never)?)),
     }
 }
@@ -124,8 +124,8 @@ mod tests {
         scene::SceneRun,
     };
     use crate::stability::{
-        bodies::{Body, Plate, Throw},
-        models::Method,
+        bodies::{LumpChain, Plate, Throw},
+        models::StabilityMethod,
     };
 
     const METHOD: (Scheme, Solver) = (Scheme::ModalExact, Solver::Lcp);
@@ -142,11 +142,11 @@ mod tests {
     /// A body of two lumps that is thrown at a plate beside the rotor, along it at 30 m/s.
     fn beside(mut rotor: Scene, approach: f64) -> Scene {
         let throw = Throw {
-            body: Body::elastic(&[0.05, 0.05], 1e7),
+            body: LumpChain::elastic(&[0.05, 0.05], 1e7),
             velocity: [-approach, 30.0, 0.0],
             plates: vec![Plate::left(0.0201)],
             friction: 0.0,
-            method: Method::exact(METHOD.1),
+            method: StabilityMethod::exact(METHOD.1),
             step: 1e-6,
         };
         let thrown = throw.scene();

@@ -1,15 +1,15 @@
 //! Runs of the methods of `tiprub-reference`.
 
 use tiprub_reference::reduced::{
-    Method, Scene,
-    augmented::{Augmented, Options},
+    ReducedMethod, ReducedScene,
+    augmented::{Augmented, NewmarkOptions},
     moreau::Moreau,
     penalty::Penalty,
 };
 
 use super::{
     competitor::Competitor,
-    run::{Run, Seen},
+    run::{StepExtremes, TimedRun},
 };
 
 /// How soft contact may be: what augmented Lagrangian and penalty need to know of a scene.
@@ -24,16 +24,16 @@ pub(crate) struct Softness {
 }
 
 /// A run of a method of the reference crate.
-pub(crate) struct OutsideRun<'a, S: Scene> {
+pub(crate) struct OutsideRun<'a, S: ReducedScene> {
     scene: &'a S,
-    method: Box<dyn Method + 'a>,
+    method: Box<dyn ReducedMethod + 'a>,
     step: f64,
     steps: u64,
     /// Internal steps per sample.
     division: u32,
 }
 
-impl<'a, S: Scene> OutsideRun<'a, S> {
+impl<'a, S: ReducedScene> OutsideRun<'a, S> {
     /// From the scene's start, with `division` steps per sample `interval` (s).
     ///
     /// # Errors
@@ -47,10 +47,10 @@ impl<'a, S: Scene> OutsideRun<'a, S> {
     ) -> Result<Self, String> {
         let step = interval / f64::from(division);
         let Softness { stiffness, tolerance, margin } = softness;
-        let method: Box<dyn Method + 'a> = match competitor {
+        let method: Box<dyn ReducedMethod + 'a> = match competitor {
             Competitor::Moreau => Box::new(Moreau::new(scene, step)),
             Competitor::Augmented => {
-                Box::new(Augmented::new(scene, step, Options { penalty: 10.0 * stiffness, tolerance, margin }))
+                Box::new(Augmented::new(scene, step, NewmarkOptions { penalty: 10.0 * stiffness, tolerance, margin }))
             }
             Competitor::Penalty(times) => Box::new(Penalty::new(scene, step, f64::from(times) * stiffness)?),
             Competitor::Core(..) | Competitor::Full(_) => return Err("this is no method of the reference crate".into()),
@@ -59,7 +59,7 @@ impl<'a, S: Scene> OutsideRun<'a, S> {
     }
 
     #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
-    fn one(&mut self, seen: Option<&mut Seen>) -> Result<(), String> {
+    fn one(&mut self, seen: Option<&mut StepExtremes>) -> Result<(), String> {
         let step = self.method.step()?;
         self.steps += 1;
         if let Some(seen) = seen {
@@ -70,12 +70,12 @@ impl<'a, S: Scene> OutsideRun<'a, S> {
     }
 }
 
-impl<S: Scene> Run for OutsideRun<'_, S> {
+impl<S: ReducedScene> TimedRun for OutsideRun<'_, S> {
     fn advance(&mut self) -> Result<(), String> {
         (0..self.division).try_for_each(|_| self.one(None))
     }
 
-    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+    fn watch(&mut self, seen: &mut StepExtremes) -> Result<(), String> {
         (0..self.division).try_for_each(|_| self.one(Some(seen)))
     }
 

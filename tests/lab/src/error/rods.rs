@@ -3,15 +3,15 @@
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::{
     dynamics::{bank::BankOptions, modal::ModalModel, sectors::SectorModel},
-    gaps::{Drive, FixedGap, GapLaw},
+    gaps::{FixedGap, GapLaw, PrescribedMotion},
     settings::{Scheme, Solver},
     stability::{self, massless},
     system::{System, SystemSettings},
 };
-use tiprub_reference::reduced::bars::Rod;
+use tiprub_reference::reduced::bars::RodModel;
 use tiprub_test_models::{node, structure};
 
-use super::run::{Run, Seen};
+use super::run::{StepExtremes, TimedRun};
 
 /// Normal of the one contact: the structure's first direction closes the gap.
 pub(super) const NORMAL: [f64; 3] = [-1.0, 0.0, 0.0];
@@ -35,7 +35,7 @@ impl CoreRod {
     ///
     /// # Errors
     /// Never with rods.
-    pub(crate) fn new(rod: &Rod, ends: usize, whole: bool) -> Result<Self, String> {
+    pub(crate) fn new(rod: &RodModel, ends: usize, whole: bool) -> Result<Self, String> {
         let count = rod.closing.len();
         let mut contact_map = DMatrix::zeros(3, count);
         contact_map.row_mut(0).copy_from(&rod.closing.transpose());
@@ -83,7 +83,7 @@ impl CoreRod {
             let velocity = self.start[1][mode] - if dynamic { self.half_kick(mode, step) } else { 0.0 };
             system.bank_mut().set_modal_state(mode, 0, self.start[0][mode], velocity);
         }
-        system.start(&[Drive::default()]);
+        system.start(&[PrescribedMotion::default()]);
         Ok(RodRun { rod: self, system, division, step })
     }
 
@@ -119,7 +119,7 @@ pub(crate) struct RodRun<'a> {
 impl RodRun<'_> {
     fn one(&mut self) -> Result<(), String> {
         self.system.bank_mut().loads_mut().copy_from_slice(&self.rod.load);
-        let stepped = self.system.step(&[Drive::default()]);
+        let stepped = self.system.step(&[PrescribedMotion::default()]);
         stepped.map_err(|failure| format!("step {} failed: {failure:?}", self.system.steps()))
     }
 
@@ -128,13 +128,13 @@ impl RodRun<'_> {
     }
 }
 
-impl Run for RodRun<'_> {
+impl TimedRun for RodRun<'_> {
     fn advance(&mut self) -> Result<(), String> {
         (0..self.division).try_for_each(|_| self.one())
     }
 
     #[expect(clippy::cast_precision_loss, reason = "step counts are below 2^52")]
-    fn watch(&mut self, seen: &mut Seen) -> Result<(), String> {
+    fn watch(&mut self, seen: &mut StepExtremes) -> Result<(), String> {
         for _ in 0..self.division {
             self.one()?;
             let forces = self.system.events().iter().map(|event| event.normal);

@@ -9,9 +9,9 @@ use tiprub_shell::{Result, console::Console};
 use crate::beside::blades_of;
 
 use super::{
-    competitor::Family,
+    competitor::EquationFamily,
     outside::Softness,
-    turning::{Facts, Turning},
+    turning::{TurningCase, TurningFacts},
 };
 
 /// Component modes kept beside the contact nodes' own.
@@ -38,7 +38,7 @@ const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2
 
 /// How deep the bumps are.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Rub {
+pub(crate) enum BumpDepth {
     Light,
     Heavy,
 }
@@ -47,13 +47,18 @@ pub(crate) enum Rub {
 ///
 /// # Errors
 /// The reduction refuses; never with what ships.
-pub(crate) fn rotor(rub: Rub, quick: bool, cache: &RomCache, console: &Console) -> Result<Turning<BladeScene>> {
+pub(crate) fn rotor(
+    rub: BumpDepth,
+    quick: bool,
+    cache: &RomCache,
+    console: &Console,
+) -> Result<TurningCase<BladeScene>> {
     let (name, figures, title, intrusion, bumps) = match rub {
-        Rub::Light => {
+        BumpDepth::Light => {
             let figures = ["rotor37-paper-light-steps", "rotor37-paper-light-total"];
             ("rotor37-paper-light", figures, "The paper's model, light rub", "a fifth of the gap", LIGHT)
         }
-        Rub::Heavy => {
+        BumpDepth::Heavy => {
             let figures = ["rotor37-paper-heavy-steps", "rotor37-paper-heavy-total"];
             ("rotor37-paper-heavy", figures, "The paper's model, heavy rub", "the whole gap", HEAVY)
         }
@@ -72,7 +77,7 @@ pub(crate) fn rotor(rub: Rub, quick: bool, cache: &RomCache, console: &Console) 
         "36 blades of rotor 37 with three contact nodes each, at design speed, rub with µ = 0.15 against a rigid casing whose two bumps intrude by {intrusion}. The truth \
          is the reference with most component modes."
     );
-    let facts = Facts {
+    let facts = TurningFacts {
         name,
         figures,
         title,
@@ -84,10 +89,13 @@ pub(crate) fn rotor(rub: Rub, quick: bool, cache: &RomCache, console: &Console) 
         divisions: if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() },
         outside_divisions: None,
         references: if quick { QUICK_REFERENCES } else { REFERENCES },
-        families: [vec![Family::MASSLESS, Family::STICKING, Family::BOTH], vec![Family::MASSLESS]],
+        families: [
+            vec![EquationFamily::MASSLESS, EquationFamily::STICKING, EquationFamily::BOTH],
+            vec![EquationFamily::MASSLESS],
+        ],
         softness: SOFTNESS,
     };
-    Turning::new(facts, sizes)
+    TurningCase::new(facts, sizes)
 }
 
 fn blade(modes: usize, quick: bool, cache: &RomCache, console: &Console) -> Result<Rom> {

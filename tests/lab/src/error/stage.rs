@@ -4,13 +4,13 @@ use nalgebra::Complex;
 use tiprub_core::{Rom, Scene, settings::Shape};
 use tiprub_gallery::{builtin::DiskModel, rom_cache::RomCache, scene_source};
 use tiprub_model::{cyclic::ModeSelection, stage::StageOptions};
-use tiprub_reference::reduced::disk::{Casing, Pencil, Stage, StageScene};
+use tiprub_reference::reduced::disk::{CasingModel, Pencil, StageReference, StageScene};
 use tiprub_shell::{Failure, Result, console::Console};
 
 use super::{
-    competitor::Family,
+    competitor::EquationFamily,
     outside::Softness,
-    turning::{Facts, Turning},
+    turning::{TurningCase, TurningFacts},
 };
 
 /// Component modes per nodal diameter.
@@ -38,7 +38,7 @@ const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2
 ///
 /// # Errors
 /// The reduction refuses; never with what ships.
-pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<Turning<StageScene>> {
+pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<TurningCase<StageScene>> {
     let coarse = scene_source::stage_scene(true, cache, console)?;
     let mut sizes = Vec::new();
     for &modes in if quick { &QUICK_MODES[..] } else { &MODES[..] } {
@@ -50,7 +50,7 @@ pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<
     }
     let description = "56 coupled sectors (coarse mesh) in an elastic casing that goes oval until it touches, µ = 0.15. The truth is the \
                        reference with most component modes.";
-    let facts = Facts {
+    let facts = TurningFacts {
         name: "stage-coarse",
         figures: ["stage-coarse-steps", "stage-coarse-total"],
         title: "Stage on a coarse mesh",
@@ -62,10 +62,10 @@ pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<
         divisions: if quick { QUICK_DIVISIONS.to_vec() } else { DIVISIONS.to_vec() },
         outside_divisions: (!quick).then(|| OUTSIDE_DIVISIONS.to_vec()),
         references: if quick { QUICK_REFERENCES } else { REFERENCES },
-        families: [vec![Family::MASSLESS, Family::STICKING], Vec::new()],
+        families: [vec![EquationFamily::MASSLESS, EquationFamily::STICKING], Vec::new()],
         softness: SOFTNESS,
     };
-    Turning::new(facts, sizes)
+    TurningCase::new(facts, sizes)
 }
 
 fn disk(modes: usize, cache: &RomCache, console: &Console) -> Result<Rom> {
@@ -91,12 +91,12 @@ fn outside(scene: &Scene) -> Option<StageScene> {
         contact_map: harmonic.contact_map.clone(),
     });
     let load = settings.structures[1].load?;
-    StageScene::new(Stage {
+    StageScene::new(StageReference {
         pencils: std::iter::once(zero).chain(others).collect(),
         tips: disk.contact_nodes.iter().map(|node| node.position).collect(),
         sectors: disk.sectors,
         damping: settings.structures[0].damping_ratio.unwrap_or(disk.damping_ratio),
-        casing: Casing {
+        casing: CasingModel {
             mass: ring.mass.clone(),
             stiffness: ring.stiffness.clone(),
             contact_map: ring.contact_map.clone(),

@@ -5,16 +5,16 @@ use tiprub_reference::reduced;
 use tiprub_shell::{Failure, Result};
 
 use super::{
-    case::{Case, without_finest},
-    competitor::{Competitor, Family, TOLERANCES, TOLERANT},
+    case::{ErrorCase, without_finest},
+    competitor::{Competitor, EquationFamily, TOLERANCES, TOLERANT},
     outside::{OutsideRun, Softness},
-    run::Run,
+    run::TimedRun,
     scene::SceneRun,
     window,
 };
 
 /// What is told of a rotor, and how it is stepped.
-pub(crate) struct Facts {
+pub(crate) struct TurningFacts {
     pub name: &'static str,
     /// Names of its two figures.
     pub figures: [&'static str; 2],
@@ -35,24 +35,24 @@ pub(crate) struct Facts {
     /// The same of the references, the product's and Moreau-Jean's.
     pub references: (u32, u32),
     /// Equations whose limits are computed at the standard size, and at the others.
-    pub families: [Vec<Family>; 2],
+    pub families: [Vec<EquationFamily>; 2],
     pub softness: Softness,
 }
 
 /// A rotor with several numbers of modes: for the product, and for the reference crate.
-pub(crate) struct Turning<S> {
-    facts: Facts,
+pub(crate) struct TurningCase<S> {
+    facts: TurningFacts,
     sizes: Vec<(usize, Scene, S)>,
     samples: usize,
     parting: Vec<f64>,
 }
 
-impl<S: reduced::Scene> Turning<S> {
+impl<S: reduced::ReducedScene> TurningCase<S> {
     /// See how long it can be followed.
     ///
     /// # Errors
     /// A run fails; never with what ships.
-    pub(crate) fn new(facts: Facts, sizes: Vec<(usize, Scene, S)>) -> Result<Self> {
+    pub(crate) fn new(facts: TurningFacts, sizes: Vec<(usize, Scene, S)>) -> Result<Self> {
         let [samples, _] = facts.samples;
         let mut turning = Self { facts, sizes, samples, parting: Vec::new() };
         let (windows, division) = turning.facts.long;
@@ -63,7 +63,7 @@ impl<S: reduced::Scene> Turning<S> {
     }
 }
 
-impl<S: reduced::Scene> Case for Turning<S> {
+impl<S: reduced::ReducedScene> ErrorCase for TurningCase<S> {
     fn name(&self) -> &'static str {
         self.facts.name
     }
@@ -124,7 +124,7 @@ impl<S: reduced::Scene> Case for Turning<S> {
         (own, if size == self.standard() { outside } else { outside / 4 })
     }
 
-    fn families(&self, size: usize) -> Vec<Family> {
+    fn families(&self, size: usize) -> Vec<EquationFamily> {
         self.facts.families[usize::from(size != self.standard())].clone()
     }
 
@@ -138,9 +138,9 @@ impl<S: reduced::Scene> Case for Turning<S> {
         competitor: Competitor,
         division: u32,
         perturbation: f64,
-    ) -> Result<Box<dyn Run + 'a>, String> {
+    ) -> Result<Box<dyn TimedRun + 'a>, String> {
         let (_, scene, outside) = &self.sizes[size];
-        let Facts { interval, softness, .. } = self.facts;
+        let TurningFacts { interval, softness, .. } = self.facts;
         Ok(match competitor {
             Competitor::Core(scheme, solver) => {
                 let scene = SceneRun::by(scene, (scheme, solver), interval, division, perturbation);

@@ -2,18 +2,18 @@
 
 use tiprub_core::Rom;
 use tiprub_core::settings::{Interpolation, SceneSettings, Scheme, Solver, SplineSettings};
-use tiprub_test_models::{Random, lattice};
+use tiprub_test_models::{SeededRandom, lattice};
 
 use super::structures::chance;
-use crate::stability::bodies::{Body, HALF, Plate, Throw};
-use crate::stability::models::Method;
+use crate::stability::bodies::{HALF, LumpChain, Plate, Throw};
+use crate::stability::models::StabilityMethod;
 
 /// Settings, structures, and a length (m) that displacements go by.
-pub(crate) fn scene(random: &mut Random, scheme: Scheme, solver: Solver) -> (SceneSettings, Vec<Rom>, f64) {
+pub(crate) fn scene(random: &mut SeededRandom, scheme: Scheme, solver: Solver) -> (SceneSettings, Vec<Rom>, f64) {
     let friction = random.of(&[0.0, 0.1, 0.3, 0.8]);
     // Contact nodes on its faces alone leave modes that keep their inertia, as galerkin needs them; it is large, hence rare.
     let mut scene = if scheme == Scheme::Galerkin && chance(random, 0.3) {
-        let plates = [(lattice::Side::Left, HALF + 5e-5), (lattice::Side::Right, HALF + 1e-4)];
+        let plates = [(lattice::BlockSide::Left, HALF + 5e-5), (lattice::BlockSide::Right, HALF + 1e-4)];
         let faces = lattice::faces([0.0; 3]);
         let mut scene =
             lattice::with(lattice::scene(faces, &plates, false, random.vector(8.0)), friction, solver, scheme);
@@ -36,10 +36,11 @@ pub(crate) fn scene(random: &mut Random, scheme: Scheme, solver: Solver) -> (Sce
     (scene.settings, scene.roms, 1e-4)
 }
 
-fn throw(random: &mut Random, scheme: Scheme, solver: Solver, friction: f64) -> Throw {
+fn throw(random: &mut SeededRandom, scheme: Scheme, solver: Solver, friction: f64) -> Throw {
     let lumps = 1 + random.below(3);
     let masses: Vec<f64> = (0..lumps).map(|_| random.scale(0.02, 1.0)).collect();
-    let body = if lumps == 1 { Body::rigid(masses[0]) } else { Body::elastic(&masses, random.scale(1e6, 1e8)) };
+    let body =
+        if lumps == 1 { LumpChain::rigid(masses[0]) } else { LumpChain::elastic(&masses, random.scale(1e6, 1e8)) };
     let radius = random.of(&[0.0, 0.0, 0.3]);
     let mut plate = |side: f64| Plate {
         side,
@@ -51,6 +52,6 @@ fn throw(random: &mut Random, scheme: Scheme, solver: Solver, friction: f64) -> 
         left if left.stiffness > 5e6 => vec![left],
         left => vec![left, plate(1.0)],
     };
-    let method = Method { scheme, ..Method::exact(solver) };
+    let method = StabilityMethod { scheme, ..StabilityMethod::exact(solver) };
     Throw { body, velocity: random.vector(6.0), plates, friction, method, step: 1e-6 }
 }

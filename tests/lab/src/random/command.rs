@@ -4,11 +4,11 @@ use std::path::Path;
 
 use tiprub_packaging::cli::LibraryArguments;
 use tiprub_packaging::library;
-use tiprub_shell::console::{Console, Outcome};
+use tiprub_shell::console::{CommandOutcome, Console};
 use tiprub_shell::{Failure, Result, output_file, sweep};
 
-use super::faces::Faces;
-use super::table::{Table, row_as_json, row_as_text};
+use super::faces::LibraryFaces;
+use super::table::{RandomTable, row_as_json, row_as_text};
 use super::{judged, scenes};
 use crate::cli::RandomArguments;
 
@@ -19,7 +19,7 @@ const NAMED: usize = 10;
 ///
 /// # Errors
 /// No library, files that cannot be written, or a scene that is wrong.
-pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<Outcome> {
+pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<CommandOutcome> {
     let directory = tempfile::tempdir()
         .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
     let faces = if arguments.fmu > 0 { Some(load(arguments, console, directory.path())?) } else { None };
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<Outc
         |done| task.at(done as u64),
     )?;
     drop(task);
-    let table = Table { rows };
+    let table = RandomTable { rows };
     if let Some(out) = &arguments.out {
         for row in table.wrong() {
             write_scene(out, row.seed)?;
@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<Outc
     }
     let seeds: Vec<u64> = table.wrong().map(|row| row.seed).collect();
     if seeds.is_empty() {
-        return Ok(Outcome { text: table.to_text(), json: table.to_json(), ..Outcome::default() });
+        return Ok(CommandOutcome { text: table.to_text(), json: table.to_json(), ..CommandOutcome::default() });
     }
     console.say(table.to_text());
     let named: Vec<String> = seeds.iter().take(NAMED).map(u64::to_string).collect();
@@ -66,7 +66,7 @@ fn seed_of(seed: u64, index: usize) -> u64 {
 }
 
 /// One scene in full.
-fn only(arguments: &RandomArguments, faces: Option<&Faces>, seed: u64) -> Result<Outcome> {
+fn only(arguments: &RandomArguments, faces: Option<&LibraryFaces>, seed: u64) -> Result<CommandOutcome> {
     let row = judged(seed, faces);
     if let Some(out) = &arguments.out {
         write_scene(out, seed)?;
@@ -75,7 +75,7 @@ fn only(arguments: &RandomArguments, faces: Option<&Faces>, seed: u64) -> Result
         let problem = row.findings.iter().map(|one| format!("{}: {}", one.oracle, one.text)).collect::<Vec<_>>();
         return Err(Failure::new(format!("scene {seed}"), problem.join("; "), row_as_text(&row)));
     }
-    Ok(Outcome { text: row_as_text(&row), json: row_as_json(&row), ..Outcome::default() })
+    Ok(CommandOutcome { text: row_as_text(&row), json: row_as_json(&row), ..CommandOutcome::default() })
 }
 
 /// The scene as TOML with its ROMs, as an FMU has them.
@@ -88,15 +88,15 @@ fn write_scene(out: &Path, seed: u64) -> Result<()> {
     Ok(())
 }
 
-fn load(arguments: &RandomArguments, console: &Console, directory: &Path) -> Result<Faces> {
+fn load(arguments: &RandomArguments, console: &Console, directory: &Path) -> Result<LibraryFaces> {
     let chosen =
         LibraryArguments { library: arguments.library.iter().cloned().collect(), ..LibraryArguments::default() };
-    let libraries = library::load(library::Unit::Scene, &chosen, console)?;
+    let libraries = library::load(library::LibraryUnit::Scene, &chosen, console)?;
     let here = tiprub_fmi_host::Platform::here();
     let fitting = libraries.into_iter().find(|library| Some(library.platform) == here);
     let fitting =
         fitting.ok_or_else(|| Failure::new("FMU library", "none is for this machine", "Give one with --library"))?;
     let path = directory.join("tiprub_fmi");
     output_file::write(&path, fitting.bytes)?;
-    Faces::load(&path)
+    LibraryFaces::load(&path)
 }

@@ -4,17 +4,17 @@ use std::path::Path;
 
 use tiprub_fmi_host::api::{Fmi2Api, Fmi3Api};
 use tiprub_shell::Result;
-use tiprub_tests::scene::Resources;
+use tiprub_tests::scene::UnpackedResources;
 use tiprub_tests::{OK, WARNING, fmi2, fmi3};
 
-use super::march::{Face, Plan, Record};
+use super::march::{OutputRecord, RandomPlan, SteppedInstance};
 use super::oracles::Finding;
-use super::scenes::{Trial, numbers};
+use super::scenes::{RandomScene, numbers};
 use super::states::LATER;
 
 /// Both faces of the library.
 #[derive(Debug)]
-pub(crate) struct Faces {
+pub(crate) struct LibraryFaces {
     two: Fmi2Api,
     three: Fmi3Api,
 }
@@ -25,18 +25,18 @@ pub(crate) enum Native<'a> {
     /// It was rejected with this message.
     Rejected(&'a str),
     /// It ran.
-    Ran(&'a Plan, &'a Record),
+    Ran(&'a RandomPlan, &'a OutputRecord),
 }
 
 /// An instance whose states can be carried elsewhere.
-trait Instance: Face {
+trait PortableInstance: SteppedInstance {
     fn state(&self) -> Vec<u8>;
     fn resume(&self, bytes: &[u8]) -> std::result::Result<(), String>;
 }
 
 macro_rules! instance {
     ($slave:ty) => {
-        impl Instance for $slave {
+        impl PortableInstance for $slave {
             fn state(&self) -> Vec<u8> {
                 self.serialise(self.save())
             }
@@ -50,14 +50,14 @@ macro_rules! instance {
     };
 }
 
-instance!(fmi2::Slave<'_>);
-instance!(fmi3::Slave<'_>);
+instance!(fmi2::Fmi2TestSlave<'_>);
+instance!(fmi3::Fmi3TestSlave<'_>);
 
 fn is_good(status: i32) -> bool {
     status == OK || status == WARNING
 }
 
-impl Faces {
+impl LibraryFaces {
     /// Load a library.
     ///
     /// # Errors
@@ -67,15 +67,15 @@ impl Faces {
     }
 
     /// Run a scene as both versions and compare with what came of it natively.
-    pub(crate) fn compare(&self, trial: &Trial, native: Native) -> Vec<Finding> {
-        let resources = Resources::of(&trial.scene, false);
+    pub(crate) fn compare(&self, trial: &RandomScene, native: Native) -> Vec<Finding> {
+        let resources = UnpackedResources::of(&trial.scene, false);
         let two = |time: f64| {
-            let slave = fmi2::Slave::try_new(&self.two, &fmi2::Arguments::new(&resources))?;
+            let slave = fmi2::Fmi2TestSlave::try_new(&self.two, &fmi2::Fmi2Arguments::new(&resources))?;
             let good = is_good(slave.setup(time, None)) && is_good(slave.enter()) && is_good(slave.exit());
             if good { Ok(slave) } else { Err(slave.log()) }
         };
         let three = |time: f64| {
-            let slave = fmi3::Slave::try_new(&self.three, &fmi3::Arguments::new(&resources))?;
+            let slave = fmi3::Fmi3TestSlave::try_new(&self.three, &fmi3::Fmi3Arguments::new(&resources))?;
             let good = is_good(slave.enter(time, None)) && is_good(slave.exit());
             if good { Ok(slave) } else { Err(slave.log()) }
         };
@@ -89,10 +89,10 @@ impl Faces {
 }
 
 /// How a face differs from the native run, if it does.
-fn difference<I: Instance>(
+fn difference<I: PortableInstance>(
     name: &str,
     start: impl Fn(f64) -> std::result::Result<I, String>,
-    trial: &Trial,
+    trial: &RandomScene,
     native: Native,
 ) -> Option<String> {
     let (plan, record) = match native {
@@ -111,7 +111,7 @@ fn difference<I: Instance>(
     };
     let mut random = numbers(trial.seed, 4);
     let at = random.below(record.points.len() + 1);
-    let mut own = Record::default();
+    let mut own = OutputRecord::default();
     for index in 0..at {
         match plan.step(&mut slave, index) {
             Ok(point) => own.points.push(point),

@@ -1,15 +1,15 @@
 //! Which features a scene has, by the names of the table.
 
 use tiprub_core::Scene;
-use tiprub_core::settings::{InputInterpolation, Interpolation, Motion, StructureSettings, SurfaceSettings};
+use tiprub_core::settings::{BodyMotion, InputInterpolation, Interpolation, StructureSettings, SurfaceSettings};
 
 /// A feature's name, and whether a scene has it.
-type Feature = (&'static str, fn(&Scene) -> bool);
+type SceneFeature = (&'static str, fn(&Scene) -> bool);
 
 /// All features.
-pub(crate) const FEATURES: [Feature; 36] = [
-    ("rotor", |scene| any_structure(scene, |own| own.motion == Motion::Rotating)),
-    ("free body", |scene| any_structure(scene, |own| own.motion == Motion::Free)),
+pub(crate) const FEATURES: [SceneFeature; 36] = [
+    ("rotor", |scene| any_structure(scene, |own| own.motion == BodyMotion::Rotating)),
+    ("free body", |scene| any_structure(scene, |own| own.motion == BodyMotion::Free)),
     ("two rotors", |scene| rotors(scene) > 1),
     ("several pairs", |scene| scene.settings.contacts.len() > 1),
     ("coupled sectors", |scene| scene.roms.iter().any(tiprub_core::Rom::is_cyclic)),
@@ -36,8 +36,8 @@ pub(crate) const FEATURES: [Feature; 36] = [
     ("stiffening", |scene| any_structure(scene, |own| own.spin.stiffening)),
     ("growth", |scene| any_structure(scene, |own| own.spin.growth)),
     ("Coriolis", |scene| any_structure(scene, |own| own.spin.coriolis)),
-    ("heat of rotors", |scene| any_structure(scene, |own| own.thermal && own.motion == Motion::Rotating)),
-    ("heat of casings", |scene| any_structure(scene, |own| own.thermal && own.motion == Motion::Still)),
+    ("heat of rotors", |scene| any_structure(scene, |own| own.thermal && own.motion == BodyMotion::Rotating)),
+    ("heat of casings", |scene| any_structure(scene, |own| own.thermal && own.motion == BodyMotion::Still)),
     ("softening", |scene| any_structure(scene, |own| own.softening > 0.0)),
     ("load on casing", |scene| any_structure(scene, |own| own.load.is_some())),
     ("stress", |scene| scene.settings.outputs.stress),
@@ -46,7 +46,7 @@ pub(crate) const FEATURES: [Feature; 36] = [
     ("whirl", |scene| any_structure(scene, |own| own.whirl)),
     ("axial shift", |scene| any_structure(scene, |own| own.axial_shift)),
     ("friction", |scene| scene.settings.contacts.iter().any(|contact| contact.friction > 0.0)),
-    ("slow sliding", |scene| any_structure(scene, |own| own.motion == Motion::Rotating && own.speed.abs() < 30.0)),
+    ("slow sliding", |scene| any_structure(scene, |own| own.motion == BodyMotion::Rotating && own.speed.abs() < 30.0)),
     ("inputs held", |scene| scene.settings.time.input_interpolation == InputInterpolation::Hold),
     ("steps bounded", |scene| scene.settings.time.steps_at_most.is_some()),
 ];
@@ -60,7 +60,7 @@ fn any_surface(scene: &Scene, has: impl Fn(&SurfaceSettings) -> bool) -> bool {
 }
 
 fn rotors(scene: &Scene) -> usize {
-    scene.settings.structures.iter().filter(|own| own.motion == Motion::Rotating).count()
+    scene.settings.structures.iter().filter(|own| own.motion == BodyMotion::Rotating).count()
 }
 
 fn coatings(scene: &Scene, cut: bool) -> bool {

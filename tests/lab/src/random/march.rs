@@ -1,14 +1,14 @@
 //! A scene stepped through its communication steps, natively or through the C interface of an FMU.
 
-use tiprub_core::variables::{Causality, Kind};
+use tiprub_core::variables::{Causality, DataType};
 use tiprub_core::{Error, Simulation};
 use tiprub_tests::{OK, WARNING, fmi2, fmi3};
 
-use super::inputs::{Course, courses};
-use super::scenes::Trial;
+use super::inputs::{RandomInput, courses};
+use super::scenes::RandomScene;
 
 /// Whatever can be stepped.
-pub(crate) trait Face {
+pub(crate) trait SteppedInstance {
     /// Set an input, with its slope where it is given.
     fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) -> Result<(), String>;
     /// One communication step.
@@ -19,8 +19,8 @@ pub(crate) trait Face {
 
 /// What all runs of a scene have in common.
 #[derive(Debug)]
-pub(crate) struct Plan {
-    courses: Vec<Course>,
+pub(crate) struct RandomPlan {
+    courses: Vec<RandomInput>,
     /// References of all real outputs.
     pub outputs: Vec<u32>,
     /// Start of each communication step, and the end of the last (s).
@@ -31,22 +31,22 @@ pub(crate) struct Plan {
 
 /// Outputs after each communication step, and how the run ended where it did not reach the end.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Record {
+pub(crate) struct OutputRecord {
     /// Outputs as bits, communication step by communication step.
     pub points: Vec<Vec<u64>>,
     /// The message of the step that was not done.
     pub end: Option<String>,
 }
 
-impl Plan {
+impl RandomPlan {
     /// Of a scene whose tables are those of `simulation`, which was not started yet.
-    pub(crate) fn new(trial: &Trial, simulation: &Simulation) -> Self {
+    pub(crate) fn new(trial: &RandomScene, simulation: &Simulation) -> Self {
         let mut times = vec![0.0];
         for length in &trial.lengths {
             times.push(times[times.len() - 1] + length);
         }
         let rows = simulation.table().variables().iter();
-        let outputs = rows.filter(|row| row.causality == Causality::Output && row.kind == Kind::Real);
+        let outputs = rows.filter(|row| row.causality == Causality::Output && row.kind == DataType::Real);
         let outputs = outputs.flat_map(|row| (row.reference..).take(row.len())).collect();
         let slopes = trial.slopes;
         Self { courses: courses(trial, simulation), outputs, times, lengths: trial.lengths.clone(), slopes }
@@ -68,7 +68,7 @@ impl Plan {
     }
 
     /// Set the inputs of a communication step: where they go by its end, or with slopes where they are at its start.
-    pub(crate) fn set_inputs(&self, face: &mut impl Face, index: usize) -> Result<(), String> {
+    pub(crate) fn set_inputs(&self, face: &mut impl SteppedInstance, index: usize) -> Result<(), String> {
         for course in &self.courses {
             if self.slopes {
                 let (value, slope) = course.at(self.times[index]);
@@ -81,15 +81,20 @@ impl Plan {
     }
 
     /// One communication step with its inputs.
-    pub(crate) fn step(&self, face: &mut impl Face, index: usize) -> Result<Vec<u64>, String> {
+    pub(crate) fn step(&self, face: &mut impl SteppedInstance, index: usize) -> Result<Vec<u64>, String> {
         self.set_inputs(face, index)?;
         face.step(self.times[index], self.lengths[index])?;
         Ok(face.bits(&self.outputs))
     }
 
     /// From a communication point to the end, or as far as it goes.
-    pub(crate) fn march<F: Face>(&self, face: &mut F, from: usize, mut look: impl FnMut(&F, usize)) -> Record {
-        let mut record = Record::default();
+    pub(crate) fn march<F: SteppedInstance>(
+        &self,
+        face: &mut F,
+        from: usize,
+        mut look: impl FnMut(&F, usize),
+    ) -> OutputRecord {
+        let mut record = OutputRecord::default();
         for index in from..self.len() {
             match self.step(face, index) {
                 Ok(point) => record.points.push(point),
@@ -104,14 +109,14 @@ impl Plan {
     }
 }
 
-impl Record {
+impl OutputRecord {
     /// What is after a communication point.
     pub(crate) fn from(&self, index: usize) -> Self {
         Self { points: self.points[index.min(self.points.len())..].to_vec(), end: self.end.clone() }
     }
 
     /// The first difference from another record, in words; ends are compared by their message.
-    pub(crate) fn differs(&self, other: &Self, plan: &Plan, from: usize) -> Option<String> {
+    pub(crate) fn differs(&self, other: &Self, plan: &RandomPlan, from: usize) -> Option<String> {
         for (index, (own, other)) in self.points.iter().zip(&other.points).enumerate() {
             let off = own.iter().zip(other).position(|(own, other)| own != other);
             if let Some(place) = off {
@@ -136,7 +141,7 @@ fn text(error: Error) -> String {
     error.to_string()
 }
 
-impl Face for Simulation {
+impl SteppedInstance for Simulation {
     fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) -> Result<(), String> {
         self.set_real(reference, value).map_err(text)?;
         slope.map_or(Ok(()), |slope| self.set_input_derivative(reference, 1, slope).map_err(text))
@@ -155,14 +160,14 @@ fn accepted(status: i32, log: impl FnOnce() -> String) -> Result<(), String> {
     if status == OK || status == WARNING { Ok(()) } else { Err(log()) }
 }
 
-impl Face for fmi2::Slave<'_> {
+impl SteppedInstance for fmi2::Fmi2TestSlave<'_> {
     fn set(&mut self, reference: u32, value: f64, slope: Option<f64>) -> Result<(), String> {
         accepted(self.set_reals(&[reference], &[value]), || self.log())?;
         slope.map_or(Ok(()), |slope| accepted(self.set_derivatives(&[reference], 1, &[slope]), || self.log()))
     }
 
     fn step(&mut self, time: f64, length: f64) -> Result<(), String> {
-        accepted(fmi2::Slave::step(self, time, length), || self.log())
+        accepted(fmi2::Fmi2TestSlave::step(self, time, length), || self.log())
     }
 
     fn bits(&self, references: &[u32]) -> Vec<u64> {
@@ -170,13 +175,13 @@ impl Face for fmi2::Slave<'_> {
     }
 }
 
-impl Face for fmi3::Slave<'_> {
+impl SteppedInstance for fmi3::Fmi3TestSlave<'_> {
     fn set(&mut self, reference: u32, value: f64, _slope: Option<f64>) -> Result<(), String> {
         accepted(self.set_reals(&[reference], &[value]), || self.log())
     }
 
     fn step(&mut self, time: f64, length: f64) -> Result<(), String> {
-        accepted(fmi3::Slave::step(self, time, length).status, || self.log())
+        accepted(fmi3::Fmi3TestSlave::step(self, time, length).status, || self.log())
     }
 
     fn bits(&self, references: &[u32]) -> Vec<u64> {

@@ -21,14 +21,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_core::{Error, Simulation};
 
-use faces::{Faces, Native};
-use march::Plan;
-use oracles::{Finding, Watch};
-use scenes::Trial;
+use faces::{LibraryFaces, Native};
+use march::RandomPlan;
+use oracles::{Finding, OracleWatch};
+use scenes::RandomScene;
 
 /// What came of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Outcome {
+enum SceneOutcome {
     /// It ran to its end.
     Ran,
     /// It was rejected before its start.
@@ -39,13 +39,13 @@ enum Outcome {
 
 /// A scene with what came of it, and all that should not be.
 #[derive(Debug, Clone, PartialEq)]
-struct Row {
+struct RandomRow {
     seed: u64,
     scheme: Scheme,
     solver: Solver,
     /// Places in [`features::FEATURES`].
     features: Vec<usize>,
-    outcome: Outcome,
+    outcome: SceneOutcome,
     /// The message of a rejection or of an end.
     message: Option<String>,
     findings: Vec<Finding>,
@@ -55,22 +55,22 @@ struct Row {
     seconds: f64,
 }
 
-impl Row {
+impl RandomRow {
     fn is_wrong(&self) -> bool {
         !self.findings.is_empty()
     }
 }
 
 /// Run a scene and ask all oracles; with the library, those of the FMU too.
-fn judged(seed: u64, faces: Option<&Faces>) -> Row {
+fn judged(seed: u64, faces: Option<&LibraryFaces>) -> RandomRow {
     let clock = std::time::Instant::now();
     let trial = scenes::trial(seed);
-    let mut row = Row {
+    let mut row = RandomRow {
         seed,
         scheme: trial.scene.settings.time.scheme,
         solver: oracles::solver(&trial.scene),
         features: features::of(&trial.scene),
-        outcome: Outcome::Rejected,
+        outcome: SceneOutcome::Rejected,
         message: None,
         findings: Vec::new(),
         compared: faces.is_some(),
@@ -85,9 +85,9 @@ fn judged(seed: u64, faces: Option<&Faces>) -> Row {
     row
 }
 
-fn run(trial: &Trial, faces: Option<&Faces>, row: &mut Row) {
+fn run(trial: &RandomScene, faces: Option<&LibraryFaces>, row: &mut RandomRow) {
     let begun = Simulation::new(&trial.scene).and_then(|mut simulation| {
-        let (plan, watch) = (Plan::new(trial, &simulation), Watch::new(trial, &simulation));
+        let (plan, watch) = (RandomPlan::new(trial, &simulation), OracleWatch::new(trial, &simulation));
         simulation.initialise(0.0)?;
         Ok((simulation, plan, watch))
     });
@@ -97,7 +97,7 @@ fn run(trial: &Trial, faces: Option<&Faces>, row: &mut Row) {
     };
     watch.begin(&simulation);
     let record = plan.march(&mut simulation, 0, |simulation, _| watch.look(simulation));
-    row.outcome = if record.end.is_some() { Outcome::Ended } else { Outcome::Ran };
+    row.outcome = if record.end.is_some() { SceneOutcome::Ended } else { SceneOutcome::Ran };
     row.message.clone_from(&record.end);
     row.findings.extend(record.end.as_deref().and_then(oracles::ends));
     row.findings.extend(watch.findings());
@@ -108,7 +108,7 @@ fn run(trial: &Trial, faces: Option<&Faces>, row: &mut Row) {
     }
 }
 
-fn reject(trial: &Trial, faces: Option<&Faces>, row: &mut Row, error: &Error) {
+fn reject(trial: &RandomScene, faces: Option<&LibraryFaces>, row: &mut RandomRow, error: &Error) {
     row.message = Some(error.to_string());
     row.findings.extend(oracles::names(error));
     if let Some(faces) = faces {

@@ -1,11 +1,11 @@
 //! What must hold of any scene: energy, losses, penetration, finite outputs, messages.
 
-use tiprub_core::rom::Frame;
+use tiprub_core::rom::DisplacementFrame;
 use tiprub_core::settings::{ContactSettings, Scheme, Solver};
 use tiprub_core::warning::Topic;
 use tiprub_core::{Error, Ledger, Rom, Scene, Simulation};
 
-use super::scenes::Trial;
+use super::scenes::RandomScene;
 use super::structures::largest_frequency;
 
 /// Rounding of the energy ledger, as a fraction of all energy exchanged.
@@ -99,7 +99,7 @@ impl Growing {
 
 /// Largest of everything that should be small, over a run.
 #[derive(Debug, Clone)]
-pub(crate) struct Watch {
+pub(crate) struct OracleWatch {
     growing: Vec<Growing>,
     /// Length of the internal step at first (s), and whether it has been another one.
     step: f64,
@@ -124,9 +124,9 @@ pub(crate) struct Watch {
     scale: f64,
 }
 
-impl Watch {
+impl OracleWatch {
     /// Of a simulation that was not started yet.
-    pub(crate) fn new(trial: &Trial, simulation: &Simulation) -> Self {
+    pub(crate) fn new(trial: &RandomScene, simulation: &Simulation) -> Self {
         let table = simulation.table();
         let grows = |row: &&tiprub_core::variables::Variable| {
             GROWING.contains(&row.name.rsplit('.').next().unwrap_or_default())
@@ -277,7 +277,7 @@ fn loosest_gap(scene: &Scene, gap: f64) -> f64 {
 
 /// How deep `film` may leave a node inside without a warning (m).
 fn film_inside(scene: &Scene) -> f64 {
-    if scene.roms.iter().any(|rom| rom.frame == Frame::Cartesian) {
+    if scene.roms.iter().any(|rom| rom.frame == DisplacementFrame::Cartesian) {
         return FILM_INSIDE_FREE * scene.roms.iter().map(extent).fold(f64::INFINITY, f64::min);
     }
     FILM_INSIDE * scene.settings.contacts.iter().map(ContactSettings::nominal_gap).fold(0.0, f64::max)
@@ -302,7 +302,7 @@ fn warned_depth(simulation: &Simulation) -> f64 {
 /// How a quantity that only grows may fall nevertheless, as the guide announces it.
 fn announced(name: &str, scene: &Scene) -> Fall {
     let scheme = scene.settings.time.scheme;
-    let is_free = scene.roms.iter().any(|rom| rom.frame == Frame::Cartesian);
+    let is_free = scene.roms.iter().any(|rom| rom.frame == DisplacementFrame::Cartesian);
     match name {
         "impact_loss" if scheme == Scheme::Galerkin => Fall::Spent,
         "impact_loss" => Fall::Returned { steps: scheme != Scheme::MasslessBoundary && solver(scene) != Solver::Film },

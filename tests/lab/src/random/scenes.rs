@@ -1,19 +1,20 @@
 //! Valid scenes that nobody chose: features, schemes, solvers and inputs by chance.
 
 use tiprub_core::settings::{
-    Closure, CoatingSettings, ContactSettings, CuttingSettings, Direction, ExcitationSettings, ExperimentSettings,
-    InitialSettings, InputInterpolation, Interpolation, LoadSettings, Meridian, Motion, OutputSettings, PatchSettings,
-    Preset, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings, SurfaceSettings, TimeSettings,
+    BodyMotion, Closure, CoatingSettings, ContactSettings, CuttingSettings, ExcitationSettings, ExperimentSettings,
+    ForceDirection, InitialSettings, InputInterpolation, Interpolation, LoadSettings, Meridian, OutputSettings,
+    PatchSettings, Preset, SceneSettings, Scheme, Shape, Solver, SplineSettings, StructureSettings, SurfaceSettings,
+    TimeSettings,
 };
 use tiprub_core::{Rom, Scene};
-use tiprub_test_models::Random;
+use tiprub_test_models::SeededRandom;
 
 use super::bodies;
 use super::structures::{self, casing, chance, largest_frequency, lowest_frequency, rotor};
 
 /// A scene with the communication steps that it is run by.
 #[derive(Debug, Clone)]
-pub(crate) struct Trial {
+pub(crate) struct RandomScene {
     /// What all of it follows from.
     pub seed: u64,
     /// The scene.
@@ -27,15 +28,15 @@ pub(crate) struct Trial {
 }
 
 /// Numbers that follow from a seed, and another purpose gives others.
-pub(crate) fn numbers(seed: u64, purpose: u64) -> Random {
+pub(crate) fn numbers(seed: u64, purpose: u64) -> SeededRandom {
     let mut mixed = seed ^ purpose.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    Random(mixed ^ (mixed >> 31))
+    SeededRandom(mixed ^ (mixed >> 31))
 }
 
 /// The scene of a seed.
-pub(crate) fn trial(seed: u64) -> Trial {
+pub(crate) fn trial(seed: u64) -> RandomScene {
     let mut random = numbers(seed, 1);
     let scheme = random.of(&Scheme::ALL);
     let solver = match scheme {
@@ -57,7 +58,7 @@ pub(crate) fn trial(seed: u64) -> Trial {
     scene.settings.name = format!("random_{seed:x}");
     let lengths = time(&mut random, &mut scene, scheme);
     let slopes = chance(&mut random, 0.4);
-    Trial { seed, scene, lengths, gap, slopes }
+    RandomScene { seed, scene, lengths, gap, slopes }
 }
 
 /// Without structures.
@@ -79,7 +80,7 @@ pub(crate) fn empty() -> SceneSettings {
 }
 
 /// Internal step, communication steps and what bounds them.
-fn time(random: &mut Random, scene: &mut Scene, scheme: Scheme) -> Vec<f64> {
+fn time(random: &mut SeededRandom, scene: &mut Scene, scheme: Scheme) -> Vec<f64> {
     let fastest = scene.roms.iter().map(largest_frequency).fold(0.0, f64::max);
     let slowest = scene.roms.iter().map(lowest_frequency).fold(f64::INFINITY, f64::min);
     let time = &mut scene.settings.time;
@@ -118,7 +119,7 @@ fn time(random: &mut Random, scene: &mut Scene, scheme: Scheme) -> Vec<f64> {
 }
 
 struct Draw<'a> {
-    random: &'a mut Random,
+    random: &'a mut SeededRandom,
     scheme: Scheme,
     solver: Solver,
     settings: SceneSettings,
@@ -153,7 +154,7 @@ impl Draw<'_> {
         let coupled = self.chance(0.22);
         let sectors = self.random.of(if coupled { &[3, 4, 5, 6] } else { &[1, 2, 3, 4, 6] });
         let nodes = self.random.of(&[1_usize, 2, 3, 4]);
-        let shape = structures::Shape { sectors, nodes, coupled, axial: 0.03 * index as f64 };
+        let shape = structures::RotorShape { sectors, nodes, coupled, axial: 0.03 * index as f64 };
         let rom = rotor(self.random, shape);
         let name = if index == 0 { "front" } else { "rear" };
         let parts = if nodes > 1 && !coated && self.chance(0.15) { 2 } else { 1 };
@@ -205,7 +206,7 @@ impl Draw<'_> {
     fn excitation(&mut self, rom: &Rom) -> ExcitationSettings {
         let by_node = self.chance(0.5);
         let node = by_node.then(|| rom.contact_nodes[self.random.below(rom.contact_nodes.len())].name.clone());
-        let all = [Direction::Radial, Direction::Tangential, Direction::Axial];
+        let all = [ForceDirection::Radial, ForceDirection::Tangential, ForceDirection::Axial];
         let mode = (!by_node || self.chance(0.3)).then_some(1);
         ExcitationSettings {
             order: u32::try_from(self.random.below(6)).unwrap_or(0),
@@ -341,7 +342,7 @@ impl Draw<'_> {
         let structure = StructureSettings {
             name: "ring".into(),
             rom: "ring".into(),
-            motion: Motion::Still,
+            motion: BodyMotion::Still,
             damping_ratio: self.chance(0.5).then(|| self.random.scale(1e-3, 0.1)),
             thermal: self.chance(0.35),
             load: self.chance(0.3).then_some(load),
@@ -353,7 +354,7 @@ impl Draw<'_> {
 
     fn outputs(&mut self, flexible: bool, coated: bool) {
         let sectors = self.roms.iter().zip(&self.settings.structures);
-        let rotors = sectors.filter(|(_, own)| own.motion == Motion::Rotating);
+        let rotors = sectors.filter(|(_, own)| own.motion == BodyMotion::Rotating);
         let (fewest, coupled) = rotors.fold((usize::MAX, false), |(fewest, coupled), (rom, _)| {
             (fewest.min(rom.sectors), coupled || rom.is_cyclic())
         });

@@ -1,18 +1,18 @@
 //! Saved states at random points, restored where they were saved and elsewhere; derivatives over steps that must not disturb.
 
 use tiprub_core::Simulation;
-use tiprub_test_models::Random;
+use tiprub_test_models::SeededRandom;
 
-use super::march::{Plan, Record};
+use super::march::{OutputRecord, RandomPlan};
 use super::oracles::Finding;
-use super::scenes::{Trial, numbers};
+use super::scenes::{RandomScene, numbers};
 use super::structures::chance;
 
 /// A start time of an instance that begins later than any state was saved (s).
 pub(crate) const LATER: f64 = 7.5;
 
 /// Findings of the oracle of saved states, of a scene that ran as `record` says.
-pub(crate) fn restored(trial: &Trial, plan: &Plan, record: &Record) -> Vec<Finding> {
+pub(crate) fn restored(trial: &RandomScene, plan: &RandomPlan, record: &OutputRecord) -> Vec<Finding> {
     let mut random = numbers(trial.seed, 2);
     if record.points.is_empty() {
         return Vec::new();
@@ -24,7 +24,7 @@ pub(crate) fn restored(trial: &Trial, plan: &Plan, record: &Record) -> Vec<Findi
     found.map(|text| Finding { oracle: "states", text }).collect()
 }
 
-fn started(trial: &Trial, time: f64) -> Result<Simulation, String> {
+fn started(trial: &RandomScene, time: f64) -> Result<Simulation, String> {
     let mut simulation = Simulation::new(&trial.scene).map_err(|error| error.to_string())?;
     simulation.initialise(time).map_err(|error| error.to_string())?;
     Ok(simulation)
@@ -42,7 +42,7 @@ fn go_on(
     simulation: &mut Simulation,
     state: &[u8],
     at: usize,
-    (plan, record): (&Plan, &Record),
+    (plan, record): (&RandomPlan, &OutputRecord),
 ) -> Option<String> {
     if let Err(error) = simulation.restore_state(state) {
         return Some(format!("the state of communication point {at} is refused by {name}: {error}"));
@@ -53,7 +53,12 @@ fn go_on(
 }
 
 /// At a communication point: saving disturbs nothing, and the state leads to the same bits in this and in other instances.
-fn saved_between(trial: &Trial, plan: &Plan, record: &Record, random: &mut Random) -> Option<String> {
+fn saved_between(
+    trial: &RandomScene,
+    plan: &RandomPlan,
+    record: &OutputRecord,
+    random: &mut SeededRandom,
+) -> Option<String> {
     let at = random.below(record.points.len() + 1);
     let mut simulation = started(trial, 0.0).ok()?;
     for index in 0..at {
@@ -76,7 +81,12 @@ fn saved_between(trial: &Trial, plan: &Plan, record: &Record, random: &mut Rando
 }
 
 /// Within a communication step, between two internal ones.
-fn saved_within(trial: &Trial, plan: &Plan, record: &Record, random: &mut Random) -> Option<String> {
+fn saved_within(
+    trial: &RandomScene,
+    plan: &RandomPlan,
+    record: &OutputRecord,
+    random: &mut SeededRandom,
+) -> Option<String> {
     let at = random.below(record.points.len());
     let mut simulation = started(trial, 0.0).ok()?;
     for index in 0..at {
@@ -98,7 +108,7 @@ fn saved_within(trial: &Trial, plan: &Plan, record: &Record, random: &mut Random
     }
     for (name, instance) in [("the same", &mut simulation), ("a fresh", &mut fresh)] {
         while !instance.advance().ok()?.finished {}
-        let after = super::march::Face::bits(instance, &plan.outputs);
+        let after = super::march::SteppedInstance::bits(instance, &plan.outputs);
         let expected = &record.points[at];
         if let Some(place) = after.iter().zip(expected).position(|(own, other)| own != other) {
             let [own, other] = [after[place], expected[place]].map(f64::from_bits);
@@ -114,7 +124,12 @@ fn saved_within(trial: &Trial, plan: &Plan, record: &Record, random: &mut Random
 }
 
 /// The same run after a reset at a random point.
-fn after_reset(trial: &Trial, plan: &Plan, record: &Record, random: &mut Random) -> Option<String> {
+fn after_reset(
+    trial: &RandomScene,
+    plan: &RandomPlan,
+    record: &OutputRecord,
+    random: &mut SeededRandom,
+) -> Option<String> {
     if !chance(random, 0.3) {
         return None;
     }
@@ -133,7 +148,7 @@ fn after_reset(trial: &Trial, plan: &Plan, record: &Record, random: &mut Random)
 }
 
 /// Derivatives over some steps: they disturb nothing.
-pub(crate) fn differentiated(trial: &Trial, plan: &Plan, record: &Record) -> Option<Finding> {
+pub(crate) fn differentiated(trial: &RandomScene, plan: &RandomPlan, record: &OutputRecord) -> Option<Finding> {
     let mut random = numbers(trial.seed, 3);
     let inputs = plan.inputs();
     let mut simulation = Simulation::new(&trial.scene).ok()?;
@@ -152,7 +167,7 @@ pub(crate) fn differentiated(trial: &Trial, plan: &Plan, record: &Record) -> Opt
     let asked: Vec<usize> = (0..2).map(|_| random.below(plan.len())).collect();
     let mut refusal = None;
     let after = {
-        let mut own = Record::default();
+        let mut own = OutputRecord::default();
         for index in 0..plan.len() {
             match plan.step(&mut simulation, index) {
                 Ok(point) => own.points.push(point),

@@ -4,12 +4,14 @@ use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
-use tiprub_core::rom::{Basis, Frame, Patch, SUPPORT_ROWS, Support, Thermal, Watched};
-use tiprub_test_models::disk::Disk;
-use tiprub_test_models::{RADIUS, Random, modal, node, ring_of, spin};
+use tiprub_core::rom::{
+    DisplacementFrame, ReductionBasis, SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints,
+};
+use tiprub_test_models::disk::TestDisk;
+use tiprub_test_models::{RADIUS, SeededRandom, modal, node, ring_of, spin};
 
 /// True with this probability.
-pub(crate) fn chance(random: &mut Random, probability: f64) -> bool {
+pub(crate) fn chance(random: &mut SeededRandom, probability: f64) -> bool {
     random.unit() < probability
 }
 
@@ -35,7 +37,7 @@ fn frequencies(rom: &Rom) -> impl Iterator<Item = f64> {
 
 /// What a rotor looks like.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shape {
+pub(crate) struct RotorShape {
     /// Identical sectors.
     pub sectors: usize,
     /// Contact nodes of a sector.
@@ -47,7 +49,7 @@ pub(crate) struct Shape {
 }
 
 /// A rotor; the names of its contact nodes begin with `tip_`.
-pub(crate) fn rotor(random: &mut Random, shape: Shape) -> Rom {
+pub(crate) fn rotor(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     let mut rom = if shape.coupled { disk(random, shape) } else { blade(random, shape) };
     let slope = random.of(&[0.0, -0.2, 0.3]);
     let curved = chance(random, 0.3);
@@ -82,7 +84,7 @@ fn follow_slopes(rom: &mut Rom) {
 }
 
 /// Turn contact nodes into patches, in two rows where their number allows it.
-fn patches(random: &mut Random, rom: &mut Rom) {
+fn patches(random: &mut SeededRandom, rom: &mut Rom) {
     let count = rom.contact_nodes.len();
     for node in &mut rom.contact_nodes {
         (node.area, node.length) = (random.scale(1e-5, 1e-4), random.within(5e-3, 2e-2));
@@ -98,7 +100,7 @@ fn patches(random: &mut Random, rom: &mut Rom) {
 }
 
 /// Uncoupled blades given by their modes, the highest of which move single contact directions.
-fn blade(random: &mut Random, shape: Shape) -> Rom {
+fn blade(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     let rows = 3 * shape.nodes;
     let slow = 1 + random.below(5);
     // Too few for quasi-static modes at times.
@@ -120,20 +122,20 @@ fn blade(random: &mut Random, shape: Shape) -> Rom {
     let mut rom = modal("blade", &frequencies, |row, mode| entries[(row, mode)], nodes);
     rom.sectors = shape.sectors;
     if chance(random, 0.4) {
-        rom.extras.basis = Basis::FreeInterface;
+        rom.extras.basis = ReductionBasis::FreeInterface;
     }
     add_extras(random, &mut rom);
     rom
 }
 
 /// What only uncoupled blades have: spin matrices, heat, places of stress, watched points.
-fn add_extras(random: &mut Random, rom: &mut Rom) {
+fn add_extras(random: &mut SeededRandom, rom: &mut Rom) {
     let order = rom.order();
     rom.extras.spin = Some(spin(order));
     let squares: Vec<f64> = rom.stiffness.diagonal().iter().copied().collect();
     let loads = DMatrix::from_fn(order, 1, |mode, _| squares[mode] * 3e-8 * random.signed());
-    rom.extras.thermal = Some(Thermal { loads, patches: vec![Patch { angle: [0.0, TAU], axial: [-0.1, 0.1] }] });
-    let mut points = |rows: usize, size: f64, name: &str| Watched {
+    rom.extras.thermal = Some(Thermal { loads, patches: vec![ThermalPatch { angle: [0.0, TAU], axial: [-0.1, 0.1] }] });
+    let mut points = |rows: usize, size: f64, name: &str| WatchedPoints {
         map: random.matrix(2 * rows, order) * size,
         points: (0..2).map(|index| node(format!("{name}_{index}"), [0.2, 0.0, 0.01 * index as f64], 0.0)).collect(),
     };
@@ -142,18 +144,18 @@ fn add_extras(random: &mut Random, rom: &mut Rom) {
 }
 
 /// Sectors coupled to their neighbours.
-fn disk(random: &mut Random, shape: Shape) -> Rom {
+fn disk(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     let order = 3 * shape.nodes + 1 + random.below(4);
     let seed = (random.unit() * 1e9).to_bits();
-    let mut rom = Disk::random(shape.sectors, shape.nodes, order, random.scale(0.01, 0.15), seed).cyclic();
+    let mut rom = TestDisk::random(shape.sectors, shape.nodes, order, random.scale(0.01, 0.15), seed).cyclic();
     let load = 2e-3 * (TAU * 900.0_f64).powi(2) * 1e-7;
     let loads = DMatrix::from_fn(order, 1, |_, _| load * random.signed());
-    rom.extras.thermal = Some(Thermal { loads, patches: vec![Patch { angle: [0.0, TAU], axial: [-0.1, 0.1] }] });
+    rom.extras.thermal = Some(Thermal { loads, patches: vec![ThermalPatch { angle: [0.0, TAU], axial: [-0.1, 0.1] }] });
     rom
 }
 
 /// A casing of analytic modes with four warm quarters and a support.
-pub(crate) fn casing(random: &mut Random) -> Rom {
+pub(crate) fn casing(random: &mut SeededRandom) -> Rom {
     let (around, along) = (random.of(&[12, 16, 24]), random.of(&[2, 3, 4]));
     let mut rom = ring_of(around, along, random.of(&[3, 4, 5]));
     let stiffer = random.scale(0.3, 20.0);
@@ -163,11 +165,11 @@ pub(crate) fn casing(random: &mut Random) -> Rom {
     rom.damping_ratio = random.of(&[0.0, 0.01, 0.05]);
     let order = rom.order();
     let mut matrix = |rows: usize, columns: usize, size: f64| random.matrix(rows, columns) * size;
-    rom.extras.support = Some(Support {
+    rom.extras.support = Some(SupportRows {
         stiffness: matrix(SUPPORT_ROWS, order, 1e6),
         mass: matrix(SUPPORT_ROWS, order, 0.1),
         thermal: matrix(SUPPORT_ROWS, 4, 10.0),
     });
-    debug_assert_eq!(rom.frame, Frame::Cylindrical);
+    debug_assert_eq!(rom.frame, DisplacementFrame::Cylindrical);
     rom
 }

@@ -6,24 +6,24 @@ use serde_json::{Value, json};
 use tiprub_core::settings::{Scheme, Solver};
 
 use super::features::FEATURES;
-use super::{Outcome, Row};
+use super::{RandomRow, SceneOutcome};
 
 /// How many scenes ran, were rejected, ended with their reason, are wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct Counts([usize; 4]);
+struct SceneCounts([usize; 4]);
 
 /// Names of the counts.
 const COUNTS: [&str; 4] = ["ran", "rejected", "ended", "wrong"];
 
-impl Counts {
-    fn of<'a>(rows: impl Iterator<Item = &'a Row>) -> Self {
+impl SceneCounts {
+    fn of<'a>(rows: impl Iterator<Item = &'a RandomRow>) -> Self {
         let mut counts = Self::default();
         for row in rows {
             let place = match (row.is_wrong(), row.outcome) {
                 (true, _) => 3,
-                (_, Outcome::Ran) => 0,
-                (_, Outcome::Rejected) => 1,
-                (_, Outcome::Ended) => 2,
+                (_, SceneOutcome::Ran) => 0,
+                (_, SceneOutcome::Rejected) => 1,
+                (_, SceneOutcome::Ended) => 2,
             };
             counts.0[place] += 1;
         }
@@ -46,14 +46,14 @@ impl Counts {
 
 /// All rows of a run.
 #[derive(Debug)]
-pub(super) struct Table {
+pub(super) struct RandomTable {
     /// One per scene.
-    pub rows: Vec<Row>,
+    pub rows: Vec<RandomRow>,
 }
 
-impl Table {
+impl RandomTable {
     /// Rows that something is wrong with.
-    pub(super) fn wrong(&self) -> impl Iterator<Item = &Row> {
+    pub(super) fn wrong(&self) -> impl Iterator<Item = &RandomRow> {
         self.rows.iter().filter(|row| row.is_wrong())
     }
 
@@ -63,8 +63,8 @@ impl Table {
             .collect()
     }
 
-    fn counts(&self, scheme: Option<Scheme>, solver: Option<Solver>, feature: Option<usize>) -> Counts {
-        Counts::of(self.rows.iter().filter(|row| {
+    fn counts(&self, scheme: Option<Scheme>, solver: Option<Solver>, feature: Option<usize>) -> SceneCounts {
+        SceneCounts::of(self.rows.iter().filter(|row| {
             scheme.is_none_or(|scheme| row.scheme == scheme)
                 && solver.is_none_or(|solver| row.solver == solver)
                 && feature.is_none_or(|feature| row.features.contains(&feature))
@@ -86,7 +86,7 @@ impl Table {
 
     /// For a terminal.
     pub(super) fn to_text(&self) -> String {
-        let all = Counts::of(self.rows.iter());
+        let all = SceneCounts::of(self.rows.iter());
         let summary =
             COUNTS.iter().zip(all.0).map(|(name, count)| format!("{count} {name}")).collect::<Vec<_>>().join(", ");
         let compared = self.rows.iter().filter(|row| row.compared).count();
@@ -114,7 +114,7 @@ impl Table {
     pub(super) fn to_json(&self) -> Value {
         let mut cells = Vec::new();
         for (scheme, solver) in self.methods() {
-            let mut cell = |feature: &str, counts: Counts| {
+            let mut cell = |feature: &str, counts: SceneCounts| {
                 cells.push(json!({
                     "scheme": scheme.name(), "solver": solver.name(), "feature": feature, "counts": counts.to_json(),
                 }));
@@ -128,7 +128,7 @@ impl Table {
             self.oracles().into_iter().map(|(oracle, count)| (oracle.to_owned(), json!(count))).collect();
         json!({
             "scenes": self.rows.len(),
-            "counts": Counts::of(self.rows.iter()).to_json(),
+            "counts": SceneCounts::of(self.rows.iter()).to_json(),
             "compared": self.rows.iter().filter(|row| row.compared).count(),
             "oracles": oracles,
             "cells": cells,
@@ -138,7 +138,7 @@ impl Table {
 }
 
 /// A row in full.
-pub(super) fn row_as_json(row: &Row) -> Value {
+pub(super) fn row_as_json(row: &RandomRow) -> Value {
     json!({
         "seed": row.seed,
         "scheme": row.scheme.name(),
@@ -152,7 +152,7 @@ pub(super) fn row_as_json(row: &Row) -> Value {
 }
 
 /// A row in words.
-pub(super) fn row_as_text(row: &Row) -> String {
+pub(super) fn row_as_text(row: &RandomRow) -> String {
     let features: Vec<&str> = row.features.iter().map(|index| FEATURES[*index].0).collect();
     let mut text = format!(
         "scene {}: {}, {}; {}\n  {}",

@@ -5,7 +5,7 @@ mod mission;
 mod sectors;
 
 use mission::Mission;
-use sectors::{Kept, Problems, Solutions};
+use sectors::{Problems, SectorEnergy, Solutions};
 use serde_json::{Value, json};
 use tiprub_core::{
     Scene, Simulation,
@@ -17,7 +17,7 @@ use tiprub_shell::{
     sweep::{self, processors},
 };
 use tiprub_study::{Statement, Study, arguments::StudyCommon, machine};
-use tiprub_test_models::{GAP, Random, bumps, rich_blade};
+use tiprub_test_models::{GAP, SeededRandom, bumps, rich_blade};
 
 /// Sectors of the random rotors.
 const SECTORS: usize = 4;
@@ -41,7 +41,7 @@ const TRIALS: [u64; 2] = [5_000, 125_000];
 
 /// A rub that nobody chose.
 fn random_rub(number: usize) -> Scene {
-    let mut random = Random(1 + 7919 * number as u64);
+    let mut random = SeededRandom(1 + 7919 * number as u64);
     let mut scene = bumps(rich_blade(SECTORS));
     scene.settings.structures[0].speed = random.within(300.0, 2000.0);
     scene.settings.structures[0].damping_ratio = Some(random.scale(1e-4, 3e-2));
@@ -107,7 +107,7 @@ fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 
 /// What came of a rub.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Rub {
+enum ScatterRub {
     /// Errors over the tolerances.
     Followed([f64; 4]),
     /// Nothing touches.
@@ -118,29 +118,29 @@ enum Rub {
     Unknown,
 }
 
-fn errors(number: &usize) -> Result<Rub> {
+fn errors(number: &usize) -> Result<ScatterRub> {
     let scene = random_rub(*number);
     let (Ok(window), [Ok(truth), Ok(other)]) = (followed(&scene), TRUTH.map(|of| run(&scene, of, 0.0))) else {
-        return Ok(Rub::Lost);
+        return Ok(ScatterRub::Lost);
     };
     let Some(first) = truth.displacements.iter().position(|all| all.iter().any(|u| *u != 0.0)) else {
-        return Ok(Rub::Open);
+        return Ok(ScatterRub::Open);
     };
     let mut window = window.min(truth.displacements.len()).min(other.displacements.len());
     let mut runs = Vec::new();
     for tolerance in TOLERANCES {
-        let Ok(ran) = run(&scene, (H, tolerance), 0.0) else { return Ok(Rub::Lost) };
+        let Ok(ran) = run(&scene, (H, tolerance), 0.0) else { return Ok(ScatterRub::Lost) };
         window = window.min(ran.displacements.len());
         runs.push(ran);
     }
     if window < first + 3 {
-        return Ok(Rub::Lost);
+        return Ok(ScatterRub::Lost);
     }
     let off = |ran: &Ran| apart(&ran.displacements[..window], &truth.displacements[..window]);
     if off(&other) > KNOWN {
-        return Ok(Rub::Unknown);
+        return Ok(ScatterRub::Unknown);
     }
-    Ok(Rub::Followed(std::array::from_fn(|index| off(&runs[index]) / TOLERANCES[index])))
+    Ok(ScatterRub::Followed(std::array::from_fn(|index| off(&runs[index]) / TOLERANCES[index])))
 }
 
 /// Median, 95 % and most of sorted values: the smallest value that so many are not above.
@@ -166,15 +166,15 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let task = console.task("Random rubs", Some(numbers.len() as u64));
     let found = sweep::sweep(&numbers, processors(), errors, |done| task.at(done as u64))?;
     drop(task);
-    let of_rub = |rub: &Rub| if let Rub::Followed(ratios) = rub { Some(*ratios) } else { None };
+    let of_rub = |rub: &ScatterRub| if let ScatterRub::Followed(ratios) = rub { Some(*ratios) } else { None };
     let followed: Vec<[f64; 4]> = found.iter().filter_map(of_rub).collect();
-    let [open, lost, unknown] =
-        [Rub::Open, Rub::Lost, Rub::Unknown].map(|kind| found.iter().filter(|rub| **rub == kind).count());
+    let [open, lost, unknown] = [ScatterRub::Open, ScatterRub::Lost, ScatterRub::Unknown]
+        .map(|kind| found.iter().filter(|rub| **rub == kind).count());
     let mut ratios: [Vec<f64>; 4] = std::array::from_fn(|index| followed.iter().map(|one| one[index]).collect());
     ratios.iter_mut().for_each(|one| one.sort_by(f64::total_cmp));
     let of_ratios = ratios.each_ref().map(|one| quantiles(one));
     let left = left()?;
-    let kept: Vec<Option<Kept>> =
+    let kept: Vec<Option<SectorEnergy>> =
         [1e-3, 1e-6, 1e-7].map(|tolerance| sectors::energy(tolerance, SWITCHES[which])).to_vec();
     let problems: Vec<Problems> = [2, 3]
         .into_iter()
@@ -249,7 +249,7 @@ fn left() -> Result<Vec<Left>> {
 
 fn statements(
     ratios: &[[f64; 3]; 4],
-    kept: &[Option<Kept>],
+    kept: &[Option<SectorEnergy>],
     problems: &[Problems],
     solutions: &[Solutions],
 ) -> Vec<Statement> {
@@ -290,7 +290,7 @@ fn statements(
 fn tables(
     ratios: &[[f64; 3]; 4],
     left: &[Left],
-    (kept, problems, solutions): (&[Option<Kept>], &[Problems], &[Solutions]),
+    (kept, problems, solutions): (&[Option<SectorEnergy>], &[Problems], &[Solutions]),
     (long, hour): ([f64; 3], &Mission),
 ) -> String {
     let ratios: Vec<Vec<String>> = TOLERANCES

@@ -2,15 +2,15 @@
 
 use nalgebra::DMatrix;
 use tiprub_core::galerkin::{
-    level::{Level, Modes},
-    sector::{Demand, Effort, Marcher, Tables, Taken, Witness},
+    level::{ContactModes, StepTables},
+    sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness},
     state::SectorState,
-    trial::{Kind, Obstacle, Sliding},
+    trial::{ForceInterpolation, Obstacle, SlidingState},
 };
-use tiprub_test_models::Random;
+use tiprub_test_models::SeededRandom;
 
 /// Modes from some hundred to some 10⁵ rad/s, what as many beyond leave, and `stiff` times that of a local flexibility.
-fn modes(count: usize, nodes: usize, stiff: f64, random: &mut Random) -> Modes {
+fn modes(count: usize, nodes: usize, stiff: f64, random: &mut SeededRandom) -> ContactModes {
     let rows = 3 * nodes;
     let shapes = random.matrix(rows, 2 * count) * 3.0;
     let frequency = |mode: usize| 900.0 * (1.0 + (mode as f64).powf(1.5));
@@ -18,7 +18,7 @@ fn modes(count: usize, nodes: usize, stiff: f64, random: &mut Random) -> Modes {
     for mode in count..2 * count {
         residual += shapes.column(mode) * shapes.column(mode).transpose() / frequency(mode).powi(2);
     }
-    Modes {
+    ContactModes {
         frequencies: (0..count).map(frequency).collect(),
         damping_ratios: vec![0.0; count],
         shapes: shapes.columns(0, count).into_owned(),
@@ -27,7 +27,7 @@ fn modes(count: usize, nodes: usize, stiff: f64, random: &mut Random) -> Modes {
 }
 
 /// A plane across x at a place, that slides along y.
-struct Wall {
+struct ScatterWall {
     place: f64,
     friction: f64,
     /// Steps in which a node opens or closes.
@@ -36,18 +36,18 @@ struct Wall {
     dropped: f64,
 }
 
-impl Obstacle for Wall {
+impl Obstacle for ScatterWall {
     fn gap(&mut self, _: usize, _: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         (self.place - moved[0], [-1.0, 0.0, 0.0])
     }
 
-    fn direction(&mut self, _: usize, _: usize, sliding: &Sliding) -> [f64; 3] {
+    fn direction(&mut self, _: usize, _: usize, sliding: &SlidingState) -> [f64; 3] {
         [sliding.normal[0], -self.friction, 0.0]
     }
 }
 
-impl Witness for Wall {
-    fn go(&mut self, _: f64, _: f64, _: &Level, _: Kind) {}
+impl Witness for ScatterWall {
+    fn go(&mut self, _: f64, _: f64, _: &StepTables, _: ForceInterpolation) {}
 
     fn is_clear(&self, _: f64, _: f64, reach: &[f64]) -> bool {
         reach.iter().step_by(3).all(|reach| *reach < self.place)
@@ -55,7 +55,7 @@ impl Witness for Wall {
 
     fn flew(&mut self, _: f64) {}
 
-    fn took(&mut self, step: &Taken) {
+    fn took(&mut self, step: &AcceptedStep) {
         self.dropped += step.dropped;
         let points = 0..=step.trial.points();
         for node in 0..step.trial.nodes() {
@@ -67,7 +67,7 @@ impl Witness for Wall {
 
 /// Energy of a sector without damping, friction and motion of the wall.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Kept {
+pub(super) struct SectorEnergy {
     pub(super) tolerance: f64,
     pub(super) switches: u64,
     /// Most at the end of any span, and at the end, relative to the start.
@@ -80,29 +80,29 @@ pub(super) struct Kept {
 const MOST_TRIED: u64 = 100;
 
 /// March until so many contacts have opened or closed, or nothing touches any more.
-pub(super) fn energy(tolerance: f64, switches: u64) -> Option<Kept> {
+pub(super) fn energy(tolerance: f64, switches: u64) -> Option<SectorEnergy> {
     let (span, nodes, count) = (4e-5, 2, 10);
-    let modes = modes(count, nodes, 1.0, &mut Random(11));
+    let modes = modes(count, nodes, 1.0, &mut SeededRandom(11));
     let mut tables = Tables::new(modes.clone(), span);
     tables.set_span(span);
-    let (mut state, mut marcher) = (SectorState::new(count, nodes), Marcher::new(count, nodes));
+    let (mut state, mut marcher) = (SectorState::new(count, nodes), SectorIntegrator::new(count, nodes));
     for (mode, v) in state.velocity.iter_mut().enumerate() {
         *v = 0.5 / (mode + 1) as f64;
     }
-    let mut wall = Wall { place: 1e-4, friction: 0.0, switches: 0, dropped: 0.0 };
+    let mut wall = ScatterWall { place: 1e-4, friction: 0.0, switches: 0, dropped: 0.0 };
     state.gaps.fill(wall.place);
     let energy = |state: &SectorState| {
         let (kinetic, strain) = state.energies(&modes.frequencies, &modes.residual);
         kinetic + strain
     };
     let (start, mut most, mut effort) = (energy(&state), 0.0_f64, Effort::default());
-    let demand = Demand { tolerance, precision: 1e-15, most: u64::MAX };
+    let demand = StepGoal { tolerance, precision: 1e-15, most: u64::MAX };
     // What switches lose may end contact for good.
     while wall.switches < switches && effort.tried() < MOST_TRIED * switches {
         marcher.march(&tables, &mut state, &mut wall, demand, &mut effort).ok()?;
         most = most.max(energy(&state));
     }
-    Some(Kept { tolerance, switches: wall.switches, most: most / start, left: energy(&state) / start, effort })
+    Some(SectorEnergy { tolerance, switches: wall.switches, most: most / start, left: energy(&state) / start, effort })
 }
 
 /// Contact problems that came up.
@@ -119,7 +119,7 @@ pub(super) struct Problems {
 
 /// Random sectors with random motion at a wall, span by span, until `trials` contact problems of one degree were tried.
 pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
-    let mut random = Random(7 + degree as u64);
+    let mut random = SeededRandom(7 + degree as u64);
     let mut found = Problems { degree, friction, ..Problems::default() };
     while found.trials < trials {
         let nodes = 1 + random.below(3);
@@ -132,14 +132,14 @@ pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
             continue;
         }
         tables.set_span(span);
-        let mut marcher = Marcher::new(count, nodes);
+        let mut marcher = SectorIntegrator::new(count, nodes);
         for _ in 0..20 {
             let mut state = SectorState::new(count, nodes);
             state.velocity.iter_mut().for_each(|v| *v = random.signed());
-            let mut wall = Wall { place: 2e-5 * random.unit(), friction, switches: 0, dropped: 0.0 };
+            let mut wall = ScatterWall { place: 2e-5 * random.unit(), friction, switches: 0, dropped: 0.0 };
             state.gaps.fill(wall.place);
             let (mut effort, demand) =
-                (Effort::default(), Demand { tolerance: 1e-7, precision: 1e-13, most: u64::MAX });
+                (Effort::default(), StepGoal { tolerance: 1e-7, precision: 1e-13, most: u64::MAX });
             let outcome = (0..4).try_for_each(|_| marcher.march(&tables, &mut state, &mut wall, demand, &mut effort));
             found.given_up += u64::from(outcome.is_err());
             found.trials += effort.trials;
@@ -181,7 +181,7 @@ fn count_solutions(w: &DMatrix<f64>, gaps: &[f64]) -> usize {
 
 /// Contact problems of one and two nodes in random motion without forces, on a step of random length.
 pub(super) fn solutions(degree: usize, friction: f64, problems: u64) -> Solutions {
-    let mut random = Random(70 + degree as u64);
+    let mut random = SeededRandom(70 + degree as u64);
     let mut found = Solutions { degree, friction, ..Solutions::default() };
     while found.problems < problems {
         let (nodes, count) = (1 + random.below(2), 4 + random.below(9));
@@ -190,7 +190,7 @@ pub(super) fn solutions(degree: usize, friction: f64, problems: u64) -> Solution
         if modes.allows_cubics(step) != (degree == 3) {
             continue;
         }
-        let mut level = Level::new(&modes, degree);
+        let mut level = StepTables::new(&modes, degree);
         level.set_step(&modes, step);
         let lanes = level.compliance.lanes();
         // Displacement along x per force (−1, −µ) opens by as much less.

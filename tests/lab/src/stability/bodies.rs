@@ -5,13 +5,13 @@ use tiprub_core::{
     Rom, Scene, Simulation,
     rom::ContactGrid,
     settings::{
-        ContactSettings, ExperimentSettings, Motion, OutputSettings, Preset, SceneSettings, StructureSettings,
+        BodyMotion, ContactSettings, ExperimentSettings, OutputSettings, Preset, SceneSettings, StructureSettings,
         SurfaceSettings, TimeSettings,
     },
 };
 use tiprub_test_models::{node, structure};
 
-use super::{models::Method, observe::real};
+use super::{models::StabilityMethod, observe::real};
 
 /// Half the side of the body (m), and half its width.
 pub(crate) const HALF: f64 = 0.02;
@@ -23,7 +23,7 @@ pub(crate) const FURTHEST: f64 = 0.1 * 2.0 * HALF;
 /// Lumps in a row along x, the first at the left face and the last at the right one; four contact nodes on each of these faces.
 /// One lump is a rigid body without rotation: it has both faces.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Body {
+pub(crate) struct LumpChain {
     /// Masses of the lumps (kg).
     pub masses: Vec<f64>,
     /// Stiffness of the springs between neighbours, each direction (N/m).
@@ -36,7 +36,7 @@ pub(crate) struct Body {
     pub corners: usize,
 }
 
-impl Body {
+impl LumpChain {
     /// One lump at the origin.
     pub(crate) fn rigid(mass: f64) -> Self {
         Self { masses: vec![mass], spring: 0.0, centre: [0.0; 3], ground: 0.0, corners: 4 }
@@ -158,7 +158,7 @@ impl Plate {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Throw {
     /// The body.
-    pub body: Body,
+    pub body: LumpChain,
     /// Where it goes (m/s).
     pub velocity: [f64; 3],
     /// At most one on each side.
@@ -166,7 +166,7 @@ pub(crate) struct Throw {
     /// Coefficient µ of all pairs.
     pub friction: f64,
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Internal step and communication step (s).
     pub step: f64,
 }
@@ -178,14 +178,14 @@ impl Throw {
         let mut structures = vec![StructureSettings {
             name: "body".into(),
             rom: "body".into(),
-            motion: Motion::Free,
+            motion: BodyMotion::Free,
             velocity: self.velocity,
             ..StructureSettings::default()
         }];
         structures.extend(self.plates.iter().map(|plate| StructureSettings {
             name: format!("{}_plate", name(plate)),
             rom: "plate".into(),
-            motion: Motion::Still,
+            motion: BodyMotion::Still,
             ..StructureSettings::default()
         }));
         let surface = |plate: &Plate| SurfaceSettings {

@@ -128,7 +128,7 @@ impl Check {
 
 /// What a case came to, when it came to an end of its own.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Happened {
+pub(crate) struct CaseEnd {
     /// The refusal, if there was one.
     pub refusal: Option<String>,
     /// What was compared.
@@ -137,7 +137,7 @@ pub(crate) struct Happened {
     pub remarks: Vec<String>,
 }
 
-impl Happened {
+impl CaseEnd {
     /// An answer with its checks.
     pub(crate) fn answer(checks: Vec<Check>) -> Self {
         Self { checks, ..Self::default() }
@@ -187,7 +187,7 @@ impl Happened {
 
 /// What a case is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Verdict {
+pub(crate) enum CaseVerdict {
     /// A right answer.
     Right,
     /// Refused as it should be, before the first step.
@@ -202,7 +202,7 @@ pub(crate) enum Verdict {
     Hung,
 }
 
-impl Verdict {
+impl CaseVerdict {
     /// All of them, in the order of a table.
     pub(crate) const ALL: [Self; 6] = [Self::Right, Self::Refused, Self::Ended, Self::Wrong, Self::Crashed, Self::Hung];
 
@@ -228,7 +228,7 @@ impl Verdict {
 const IN_A_STEP: &str = "last good time";
 
 /// Verdict on what happened, and what to say about it.
-pub(crate) fn judge(expected: &Expected, happened: &Happened) -> (Verdict, String) {
+pub(crate) fn judge(expected: &Expected, happened: &CaseEnd) -> (CaseVerdict, String) {
     let failed: Vec<String> = happened.checks.iter().filter(|check| !check.holds()).map(Check::to_text).collect();
     let remarks = happened.remarks.iter().map(|remark| format!("; {remark}")).collect::<String>();
     let words = match expected {
@@ -236,21 +236,21 @@ pub(crate) fn judge(expected: &Expected, happened: &Happened) -> (Verdict, Strin
         Expected::Refused(words) | Expected::Either(_, words) => Some(words),
     };
     match (&happened.refusal, words) {
-        (Some(message), None) => (Verdict::Wrong, format!("refused: {message}")),
+        (Some(message), None) => (CaseVerdict::Wrong, format!("refused: {message}")),
         (Some(message), Some(words)) => {
             if let Some(missing) = unnamed(message, words) {
-                return (Verdict::Wrong, format!("refused without naming {missing}: {message}"));
+                return (CaseVerdict::Wrong, format!("refused without naming {missing}: {message}"));
             }
             if !failed.is_empty() {
-                return (Verdict::Wrong, format!("{}; refused: {message}", failed.join("; ")));
+                return (CaseVerdict::Wrong, format!("{}; refused: {message}", failed.join("; ")));
             }
-            let verdict = if message.contains(IN_A_STEP) { Verdict::Ended } else { Verdict::Refused };
+            let verdict = if message.contains(IN_A_STEP) { CaseVerdict::Ended } else { CaseVerdict::Refused };
             (verdict, format!("{message}{remarks}"))
         }
-        (None, _) if !failed.is_empty() => (Verdict::Wrong, format!("{}{remarks}", failed.join("; "))),
-        (None, _) if matches!(expected, Expected::Refused(_)) => (Verdict::Wrong, "was not refused".to_owned()),
-        (None, _) if happened.checks.is_empty() => (Verdict::Wrong, "nothing was compared".to_owned()),
-        (None, _) => (Verdict::Right, format!("{}{remarks}", tightest(&happened.checks))),
+        (None, _) if !failed.is_empty() => (CaseVerdict::Wrong, format!("{}{remarks}", failed.join("; "))),
+        (None, _) if matches!(expected, Expected::Refused(_)) => (CaseVerdict::Wrong, "was not refused".to_owned()),
+        (None, _) if happened.checks.is_empty() => (CaseVerdict::Wrong, "nothing was compared".to_owned()),
+        (None, _) => (CaseVerdict::Right, format!("{}{remarks}", tightest(&happened.checks))),
     }
 }
 
@@ -266,16 +266,16 @@ fn tightest(checks: &[Check]) -> String {
 
 /// What a case may use beside its own models.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Context {
+pub(crate) struct CaseContext {
     /// Directory with packaged FMUs, where the parent made some.
     pub fmus: Option<PathBuf>,
 }
 
 /// The work of a case.
-type Work = Box<dyn Fn(&Context) -> Happened + Send + Sync>;
+type CaseWork = Box<dyn Fn(&CaseContext) -> CaseEnd + Send + Sync>;
 
 /// One row of the table.
-pub(crate) struct Case {
+pub(crate) struct StabilityCase {
     /// Family, slash, what sets it apart: `step-limit/central-difference/lcp/h=0.9`.
     pub name: String,
     /// What is expected.
@@ -286,21 +286,21 @@ pub(crate) struct Case {
     pub imports: bool,
     /// Wall-clock limit (s).
     pub limit: f64,
-    work: Work,
+    work: CaseWork,
 }
 
-impl std::fmt::Debug for Case {
+impl std::fmt::Debug for StabilityCase {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(out, "{}", self.name)
     }
 }
 
-impl Case {
+impl StabilityCase {
     /// A case of the full table.
     pub(crate) fn new(
         name: impl Into<String>,
         expected: Expected,
-        work: impl Fn(&Context) -> Happened + Send + Sync + 'static,
+        work: impl Fn(&CaseContext) -> CaseEnd + Send + Sync + 'static,
     ) -> Self {
         let (name, work) = (name.into(), Box::new(work));
         Self { name, expected, quick: false, imports: false, limit: TIME_LIMIT, work }
@@ -327,7 +327,7 @@ impl Case {
     }
 
     /// Do it, in this process.
-    pub(crate) fn run(&self, context: &Context) -> Happened {
+    pub(crate) fn run(&self, context: &CaseContext) -> CaseEnd {
         (self.work)(context)
     }
 }
@@ -344,7 +344,7 @@ pub(crate) trait Cases {
     );
 }
 
-impl Cases for Vec<Case> {
+impl Cases for Vec<StabilityCase> {
     fn add(
         &mut self,
         quick: bool,
@@ -352,7 +352,7 @@ impl Cases for Vec<Case> {
         expected: Expected,
         work: impl Fn() -> tiprub_core::Result<Vec<Check>> + Send + Sync + 'static,
     ) {
-        self.push(Case::new(name, expected, move |_| Happened::of(work())).quick(quick));
+        self.push(StabilityCase::new(name, expected, move |_| CaseEnd::of(work())).quick(quick));
     }
 }
 
@@ -360,7 +360,7 @@ impl Cases for Vec<Case> {
 mod tests {
     use super::*;
 
-    fn verdict(expected: Expected, happened: Happened) -> Verdict {
+    fn verdict(expected: Expected, happened: CaseEnd) -> CaseVerdict {
         judge(&expected, &happened).0
     }
 
@@ -368,50 +368,50 @@ mod tests {
     fn an_answer_is_right_only_if_something_was_compared_and_all_of_it_holds() {
         let right = || Expected::right("x");
         let within = Check::at_most("a", 1e-12, 1e-9);
-        assert_eq!(verdict(right(), Happened::answer(vec![within.clone()])), Verdict::Right);
-        assert_eq!(verdict(right(), Happened::answer(vec![])), Verdict::Wrong);
+        assert_eq!(verdict(right(), CaseEnd::answer(vec![within.clone()])), CaseVerdict::Right);
+        assert_eq!(verdict(right(), CaseEnd::answer(vec![])), CaseVerdict::Wrong);
         for found in [2e-9, f64::NAN, f64::INFINITY] {
             let beyond = Check::at_most("b", found, 1e-9);
-            assert_eq!(verdict(right(), Happened::answer(vec![within.clone(), beyond])), Verdict::Wrong);
+            assert_eq!(verdict(right(), CaseEnd::answer(vec![within.clone(), beyond])), CaseVerdict::Wrong);
         }
-        assert_eq!(verdict(right(), Happened::answer(vec![Check::so("c", false)])), Verdict::Wrong);
-        assert_eq!(verdict(right(), Happened::refused("h is too long")), Verdict::Wrong);
+        assert_eq!(verdict(right(), CaseEnd::answer(vec![Check::so("c", false)])), CaseVerdict::Wrong);
+        assert_eq!(verdict(right(), CaseEnd::refused("h is too long")), CaseVerdict::Wrong);
     }
 
     #[test]
     fn a_refusal_counts_only_where_it_is_expected_and_names_what_it_should() {
         let refused = || Expected::refused(["µ", "h ="]);
-        assert_eq!(verdict(refused(), Happened::refused("µ = 2 with h = 1 s")), Verdict::Refused);
-        assert_eq!(verdict(refused(), Happened::refused("µ = 2")), Verdict::Wrong);
+        assert_eq!(verdict(refused(), CaseEnd::refused("µ = 2 with h = 1 s")), CaseVerdict::Refused);
+        assert_eq!(verdict(refused(), CaseEnd::refused("µ = 2")), CaseVerdict::Wrong);
         let several = || Expected::refused_as(&[&["µ", "h ="], &["load"]]);
-        assert_eq!(verdict(several(), Happened::refused("the load is 1e300")), Verdict::Refused);
-        assert_eq!(verdict(several(), Happened::refused("µ = 2")), Verdict::Wrong);
-        let ended = Happened::refused("at t = 2 s (last good time 1 s) the load is 1e300");
-        assert_eq!(verdict(several(), ended), Verdict::Ended);
+        assert_eq!(verdict(several(), CaseEnd::refused("the load is 1e300")), CaseVerdict::Refused);
+        assert_eq!(verdict(several(), CaseEnd::refused("µ = 2")), CaseVerdict::Wrong);
+        let ended = CaseEnd::refused("at t = 2 s (last good time 1 s) the load is 1e300");
+        assert_eq!(verdict(several(), ended), CaseVerdict::Ended);
         // Nothing named is nothing asked: no refusal counts.
         for nothing in [Expected::refused([""]), Expected::refused([]), Expected::refused_as(&[])] {
-            assert_eq!(verdict(nothing, Happened::refused("no")), Verdict::Wrong);
+            assert_eq!(verdict(nothing, CaseEnd::refused("no")), CaseVerdict::Wrong);
         }
-        let answer = Happened::answer(vec![Check::so("a", true)]);
-        assert_eq!(verdict(refused(), answer.clone()), Verdict::Wrong);
+        let answer = CaseEnd::answer(vec![Check::so("a", true)]);
+        assert_eq!(verdict(refused(), answer.clone()), CaseVerdict::Wrong);
         let either = || Expected::either("x", ["µ"]);
-        assert_eq!(verdict(either(), answer), Verdict::Right);
-        assert_eq!(verdict(either(), Happened::refused("µ")), Verdict::Refused);
-        let spoiled = Happened { checks: vec![Check::so("a", false)], ..Happened::refused("µ") };
-        assert_eq!(verdict(either(), spoiled), Verdict::Wrong);
+        assert_eq!(verdict(either(), answer), CaseVerdict::Right);
+        assert_eq!(verdict(either(), CaseEnd::refused("µ")), CaseVerdict::Refused);
+        let spoiled = CaseEnd { checks: vec![Check::so("a", false)], ..CaseEnd::refused("µ") };
+        assert_eq!(verdict(either(), spoiled), CaseVerdict::Wrong);
     }
 
     #[test]
     fn what_happened_crosses_the_process_boundary_bit_by_bit() {
-        let happened = Happened {
+        let happened = CaseEnd {
             refusal: Some("no".into()),
             checks: vec![Check::at_most("a", f64::NAN, 0.1), Check::at_most("b", 1.0 / 3.0, f64::INFINITY)],
             remarks: vec!["c".into()],
         };
         let text = happened.to_json().to_string();
-        let back = Happened::from_json(&serde_json::from_str(&text).unwrap()).unwrap();
+        let back = CaseEnd::from_json(&serde_json::from_str(&text).unwrap()).unwrap();
         assert_eq!(back.to_json(), happened.to_json());
         assert!(back.checks[0].found.is_nan() && back.checks[1].bound.is_infinite());
-        assert_eq!(Happened::from_json(&json!({})), None);
+        assert_eq!(CaseEnd::from_json(&json!({})), None);
     }
 }

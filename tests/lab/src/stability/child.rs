@@ -11,7 +11,7 @@ use std::{
 
 use tiprub_shell::{Failure, Result};
 
-use super::{Case, Context, Happened, Verdict, judge};
+use super::{CaseContext, CaseEnd, CaseVerdict, StabilityCase, judge};
 
 /// Between two looks at a child.
 const PATIENCE: Duration = Duration::from_millis(4);
@@ -22,7 +22,7 @@ const LAST_WORDS: usize = 300;
 
 /// One row of the table, filled in.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Row {
+pub(crate) struct StabilityRow {
     /// Name of the case.
     pub name: String,
     /// What was expected.
@@ -30,7 +30,7 @@ pub(crate) struct Row {
     /// What happened.
     pub happened: String,
     /// What that is worth.
-    pub verdict: Verdict,
+    pub verdict: CaseVerdict,
     /// Wall-clock time (s).
     pub seconds: f64,
 }
@@ -45,7 +45,7 @@ fn program() -> std::io::Result<PathBuf> {
 ///
 /// # Errors
 /// No child process can be started.
-pub(crate) fn run(case: &Case, context: &Context) -> Result<Row> {
+pub(crate) fn run(case: &StabilityCase, context: &CaseContext) -> Result<StabilityRow> {
     let clock = Instant::now();
     let lost = |error: std::io::Error| Failure::new("child process", error, "Free memory and try again");
     let mut command = Command::new(program().map_err(lost)?);
@@ -61,22 +61,22 @@ pub(crate) fn run(case: &Case, context: &Context) -> Result<Row> {
     let code = wait(&mut child, Duration::from_secs_f64(case.limit)).map_err(lost)?;
     let [stdout, stderr] = [stdout, stderr].map(|thread| thread.join().unwrap_or_default());
     let (verdict, happened) = match code {
-        None => (Verdict::Hung, format!("did not end within {} s", case.limit)),
+        None => (CaseVerdict::Hung, format!("did not end within {} s", case.limit)),
         Some(ended) => read(case, &ended, &stdout, &stderr),
     };
     let seconds = clock.elapsed().as_secs_f64();
-    Ok(Row { name: case.name.clone(), expected: case.expected.to_text(), happened, verdict, seconds })
+    Ok(StabilityRow { name: case.name.clone(), expected: case.expected.to_text(), happened, verdict, seconds })
 }
 
-fn read(case: &Case, ended: &str, stdout: &str, stderr: &str) -> (Verdict, String) {
+fn read(case: &StabilityCase, ended: &str, stdout: &str, stderr: &str) -> (CaseVerdict, String) {
     let written = stdout.lines().last().and_then(|line| serde_json::from_str(line).ok());
-    match written.as_ref().and_then(Happened::from_json).filter(|_| ended.is_empty()) {
+    match written.as_ref().and_then(CaseEnd::from_json).filter(|_| ended.is_empty()) {
         Some(happened) => judge(&case.expected, &happened),
         None => {
             let words: Vec<char> = stderr.trim().chars().collect();
             let words: String = words[words.len().saturating_sub(LAST_WORDS)..].iter().collect();
             let ended = if ended.is_empty() { "ended without an answer" } else { ended };
-            (Verdict::Crashed, format!("{ended}: {}", words.replace('\n', " ")))
+            (CaseVerdict::Crashed, format!("{ended}: {}", words.replace('\n', " ")))
         }
     }
 }
@@ -113,6 +113,6 @@ fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<String>> {
 pub(crate) fn answer(name: &str) -> Result<serde_json::Value> {
     let case = super::named(name, false).into_iter().find(|case| case.name == name);
     let case = case.ok_or_else(|| Failure::usage("--child", format!("there is no case {name}"), ""))?;
-    let context = Context { fmus: env::var_os(FMUS).map(Into::into) };
+    let context = CaseContext { fmus: env::var_os(FMUS).map(Into::into) };
     Ok(case.run(&context).to_json())
 }

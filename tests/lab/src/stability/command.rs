@@ -2,39 +2,39 @@
 
 use tiprub_packaging::{
     cli::LibraryArguments,
-    fmu::{FmiVersion, Package},
+    fmu::{FmiVersion, FmuPackage},
     library,
 };
 use tiprub_shell::{
     Failure, Result,
-    console::{Console, Outcome},
+    console::{CommandOutcome, Console},
     output_file,
-    places::{self, Named},
+    places::{self, NamedFile},
     sweep,
 };
 
 use crate::{
-    cli::StabilityArguments,
-    stability::{self, Case, Context, child, families::values, table::Table},
+    cli::LabStabilityArguments,
+    stability::{self, CaseContext, StabilityCase, child, families::values, table::StabilityTable},
 };
 
 /// Run the cases asked for and write the table.
 ///
 /// # Errors
 /// No case of that name, files that cannot be written, or a case that is neither right nor refused as it should be.
-pub(crate) fn run(arguments: &StabilityArguments, console: &Console) -> Result<Outcome> {
+pub(crate) fn run(arguments: &LabStabilityArguments, console: &Console) -> Result<CommandOutcome> {
     if let Some(name) = &arguments.child {
         let json = child::answer(name)?;
-        return Ok(Outcome { text: json.to_string(), json, ..Outcome::default() });
+        return Ok(CommandOutcome { text: json.to_string(), json, ..CommandOutcome::default() });
     }
     let cases = chosen(arguments)?;
-    let written = Table::FILES.map(|name| Named::new("--out", arguments.out.join(name)));
-    places::apart(&Vec::from_iter(Named::option("--library", &arguments.library)), &written)?;
+    let written = StabilityTable::FILES.map(|name| NamedFile::new("--out", arguments.out.join(name)));
+    places::apart(&Vec::from_iter(NamedFile::option("--library", &arguments.library)), &written)?;
     // Before the long work: what would fail after it.
     output_file::try_directory(&arguments.out)?;
     // Lives as long as the cases run.
     let fmus = if cases.iter().any(|case| case.imports) { Some(package(arguments, console)?) } else { None };
-    let context = Context { fmus: fmus.as_ref().map(|directory| directory.path().to_owned()) };
+    let context = CaseContext { fmus: fmus.as_ref().map(|directory| directory.path().to_owned()) };
     let task = console.task("Stability", Some(cases.len() as u64));
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
     let rows = sweep::sweep(
@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &StabilityArguments, console: &Console) -> Result<O
         |done| task.at(done as u64),
     )?;
     drop(task);
-    let table = Table { rows };
+    let table = StabilityTable { rows };
     let outcome = table.write(&arguments.out)?;
     verdict(&table, &arguments.out).map_or(Ok(outcome), Err)
 }
@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &StabilityArguments, console: &Console) -> Result<O
 const NAMED: usize = 5;
 
 /// The failure of a table with cases that are neither right nor refused as they should be.
-fn verdict(table: &Table, directory: &std::path::Path) -> Option<Failure> {
+fn verdict(table: &StabilityTable, directory: &std::path::Path) -> Option<Failure> {
     let unsound: Vec<String> = table.unsound().map(|row| format!("{} {}", row.verdict.name(), row.name)).collect();
     if unsound.is_empty() {
         return None;
@@ -76,15 +76,15 @@ fn verdict(table: &Table, directory: &std::path::Path) -> Option<Failure> {
 }
 
 /// The scenes whose variables are walked, as FMUs of both versions in a temporary directory.
-fn package(arguments: &StabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
+fn package(arguments: &LabStabilityArguments, console: &Console) -> Result<tempfile::TempDir> {
     let chosen =
         LibraryArguments { library: arguments.library.iter().cloned().collect(), ..LibraryArguments::default() };
-    let libraries = library::load(library::Unit::Scene, &chosen, console)?;
+    let libraries = library::load(library::LibraryUnit::Scene, &chosen, console)?;
     let directory = tempfile::tempdir()
         .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
     for name in values::SCENES {
         let scene = values::scene(name);
-        let package = Package::new(&scene, &libraries)?;
+        let package = FmuPackage::new(&scene, &libraries)?;
         for version in [FmiVersion::Two, FmiVersion::Three] {
             let path = directory.path().join(format!("{name}-{}.fmu", version.digit()));
             package.write(&path, version, Some(false))?;
@@ -93,12 +93,12 @@ fn package(arguments: &StabilityArguments, console: &Console) -> Result<tempfile
     Ok(directory)
 }
 
-fn chosen(arguments: &StabilityArguments) -> Result<Vec<Case>> {
+fn chosen(arguments: &LabStabilityArguments) -> Result<Vec<StabilityCase>> {
     let Some(prefix) = &arguments.case else { return Ok(stability::cases(arguments.quick)) };
     let cases = stability::named(prefix, arguments.quick);
     if cases.is_empty() {
         let cases = stability::cases(arguments.quick);
-        let mut families: Vec<&str> = cases.iter().map(Case::family).chain(["judge"]).collect();
+        let mut families: Vec<&str> = cases.iter().map(StabilityCase::family).chain(["judge"]).collect();
         families.sort_unstable();
         families.dedup();
         let of = if arguments.quick { " of the quick form" } else { "" };

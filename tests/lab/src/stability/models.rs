@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DMatrix, Matrix3};
 use tiprub_core::{
     Rom, Scene,
-    rom::{Frame, Harmonic, RomExtras},
+    rom::{DisplacementFrame, Harmonic, RomExtras},
     settings::{Scheme, Solver},
 };
-pub(crate) use tiprub_test_models::{GAP, RADIUS, Random, bumps, rich_blade as blade, round};
+pub(crate) use tiprub_test_models::{GAP, RADIUS, SeededRandom, bumps, rich_blade as blade, round};
 use tiprub_test_models::{node, ring, structure};
 
 /// Longest step of adaptive integration (s), as scenes have it that name none.
@@ -19,7 +19,7 @@ pub(crate) const SOLVERS: [(Solver, &str); Solver::ALL.len()] =
 
 /// How the length of a step is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Steps {
+pub(crate) enum StepChoice {
     /// The case gives the internal step; for galerkin the longest one, with the largest tolerance that scenes accept.
     Fixed,
     /// The tolerance of the method (a fraction of the clearance) chooses it.
@@ -28,28 +28,28 @@ pub(crate) enum Steps {
 
 /// Scheme, contact solver, and choice of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Method {
+pub(crate) struct StabilityMethod {
     /// Scheme.
     pub scheme: Scheme,
     /// Contact solver.
     pub solver: Solver,
     /// Choice of the step.
-    pub steps: Steps,
+    pub steps: StepChoice,
 }
 
 /// Schemes with their choice of the step and their name in the table.
-const INTEGRATIONS: [(Scheme, Steps, &str); Scheme::ALL.len() + 1] = [
-    (Scheme::CentralDifference, Steps::Fixed, "central"),
-    (Scheme::ModalExact, Steps::Fixed, "exact"),
-    (Scheme::MasslessBoundary, Steps::Fixed, "massless"),
-    (Scheme::Galerkin, Steps::Adaptive(1e-4), "galerkin"),
-    (Scheme::Galerkin, Steps::Fixed, "galerkin-fixed"),
+const INTEGRATIONS: [(Scheme, StepChoice, &str); Scheme::ALL.len() + 1] = [
+    (Scheme::CentralDifference, StepChoice::Fixed, "central"),
+    (Scheme::ModalExact, StepChoice::Fixed, "exact"),
+    (Scheme::MasslessBoundary, StepChoice::Fixed, "massless"),
+    (Scheme::Galerkin, StepChoice::Adaptive(1e-4), "galerkin"),
+    (Scheme::Galerkin, StepChoice::Fixed, "galerkin-fixed"),
 ];
 
-impl Method {
+impl StabilityMethod {
     /// Modal-exact with this solver.
     pub(crate) const fn exact(solver: Solver) -> Self {
-        Self { scheme: Scheme::ModalExact, solver, steps: Steps::Fixed }
+        Self { scheme: Scheme::ModalExact, solver, steps: StepChoice::Fixed }
     }
 
     /// Every method.
@@ -70,8 +70,8 @@ impl Method {
 
     /// Scheme and choice of the step, in a word.
     pub(crate) fn integration(self) -> &'static str {
-        let adaptive = |steps| matches!(steps, Steps::Adaptive(_));
-        let own = |&(scheme, steps, _): &(Scheme, Steps, &str)| {
+        let adaptive = |steps| matches!(steps, StepChoice::Adaptive(_));
+        let own = |&(scheme, steps, _): &(Scheme, StepChoice, &str)| {
             scheme == self.scheme && adaptive(steps) == adaptive(self.steps)
         };
         INTEGRATIONS.iter().find(|row| own(row)).map_or("", |(.., name)| name)
@@ -106,7 +106,7 @@ impl Method {
 
     /// Steps by a tolerance.
     pub(crate) fn is_adaptive(self) -> bool {
-        matches!(self.steps, Steps::Adaptive(_))
+        matches!(self.steps, StepChoice::Adaptive(_))
     }
 
     /// Massless-boundary.
@@ -116,14 +116,14 @@ impl Method {
 
     /// With another tolerance, if it has one.
     pub(crate) fn within(self, tolerance: f64) -> Self {
-        if self.is_adaptive() { Self { steps: Steps::Adaptive(tolerance), ..self } } else { self }
+        if self.is_adaptive() { Self { steps: StepChoice::Adaptive(tolerance), ..self } } else { self }
     }
 
     /// What an answer is compared with: a smaller tolerance; and the step is to be divided by the second number.
     pub(crate) fn finer(self) -> (Self, f64) {
         match self.steps {
-            Steps::Adaptive(tolerance) => (self.within((tolerance / 16.0).max(1e-9)), 1.0),
-            Steps::Fixed => (self, 4.0),
+            StepChoice::Adaptive(tolerance) => (self.within((tolerance / 16.0).max(1e-9)), 1.0),
+            StepChoice::Fixed => (self, 4.0),
         }
     }
 
@@ -136,9 +136,9 @@ impl Method {
     pub(crate) fn on(self, scene: Scene) -> Scene {
         let mut scene = with_methods(scene, self.scheme, self.solver);
         scene.settings.time.tolerance = match self.steps {
-            Steps::Adaptive(tolerance) => Some(tolerance),
-            Steps::Fixed if self.is_galerkin() => Some(tiprub_core::ranges::TOLERANCE[1]),
-            Steps::Fixed => None,
+            StepChoice::Adaptive(tolerance) => Some(tolerance),
+            StepChoice::Fixed if self.is_galerkin() => Some(tiprub_core::ranges::TOLERANCE[1]),
+            StepChoice::Fixed => None,
         };
         scene
     }
@@ -239,7 +239,7 @@ impl Tower {
         let nodes = (0..self.copies).map(node).collect();
         let rom = structure("tower", mass, self.stiffness(0.0), contact_map, nodes);
         let extras = RomExtras { harmonics, ..RomExtras::default() };
-        Rom { sectors: self.sectors, frame: Frame::Cylindrical, damping_ratio: 0.005, extras, ..rom }
+        Rom { sectors: self.sectors, frame: DisplacementFrame::Cylindrical, damping_ratio: 0.005, extras, ..rom }
     }
 
     /// Largest angular frequency of one sector (rad/s), from the springs as written.

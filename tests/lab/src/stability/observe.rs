@@ -22,10 +22,10 @@ pub(crate) fn steps(time: f64, length: f64) -> u32 {
 ///
 /// # Errors
 /// The scene is refused.
-pub(crate) fn begin(scene: &Scene) -> Result<(Simulation, Watch)> {
+pub(crate) fn begin(scene: &Scene) -> Result<(Simulation, StabilityWatch)> {
     let mut simulation = Simulation::new(scene)?;
     simulation.initialise(0.0)?;
-    Ok((simulation, Watch::new(scene)))
+    Ok((simulation, StabilityWatch::new(scene)))
 }
 
 /// Value of a real variable that the scene has.
@@ -77,7 +77,7 @@ pub(crate) fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
 
 /// Largest of everything that should be small, over a run.
 #[derive(Debug, Clone)]
-pub(crate) struct Watch {
+pub(crate) struct StabilityWatch {
     sectors: usize,
     slopes: Vec<f64>,
     clearances: Vec<f64>,
@@ -108,7 +108,7 @@ pub(crate) struct Watch {
     pub finite: bool,
 }
 
-impl Watch {
+impl StabilityWatch {
     /// Before the first step of an initialised simulation of `scene`.
     pub(crate) fn new(scene: &tiprub_core::Scene) -> Self {
         let (contact, rom) = (&scene.settings.contacts[0], &scene.roms[0]);

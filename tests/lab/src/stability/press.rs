@@ -14,7 +14,7 @@ use tiprub_core::{
 use super::{
     Check,
     models::{RADIUS, allowed},
-    observe::{Watch, begin, real, set, steps},
+    observe::{StabilityWatch, begin, real, set, steps},
 };
 
 /// Damping that brings the blades to rest.
@@ -77,7 +77,7 @@ impl Press {
         Ok(checks)
     }
 
-    fn march(&self) -> Result<(Simulation, Watch)> {
+    fn march(&self) -> Result<(Simulation, StabilityWatch)> {
         let mut scene = self.scene.clone();
         scene.settings.structures[0].damping_ratio.get_or_insert(DAMPING);
         let step = scene.settings.time.step;

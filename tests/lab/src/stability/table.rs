@@ -4,23 +4,23 @@ use std::{fmt::Write as _, path::Path};
 
 use serde_json::{Value, json};
 use tiprub_figure::{STYLE, escape};
-use tiprub_shell::{Result, console::Outcome, output_file};
+use tiprub_shell::{Result, console::CommandOutcome, output_file};
 
-use super::{Verdict, child::Row, models::Method};
+use super::{CaseVerdict, child::StabilityRow, models::StabilityMethod};
 
 /// All rows.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Table {
+pub(crate) struct StabilityTable {
     /// One row per case, in the order of the cases.
-    pub rows: Vec<Row>,
+    pub rows: Vec<StabilityRow>,
 }
 
-impl Table {
+impl StabilityTable {
     /// What [`Table::write`] writes.
     pub(crate) const FILES: [&str; 4] = ["index.html", "results.json", "stability.csv", "stability.md"];
 
     /// Number of rows of a verdict.
-    pub(crate) fn count(&self, verdict: Verdict) -> usize {
+    pub(crate) fn count(&self, verdict: CaseVerdict) -> usize {
         self.rows.iter().filter(|row| row.verdict == verdict).count()
     }
 
@@ -36,16 +36,16 @@ impl Table {
     }
 
     /// Families with a row for each of their methods: cases, and how many of each verdict.
-    fn methods(&self) -> Vec<Counted<'_>> {
-        let mut counted: Vec<Counted<'_>> = Vec::new();
+    fn methods(&self) -> Vec<FamilyCount<'_>> {
+        let mut counted: Vec<FamilyCount<'_>> = Vec::new();
         for row in &self.rows {
-            let (family, method) = (family(row), Method::in_name(&row.name));
+            let (family, method) = (family(row), StabilityMethod::in_name(&row.name));
             let place = counted.iter().position(|one| one.family == family && one.method == method);
             let place = place.unwrap_or_else(|| {
-                counted.push(Counted { family, method, counts: [0; Verdict::ALL.len()] });
+                counted.push(FamilyCount { family, method, counts: [0; CaseVerdict::ALL.len()] });
                 counted.len() - 1
             });
-            let verdict = Verdict::ALL.iter().position(|verdict| *verdict == row.verdict);
+            let verdict = CaseVerdict::ALL.iter().position(|verdict| *verdict == row.verdict);
             counted[place].counts[verdict.unwrap_or(0)] += 1;
         }
         counted
@@ -53,13 +53,13 @@ impl Table {
 
     /// Families by schemes with their choice of the step: right + refused + ended, and what is wrong where something is.
     fn by_method(&self) -> (Vec<&'static str>, Vec<(&str, Vec<String>)>) {
-        let columns: Vec<Option<&str>> = Method::integrations().map(Some).chain([None]).collect();
+        let columns: Vec<Option<&str>> = StabilityMethod::integrations().map(Some).chain([None]).collect();
         let counted = self.methods();
         let cell = |family: &str, column: Option<&str>| {
             let rows = counted.iter().filter(|one| one.family == family && one.method.0 == column);
             let sum = |verdict: usize| rows.clone().map(|one| one.counts[verdict]).sum::<usize>();
             let [right, refused, ended] = [0, 1, 2].map(sum);
-            let wrong: usize = (3..Verdict::ALL.len()).map(sum).sum();
+            let wrong: usize = (3..CaseVerdict::ALL.len()).map(sum).sum();
             match (right + refused + ended, wrong) {
                 (0, 0) => String::new(),
                 (_, 0) => format!("{right} + {refused} + {ended}"),
@@ -67,25 +67,25 @@ impl Table {
             }
         };
         let line = |family| (family, columns.iter().map(|column| cell(family, *column)).collect());
-        let names = Method::integrations().chain([OTHER]).collect();
+        let names = StabilityMethod::integrations().chain([OTHER]).collect();
         (names, self.families().into_iter().map(line).collect())
     }
 
     /// Rows that are neither right nor refused.
-    pub(crate) fn unsound(&self) -> impl Iterator<Item = &Row> {
+    pub(crate) fn unsound(&self) -> impl Iterator<Item = &StabilityRow> {
         self.rows.iter().filter(|row| !row.verdict.is_sound())
     }
 
     fn summary(&self) -> String {
-        let counts = Verdict::ALL.map(|verdict| format!("{} {}", self.count(verdict), verdict.name()));
+        let counts = CaseVerdict::ALL.map(|verdict| format!("{} {}", self.count(verdict), verdict.name()));
         format!("{} cases: {}", self.rows.len(), counts.join(", "))
     }
 
     fn to_text(&self) -> String {
         let mut text = format!("Stability on stiff and extreme cases\n{}\n\n", self.summary());
-        let _ = writeln!(text, "  {:<16}{}", "family", Verdict::ALL.map(|v| format!("{:>9}", v.name())).concat());
+        let _ = writeln!(text, "  {:<16}{}", "family", CaseVerdict::ALL.map(|v| format!("{:>9}", v.name())).concat());
         for family in self.families() {
-            let counts = Verdict::ALL.map(|verdict| format!("{:>9}", self.of(family, verdict)));
+            let counts = CaseVerdict::ALL.map(|verdict| format!("{:>9}", self.of(family, verdict)));
             let _ = writeln!(text, "  {family:<16}{}", counts.concat());
         }
         let (columns, lines) = self.by_method();
@@ -106,18 +106,20 @@ impl Table {
         text
     }
 
-    fn of(&self, asked: &str, verdict: Verdict) -> usize {
+    fn of(&self, asked: &str, verdict: CaseVerdict) -> usize {
         self.rows.iter().filter(|row| family(row) == asked && row.verdict == verdict).count()
     }
 
     /// For programs.
     pub(crate) fn to_json(&self) -> Value {
-        let counts: serde_json::Map<_, _> =
-            Verdict::ALL.iter().map(|verdict| (verdict.name().to_lowercase(), json!(self.count(*verdict)))).collect();
+        let counts: serde_json::Map<_, _> = CaseVerdict::ALL
+            .iter()
+            .map(|verdict| (verdict.name().to_lowercase(), json!(self.count(*verdict))))
+            .collect();
         json!({
             "cases": self.rows.len(),
             "counts": counts,
-            "methods": self.methods().iter().map(Counted::to_json).collect::<Vec<_>>(),
+            "methods": self.methods().iter().map(FamilyCount::to_json).collect::<Vec<_>>(),
             "rows": self.rows.iter().map(|row| json!({
                 "case": row.name, "expected": row.expected, "happened": row.happened,
                 "verdict": row.verdict.name(), "seconds": row.seconds,
@@ -137,10 +139,11 @@ impl Table {
 
     /// The chapter of the guide, below its fixed introduction. No times: the same sources give the same text.
     pub(crate) fn to_markdown(&self) -> String {
-        let mut text = format!("{}\n\n| family | {} |\n", self.summary(), Verdict::ALL.map(Verdict::name).join(" | "));
+        let mut text =
+            format!("{}\n\n| family | {} |\n", self.summary(), CaseVerdict::ALL.map(CaseVerdict::name).join(" | "));
         text.push_str("|---|---|---|---|---|---|---|\n");
         for family in self.families() {
-            let counts = Verdict::ALL.map(|verdict| self.of(family, verdict).to_string());
+            let counts = CaseVerdict::ALL.map(|verdict| self.of(family, verdict).to_string());
             let _ = writeln!(text, "| {family} | {} |", counts.join(" | "));
         }
         let (columns, lines) = self.by_method();
@@ -151,10 +154,10 @@ impl Table {
         }
         for family in self.families() {
             let _ = write!(text, "\n### {family}\n\n| case | expected | happened | verdict |\n|---|---|---|---|\n");
-            let rows: Vec<&Row> = self.rows.iter().filter(|row| self::family(row) == family).collect();
+            let rows: Vec<&StabilityRow> = self.rows.iter().filter(|row| self::family(row) == family).collect();
             for (name, group) in groups(&rows) {
-                let counts = Verdict::ALL.map(|verdict| group.iter().filter(|row| row.verdict == verdict).count());
-                let verdicts = Verdict::ALL.iter().zip(counts).filter(|(_, count)| *count > 0);
+                let counts = CaseVerdict::ALL.map(|verdict| group.iter().filter(|row| row.verdict == verdict).count());
+                let verdicts = CaseVerdict::ALL.iter().zip(counts).filter(|(_, count)| *count > 0);
                 let verdicts: Vec<String> = match group.len() {
                     1 => verdicts.map(|(verdict, _)| verdict.name().to_owned()).collect(),
                     _ => verdicts.map(|(verdict, count)| format!("{count} {}", verdict.name())).collect(),
@@ -188,7 +191,7 @@ impl Table {
     ///
     /// # Errors
     /// Files cannot be written.
-    pub(crate) fn write(&self, directory: &Path) -> Result<Outcome> {
+    pub(crate) fn write(&self, directory: &Path) -> Result<CommandOutcome> {
         output_file::create_directory(directory)?;
         let page = directory.join("index.html");
         output_file::write(&page, self.to_html())?;
@@ -196,23 +199,27 @@ impl Table {
         output_file::write(&directory.join("stability.md"), self.to_markdown())?;
         let json = self.to_json();
         output_file::write(&directory.join("results.json"), format!("{json:#}\n"))?;
-        Ok(Outcome { text: format!("{}\nopen {}", self.to_text(), page.display()), json, ..Outcome::default() })
+        Ok(CommandOutcome {
+            text: format!("{}\nopen {}", self.to_text(), page.display()),
+            json,
+            ..CommandOutcome::default()
+        })
     }
 }
 
 /// Cases of a family that one method runs.
 #[derive(Debug)]
-struct Counted<'a> {
+struct FamilyCount<'a> {
     family: &'a str,
     /// Scheme with its choice of the step, and solver; as far as the names of cases tell.
     method: (Option<&'static str>, Option<&'static str>),
     /// Of each verdict.
-    counts: [usize; Verdict::ALL.len()],
+    counts: [usize; CaseVerdict::ALL.len()],
 }
 
-impl Counted<'_> {
+impl FamilyCount<'_> {
     fn to_json(&self) -> Value {
-        let counts = Verdict::ALL.iter().zip(self.counts);
+        let counts = CaseVerdict::ALL.iter().zip(self.counts);
         let counts: serde_json::Map<_, _> =
             counts.map(|(verdict, count)| (verdict.name().to_lowercase(), json!(count))).collect();
         json!({
@@ -233,7 +240,7 @@ fn wide(cells: &[impl AsRef<str>]) -> String {
     cells.iter().map(|cell| format!("{:>18}", cell.as_ref())).collect()
 }
 
-fn family(row: &Row) -> &str {
+fn family(row: &StabilityRow) -> &str {
     row.name.split('/').next().unwrap_or(&row.name)
 }
 
@@ -244,12 +251,12 @@ const SHOWN: usize = 160;
 
 /// Rows of a family with the names they go by: each by itself, or those that differ in the last part of the name together,
 /// the first of them as an example.
-fn groups<'a>(rows: &[&'a Row]) -> Vec<(String, Vec<&'a Row>)> {
-    let own = |row: &Row| row.name.split_once('/').map_or(row.name.clone(), |(_, rest)| rest.to_owned());
+fn groups<'a>(rows: &[&'a StabilityRow]) -> Vec<(String, Vec<&'a StabilityRow>)> {
+    let own = |row: &StabilityRow| row.name.split_once('/').map_or(row.name.clone(), |(_, rest)| rest.to_owned());
     if rows.len() <= LISTED {
         return rows.iter().map(|row| (own(row), vec![*row])).collect();
     }
-    let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
+    let mut groups: Vec<(String, Vec<&StabilityRow>)> = Vec::new();
     for row in rows {
         let name = own(row);
         let name = name.rsplit_once('/').map_or(name.clone(), |(before, _)| format!("{before}/…"));

@@ -2,30 +2,30 @@
 
 use tiprub_figure::{
     plots::{Plot, Series},
-    waterfall::{Axis, Waterfall},
+    waterfall::{Waterfall, WaterfallAxis},
 };
 use tiprub_shell::Result;
-use tiprub_study::{Figure, Picture, Sheet};
+use tiprub_study::{Picture, Sheet, StudyFigure};
 
-use super::{CASINGS, Casing, RAMP_PERIODS, Run, SHOWN, Setup, nearest};
+use super::{CASINGS, RAMP_PERIODS, Run, SHOWN, StageCasing, StageSetup, nearest};
 
 /// Nodal diameters below this share of the largest amplitude are not drawn.
 const SILENT: f64 = 1e-4;
 
 /// All pictures of one casing.
-pub(super) fn of(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> Result<Vec<Figure>> {
+pub(super) fn of(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &[String]) -> Result<Vec<StudyFigure>> {
     let mut all = vec![clearances(setup, casing, nearest(setup, runs)?, names)?];
     all.extend(SHOWN.map(|number| waterfall(setup, casing, runs, number)));
     all.push(amplitudes(setup, casing, runs, names)?);
     Ok(all)
 }
 
-fn of_casing(casing: Casing, names: [&'static str; 3]) -> &'static str {
+fn of_casing(casing: StageCasing, names: [&'static str; 3]) -> &'static str {
     names[casing as usize]
 }
 
 /// Clearances of blade 1 over time at one speed: fig. 11.
-fn clearances(setup: &Setup, casing: Casing, run: &Run, names: &[String]) -> Result<Figure> {
+fn clearances(setup: &StageSetup, casing: StageCasing, run: &Run, names: &[String]) -> Result<StudyFigure> {
     let gap = setup.gap();
     let time = |time: &f64| time * setup.frequency;
     let series = names.iter().zip(&run.clearances).map(|(name, column)| {
@@ -48,7 +48,7 @@ fn clearances(setup: &Setup, casing: Casing, run: &Run, names: &[String]) -> Res
         row.push(run.contacts.get(index).copied().unwrap_or(0.0));
         sheet.rows.push(row);
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: of_casing(casing, ["clearances-smooth", "clearances-rigid", "clearances-flexible"]),
         caption: format!(
             "Clearance between blade 1 and the casing at its three contact nodes, {}, at {:.1} rad/s. The oval grows over the first \
@@ -62,7 +62,7 @@ fn clearances(setup: &Setup, casing: Casing, run: &Run, names: &[String]) -> Res
 }
 
 /// Amplitude of one nodal diameter over time and speed: fig. 12.
-fn waterfall(setup: &Setup, casing: Casing, runs: &[Run], nodal_diameter: usize) -> Figure {
+fn waterfall(setup: &StageSetup, casing: StageCasing, runs: &[Run], nodal_diameter: usize) -> StudyFigure {
     let critical = setup.critical_speed();
     let points = |run: &Run| {
         let column = run.times.iter().zip(&run.amplitudes[nodal_diameter]);
@@ -71,9 +71,9 @@ fn waterfall(setup: &Setup, casing: Casing, runs: &[Run], nodal_diameter: usize)
     let all = runs.iter().flat_map(|run| run.amplitudes[nodal_diameter].iter().map(|value| 1e6 * value));
     let times = runs.iter().flat_map(|run| run.times.iter().map(|time| time * setup.frequency));
     let waterfall = Waterfall {
-        x: Axis::over("time (periods of the first mode of nodal diameter 2)", times),
-        depth: Axis::over("speed / critical speed", runs.iter().map(|run| run.speed / critical)),
-        value: Axis::over("amplitude (µm)", all.chain([0.0])),
+        x: WaterfallAxis::over("time (periods of the first mode of nodal diameter 2)", times),
+        depth: WaterfallAxis::over("speed / critical speed", runs.iter().map(|run| run.speed / critical)),
+        value: WaterfallAxis::over("amplitude (µm)", all.chain([0.0])),
         curves: runs.iter().map(|run| (run.speed / critical, points(run))).collect(),
     };
     let mut sheet = Sheet::new(["speed (rad/s)", "time (s)", "amplitude (m)"]);
@@ -81,7 +81,7 @@ fn waterfall(setup: &Setup, casing: Casing, runs: &[Run], nodal_diameter: usize)
         let column = run.times.iter().zip(&run.amplitudes[nodal_diameter]);
         sheet.rows.extend(column.map(|(time, value)| vec![run.speed, *time, *value]));
     }
-    Figure {
+    StudyFigure {
         name: if nodal_diameter == SHOWN[0] {
             of_casing(casing, ["nodal-diameter-2-smooth", "nodal-diameter-2-rigid", "nodal-diameter-2-flexible"])
         } else {
@@ -98,7 +98,7 @@ fn waterfall(setup: &Setup, casing: Casing, runs: &[Run], nodal_diameter: usize)
 }
 
 /// Effective amplitudes against speed.
-fn amplitudes(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> Result<Figure> {
+fn amplitudes(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &[String]) -> Result<StudyFigure> {
     let diameters = runs.first().map_or(0, |run| run.amplitudes.len());
     let value = |run: &Run, number: usize| run.effective(number, setup.full());
     let most = |number: usize| runs.iter().map(|run| value(run, number)).fold(0.0, f64::max);
@@ -125,7 +125,7 @@ fn amplitudes(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> 
             " Not drawn, below {SILENT:e} of the largest: nodal diameters {silent}; the numbers are whole."
         ));
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: of_casing(casing, ["amplitudes-smooth", "amplitudes-rigid", "amplitudes-flexible"]),
         caption,
         picture: Picture::plot(&plot)?,
@@ -134,7 +134,7 @@ fn amplitudes(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> 
 }
 
 /// What was found at every speed.
-fn speeds_sheet(setup: &Setup, runs: &[Run], names: &[String]) -> Sheet {
+fn speeds_sheet(setup: &StageSetup, runs: &[Run], names: &[String]) -> Sheet {
     let diameters = runs.first().map_or(0, |run| run.amplitudes.len());
     let mut sheet = Sheet::new(["speed (rad/s)", "speed / critical speed"]);
     sheet.columns.extend((0..diameters).map(|number| format!("nodal diameter {number} (m)")));
@@ -155,7 +155,7 @@ fn speeds_sheet(setup: &Setup, runs: &[Run], names: &[String]) -> Sheet {
 }
 
 /// Nodal diameter 4 relative to 2, all casings.
-pub(super) fn shares(setup: &Setup, runs: &[Vec<Run>; 3]) -> Result<Figure> {
+pub(super) fn shares(setup: &StageSetup, runs: &[Vec<Run>; 3]) -> Result<StudyFigure> {
     let share = |run: &Run| match run.ended {
         Some(_) => f64::NAN,
         None => run.effective(SHOWN[1], setup.full()) / run.effective(SHOWN[0], setup.full()),
@@ -178,7 +178,7 @@ pub(super) fn shares(setup: &Setup, runs: &[Vec<Run>; 3]) -> Result<Figure> {
         let row = runs.iter().map(|runs| share(&runs[index]));
         sheet.rows.push([runs[0][index].speed].into_iter().chain(row).collect());
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "share-of-4",
         caption:
             "Effective amplitude of nodal diameter 4 relative to that of 2 against angular velocity, of runs that reach their end."

@@ -38,7 +38,7 @@ const CLOSED: f64 = 1e-6;
 
 /// What the blades turn in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Casing {
+enum StageCasing {
     /// Oval by its shape; nothing gives way. Without friction.
     Smooth,
     /// The same with the friction of the scene.
@@ -48,9 +48,9 @@ enum Casing {
 }
 
 /// All, in the order of everything that is told.
-const CASINGS: [Casing; 3] = [Casing::Smooth, Casing::Rigid, Casing::Flexible];
+const CASINGS: [StageCasing; 3] = [StageCasing::Smooth, StageCasing::Rigid, StageCasing::Flexible];
 
-impl Casing {
+impl StageCasing {
     fn name(self) -> &'static str {
         match self {
             Self::Smooth => "rigid casing without friction",
@@ -61,7 +61,7 @@ impl Casing {
 }
 
 /// What is asked of one stage.
-struct Setup {
+struct StageSetup {
     /// Of all casings, without speed.
     scenes: [Scene; 3],
     /// Amplitude of the load that closes the clearance of the flexible casing and [`OVERLAP`] more (N/m).
@@ -75,7 +75,7 @@ struct Setup {
     quick: bool,
 }
 
-impl Setup {
+impl StageSetup {
     fn new(mut scene: Scene, quick: bool) -> Result<Self> {
         let disk = &scene.roms[0];
         let in_scene = |error| Failure::from_core("scene `stage`", error);
@@ -101,7 +101,7 @@ impl Setup {
         Ok(Self { scenes, amplitude, frequency, second_resonance, schedule, ramp, quick })
     }
 
-    fn scene(&self, casing: Casing) -> &Scene {
+    fn scene(&self, casing: StageCasing) -> &Scene {
         &self.scenes[casing as usize]
     }
 
@@ -126,7 +126,7 @@ impl Setup {
         0.5 * self.amplitude * (1.0 - (std::f64::consts::PI * share).cos())
     }
 
-    fn run(&self, casing: Casing, speed: f64) -> Result<Run> {
+    fn run(&self, casing: StageCasing, speed: f64) -> Result<Run> {
         let mut scene = self.scene(casing).clone();
         scene.settings.structures[0].speed = speed;
         let what = || format!("run at {speed} rad/s, {}", casing.name());
@@ -176,16 +176,16 @@ fn flexibility(scene: &Scene) -> Result<f64> {
 ///
 /// # Errors
 /// A model or a run fails.
-pub(crate) fn study(arguments: &crate::cli::StageArguments, console: &Console) -> Result<Study> {
+pub(crate) fn study(arguments: &crate::cli::LabStageArguments, console: &Console) -> Result<Study> {
     let quick = arguments.common.quick;
     let scene = scene_source::stage_scene(quick, &arguments.common.cache.cache(), console)?;
-    let setup = Setup::new(scene, quick)?;
+    let setup = StageSetup::new(scene, quick)?;
     let critical = setup.critical_speed();
     let count = if quick { QUICK_COUNT } else { COUNT };
     let speeds = arguments.speeds.unwrap_or(Speeds { from: RANGE[0] * critical, to: RANGE[1] * critical, count });
     // The elastic casing takes longer: it comes first, so that no processor waits in the end.
     let speeds = speeds.values();
-    let asked: Vec<(Casing, f64)> =
+    let asked: Vec<(StageCasing, f64)> =
         CASINGS.iter().rev().flat_map(|casing| speeds.iter().map(|speed| (*casing, *speed))).collect();
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
     let mut runs = {
@@ -217,7 +217,7 @@ fn warnings<'a>(runs: impl Iterator<Item = &'a Run>) -> Vec<String> {
 }
 
 /// The run nearest to resonance, of those that reach their end where one does.
-fn nearest<'a>(setup: &Setup, runs: &'a [Run]) -> Result<&'a Run> {
+fn nearest<'a>(setup: &StageSetup, runs: &'a [Run]) -> Result<&'a Run> {
     let place = |run: &Run| (run.ended.is_some(), (run.speed / setup.critical_speed() - 1.0).abs());
     let shown = runs.iter().min_by(|a, b| {
         let [a, b] = [place(a), place(b)];
@@ -226,7 +226,7 @@ fn nearest<'a>(setup: &Setup, runs: &'a [Run]) -> Result<&'a Run> {
     shown.ok_or_else(|| Failure::new("study stage", "no run", ""))
 }
 
-fn report(setup: &Setup, runs: &[Vec<Run>; 3]) -> Result<Study> {
+fn report(setup: &StageSetup, runs: &[Vec<Run>; 3]) -> Result<Study> {
     let names: Vec<String> = setup.scenes[0].roms[0].contact_nodes.iter().map(|node| node.name.clone()).collect();
     let (mut figures, mut statements, mut results) = (Vec::new(), Vec::new(), Vec::new());
     for (casing, runs) in CASINGS.into_iter().zip(runs) {
@@ -261,7 +261,7 @@ fn report(setup: &Setup, runs: &[Vec<Run>; 3]) -> Result<Study> {
     })
 }
 
-fn to_json(setup: &Setup, casing: Casing, runs: &[Run]) -> Value {
+fn to_json(setup: &StageSetup, casing: StageCasing, runs: &[Run]) -> Value {
     json!({
         "casing": casing.name(),
         "warnings": warnings(runs.iter()),
@@ -276,8 +276,8 @@ fn to_json(setup: &Setup, casing: Casing, runs: &[Run]) -> Value {
     })
 }
 
-fn facts(setup: &Setup, steps: u64, stepping: f64) -> Vec<(String, String)> {
-    let scene = setup.scene(Casing::Flexible);
+fn facts(setup: &StageSetup, steps: u64, stepping: f64) -> Vec<(String, String)> {
+    let scene = setup.scene(StageCasing::Flexible);
     let [disk, ring] = [0, 1].map(|index| &scene.roms[index]);
     let damping =
         |index: usize| scene.settings.structures[index].damping_ratio.unwrap_or(scene.roms[index].damping_ratio);

@@ -2,7 +2,7 @@
 
 use tiprub_core::{Scene, Simulation, variables::Quantity};
 
-use super::{CLOSED, Casing, Setup};
+use super::{CLOSED, StageCasing, StageSetup};
 
 /// Points of one curve that are kept.
 const MOST_POINTS: usize = 1000;
@@ -99,12 +99,12 @@ impl Elements {
 }
 
 /// What is looked at after every communication step: extremes, and how often nodes of blade 1 touch.
-struct Watch {
+struct StageWatch {
     closed: Vec<bool>,
     limit: f64,
 }
 
-impl Watch {
+impl StageWatch {
     fn look(
         &mut self,
         run: &mut Run,
@@ -160,13 +160,13 @@ fn advance(run: &mut Run, simulation: &mut Simulation, time: f64, length: f64) -
 }
 
 /// The run at one speed; one that is refused on its way keeps what came before.
-pub(super) fn march(setup: &Setup, scene: &Scene, casing: Casing, speed: f64) -> tiprub_core::Result<Run> {
+pub(super) fn march(setup: &StageSetup, scene: &Scene, casing: StageCasing, speed: f64) -> tiprub_core::Result<Run> {
     let mut simulation = Simulation::new(scene)?;
     let schedule = &setup.schedule;
     simulation.initialise(schedule.start)?;
     let elements = Elements::of(&simulation);
     let mut run = Run::new(speed, elements.clearances.len(), elements.amplitudes.len());
-    let mut watch = Watch { closed: vec![false; run.least.len()], limit: CLOSED * setup.gap() };
+    let mut watch = StageWatch { closed: vec![false; run.least.len()], limit: CLOSED * setup.gap() };
     let stride = schedule.count.div_ceil(MOST_POINTS).max(1);
     for index in 0..=schedule.count {
         let time = schedule.time(index);
@@ -177,7 +177,7 @@ pub(super) fn march(setup: &Setup, scene: &Scene, casing: Casing, speed: f64) ->
         if index == schedule.count {
             break;
         }
-        if casing == Casing::Flexible {
+        if casing == StageCasing::Flexible {
             // What is set is reached at the end of the step.
             for one in &elements.load {
                 simulation.set_real(*one, setup.load(schedule.time(index + 1)))?;

@@ -3,7 +3,7 @@
 use tiprub_shell::Result;
 use tiprub_study::Statement;
 
-use super::{Casing, RAMP_PERIODS, Run, SHOWN, Setup, nearest, warnings};
+use super::{RAMP_PERIODS, Run, SHOWN, StageCasing, StageSetup, nearest, warnings};
 
 /// Ratio of nodal diameter 4 to 2 from which on its share counts as negligible.
 const NEGLIGIBLE: f64 = 0.1;
@@ -13,7 +13,7 @@ const OFTEN: usize = 2;
 const LEDGER: f64 = 1e-9;
 
 /// What is said of one casing.
-pub(super) fn of(setup: &Setup, casing: Casing, runs: &[Run], names: &[String]) -> Result<Vec<Statement>> {
+pub(super) fn of(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &[String]) -> Result<Vec<Statement>> {
     let [numerator, denominator] = [SHOWN[1], SHOWN[0]];
     let share = |run: &Run| run.effective(numerator, setup.full()) / run.effective(denominator, setup.full());
     let shares: Vec<(f64, f64)> = runs.iter().map(|run| (run.speed, share(run))).collect();

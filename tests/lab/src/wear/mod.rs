@@ -6,21 +6,21 @@ use std::f64::consts::TAU;
 
 use serde_json::json;
 use tiprub_core::{Rom, Scene, Simulation};
-use tiprub_figure::plots::{Form, Plot, Series};
+use tiprub_figure::plots::{Plot, Series, SeriesForm};
 use tiprub_gallery::reduction;
 use tiprub_model::{
     Rotor37Options,
     craig_bampton::dense_modes,
-    rotor37::{MeshCounts, Tip},
+    rotor37::{MeshCounts, TipContact},
 };
 use tiprub_shell::{
     Failure, Result,
     console::Console,
     sweep::{self, processors},
 };
-use tiprub_study::{Figure, Picture, Sheet, Statement, Study, arguments::StudyCommon, machine};
+use tiprub_study::{Picture, Sheet, Statement, Study, StudyFigure, arguments::StudyCommon, machine};
 
-use spectrum::Line;
+use spectrum::SpectralLine;
 
 /// The scene of all runs, as the guide shows it.
 const SCENE: &str = include_str!("scene.toml");
@@ -43,24 +43,24 @@ const CASING: u32 = 2;
 
 /// A run: the speed at which so many times it are the first mode, modes, the internal step (s), and cells around.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Case {
+struct WearCase {
     order: u32,
     modes: usize,
     step: f64,
     cells: usize,
 }
 
-const PLAIN: Case = Case { order: 6, modes: 40, step: 1.2e-6, cells: 360 };
-const CASES: [Case; 6] = [
+const PLAIN: WearCase = WearCase { order: 6, modes: 40, step: 1.2e-6, cells: 360 };
+const CASES: [WearCase; 6] = [
     PLAIN,
-    Case { order: 5, ..PLAIN },
-    Case { order: 4, ..PLAIN },
-    Case { order: 4, step: 0.6e-6, ..PLAIN },
-    Case { order: 4, modes: 80, ..PLAIN },
-    Case { order: 4, cells: 720, ..PLAIN },
+    WearCase { order: 5, ..PLAIN },
+    WearCase { order: 4, ..PLAIN },
+    WearCase { order: 4, step: 0.6e-6, ..PLAIN },
+    WearCase { order: 4, modes: 80, ..PLAIN },
+    WearCase { order: 4, cells: 720, ..PLAIN },
 ];
 
-impl Case {
+impl WearCase {
     fn told(self) -> String {
         let other = [
             (self.modes > PLAIN.modes, ", twice the modes"),
@@ -73,8 +73,8 @@ impl Case {
 
 /// What came of some revolutions of a run.
 #[derive(Debug, Clone)]
-struct Window {
-    case: Case,
+struct WearWindow {
+    case: WearCase,
     speed: f64,
     /// Second mode without contact, per revolution.
     second: f64,
@@ -85,12 +85,12 @@ struct Window {
     /// Mean wear that it added (m).
     added: f64,
     /// What the tip swings most at, per revolution.
-    swings: Vec<Line>,
+    swings: Vec<SpectralLine>,
     /// Largest orders of the wear that it added.
-    lobes: Vec<Line>,
+    lobes: Vec<SpectralLine>,
 }
 
-impl Window {
+impl WearWindow {
     /// While the casing closes, where there is new wear to speak of.
     fn judged(&self) -> bool {
         self.end <= CLOSED && self.added >= JUDGED
@@ -103,7 +103,7 @@ impl Window {
 
     /// From there to the nearest of this multiple of what the tip swings at.
     fn apart(&self, multiple: u32) -> f64 {
-        let apart = |line: &Line| (f64::from(multiple) * line.rate - self.order()).abs();
+        let apart = |line: &SpectralLine| (f64::from(multiple) * line.rate - self.order()).abs();
         self.swings.iter().map(apart).fold(f64::INFINITY, f64::min)
     }
 
@@ -114,7 +114,7 @@ impl Window {
     }
 
     fn row(&self) -> String {
-        let lines = |lines: &[Line], digits: usize| {
+        let lines = |lines: &[SpectralLine], digits: usize| {
             let each = lines.iter().map(|line| format!("{:.digits$}", line.rate));
             each.collect::<Vec<_>>().join(" and ")
         };
@@ -138,7 +138,7 @@ fn rom(quick: bool, modes: usize, console: &Console) -> Result<Rom> {
             true => MeshCounts { chord: 8, thickness: 1, span: 10 },
             false => MeshCounts { chord: 16, thickness: 2, span: 20 },
         },
-        tip: Tip::Patches(9),
+        tip: TipContact::Patches(9),
         modes,
         ..Rotor37Options::default()
     };
@@ -146,7 +146,7 @@ fn rom(quick: bool, modes: usize, console: &Console) -> Result<Rom> {
 }
 
 /// The scene, and the second mode per revolution.
-fn scene(rom: &Rom, case: Case) -> Result<(Scene, f64)> {
+fn scene(rom: &Rom, case: WearCase) -> Result<(Scene, f64)> {
     let mut settings = tiprub_format::parse_scene(SCENE, "the scene of the study")?;
     let (squares, _) = dense_modes(&rom.stiffness, &rom.mass).map_err(|error| reduction::failure("modes", error))?;
     let speed = squares[0].sqrt() / f64::from(case.order);
@@ -187,7 +187,7 @@ fn run(scene: &Scene) -> tiprub_core::Result<(Vec<f64>, Vec<Vec<f64>>)> {
     Ok((clearances, maps))
 }
 
-fn windows(roms: &[(usize, Rom)], case: &Case) -> Result<Vec<Window>> {
+fn windows(roms: &[(usize, Rom)], case: &WearCase) -> Result<Vec<WearWindow>> {
     let rom = roms.iter().find(|(modes, _)| *modes == case.modes).unwrap_or(&roms[0]);
     let (scene, second) = scene(&rom.1, *case)?;
     let (clearances, maps) = run(&scene).map_err(|error| Failure::from_core(format!("lab wear, {case:?}"), error))?;
@@ -198,7 +198,7 @@ fn windows(roms: &[(usize, Rom)], case: &Case) -> Result<Vec<Window>> {
         let new: Vec<f64> = after.iter().zip(before).map(|(after, before)| after - before).collect();
         let mean = |map: &[f64]| map.iter().sum::<f64>() / map.len() as f64;
         let samples = &clearances[first * SAMPLES as usize..last * SAMPLES as usize];
-        Window {
+        WearWindow {
             case: *case,
             speed: scene.settings.structures[0].speed,
             second,
@@ -212,13 +212,13 @@ fn windows(roms: &[(usize, Rom)], case: &Case) -> Result<Vec<Window>> {
     Ok(ends.map(window).collect())
 }
 
-fn table(windows: &[Window]) -> String {
+fn table(windows: &[WearWindow]) -> String {
     let head = "| speed (rad/s) | first mode per revolution, without contact | revolutions | new wear (µm) | wear at the end: mean, largest (µm) | \
                 the tip swings most at, per revolution | lobes of the new wear |\n|---|---|---|---|---|---|---|\n";
-    std::iter::once(head.to_owned()).chain(windows.iter().map(Window::row)).collect()
+    std::iter::once(head.to_owned()).chain(windows.iter().map(WearWindow::row)).collect()
 }
 
-fn figure(windows: &[Window]) -> Result<Figure> {
+fn figure(windows: &[WearWindow]) -> Result<StudyFigure> {
     let mut sheet = Sheet::new([
         "first mode per revolution",
         "second",
@@ -239,9 +239,10 @@ fn figure(windows: &[Window]) -> Result<Figure> {
         "with (m)",
     ]);
     for window in windows {
-        let Window { case, second, end, wear, added, swings, lobes, .. } = window;
-        let line =
-            |lines: &[Line], index: usize| lines.get(index).map_or([f64::NAN; 2], |line| [line.rate, line.amplitude]);
+        let WearWindow { case, second, end, wear, added, swings, lobes, .. } = window;
+        let line = |lines: &[SpectralLine], index: usize| {
+            lines.get(index).map_or([f64::NAN; 2], |line| [line.rate, line.amplitude])
+        };
         let [modes, cells] = [case.modes, case.cells].map(|count| count as f64);
         let mut row = vec![f64::from(case.order), *second, modes, cells, case.step, f64::from(*end), *added];
         row.extend(
@@ -254,10 +255,10 @@ fn figure(windows: &[Window]) -> Result<Figure> {
         .filter(|window| window.judged())
         .flat_map(|window| window.swings.iter().map(|line| (line.rate, window.order())));
     let series = vec![
-        Series::line("as many", vec![(0.0, 0.0), (20.0, 20.0)]).drawn(Form::Thin, 1),
-        Series::line("windows of revolutions", points.collect()).drawn(Form::Dots, 0),
+        Series::line("as many", vec![(0.0, 0.0), (20.0, 20.0)]).drawn(SeriesForm::Thin, 1),
+        Series::line("windows of revolutions", points.collect()).drawn(SeriesForm::Dots, 0),
     ];
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "lobes",
         caption: "Largest order of the wear that some revolutions add against what the tip swings at in them, while the casing closes.".into(),
         picture: Picture::plot(&Plot::new("vibrations per revolution", "lobes of the new wear", series))?,
@@ -265,12 +266,12 @@ fn figure(windows: &[Window]) -> Result<Figure> {
     })
 }
 
-fn statements(windows: &[Window]) -> Vec<Statement> {
-    let judged: Vec<&Window> = windows.iter().filter(|window| window.judged()).collect();
-    let nearest = |window: &Window| (1..=MULTIPLES).map(|of| window.apart(of)).fold(f64::INFINITY, f64::min);
+fn statements(windows: &[WearWindow]) -> Vec<Statement> {
+    let judged: Vec<&WearWindow> = windows.iter().filter(|window| window.judged()).collect();
+    let nearest = |window: &WearWindow| (1..=MULTIPLES).map(|of| window.apart(of)).fold(f64::INFINITY, f64::min);
     let farthest = judged.iter().map(|window| nearest(window)).fold(0.0, f64::max);
     let once = judged.iter().filter(|window| window.apart(1) < 1.0).count();
-    let lowest = |window: &Window| window.swings.iter().map(|line| line.rate).fold(f64::INFINITY, f64::min);
+    let lowest = |window: &WearWindow| window.swings.iter().map(|line| line.rate).fold(f64::INFINITY, f64::min);
     let ratios = judged.iter().map(|window| lowest(window) / f64::from(window.case.order));
     let stiffened = ratios.fold(f64::INFINITY, f64::min);
     let last = windows.iter().filter(|window| window.end == TURNS);
@@ -309,7 +310,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let task = console.task("Runs into the coating", Some(cases.len() as u64));
     let found = sweep::sweep(cases, processors(), |case| windows(&roms, case), |done| task.at(done as u64))?;
     drop(task);
-    let windows: Vec<Window> = found.into_iter().flatten().collect();
+    let windows: Vec<WearWindow> = found.into_iter().flatten().collect();
     Ok(Study {
         name: "wear",
         title: "Wear of the coating".into(),

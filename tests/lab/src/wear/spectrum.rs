@@ -10,7 +10,7 @@ const SHARE: f64 = 0.5;
 
 /// Something that comes so many times per revolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Line {
+pub(super) struct SpectralLine {
     pub(super) rate: f64,
     pub(super) amplitude: f64,
 }
@@ -26,14 +26,14 @@ fn transform(values: &[f64], step: f64) -> f64 {
 }
 
 /// The largest one, and a second that is not much smaller.
-fn largest(mut lines: Vec<Line>) -> Vec<Line> {
+fn largest(mut lines: Vec<SpectralLine>) -> Vec<SpectralLine> {
     lines.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
     let least = SHARE * lines.first().map_or(0.0, |line| line.amplitude);
     lines.into_iter().take(2).filter(|line| line.amplitude >= least).collect()
 }
 
 /// Peaks of the spectrum of so many samples per revolution, without what drifts and what is at most `below` per revolution; Hann's window.
-pub(super) fn swings(samples: &[f64], per_turn: u32, below: u32) -> Vec<Line> {
+pub(super) fn swings(samples: &[f64], per_turn: u32, below: u32) -> Vec<SpectralLine> {
     let count = samples.len() as f64;
     let middle = 0.5 * (count - 1.0);
     let mean = samples.iter().sum::<f64>() / count;
@@ -47,19 +47,19 @@ pub(super) fn swings(samples: &[f64], per_turn: u32, below: u32) -> Vec<Line> {
     let rates = FINENESS * (below + 1)..FINENESS * MOST;
     let line = |rate: u32| {
         let rate = f64::from(rate) / f64::from(FINENESS);
-        Line { rate, amplitude: 4.0 / count * transform(&weighted, TAU * rate / f64::from(per_turn)) }
+        SpectralLine { rate, amplitude: 4.0 / count * transform(&weighted, TAU * rate / f64::from(per_turn)) }
     };
-    let all: Vec<Line> = rates.map(line).collect();
+    let all: Vec<SpectralLine> = rates.map(line).collect();
     let peaks = all.windows(3).filter(|of| of[1].amplitude > of[0].amplitude && of[1].amplitude >= of[2].amplitude);
     largest(peaks.map(|of| of[1]).collect())
 }
 
 /// Largest orders of a map over the circumference, above `below`.
-pub(super) fn lobes(map: &[f64], below: u32) -> Vec<Line> {
+pub(super) fn lobes(map: &[f64], below: u32) -> Vec<SpectralLine> {
     let count = map.len() as f64;
     let line = |order: u32| {
         let rate = f64::from(order);
-        Line { rate, amplitude: 2.0 / count * transform(map, TAU * rate / count) }
+        SpectralLine { rate, amplitude: 2.0 / count * transform(map, TAU * rate / count) }
     };
     largest((below + 1..=MOST).map(line).collect())
 }

@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use serde_json::{Value, json};
 use tiprub_core::{
     Rom, Scene,
-    rom::{ContactNode, Frame},
+    rom::{ContactNode, DisplacementFrame},
     settings::{Scheme, Shape, Solver},
 };
 use tiprub_figure::plots::{Plot, Series};
@@ -22,14 +22,14 @@ use tiprub_model::{
     stress::StressPlaces,
 };
 use tiprub_reference::{
-    blade::{Blade, Gauge, History, Part, Steps},
-    reduced::rub::Obstacle,
+    blade::{BladeHistory, BladeSteps, FullBlade, Gauge, TipPart},
+    reduced::rub::BumpedCasing,
 };
 use tiprub_shell::{Failure, Result, console::Console, sweep};
 use tiprub_study::{
-    Figure, Picture, Sheet, Statement, Study,
+    Picture, Sheet, Statement, Study, StudyFigure,
     arguments::StudyCommon,
-    convergence::march::{Marched, march},
+    convergence::march::{RunSummary, march},
 };
 
 pub(crate) use stress::study as stress;
@@ -39,7 +39,7 @@ const INTERVAL: f64 = 4e-6;
 /// From the middle of the tip at the start to that of the first bump (rad).
 const AHEAD: f64 = 0.5;
 /// How big it is.
-struct Size {
+struct WitnessSize {
     mesh: MeshCounts,
     /// Samples: two touches, or one.
     samples: usize,
@@ -53,7 +53,7 @@ struct Size {
     rows: usize,
 }
 
-const FULL: Size = Size {
+const FULL: WitnessSize = WitnessSize {
     mesh: MeshCounts { chord: 12, thickness: 2, span: 20 },
     samples: 575,
     divisions: [4, 8, 16],
@@ -61,7 +61,7 @@ const FULL: Size = Size {
     modes: [80, 400],
     rows: 3,
 };
-const QUICK: Size = Size {
+const QUICK: WitnessSize = WitnessSize {
     mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
     samples: 125,
     divisions: [2, 4, 8],
@@ -95,7 +95,7 @@ impl Touching {
 }
 
 /// A reduced model and how the product steps it.
-struct Reduced {
+struct WitnessModel {
     name: &'static str,
     touching: Touching,
     modes: usize,
@@ -105,7 +105,7 @@ struct Reduced {
 }
 
 /// A run of the product, or why it was refused.
-type Reached = std::result::Result<Marched, String>;
+type WitnessRun = std::result::Result<RunSummary, String>;
 
 /// Default method and step; short steps, that the model alone is judged; and the paper's.
 const DEFAULT: ((Scheme, Solver), u32) = ((Scheme::ModalExact, Solver::Lcp), 8);
@@ -115,14 +115,14 @@ const MASSLESS: ((Scheme, Solver), u32) = ((Scheme::MasslessBoundary, Solver::Lc
 const GALERKIN: ((Scheme, Solver), u32) = ((Scheme::Galerkin, Solver::Lcp), 1);
 const PAPER: ((Scheme, Solver), u32) = ((Scheme::CentralDifference, Solver::Film), 4);
 
-impl Size {
+impl WitnessSize {
     fn of(quick: bool) -> &'static Self {
         if quick { &QUICK } else { &FULL }
     }
 
-    fn reduced(&self) -> Vec<Reduced> {
+    fn reduced(&self) -> Vec<WitnessModel> {
         let ([few, many], [own, most]) = (self.patches, self.modes);
-        let one = |name, touching, modes, (method, division)| Reduced { name, touching, modes, method, division };
+        let one = |name, touching, modes, (method, division)| WitnessModel { name, touching, modes, method, division };
         let patches = Touching::Patches;
         let all = [
             one("the paper's", Touching::Nodes(3), 20, PAPER),
@@ -157,23 +157,23 @@ impl Size {
 }
 
 /// The scene: that of rotor 37, one blade without damping that meets the first bump soon.
-struct Setting {
-    size: &'static Size,
+struct WitnessScene {
+    size: &'static WitnessSize,
     material: Material,
     blade: BladeMesh,
-    full: Blade,
+    full: FullBlade,
     /// Angle of the middle of the tip (rad).
     middle: f64,
 }
 
-impl Setting {
+impl WitnessScene {
     fn new(quick: bool) -> Result<Self> {
-        let size = Size::of(quick);
+        let size = WitnessSize::of(quick);
         let told = |error| failure("the full blade", error);
         let material = Rotor37Options::default().material;
         let blade = blade_mesh(size.mesh).map_err(told)?;
         let clamped = blade.mesh.set("hub").map_err(told)?;
-        let full = Blade::new(&blade.mesh, &material, clamped).map_err(told)?;
+        let full = FullBlade::new(&blade.mesh, &material, clamped).map_err(told)?;
         let mut setting = Self { size, material, full, middle: 0.0, blade };
         setting.middle = setting.parts(Touching::Patches(3, 1))?[1].angle();
         Ok(setting)
@@ -200,23 +200,23 @@ impl Setting {
         found.map_err(|error| failure("the tip of the blade", error))
     }
 
-    fn parts(&self, touching: Touching) -> Result<Vec<Part>> {
+    fn parts(&self, touching: Touching) -> Result<Vec<TipPart>> {
         let mesh = &self.blade.mesh;
         let tip = mesh.set("tip").map_err(|error| failure("the tip of the blade", error))?;
         match touching {
-            Touching::Points(each) => return Ok(Part::points(mesh, tip, each)),
-            Touching::Sides => return Ok(Part::outline(mesh, tip)),
+            Touching::Points(each) => return Ok(TipPart::points(mesh, tip, each)),
+            Touching::Sides => return Ok(TipPart::outline(mesh, tip)),
             Touching::Nodes(_) | Touching::Patches(..) => {}
         }
-        let part = |point: &ContactPoint| Part::mean(&mesh.nodes, point.weights(), point.meridional_slope);
+        let part = |point: &ContactPoint| TipPart::mean(&mesh.nodes, point.weights(), point.meridional_slope);
         Ok(self.contact(touching)?.iter().map(part).collect())
     }
 
-    fn rom(&self, reduced: &Reduced) -> Result<Rom> {
+    fn rom(&self, reduced: &WitnessModel) -> Result<Rom> {
         self.rom_with(reduced, StressPlaces::default())
     }
 
-    fn rom_with(&self, reduced: &Reduced, stress: StressPlaces) -> Result<Rom> {
+    fn rom_with(&self, reduced: &WitnessModel, stress: StressPlaces) -> Result<Rom> {
         let told = |error| failure("reducing the blade", error);
         let options = ReductionOptions {
             name: "rotor37".into(),
@@ -227,7 +227,7 @@ impl Setting {
             modes: reduced.modes,
             checked_modes: 10,
             sectors: 1,
-            frame: Frame::Cylindrical,
+            frame: DisplacementFrame::Cylindrical,
             watched: self.blade.contact_points(3).map_err(told)?,
             stress,
             damping_ratio: 0.0,
@@ -239,11 +239,11 @@ impl Setting {
     }
 
     /// The scene around a reduced model.
-    fn scene(&self, reduced: &Reduced) -> Result<Scene> {
+    fn scene(&self, reduced: &WitnessModel) -> Result<Scene> {
         self.scene_of(reduced, self.rom(reduced)?)
     }
 
-    fn scene_of(&self, reduced: &Reduced, rom: Rom) -> Result<Scene> {
+    fn scene_of(&self, reduced: &WitnessModel, rom: Rom) -> Result<Scene> {
         let mut settings = scene_source::settings("builtin:rotor37-one-row")?;
         let surface = &mut settings.surfaces[0];
         surface.ramp_time = 0.0;
@@ -258,26 +258,26 @@ impl Setting {
     }
 
     /// A run, or why it is refused.
-    fn run_reduced(&self, reduced: &Reduced) -> Result<Reached> {
+    fn run_reduced(&self, reduced: &WitnessModel) -> Result<WitnessRun> {
         Ok(march(&self.scene(reduced)?, &[], reduced.division, self.size.samples))
     }
 
     /// The full model, with stress at gauges.
-    fn run_full(&self, touching: Touching, division: u32, gauges: &[Gauge]) -> Result<History> {
+    fn run_full(&self, touching: Touching, division: u32, gauges: &[Gauge]) -> Result<BladeHistory> {
         let told = |error| failure("the full blade", error);
         let settings = scene_source::settings("builtin:rotor37-one-row")?;
         let Shape::TwoLobe { depth, width, .. } = settings.surfaces[0].shape else {
             return Err(Failure::new("study witness", "the scene has no bumps", ""));
         };
         let contact = &settings.contacts[0];
-        let obstacle = Obstacle {
+        let obstacle = BumpedCasing {
             clearance: contact.gap,
             speed: settings.structures[0].speed,
             friction: contact.friction,
             bumps: [2.0 * contact.gap * depth, width, 0.0],
         };
-        let parts: Vec<Part> = self.parts(touching)?.into_iter().map(|part| part.turned(-self.phase())).collect();
-        let steps = Steps { interval: INTERVAL, division, samples: self.size.samples };
+        let parts: Vec<TipPart> = self.parts(touching)?.into_iter().map(|part| part.turned(-self.phase())).collect();
+        let steps = BladeSteps { interval: INTERVAL, division, samples: self.size.samples };
         self.full.march(&parts, &obstacle, steps, (&self.watched()?, gauges)).map_err(told)
     }
 
@@ -288,13 +288,13 @@ impl Setting {
     }
 
     /// The full model; energy that its steps lose or make beside what contact supplies.
-    fn run_witness(&self, touching: Touching, division: u32) -> Result<(Marched, f64)> {
+    fn run_witness(&self, touching: Touching, division: u32) -> Result<(RunSummary, f64)> {
         let found = self.run_full(touching, division, &[])?;
         let place = |node: &usize| {
             let [x, y, z] = self.blade.mesh.nodes[*node];
             ContactNode { position: [x.hypot(y), y.atan2(x), z], ..ContactNode::default() }
         };
-        let marched = Marched {
+        let marched = RunSummary {
             points: self.watched()?.iter().map(place).collect(),
             impulse: found.impulses.iter().sum(),
             friction_work: found.friction_work.last().copied().unwrap_or_default(),
@@ -307,22 +307,22 @@ impl Setting {
 }
 
 /// All runs.
-struct Runs {
-    witnesses: Vec<((Touching, u32), Marched)>,
-    reduced: Vec<(Reduced, Reached)>,
+struct WitnessRuns {
+    witnesses: Vec<((Touching, u32), RunSummary)>,
+    reduced: Vec<(WitnessModel, WitnessRun)>,
     /// Largest residual of energy of a witness.
     residual: f64,
 }
 
-impl Runs {
+impl WitnessRuns {
     /// The witness with this contact and the shortest steps.
-    fn witness(&self, touching: Touching) -> Result<&Marched> {
+    fn witness(&self, touching: Touching) -> Result<&RunSummary> {
         let missing = || Failure::new("study witness", format!("no witness with {}", touching.name()), "");
         self.witnesses.iter().rev().find(|((other, _), _)| *other == touching).map(|(_, run)| run).ok_or_else(missing)
     }
 
-    fn row(&self, name: String, run: &Marched, touching: Touching) -> Result<Row> {
-        Ok(Row {
+    fn row(&self, name: String, run: &RunSummary, touching: Touching) -> Result<WitnessRow> {
+        Ok(WitnessRow {
             name,
             impulse: run.impulse,
             friction_work: run.friction_work,
@@ -332,19 +332,19 @@ impl Runs {
         })
     }
 
-    fn rows(&self) -> Result<Vec<Row>> {
+    fn rows(&self) -> Result<Vec<WitnessRow>> {
         let witnesses = self.witnesses.iter().map(|((touching, division), run)| {
             let step = 1e6 * INTERVAL / f64::from(*division);
             let row = self.row(format!("full model, {}, {step} µs", touching.name()), run, *touching)?;
-            Ok(Row { finest: std::ptr::eq(self.witness(*touching)?, run), ..row })
+            Ok(WitnessRow { finest: std::ptr::eq(self.witness(*touching)?, run), ..row })
         });
         let reduced = self.reduced.iter().map(|(model, run)| {
             let step = 1e6 * INTERVAL / f64::from(model.division);
-            let Reduced { name, touching, modes, .. } = model;
+            let WitnessModel { name, touching, modes, .. } = model;
             let name = format!("{name}: {}, {modes} modes, {step} µs", touching.name());
             match run {
                 Ok(run) => self.row(name, run, *touching),
-                Err(_) => Ok(Row { name: format!("{name}: refused"), finest: true, ..Row::default() }),
+                Err(_) => Ok(WitnessRow { name: format!("{name}: refused"), finest: true, ..WitnessRow::default() }),
             }
         });
         witnesses.chain(reduced).collect()
@@ -354,7 +354,7 @@ impl Runs {
 /// One run against the full model with the same contact and with contact at its sides: displacements, impulse, friction work, peak force,
 /// strain energy.
 #[derive(Default)]
-struct Row {
+struct WitnessRow {
     name: String,
     /// N·s.
     impulse: f64,
@@ -366,7 +366,7 @@ struct Row {
     finest: bool,
 }
 
-impl Row {
+impl WitnessRow {
     fn displacement(&self) -> f64 {
         self.own[0].unwrap_or(f64::NAN)
     }
@@ -381,25 +381,25 @@ fn shown(value: &Option<f64>) -> String {
 
 /// Every run against the full model with the same contact, then each contact against that at the nodes of the outline: the full model with its
 /// shortest steps, and the reduced ones.
-fn tables(rows: &[Row]) -> String {
+fn tables(rows: &[WitnessRow]) -> String {
     let mut text = String::from(
         "| run | impulse (N·s) | friction work (J) | same contact: displacements | impulse | friction work |\n|---|---|---|---|---|---|\n",
     );
-    for Row { name, impulse, friction_work, own, .. } in rows {
+    for WitnessRow { name, impulse, friction_work, own, .. } in rows {
         let cells: Vec<String> = own[..3].iter().map(shown).collect();
         text.push_str(&format!("| {name} | {impulse:.4} | {friction_work:.2} | {} |\n", cells.join(" | ")));
     }
     text.push_str(
         "\n| contact | impulse (N·s) | friction work (J) | sides: displacements | impulse | friction work |\n|---|---|---|---|---|---|\n",
     );
-    for Row { name, impulse, friction_work, sides, .. } in rows.iter().filter(|row| row.finest) {
+    for WitnessRow { name, impulse, friction_work, sides, .. } in rows.iter().filter(|row| row.finest) {
         let cells: Vec<String> = sides[..3].iter().map(shown).collect();
         text.push_str(&format!("| {name} | {impulse:.4} | {friction_work:.2} | {} |\n", cells.join(" | ")));
     }
     text
 }
 
-fn figure(runs: &Runs, size: &Size) -> Result<Figure> {
+fn figure(runs: &WitnessRuns, size: &WitnessSize) -> Result<StudyFigure> {
     let witness = runs.witness(Touching::Patches(size.patches[0], 1))?;
     let sides = runs.witness(Touching::Sides)?;
     let named =
@@ -413,7 +413,7 @@ fn figure(runs: &Runs, size: &Size) -> Result<Figure> {
     ];
     let time = |sample: usize| 1e3 * (sample + 1) as f64 * INTERVAL;
     // Radial displacement of the trailing edge, the third node.
-    let line = |run: &Marched| {
+    let line = |run: &RunSummary| {
         run.displacements.iter().enumerate().map(|(sample, all)| (time(sample), 1e6 * all[6])).collect::<Vec<_>>()
     };
     let all: Vec<(&str, Vec<(f64, f64)>)> =
@@ -426,7 +426,7 @@ fn figure(runs: &Runs, size: &Size) -> Result<Figure> {
         let values = all.iter().map(|(_, points)| points[sample].1);
         sheet.rows.push([time(sample)].into_iter().chain(values).collect());
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "trailing-edge",
         caption: "The blade passes the bumps: full finite elements, the default reduction, and the paper's.".into(),
         picture: Picture::plot(&plot)?,
@@ -438,7 +438,7 @@ fn percent(share: f64) -> String {
     format!("{:.2} %", 100.0 * share)
 }
 
-fn statements(rows: &[Row], runs: &Runs) -> Result<Vec<Statement>> {
+fn statements(rows: &[WitnessRow], runs: &WitnessRuns) -> Result<Vec<Statement>> {
     let find = |start: &str| {
         let missing = || Failure::new("study witness", format!("no run `{start}`"), "");
         rows.iter().find(|row| row.name.starts_with(start)).ok_or_else(missing)
@@ -447,7 +447,7 @@ fn statements(rows: &[Row], runs: &Runs) -> Result<Vec<Statement>> {
     let (default, more, paper) = (find("default:")?, find("more modes:")?, find("the paper's:")?);
     let full = find("full model, 9 × 2").or_else(|_| find("full model, 3 × 2"))?;
     let two = find("two rows, more modes:")?;
-    let [of, left] = [0, 1].map(|which| move |row: &Row| row.sides[which].unwrap_or(f64::NAN));
+    let [of, left] = [0, 1].map(|which| move |row: &WitnessRow| row.sides[which].unwrap_or(f64::NAN));
     Ok(vec![
         Statement::tested(
             "The witness balances its energy to rounding that grows through the steps, 1e-6",
@@ -494,12 +494,12 @@ fn statements(rows: &[Row], runs: &Runs) -> Result<Vec<Statement>> {
     ])
 }
 
-fn results(rows: &[Row], runs: &Runs) -> Value {
+fn results(rows: &[WitnessRow], runs: &WitnessRuns) -> Value {
     let names = ["displacements", "impulse", "friction_work", "peak_force", "strain_energy"];
     let of = |values: &[Option<f64>; 5]| -> serde_json::Map<String, Value> {
         names.iter().zip(values).map(|(name, value)| ((*name).to_owned(), json!(value))).collect()
     };
-    let row = |row: &Row| {
+    let row = |row: &WitnessRow| {
         json!({
             "run": row.name, "impulse": row.impulse, "friction_work": row.friction_work, "same_contact": of(&row.own),
             "sides": of(&row.sides),
@@ -515,7 +515,7 @@ fn results(rows: &[Row], runs: &Runs) -> Value {
 /// # Errors
 /// A model that cannot be reduced, a run that fails, a plot that cannot be drawn.
 pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
-    let setting = Setting::new(arguments.quick)?;
+    let setting = WitnessScene::new(arguments.quick)?;
     let size = setting.size;
     let task = console.task("The full blade rubs", Some(size.witnesses().len() as u64));
     // The longest first.
@@ -527,9 +527,9 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let mut witnesses: Vec<_> = asked.into_iter().zip(found).map(|(what, (run, _))| (what, run)).collect();
     let order = size.witnesses();
     witnesses.sort_by_key(|(what, _)| order.iter().position(|other| other == what));
-    let marched = |reduced: Reduced| setting.run_reduced(&reduced).map(|run| (reduced, run));
+    let marched = |reduced: WitnessModel| setting.run_reduced(&reduced).map(|run| (reduced, run));
     let reduced = size.reduced().into_iter().map(marched).collect::<Result<_>>()?;
-    let runs = Runs { witnesses, reduced, residual };
+    let runs = WitnessRuns { witnesses, reduced, residual };
     let rows = runs.rows()?;
     let MeshCounts { chord, thickness, span } = size.mesh;
     Ok(Study {

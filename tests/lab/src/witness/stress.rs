@@ -9,17 +9,19 @@ use tiprub_core::{
 use tiprub_figure::plots::{Plot, Series};
 use tiprub_gallery::reduction::failure;
 use tiprub_model::{craig_bampton::dense_modes, stress::StressPlaces};
-use tiprub_reference::blade::{Gauge, History, equivalent};
+use tiprub_reference::blade::{BladeHistory, Gauge, equivalent};
 use tiprub_shell::{Failure, Result, console::Console, sweep};
-use tiprub_study::{Figure, Picture, Sheet, Statement, Study, arguments::StudyCommon, error::measure::parts_apart};
+use tiprub_study::{
+    Picture, Sheet, Statement, Study, StudyFigure, arguments::StudyCommon, error::measure::parts_apart,
+};
 
-use super::{FINE, GALERKIN, INTERVAL, Reduced, Setting, Touching, percent};
+use super::{FINE, GALERKIN, INTERVAL, Touching, WitnessModel, WitnessScene, percent};
 
 /// Modes whose places of largest stress are looked at.
 const PLACES: usize = 6;
 
 /// What a run tells, sample by sample.
-struct Told {
+struct StressHistory {
     /// Of the watched points (m).
     displacements: Vec<Vec<f64>>,
     /// Six components of every place (Pa).
@@ -28,9 +30,9 @@ struct Told {
     equivalents: Vec<Vec<f64>>,
 }
 
-impl Told {
+impl StressHistory {
     /// Of the full model.
-    fn full(history: History) -> (Self, Vec<Vec<f64>>) {
+    fn full(history: BladeHistory) -> (Self, Vec<Vec<f64>>) {
         let each = |sample: &Vec<f64>| places(sample).map(equivalent).collect();
         let equivalents = history.stresses.iter().map(each).collect();
         (Self { displacements: history.displacements, stresses: history.stresses, equivalents }, history.forces)
@@ -100,8 +102,8 @@ fn divisions(quick: bool) -> &'static [u32] {
     if quick { &[4, 8, 16] } else { &[8, 16, 32] }
 }
 
-impl Setting {
-    fn stressed_rom(&self, reduced: &Reduced) -> Result<Rom> {
+impl WitnessScene {
+    fn stressed_rom(&self, reduced: &WitnessModel) -> Result<Rom> {
         self.rom_with(reduced, StressPlaces { modes: PLACES, ..StressPlaces::default() })
     }
 
@@ -135,7 +137,7 @@ impl Setting {
     }
 
     /// The product's run, as an importer sees it; or why it is refused.
-    fn told_by(&self, reduced: &Reduced, rom: Rom) -> Result<std::result::Result<Told, String>> {
+    fn told_by(&self, reduced: &WitnessModel, rom: Rom) -> Result<std::result::Result<StressHistory, String>> {
         let mut scene = self.scene_of(reduced, rom)?;
         scene.settings.outputs.watched_sectors = vec![1];
         scene.settings.outputs.stress = true;
@@ -175,14 +177,14 @@ impl Setting {
 }
 
 /// Displacements and stress at the communication points.
-fn run(scene: &tiprub_core::Scene, samples: usize) -> tiprub_core::Result<Told> {
+fn run(scene: &tiprub_core::Scene, samples: usize) -> tiprub_core::Result<StressHistory> {
     let mut simulation = Simulation::new(scene)?;
     simulation.initialise(0.0)?;
     let names = ["radial", "tangential", "axial", "radial_tangential", "tangential_axial", "axial_radial", "von_mises"];
     let rows = names.map(|name| simulation.table().find(&format!("blade[1].{name}_stress")));
     let count = rows[0].map_or(0, tiprub_core::variables::Variable::len);
     let rows = rows.map(|row| row.map_or(0, |row| row.reference));
-    let mut told = Told { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
+    let mut told = StressHistory { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
     for sample in 0..samples {
         simulation.do_step(sample as f64 * INTERVAL, INTERVAL)?;
         let read = |row: u32, place: usize| simulation.real(row + u32::try_from(place).unwrap_or_default());
@@ -201,7 +203,7 @@ fn run(scene: &tiprub_core::Scene, samples: usize) -> tiprub_core::Result<Told> 
 }
 
 /// The reduced model under forces of every step, by the steps that the full model took: what the missing modes alone do.
-fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<Told> {
+fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<StressHistory> {
     let (squares, shapes) = dense_modes(&rom.stiffness, &rom.mass).map_err(|error| failure("modes", error))?;
     let loads = (&rom.contact_map * &shapes).transpose();
     let seen = |map: Option<&DMatrix<f64>>| map.map_or_else(|| DMatrix::zeros(0, shapes.ncols()), |map| map * &shapes);
@@ -209,7 +211,7 @@ fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<Told> {
     let stressed = seen(rom.extras.stress.as_ref().map(|stress| &stress.map));
     let h = INTERVAL / f64::from(division);
     let (mut u, mut v) = (DVector::zeros(squares.len()), DVector::<f64>::zeros(squares.len()));
-    let mut told = Told { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
+    let mut told = StressHistory { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
     for (step, force) in forces.iter().enumerate() {
         let push = &loads * DVector::from_column_slice(force);
         for (mode, square) in squares.iter().enumerate() {
@@ -229,23 +231,23 @@ fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<Told> {
 }
 
 /// Everything that is found.
-struct Found {
+struct StressResult {
     names: Vec<String>,
     /// Radii of the places as shares of the way from hub to tip.
     heights: Vec<f64>,
     /// The full model with steps in a sample, ascending, and the mean forces of its shortest steps.
-    full: Vec<(u32, Told)>,
+    full: Vec<(u32, StressHistory)>,
     /// By the number of modes: under the full model's forces, and in a rub of its own or why that is refused.
-    reduced: Vec<(usize, Told, std::result::Result<Told, String>)>,
+    reduced: Vec<(usize, StressHistory, std::result::Result<StressHistory, String>)>,
     /// As it ships, by a tolerance: its modes, and its rub.
-    ships: (usize, Told),
+    ships: (usize, StressHistory),
     /// Difference of stress at rest with the fewest modes.
     rest: f64,
 }
 
-impl Found {
+impl StressResult {
     /// The full model with its shortest steps.
-    fn witness(&self) -> &Told {
+    fn witness(&self) -> &StressHistory {
         &self.full[self.full.len() - 1].1
     }
 
@@ -269,10 +271,10 @@ impl Found {
     }
 }
 
-fn find(setting: &Setting, quick: bool, console: &Console) -> Result<Found> {
+fn find(setting: &WitnessScene, quick: bool, console: &Console) -> Result<StressResult> {
     let size = setting.size;
     let touching = Touching::Patches(size.patches[0], 2);
-    let model = |modes: usize, (method, division)| Reduced { name: "", touching, modes, method, division };
+    let model = |modes: usize, (method, division)| WitnessModel { name: "", touching, modes, method, division };
     let roms: Vec<Rom> =
         counts(quick).iter().map(|modes| setting.stressed_rom(&model(*modes, FINE))).collect::<Result<_>>()?;
     let (names, gauges) = setting.gauges(&roms[0])?;
@@ -280,7 +282,7 @@ fn find(setting: &Setting, quick: bool, console: &Console) -> Result<Found> {
     let rest = setting.at_rest(&roms[0], &gauges, touching)?;
     let divisions = divisions(quick);
     let task = console.task("The full blade rubs", Some(divisions.len() as u64));
-    let march = |division: &u32| setting.run_full(touching, *division, &gauges).map(Told::full);
+    let march = |division: &u32| setting.run_full(touching, *division, &gauges).map(StressHistory::full);
     let mut full = sweep::sweep(divisions, sweep::processors(), march, |done| task.at(done as u64))?;
     let forces = full.last_mut().map(|(_, forces)| std::mem::take(forces)).unwrap_or_default();
     let full = divisions.iter().copied().zip(full.into_iter().map(|(told, _)| told)).collect();
@@ -295,10 +297,10 @@ fn find(setting: &Setting, quick: bool, console: &Console) -> Result<Found> {
     let by_tolerance = model(size.modes[0], GALERKIN);
     let ships = setting.told_by(&by_tolerance, setting.stressed_rom(&by_tolerance)?)?;
     let ships = ships.map_err(|why| Failure::new("lab stress", why, ""))?;
-    Ok(Found { names, heights, full, reduced, ships: (by_tolerance.modes, ships), rest })
+    Ok(StressResult { names, heights, full, reduced, ships: (by_tolerance.modes, ships), rest })
 }
 
-fn tables(found: &Found) -> String {
+fn tables(found: &StressResult) -> String {
     let rows = found.rows();
     let head = "displacements | stress | largest von Mises | at the worst place |\n|---|---|---|---|---|\n";
     let mut text = format!("| the full model's forces | {head}");
@@ -320,7 +322,7 @@ fn tables(found: &Found) -> String {
     let (full, ships) = (found.witness().largest(), found.ships.1.largest());
     let coarser = &found.full[found.full.len() - 2].1;
     for (place, name) in found.names.iter().enumerate() {
-        let apart = |told: &Told| percent(told.apart_at(found.witness(), place));
+        let apart = |told: &StressHistory| percent(told.apart_at(found.witness(), place));
         text.push_str(&format!(
             "| `{name}` | {:.0} % | {:.1} | {:.1} | {} | {} |\n",
             100.0 * found.heights[place],
@@ -333,14 +335,14 @@ fn tables(found: &Found) -> String {
     text
 }
 
-fn figure(found: &Found) -> Result<Figure> {
+fn figure(found: &StressResult) -> Result<StudyFigure> {
     let largest = found.witness().largest();
     let most = (0..largest.len()).max_by(|a, b| largest[*a].total_cmp(&largest[*b])).unwrap_or_default();
     let few = found.reduced.iter().find_map(|(modes, _, rubbed)| Some((*modes, rubbed.as_ref().ok()?)));
     let mut shown = vec![("full model".to_owned(), found.witness()), ("what ships".to_owned(), &found.ships.1)];
     shown.extend(few.map(|(modes, told)| (format!("{modes} modes"), told)));
     let time = |sample: usize| 1e3 * (sample + 1) as f64 * INTERVAL;
-    let line = |told: &Told| -> Vec<(f64, f64)> {
+    let line = |told: &StressHistory| -> Vec<(f64, f64)> {
         told.equivalents.iter().enumerate().map(|(sample, all)| (time(sample), 1e-6 * all[most])).collect()
     };
     let series = shown.iter().map(|(name, told)| Series::line(name.as_str(), line(told))).collect();
@@ -350,7 +352,7 @@ fn figure(found: &Found) -> Result<Figure> {
         let values = shown.iter().map(|(_, told)| 1e-6 * told.equivalents[sample][most]);
         sheet.rows.push([time(sample)].into_iter().chain(values).collect());
     }
-    Ok(Figure {
+    Ok(StudyFigure {
         name: "von-mises",
         caption: format!(
             "Von Mises at `{}`, the place that has most, while the blade passes the bumps.",
@@ -361,7 +363,7 @@ fn figure(found: &Found) -> Result<Figure> {
     })
 }
 
-fn statements(found: &Found) -> Vec<Statement> {
+fn statements(found: &StressResult) -> Vec<Statement> {
     let witness = found.witness();
     let apart: Vec<Apart> = found.reduced.iter().map(|(_, forced, _)| forced.apart(witness)).collect();
     let (first, last) = (apart[0], apart[apart.len() - 1]);
@@ -401,7 +403,7 @@ fn statements(found: &Found) -> Vec<Statement> {
 /// # Errors
 /// A model that cannot be reduced, a run of the full model or of what ships that fails, a plot that cannot be drawn.
 pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
-    let setting = Setting::new(arguments.quick)?;
+    let setting = WitnessScene::new(arguments.quick)?;
     let found = find(&setting, arguments.quick, console)?;
     let rows = found.rows().into_iter().map(|(name, forced, rubbed)| {
         json!({ "run": name, "same_forces": forced.map(Apart::json), "same_rub": rubbed.map(Apart::json) })

@@ -1,6 +1,6 @@
 //! What depends on step size, scheme, damping and speed, and the state carried from one of them to the next.
 
-use super::{LaneCoefficients, ModalBank};
+use super::{BankCoefficients, ModalBank};
 use crate::dynamics::modal::fill_ratios;
 use crate::schemes::{Velocity, resample};
 use crate::settings::Scheme;
@@ -31,7 +31,7 @@ impl ModalBank {
         for sector in 0..self.sectors {
             for mode in 0..self.modes() {
                 let k = self.coefficients(sector)[mode];
-                let lane = LaneCoefficients { beta: k.beta, kappa: k.kappa, load: k.load_compliance(), loss: k.loss };
+                let lane = BankCoefficients { beta: k.beta, kappa: k.kappa, load: k.load_compliance(), loss: k.loss };
                 let index = self.index(mode, sector);
                 self.lane_coefficients[index] = lane;
             }

@@ -8,7 +8,7 @@ use super::ModalBank;
 
 /// Loads of heat.
 #[derive(Debug, Clone)]
-pub(super) struct Heat {
+pub(super) struct HeatLoads {
     /// e, per mode (√kg m/K).
     expansion: Vec<f64>,
     /// K̂ e of a sector without a factor.
@@ -19,7 +19,7 @@ pub(super) struct Heat {
     now: Vec<f64>,
 }
 
-impl Heat {
+impl HeatLoads {
     /// `None` without an expansion.
     pub(super) fn new(expansion: &[f64], factors: &[f64]) -> Option<Self> {
         let modes = expansion.len();

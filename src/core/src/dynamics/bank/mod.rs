@@ -18,11 +18,11 @@ use nalgebra::DMatrix;
 use super::dispatch::InstructionSet;
 use super::excitation::{Excitation, SectorLoads};
 use super::modal::{ModalModel, ModalSpin};
-use crate::persist::{Persist, Reader, Writer, persist_fields};
+use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 use crate::schemes::{ModeCoefficients, Velocity, free_increment};
 use crate::settings::Scheme;
 use coupling::Coupling;
-use heated::Heat;
+use heated::HeatLoads;
 use predict::Predict;
 
 /// Lanes of one chunk: one 512-bit register of f64.
@@ -106,7 +106,7 @@ persist_fields!(BankState {
 
 /// What the special pass needs per mode and lane.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct LaneCoefficients {
+struct BankCoefficients {
     beta: f64,
     kappa: f64,
     /// Displacement per unit modal load; 0 in padding lanes.
@@ -132,12 +132,12 @@ pub struct ModalBank {
     coefficients: Vec<ModeCoefficients>,
     /// Velocities, the same; quasi-static modes have none.
     velocities: Vec<Velocity>,
-    lane_coefficients: Vec<LaneCoefficients>,
+    lane_coefficients: Vec<BankCoefficients>,
     /// G per set: displacement of the contact rows per unit force held for one step (m/N), rows × rows.
     flexibility: Vec<DMatrix<f64>>,
     coupling: Option<Coupling>,
     excitation: Option<SectorLoads>,
-    heat: Option<Heat>,
+    heat: Option<HeatLoads>,
     scheme: Scheme,
     step: f64,
     state: BankState,
@@ -173,7 +173,7 @@ impl ModalBank {
             .coupling
             .clone()
             .map(|(spin, stiffening, coriolis)| Coupling::new(spin, stiffening, coriolis, &options.frequency_factors));
-        let heat = Heat::new(&options.expansion, &options.frequency_factors);
+        let heat = HeatLoads::new(&options.expansion, &options.frequency_factors);
         let softening = coupling.as_ref().is_some_and(Coupling::softens);
         Self {
             instruction_set: InstructionSet::detect(),
@@ -185,7 +185,7 @@ impl ModalBank {
             contact_rows: model.contact_modes.transpose().as_slice().to_vec(),
             coefficients: vec![ModeCoefficients::default(); sets * modes],
             velocities: vec![Velocity::default(); sets * modes],
-            lane_coefficients: vec![LaneCoefficients::default(); if special { state_len } else { 0 }],
+            lane_coefficients: vec![BankCoefficients::default(); if special { state_len } else { 0 }],
             flexibility: vec![DMatrix::zeros(rows, rows); if options.flexibility { sets } else { 0 }],
             scheme: Scheme::default(),
             step: 0.0,
@@ -198,7 +198,7 @@ impl ModalBank {
                 modal_load_before: vec![0.0; if options.loads { modes } else { 0 }],
                 speed: coupling.as_ref().map_or(0.0, Coupling::speed),
                 temperature: coupling.as_ref().map_or(0.0, Coupling::temperature),
-                heat_before: vec![0.0; heat.as_ref().map_or(0, Heat::remembered)],
+                heat_before: vec![0.0; heat.as_ref().map_or(0, HeatLoads::remembered)],
                 stiffened: vec![0.0; if softening { model.quasi_static.min(modes) } else { 0 }],
             },
             modal_load: vec![0.0; if special { modes } else { 0 }],
@@ -485,7 +485,7 @@ impl ModalBank {
     }
 
     /// Save the state (not the step size).
-    pub fn save(&self, writer: &mut Writer) {
+    pub fn save(&self, writer: &mut StateWriter) {
         self.state.save(writer);
         if let Some(loads) = &self.excitation {
             loads.before.save(writer);
@@ -493,7 +493,7 @@ impl ModalBank {
     }
 
     /// Pass over a saved state and refuse what is none.
-    pub fn check(&self, reader: &mut Reader) {
+    pub fn check(&self, reader: &mut StateReader) {
         self.state.check(reader);
         if let Some(loads) = &self.excitation {
             loads.before.check(reader);
@@ -501,7 +501,7 @@ impl ModalBank {
     }
 
     /// Restore a saved state, after [`ModalBank::set_step`].
-    pub fn restore(&mut self, reader: &mut Reader) {
+    pub fn restore(&mut self, reader: &mut StateReader) {
         self.state.restore(reader);
         if let Some(loads) = &mut self.excitation {
             loads.before.restore(reader);

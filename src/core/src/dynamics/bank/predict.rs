@@ -1,6 +1,6 @@
 //! The loops over all modes and sectors.
 
-use super::{LaneCoefficients, ModalBank, ModeCoefficients};
+use super::{BankCoefficients, ModalBank, ModeCoefficients};
 use crate::dynamics::dispatch::Kernel;
 
 /// φᵀf of all modes for the forces on the contact rows of one sector.
@@ -40,7 +40,7 @@ impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predi
             let loss = &mut bank.state.loss[chunk * WIDTH..][..WIDTH];
             let displacement = &mut bank.state.displacement[chunk * WIDTH..];
             let shapes = &bank.contact_modes;
-            let modes = Modes {
+            let modes = ChunkModes {
                 coefficients: &bank.coefficients,
                 lane_coefficients: if SPECIAL { &bank.lane_coefficients[chunk * block..][..block] } else { &[] },
                 modal_load: &bank.modal_load,
@@ -75,10 +75,10 @@ impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predi
 const WIDE: usize = 18;
 
 /// What the passes over one chunk share.
-struct Modes<'a> {
+struct ChunkModes<'a> {
     coefficients: &'a [ModeCoefficients],
     /// `[mode · WIDTH + lane]` where the pass is special.
-    lane_coefficients: &'a [LaneCoefficients],
+    lane_coefficients: &'a [BankCoefficients],
     /// Modal loads where the pass is special.
     modal_load: &'a [f64],
     shapes: &'a [f64],
@@ -86,7 +86,7 @@ struct Modes<'a> {
     lanes: usize,
 }
 
-impl Modes<'_> {
+impl ChunkModes<'_> {
     /// d⁺ = β d − κ q, q⁺ = q + d⁺ for all modes of one chunk, with the displacements of the first `ROWS` contact rows
     /// (`displacement[row · lanes + lane]`). Whole arrays at a time stay in registers. Returns `ROWS`.
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use super::fourier::Synthesis;
 use super::pass::{Gather, modal_force};
-use super::{Complexes, CyclicBank, LANES, LaneCoefficients, NOTHING};
+use super::{Complexes, CyclicBank, CyclicCoefficients, LANES, NOTHING};
 use crate::schemes::{Velocity, resample};
 use crate::settings::Scheme;
 
@@ -12,7 +12,7 @@ impl CyclicBank {
         // The contact forces of the last step act with the coefficients they were found with.
         self.finish();
         (self.scheme, self.step) = (scheme, step);
-        self.lane_coefficients.fill(LaneCoefficients::NONE);
+        self.lane_coefficients.fill(CyclicCoefficients::NONE);
         for (n, diameter) in self.model.diameters.iter().enumerate() {
             for mode in 0..diameter.len() {
                 let k = diameter.coefficient(mode, scheme, step);

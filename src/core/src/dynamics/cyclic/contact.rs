@@ -1,7 +1,7 @@
 //! What contact forces on any of the sectors do.
 
 use super::fourier::Synthesis;
-use super::pass::{Answer, Gather, modal_force};
+use super::pass::{Gather, SpectralResponse, modal_force};
 use super::{CyclicBank, LANES};
 
 impl CyclicBank {
@@ -25,7 +25,7 @@ impl CyclicBank {
         let (fourier, rows, forces) = (&self.fourier, self.rows, &self.asked[..]);
         self.instruction_set.run(Gather { fourier, rows, forces, spectrum: &mut self.asked_force });
         let (touched, flexibility, force) = (&self.asked_nodes[..], &self.spectral_flexibility[..], &self.asked_force);
-        self.instruction_set.run(Answer { rows, touched, flexibility, force, spectrum: &mut self.spectrum });
+        self.instruction_set.run(SpectralResponse { rows, touched, flexibility, force, spectrum: &mut self.spectrum });
         let (spectrum, lanes, values) = (&self.spectrum, self.lanes, &mut self.moved);
         self.instruction_set.run(Synthesis { fourier, spectrum, rows, lanes, values });
     }

@@ -20,12 +20,12 @@ mod tests;
 use super::bank::{FLUSH_BELOW, LANES, lanes};
 use super::dispatch::InstructionSet;
 use super::excitation::DiskLoads;
-use crate::persist::{Persist, Reader, Writer, persist_fields};
+use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 use crate::schemes::{ModeCoefficients, Velocity, free_increment};
 use crate::settings::Scheme;
 use fourier::{Fourier, Synthesis};
 pub use model::{CyclicModel, DiameterModes};
-use pass::{Complexes, LaneCoefficients, Pass, Recover};
+use pass::{Complexes, CyclicCoefficients, Pass, Recover};
 
 const NOTHING: Complexes = [[0.0; LANES]; 2];
 
@@ -86,7 +86,7 @@ pub struct CyclicBank {
     /// Ψ, `[block][mode][row]`.
     shapes: Vec<Complexes>,
     /// `[block][mode]`.
-    lane_coefficients: Vec<LaneCoefficients>,
+    lane_coefficients: Vec<CyclicCoefficients>,
     /// `[n · modes + mode]`; the default where there is no such mode.
     coefficients: Vec<ModeCoefficients>,
     /// Velocities, the same; quasi-static modes have none.
@@ -136,7 +136,7 @@ impl CyclicBank {
         let load_count = if loads { model.diameters[0].len() } else { 0 };
         Self {
             instruction_set: InstructionSet::detect(),
-            lane_coefficients: vec![LaneCoefficients::NONE; blocks * modes],
+            lane_coefficients: vec![CyclicCoefficients::NONE; blocks * modes],
             coefficients: vec![ModeCoefficients::default(); model.diameters.len() * modes],
             velocities: vec![Velocity::default(); model.diameters.len() * modes],
             spectral_flexibility: vec![NOTHING; blocks * rows * rows],
@@ -387,7 +387,7 @@ impl CyclicBank {
     }
 
     /// Save the state (not the step size).
-    pub fn save(&self, writer: &mut Writer) {
+    pub fn save(&self, writer: &mut StateWriter) {
         self.state.save(writer);
         if let Some(loads) = &self.excitation {
             loads.before.save(writer);
@@ -395,7 +395,7 @@ impl CyclicBank {
     }
 
     /// Pass over a saved state and refuse what is none.
-    pub fn check(&self, reader: &mut Reader) {
+    pub fn check(&self, reader: &mut StateReader) {
         self.state.check(reader);
         if let Some(loads) = &self.excitation {
             loads.before.check(reader);
@@ -403,7 +403,7 @@ impl CyclicBank {
     }
 
     /// Restore a saved state, after [`CyclicBank::set_step`].
-    pub fn restore(&mut self, reader: &mut Reader) {
+    pub fn restore(&mut self, reader: &mut StateReader) {
         self.state.restore(reader);
         if let Some(loads) = &mut self.excitation {
             loads.before.restore(reader);

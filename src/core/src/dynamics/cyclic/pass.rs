@@ -16,7 +16,7 @@ const FUSED: usize = 9;
 
 /// Coefficients of one mode for the lanes of a block (see [`crate::schemes`]); 0 where there is no such mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LaneCoefficients {
+pub struct CyclicCoefficients {
     pub beta: [f64; LANES],
     pub kappa: [f64; LANES],
     pub loss: [f64; LANES],
@@ -24,7 +24,7 @@ pub struct LaneCoefficients {
     pub delayed: [f64; LANES],
 }
 
-impl LaneCoefficients {
+impl CyclicCoefficients {
     pub const NONE: Self = Self {
         beta: [0.0; LANES],
         kappa: [0.0; LANES],
@@ -43,7 +43,7 @@ pub struct Pass<'a, const APPLY: bool, const DELAYED: bool, const LOSS: bool, co
     pub rows: usize,
     /// Contact nodes that the forces act on.
     pub touched: &'a [bool],
-    pub coefficients: &'a [LaneCoefficients],
+    pub coefficients: &'a [CyclicCoefficients],
     /// Ψ, `[block][mode][row]`.
     pub shapes: &'a [Complexes],
     /// Contact forces of the step before.
@@ -243,7 +243,7 @@ pub fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) 
 
 /// Spectrum of the displacements that the forces of a spectrum cause over one step: U = Ĝ F, with Ĝ
 /// `[block][column][row]`.
-pub struct Answer<'a> {
+pub struct SpectralResponse<'a> {
     pub rows: usize,
     pub touched: &'a [bool],
     pub flexibility: &'a [Complexes],
@@ -251,7 +251,7 @@ pub struct Answer<'a> {
     pub spectrum: &'a mut [Complexes],
 }
 
-impl Kernel for Answer<'_> {
+impl Kernel for SpectralResponse<'_> {
     #[inline(always)]
     fn run(self) {
         let rows = self.rows;

@@ -1,7 +1,7 @@
 //! What a trial has found: forces, gaps and displacements of the nodes at the points, and where it leaves the state.
 
-use super::{Kind, Trial, three};
-use crate::galerkin::basis::{Basis, MOST};
+use super::{ForceInterpolation, Trial, three};
+use crate::galerkin::basis::{MOST, TimeBasis};
 use crate::galerkin::state::SectorState;
 use nalgebra::DMatrix;
 
@@ -75,9 +75,9 @@ impl Trial {
     }
 
     /// Coefficients of θᵃ of the force on a node (N), projected on degree s − 1; none where nothing pushes.
-    pub fn polynomial(&self, basis: &Basis, kind: Kind, node: usize) -> Option<[[f64; 3]; MOST]> {
+    pub fn polynomial(&self, basis: &TimeBasis, kind: ForceInterpolation, node: usize) -> Option<[[f64; 3]; MOST]> {
         let mut sums = [[0.0; 3]; MOST];
-        if kind == Kind::Constant {
+        if kind == ForceInterpolation::Constant {
             sums[0] = self.force(1, node);
             return (self.multiplier(1, node) > 0.0).then_some(sums);
         }

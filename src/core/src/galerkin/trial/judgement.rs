@@ -1,10 +1,10 @@
 //! How good a step is that has been solved: its error, what switches leave, and what came near between the points.
 
-use super::{FreeMotion, Kind, Obstacle, Trial};
-use crate::galerkin::basis::{Basis, POINTS};
+use super::{ForceInterpolation, FreeMotion, Obstacle, Trial};
+use crate::galerkin::basis::{POINTS, TimeBasis};
 use crate::galerkin::kernels::AddProduct;
-use crate::galerkin::level::Level;
-use crate::galerkin::rows::Rows;
+use crate::galerkin::level::StepTables;
+use crate::galerkin::rows::ContactRows;
 
 /// Largest change of slope of a force over a step counts by this share of it: what the highest divided difference does not see of a
 /// contact that opens or closes. Measured on 148 random rubs at tolerances from 1e-2 to 1e-5 (`lab scatter`): with 0.05, 0.1 and 0.2 five in
@@ -21,7 +21,7 @@ const OPENING: f64 = 30.0;
 pub(super) const NEAR: f64 = 4.0;
 /// How a trial came out.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Verdict {
+pub struct TrialResult {
     /// The contact problem has been solved.
     pub solved: bool,
     /// Estimate of the error it makes in displacements (m).
@@ -36,17 +36,22 @@ pub struct Verdict {
     pub factorisations: usize,
 }
 
-impl Verdict {
+impl TrialResult {
     /// Returns whether the polynomials of the step describe the motion between its points: its force is a polynomial, and its error is within
     /// the tolerance (m).
-    pub fn resolves_motion(&self, kind: Kind, tolerance: f64) -> bool {
-        kind == Kind::Polynomial && self.error <= tolerance
+    pub fn resolves_motion(&self, kind: ForceInterpolation, tolerance: f64) -> bool {
+        kind == ForceInterpolation::Polynomial && self.error <= tolerance
     }
 }
 
 impl Trial {
     /// Error, switches, and near misses of a step that is solved.
-    pub fn judge(&mut self, (level, rows): (&Level, &Rows), obstacle: &impl Obstacle, verdict: &mut Verdict) {
+    pub fn judge(
+        &mut self,
+        (level, rows): (&StepTables, &ContactRows),
+        obstacle: &impl Obstacle,
+        verdict: &mut TrialResult,
+    ) {
         let (basis, count) = (&level.basis, level.basis.count());
         self.impulses.fill(0.0);
         (verdict.switches, verdict.switched, verdict.near, verdict.error) = (false, 0.0, false, 0.0);
@@ -112,7 +117,7 @@ impl Trial {
     }
 
     /// Whether the gap of an open node comes near zero between the points.
-    fn comes_near(&self, level: &Level, node: usize, obstacle: &impl Obstacle) -> bool {
+    fn comes_near(&self, level: &StepTables, node: usize, obstacle: &impl Obstacle) -> bool {
         let basis = &level.basis;
         let mut gaps = [0.0; POINTS];
         let gaps = &mut gaps[..basis.count()];
@@ -162,7 +167,7 @@ impl Trial {
 
 /// Largest change of slope of values at the points, over the step; before and after it what begins or ends with 0 rests there. So a contact
 /// that opens or closes counts even where its values at the points happen to lie on a straight line.
-fn kink(basis: &Basis, value: impl Fn(usize) -> f64) -> f64 {
+fn kink(basis: &TimeBasis, value: impl Fn(usize) -> f64) -> f64 {
     let last = basis.degree;
     let slope = |i: usize| (value(i + 1) - value(i)) / (basis.points[i + 1] - basis.points[i]);
     let resting = |point: usize, there: usize| if value(point) == 0.0 { 0.0 } else { slope(there) };
@@ -181,7 +186,7 @@ mod tests {
     #[test]
     fn a_contact_that_opens_or_closes_has_a_kink_wherever_it_does() {
         for degree in 1..=3 {
-            let basis = Basis::new(degree);
+            let basis = TimeBasis::new(degree);
             let of = |value: &dyn Fn(f64) -> f64| kink(&basis, |point| value(basis.points[point]));
             // On a straight line from the start, to the end, and within.
             assert!((of(&|theta| theta) - 1.0).abs() < 1e-12 && (of(&|theta| 1.0 - theta) - 1.0).abs() < 1e-12);

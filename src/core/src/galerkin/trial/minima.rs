@@ -5,12 +5,12 @@
 //! gaps are those at the points.
 
 use super::judgement::NEAR;
-use super::{Kind, Obstacle, Trial};
+use super::{ForceInterpolation, Obstacle, Trial};
 use crate::cubic::{evaluate, interior_minimum};
 use crate::galerkin::advance::Advance;
-use crate::galerkin::basis::{Basis, MOST, POINTS};
-use crate::galerkin::level::Level;
-use crate::galerkin::rows::Rows;
+use crate::galerkin::basis::{MOST, POINTS, TimeBasis};
+use crate::galerkin::level::StepTables;
+use crate::galerkin::rows::ContactRows;
 use crate::galerkin::sector::{HALVINGS, Tables};
 use crate::galerkin::state::SectorState;
 
@@ -50,8 +50,8 @@ impl Minima {
 
 impl Trial {
     /// Find gaps and displacements at the points of a step without forces.
-    pub fn glide(&mut self, level: &Level, rows: &Rows, state: &SectorState, obstacle: &mut impl Obstacle) {
-        self.begin((level, Kind::Polynomial), Some(rows), state);
+    pub fn glide(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState, obstacle: &mut impl Obstacle) {
+        self.begin((level, ForceInterpolation::Polynomial), Some(rows), state);
         self.find_start(rows, state);
         self.find_gaps_at_start(rows, state, obstacle);
         self.find_gaps(obstacle);
@@ -61,7 +61,7 @@ impl Trial {
     ///
     /// Finds none if `is_resolved` is false: the polynomials of a step with a constant force, or of a step that misses the tolerance, do not
     /// describe the motion between its points.
-    pub fn find_minima(&mut self, basis: &Basis, is_resolved: bool, tolerance: f64) -> bool {
+    pub fn find_minima(&mut self, basis: &TimeBasis, is_resolved: bool, tolerance: f64) -> bool {
         self.minima.at.fill(f64::NAN);
         self.minima.parts = 0;
         let mut found = false;
@@ -90,7 +90,14 @@ impl Trial {
     }
 
     /// Follow the nodes found over a step of a level, before its state moves on.
-    pub fn follow(&mut self, tables: &Tables, of: &Level, level: usize, state: &SectorState, advance: &mut Advance) {
+    pub fn follow(
+        &mut self,
+        tables: &Tables,
+        of: &StepTables,
+        level: usize,
+        state: &SectorState,
+        advance: &mut Advance,
+    ) {
         let finer = FINER.min(HALVINGS - level);
         let (parts, rows) = (1_usize << finer, &tables.rows);
         let (table, basis) = (&tables.levels[level + finer], &of.basis);
@@ -110,7 +117,9 @@ impl Trial {
                 ];
             }
             if part < parts {
-                let forces = |node: usize| Some(within(&self.polynomial(basis, Kind::Polynomial, node)?, part, parts));
+                let forces = |node: usize| {
+                    Some(within(&self.polynomial(basis, ForceInterpolation::Polynomial, node)?, part, parts))
+                };
                 advance.under((table, rows), &mut minima.state, forces);
             }
         }
@@ -118,7 +127,7 @@ impl Trial {
     }
 
     /// What the residual flexibility adds to the displacement of a node within the step (m), and its slope by the share of the step.
-    fn bent(&self, basis: &Basis, rows: &Rows, node: usize, theta: f64) -> [[f64; 3]; 2] {
+    fn bent(&self, basis: &TimeBasis, rows: &ContactRows, node: usize, theta: f64) -> [[f64; 3]; 2] {
         let mut sums = [[0.0; 3]; 2];
         for other in 0..self.nodes() {
             let pushes = |point: usize| self.multiplier(point, other) > 0.0;
@@ -150,13 +159,13 @@ impl Trial {
     }
 
     /// Gap of a node within the step (m), by the polynomial through those at the points.
-    pub fn gap_within(&self, basis: &Basis, node: usize, theta: f64) -> f64 {
+    pub fn gap_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> f64 {
         let weights = basis.weights_at(theta);
         (0..basis.count()).map(|point| weights[point] * self.gap(point, node)).sum()
     }
 
     /// Displacement of a node within the step (m): followed exactly, or by the polynomial through those at the points.
-    pub fn displacement_within(&self, basis: &Basis, node: usize, theta: f64) -> [f64; 3] {
+    pub fn displacement_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> [f64; 3] {
         let parts = self.minima.parts;
         if parts == 0 {
             let weights = basis.weights_at(theta);
@@ -178,9 +187,9 @@ impl Trial {
     }
 
     /// Largest λ of a node within the step (N): of the polynomial through those at the points.
-    pub fn peak(&self, basis: &Basis, kind: Kind, node: usize) -> f64 {
+    pub fn peak(&self, basis: &TimeBasis, kind: ForceInterpolation, node: usize) -> f64 {
         let at_points = (0..=self.points()).fold(0.0_f64, |peak, point| peak.max(self.multiplier(point, node)));
-        if kind == Kind::Constant {
+        if kind == ForceInterpolation::Constant {
             return at_points;
         }
         let mut falling = [0.0; POINTS];

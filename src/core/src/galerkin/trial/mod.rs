@@ -8,18 +8,18 @@ mod steady;
 mod sticking;
 mod together;
 
-use super::basis::{Basis, MOST, POINTS};
-use super::compliance::{Compliance, Lanes};
-use super::kernels::{Add, AddProduct, Column, Combine, Withdraw};
-use super::level::Level;
-use super::rows::{Rows, Sums};
+use super::basis::{MOST, POINTS, TimeBasis};
+use super::compliance::{LaneCompliance, Lanes};
+use super::kernels::{Add, AddProduct, ClosingColumn, Combine, Withdraw};
+use super::level::StepTables;
+use super::rows::{ContactRows, Sums};
 use super::state::SectorState;
 use crate::dynamics::dispatch::InstructionSet;
 use crate::laws::active_set::ContactSolver;
-pub use judgement::Verdict;
+pub use judgement::TrialResult;
 use minima::Minima;
 use nalgebra::DMatrix;
-pub use obstacle::{Obstacle, Sliding, one_by_one};
+pub use obstacle::{Obstacle, SlidingState, one_by_one};
 use steady::Steady;
 use sticking::Sticking;
 
@@ -30,16 +30,16 @@ const ROUNDING: f64 = 1e-13;
 
 /// What is used to step: all points, or a constant force and the end alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ForceInterpolation {
     /// The force is a polynomial of degree s.
     Polynomial,
     /// The force is what it is at the end: dissipative whatever opens or closes.
     Constant,
 }
 
-impl Kind {
+impl ForceInterpolation {
     /// Weights of the work of forces at point i: S_ik, or those of a constant force.
-    pub fn work_weights(self, basis: &Basis, i: usize) -> [f64; POINTS] {
+    pub fn work_weights(self, basis: &TimeBasis, i: usize) -> [f64; POINTS] {
         match self {
             Self::Polynomial => basis.work[i],
             Self::Constant if i == 1 => [-1.0, 1.0, 0.0, 0.0],
@@ -219,16 +219,16 @@ impl Trial {
     /// Try a step from `state`; `precision`: gaps of contacts that count as closed (m).
     pub fn run(
         &mut self,
-        (level, kind): (&Level, Kind),
-        rows: &Rows,
+        (level, kind): (&StepTables, ForceInterpolation),
+        rows: &ContactRows,
         state: &SectorState,
         obstacle: &mut impl Obstacle,
         precision: f64,
-    ) -> Verdict {
+    ) -> TrialResult {
         let compliance = level.compliance_of(kind);
         self.begin((level, kind), Some(rows), state);
         self.find_gaps_at_start(rows, state, obstacle);
-        let mut verdict = Verdict::default();
+        let mut verdict = TrialResult::default();
         for pass in 0..PASSES {
             let (lowest, largest) = self.find_gaps(obstacle);
             let rests = self.rests();
@@ -245,7 +245,7 @@ impl Trial {
                 return verdict;
             }
         }
-        if kind == Kind::Polynomial {
+        if kind == ForceInterpolation::Polynomial {
             // Two points give a straight line, which cannot show the motion in between.
             if level.basis.degree == 1 {
                 self.find_start(rows, state);
@@ -260,7 +260,7 @@ impl Trial {
     }
 
     /// Gaps at the start where nobody has looked.
-    fn find_gaps_at_start(&mut self, rows: &Rows, state: &SectorState, obstacle: &mut impl Obstacle) {
+    fn find_gaps_at_start(&mut self, rows: &ContactRows, state: &SectorState, obstacle: &mut impl Obstacle) {
         if !state.looked {
             self.find_start(rows, state);
             for node in 0..self.nodes() {
@@ -270,7 +270,7 @@ impl Trial {
     }
 
     /// Displacements and velocities of the rows at the start.
-    pub fn find_start(&mut self, rows: &Rows, state: &SectorState) -> &[f64] {
+    pub fn find_start(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         if self.known {
             return &self.start;
         }
@@ -288,7 +288,7 @@ impl Trial {
     }
 
     /// How far each row can be from where it rests while nothing pushes (m).
-    pub fn reach(&mut self, rows: &Rows, state: &SectorState) -> &[f64] {
+    pub fn reach(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         let (sums, reach) = &mut self.reach;
         rows.reach(state, sums);
         let nodes = self.lanes.nodes;
@@ -299,7 +299,12 @@ impl Trial {
     }
 
     /// Where the rows go without forces at points 1 … s, unless somebody else knows (no `rows`), and a guess of these: as at the start.
-    pub fn begin(&mut self, (level, kind): (&Level, Kind), rows: Option<&Rows>, state: &SectorState) {
+    pub fn begin(
+        &mut self,
+        (level, kind): (&StepTables, ForceInterpolation),
+        rows: Option<&ContactRows>,
+        state: &SectorState,
+    ) {
         let compliance = level.compliance_of(kind);
         self.free_motion.is_known = false;
         self.ways = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
@@ -310,7 +315,7 @@ impl Trial {
         begun.gaps.copy_from_slice(&state.gaps);
         begun.normals.copy_from_slice(&state.normals);
         begun.slopes.iter_mut().zip(&state.slopes).for_each(|(slope, before)| *slope = *before);
-        self.per_step = if kind == Kind::Polynomial { 1.0 / level.step } else { 0.0 };
+        self.per_step = if kind == ForceInterpolation::Polynomial { 1.0 / level.step } else { 0.0 };
         let (nodes, stride) = (lanes.nodes, 3 * lanes.width());
         if let Some(rows) = rows {
             self.move_freely((level, kind), rows, state);
@@ -326,7 +331,7 @@ impl Trial {
             self.amounts.push(*force);
         }
         if !self.taken.is_empty() {
-            if kind == Kind::Polynomial && rows.is_some() {
+            if kind == ForceInterpolation::Polynomial && rows.is_some() {
                 self.combine(compliance.columns(), stride);
                 self.free[..stride].iter_mut().zip(&self.pushed).for_each(|(free, pushed)| *free += pushed);
             }
@@ -338,9 +343,14 @@ impl Trial {
     }
 
     /// Displacements of the rows without any force.
-    fn move_freely(&mut self, (level, kind): (&Level, Kind), rows: &Rows, state: &SectorState) {
+    fn move_freely(
+        &mut self,
+        (level, kind): (&StepTables, ForceInterpolation),
+        rows: &ContactRows,
+        state: &SectorState,
+    ) {
         let degree = level.basis.degree;
-        let points = if kind == Kind::Constant { degree - 1..degree } else { 0..degree };
+        let points = if kind == ForceInterpolation::Constant { degree - 1..degree } else { 0..degree };
         rows.free(level, state, points, &mut self.sums);
         let (nodes, width) = (self.lanes.nodes, self.lanes.width());
         for (point, sums) in self.sums.rows[..self.lanes.points].iter().enumerate() {
@@ -390,9 +400,9 @@ impl Trial {
     /// 0 ≤ λ ⟂ g ≥ 0 at all points and nodes: of those that penetrate or push first, then of those that these make penetrate.
     pub fn solve(
         &mut self,
-        (compliance, residual): (&Compliance, &DMatrix<f64>),
+        (compliance, residual): (&LaneCompliance, &DMatrix<f64>),
         obstacle: &mut impl Obstacle,
-        verdict: &mut Verdict,
+        verdict: &mut TrialResult,
     ) -> bool {
         self.keep_normals();
         if self.sticking.is_some() {
@@ -481,10 +491,10 @@ impl Trial {
     }
 
     /// A lane becomes an unknown: the direction of its force, and what that moves.
-    fn choose(&mut self, lane: usize, compliance: &Compliance, obstacle: &mut impl Obstacle) {
+    fn choose(&mut self, lane: usize, compliance: &LaneCompliance, obstacle: &mut impl Obstacle) {
         let (lanes, width) = (self.lanes, self.lanes.width());
         let (point, node) = lanes.place(lane);
-        let sliding = Sliding {
+        let sliding = SlidingState {
             moved: lanes.three(&self.moved, lane),
             velocity: three(&self.velocities, node),
             way: self.way(point, node),
@@ -493,7 +503,7 @@ impl Trial {
         let direction = obstacle.direction(node, point, &sliding);
         lanes.set(&mut self.directions, lane, direction);
         self.members.push(lane);
-        self.instructions.run(Column {
+        self.instructions.run(ClosingColumn {
             parts: compliance.of_lane(lane),
             direction,
             normals: &self.normals[..3 * width],
@@ -524,7 +534,7 @@ impl Trial {
     }
 
     /// Choose lanes that the forces found push into what they may touch.
-    fn choose_violated(&mut self, compliance: &Compliance, obstacle: &mut impl Obstacle) -> bool {
+    fn choose_violated(&mut self, compliance: &LaneCompliance, obstacle: &mut impl Obstacle) -> bool {
         let (lanes, width) = (self.lanes, self.lanes.width());
         let scale = self.members.iter().fold(0.0_f64, |most, lane| most.max(self.gaps[*lane].abs()));
         let (columns, coefficients) = (&self.taken[..], [&self.amounts[..]]);

@@ -17,13 +17,13 @@ pub trait Obstacle {
         None
     }
 
-    /// Whether directions of sliding turn within a step, and ask for [`Sliding::way`].
+    /// Whether directions of sliding turn within a step, and ask for [`SlidingState::way`].
     fn turns(&self) -> bool {
         false
     }
 
     /// Force per unit of λ on the node, friction included.
-    fn direction(&mut self, node: usize, point: usize, sliding: &Sliding) -> [f64; 3];
+    fn direction(&mut self, node: usize, point: usize, sliding: &SlidingState) -> [f64; 3];
 
     /// Contacts at the lanes chosen are about to be solved, with these normals: get ready to tell how what is touched gives way there.
     /// False where it does not.
@@ -52,7 +52,7 @@ pub trait Obstacle {
 
 /// How a node slides at a point of the step.
 #[derive(Debug, Clone, Copy)]
-pub struct Sliding {
+pub struct SlidingState {
     /// Its displacement (m).
     pub moved: [f64; 3],
     /// Velocity of its vibration at the start of the step (m/s).

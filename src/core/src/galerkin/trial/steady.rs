@@ -4,13 +4,13 @@
 //! Whether that holds is found out afterwards: forces press and are within the cone, sliding has not turned round, open nodes stay open.
 //! Where it does not, a step of degree 1 finds what changes.
 
-use super::{Trial, Verdict, three};
-use crate::galerkin::basis::{Basis, POINTS};
-use crate::galerkin::compliance::Compliance;
-use crate::galerkin::level::Level;
-use crate::galerkin::rows::Rows;
+use super::{Trial, TrialResult, three};
+use crate::galerkin::basis::{POINTS, TimeBasis};
+use crate::galerkin::compliance::LaneCompliance;
+use crate::galerkin::level::StepTables;
+use crate::galerkin::rows::ContactRows;
 use crate::galerkin::state::SectorState;
-use crate::galerkin::trial::{Kind, Obstacle};
+use crate::galerkin::trial::{ForceInterpolation, Obstacle};
 use crate::gaps::dot;
 use crate::laws::de_saxce::Eliminate;
 use crate::laws::tangents;
@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-10;
 
 /// What a closed contact does over the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Status {
+enum ContactStatus {
     Open,
     Sticks,
     /// Against this direction, at the start.
@@ -36,7 +36,7 @@ enum Status {
 /// Scratch.
 #[derive(Debug, Clone)]
 pub(super) struct Steady {
-    status: Vec<Status>,
+    status: Vec<ContactStatus>,
     /// Direction of the slip at every lane.
     directions: Vec<[f64; 3]>,
     matrix: Vec<f64>,
@@ -47,7 +47,7 @@ impl Steady {
     /// Room for so many lanes and nodes.
     pub(super) fn new(lanes: usize, nodes: usize) -> Self {
         Self {
-            status: vec![Status::Open; nodes],
+            status: vec![ContactStatus::Open; nodes],
             directions: vec![[0.0; 3]; lanes],
             matrix: vec![0.0; 9 * lanes * lanes],
             right: vec![0.0; 3 * lanes],
@@ -59,16 +59,16 @@ impl Trial {
     /// Try a step in which no contact changes; not solved where one does.
     pub fn run_steady(
         &mut self,
-        level: &Level,
-        rows: &Rows,
+        level: &StepTables,
+        rows: &ContactRows,
         state: &SectorState,
         obstacle: &mut impl Obstacle,
         precision: f64,
-    ) -> Verdict {
-        let mut verdict = Verdict::default();
+    ) -> TrialResult {
+        let mut verdict = TrialResult::default();
         let Some(mut own) = self.steady.take() else { return verdict };
         if self.find_status(&mut own, state, obstacle) {
-            self.begin((level, Kind::Polynomial), Some(rows), state);
+            self.begin((level, ForceInterpolation::Polynomial), Some(rows), state);
             self.find_start(rows, state);
             self.end_slopes = level.basis.slopes_at(1.0).map(|slope| slope / level.step);
             verdict.solved = self.seek_steady(&mut own, level, obstacle, precision, &mut verdict);
@@ -91,11 +91,11 @@ impl Trial {
             let along: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
             let (size, most) = (dot(along, along).sqrt(), obstacle.friction(node) * multiplier);
             *status = if multiplier == 0.0 {
-                Status::Open
+                ContactStatus::Open
             } else if size < most * (1.0 - ON_THE_CONE) {
-                Status::Sticks
+                ContactStatus::Sticks
             } else {
-                Status::Slides(along.map(|component| if size > 0.0 { -component / size } else { 0.0 }))
+                ContactStatus::Slides(along.map(|component| if size > 0.0 { -component / size } else { 0.0 }))
             };
             any |= multiplier > 0.0;
         }
@@ -105,14 +105,14 @@ impl Trial {
     fn seek_steady(
         &mut self,
         own: &mut Steady,
-        level: &Level,
+        level: &StepTables,
         obstacle: &mut impl Obstacle,
         precision: f64,
-        verdict: &mut Verdict,
+        verdict: &mut TrialResult,
     ) -> bool {
         let (lanes, basis) = (self.lanes, &level.basis);
         for lane in 0..lanes.len() {
-            if let Status::Slides(direction) = own.status[lanes.place(lane).1] {
+            if let ContactStatus::Slides(direction) = own.status[lanes.place(lane).1] {
                 own.directions[lane] = direction;
             }
         }
@@ -139,10 +139,10 @@ impl Trial {
     }
 
     /// Directions in which nodes slide at all points; by how much they have turned.
-    fn find_directions(&self, own: &mut Steady, basis: &Basis, obstacle: &impl Obstacle) -> f64 {
+    fn find_directions(&self, own: &mut Steady, basis: &TimeBasis, obstacle: &impl Obstacle) -> f64 {
         let mut turned = 0.0_f64;
         for node in 0..self.lanes.nodes {
-            let Status::Slides(_) = own.status[node] else { continue };
+            let ContactStatus::Slides(_) = own.status[node] else { continue };
             let mut places = [[0.0; 3]; POINTS];
             (1..basis.count()).for_each(|point| places[point] = self.relative(point, node, obstacle));
             for point in 1..basis.count() {
@@ -172,16 +172,16 @@ impl Trial {
             let along: [f64; 3] = std::array::from_fn(|c| moved[c] - across * normal[c]);
             dot(along, along).sqrt()
         };
-        let sticking = (0..lanes.len()).filter(|lane| own.status[lanes.place(*lane).1] == Status::Sticks);
+        let sticking = (0..lanes.len()).filter(|lane| own.status[lanes.place(*lane).1] == ContactStatus::Sticks);
         sticking.map(slip).fold(0.0, f64::max)
     }
 
     /// Forces that keep closed nodes closed, sticking ones in place and sliding ones rubbed.
-    fn solve_steady(&mut self, own: &mut Steady, compliance: &Compliance, obstacle: &impl Obstacle) -> bool {
+    fn solve_steady(&mut self, own: &mut Steady, compliance: &LaneCompliance, obstacle: &impl Obstacle) -> bool {
         let lanes = self.lanes;
         self.keep_normals();
         self.members.clear();
-        let closed = (0..lanes.len()).filter(|lane| own.status[lanes.place(*lane).1] != Status::Open);
+        let closed = (0..lanes.len()).filter(|lane| own.status[lanes.place(*lane).1] != ContactStatus::Open);
         self.members.extend(closed);
         let order = 3 * self.members.len();
         own.matrix[..order * order].fill(0.0);
@@ -191,7 +191,7 @@ impl Trial {
             let [first, second] = tangents(normal);
             let (moved, free) = (lanes.three(&self.moved, *lane), lanes.three(&self.free, *lane));
             let relative = self.relative(point, node, obstacle);
-            let slides = own.status[node] != Status::Sticks;
+            let slides = own.status[node] != ContactStatus::Sticks;
             // Forces as displacements.
             let own_columns = compliance.of_lane(*lane);
             let scale = (0..3).map(|c| lanes.three(own_columns[c], *lane)[c]).sum::<f64>() / 3.0;
@@ -251,11 +251,11 @@ impl Trial {
             let along: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
             multiplier > 0.0
                 && match own.status[node] {
-                    Status::Open => true,
-                    Status::Sticks => {
+                    ContactStatus::Open => true,
+                    ContactStatus::Sticks => {
                         dot(along, along).sqrt() <= obstacle.friction(node) * multiplier + ROUNDING * largest
                     }
-                    Status::Slides(direction) => {
+                    ContactStatus::Slides(direction) => {
                         direction.iter().all(|own| *own == 0.0) || dot(direction, own.directions[*lane]) > 0.0
                     }
                 }

@@ -3,9 +3,9 @@
 //! Polynomials are of degree 1 then, so that the slip of a node is what it moves along the surface over the step. With b the gap and the
 //! slip without its force and W the flexibility along normal and tangents, they are the problem of [`crate::laws::de_saxce`].
 
-use super::{Trial, Verdict, three};
+use super::{Trial, TrialResult, three};
 use crate::galerkin::basis::POINTS;
-use crate::galerkin::compliance::{Compliance, Lanes};
+use crate::galerkin::compliance::{LaneCompliance, Lanes};
 use crate::galerkin::kernels::{AddProduct, Combine};
 use crate::galerkin::trial::Obstacle;
 use crate::gaps::dot;
@@ -47,9 +47,9 @@ impl Trial {
     /// Forces that keep the law at the end of the step: of nodes that penetrate or push first, then of those that these make penetrate.
     pub(super) fn solve_sticking(
         &mut self,
-        compliance: &Compliance,
+        compliance: &LaneCompliance,
         obstacle: &mut impl Obstacle,
-        verdict: &mut Verdict,
+        verdict: &mut TrialResult,
     ) -> bool {
         let Some(mut own) = self.sticking.take() else { return false };
         let solved = self.seek(&mut own, compliance, obstacle, verdict);
@@ -73,9 +73,9 @@ impl Trial {
     fn seek(
         &mut self,
         own: &mut Sticking,
-        compliance: &Compliance,
+        compliance: &LaneCompliance,
         obstacle: &mut impl Obstacle,
-        verdict: &mut Verdict,
+        verdict: &mut TrialResult,
     ) -> bool {
         let lanes = self.lanes;
         self.members.clear();
@@ -128,7 +128,13 @@ impl Trial {
     }
 
     /// A node becomes three unknowns.
-    fn choose_axes(&mut self, own: &mut Sticking, lane: usize, compliance: &Compliance, obstacle: &mut impl Obstacle) {
+    fn choose_axes(
+        &mut self,
+        own: &mut Sticking,
+        lane: usize,
+        compliance: &LaneCompliance,
+        obstacle: &mut impl Obstacle,
+    ) {
         let (lanes, stride) = (self.lanes, compliance.stride());
         let normal = lanes.three(&self.normals, lane);
         let [first, second] = tangents(normal);
@@ -175,7 +181,12 @@ impl Trial {
     }
 
     /// Choose nodes that the forces found push into what they may touch.
-    fn choose_pressed(&mut self, own: &mut Sticking, compliance: &Compliance, obstacle: &mut impl Obstacle) -> bool {
+    fn choose_pressed(
+        &mut self,
+        own: &mut Sticking,
+        compliance: &LaneCompliance,
+        obstacle: &mut impl Obstacle,
+    ) -> bool {
         let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
         let scale = self.members.iter().fold(0.0_f64, |most, lane| most.max(self.gaps[*lane].abs()));
         let members = self.members.len();

@@ -2,7 +2,7 @@
 //!
 //! Between its creases the surface is a smooth sheet with its own closest point, which may lie on a crease.
 
-use super::foot::{Foot, Held, noise};
+use super::foot::{FootPoint, HeldBound, noise};
 use super::{ClosestPoint, Ends, SurfaceSpline};
 use crate::gaps::dot;
 use crate::settings::Interpolation;
@@ -15,7 +15,7 @@ impl SurfaceSpline {
     ///
     /// A sheet across a crease at the distance b along this one can only hold a closer point if b < |r| tan(φ/2) for a
     /// fold of angle φ: b ≤ 2|r| covers folds up to 126°.
-    pub(super) fn search_sheets(&self, x: [f64; 3], start: Foot) -> Option<Foot> {
+    pub(super) fn search_sheets(&self, x: [f64; 3], start: FootPoint) -> Option<FootPoint> {
         let rounding = self.rounding(x, &start);
         let mut best = start;
         // Every round lowers f, and a start on the opposite side has half the facets to walk over.
@@ -36,7 +36,7 @@ impl SurfaceSpline {
     }
 
     /// The place across the creases on these sides, where they are near.
-    fn across(&self, foot: &Foot, sides: [i8; 2]) -> Option<ClosestPoint> {
+    fn across(&self, foot: &FootPoint, sides: [i8; 2]) -> Option<ClosestPoint> {
         let (room, [length_s, _, length_t]) = (self.room(foot.place), foot.metric());
         let ClosestPoint { patch: [p, q], s, t } = foot.place;
         let near = |side: i8, position: f64, [low, high]: [f64; 2], length: f64| {
@@ -71,18 +71,19 @@ impl SurfaceSpline {
     }
 
     /// On a crease, the sheet whose normal is nearest to the direction of the node.
-    fn face_squarely(&self, x: [f64; 3], foot: Foot) -> Foot {
+    fn face_squarely(&self, x: [f64; 3], foot: FootPoint) -> FootPoint {
         let mut best = foot;
-        let squareness = |foot: &Foot| dot(foot.residual, foot.normal()).abs();
+        let squareness = |foot: &FootPoint| dot(foot.residual, foot.normal()).abs();
         for sides in NEIGHBOURS {
-            let stays =
-                |axis: usize| matches!((sides[axis], foot.held[axis]), (0, _) | (-1, Held::Low) | (1, Held::High));
+            let stays = |axis: usize| {
+                matches!((sides[axis], foot.held[axis]), (0, _) | (-1, HeldBound::Low) | (1, HeldBound::High))
+            };
             if !(stays(0) && stays(1)) {
                 continue;
             }
             let Some(place) = self.across(&foot, sides) else { continue };
-            let held = std::array::from_fn(|axis| if sides[axis] == 0 { foot.held[axis] } else { Held::No });
-            let candidate = Foot { held, ..Foot::at(self, x, place) };
+            let held = std::array::from_fn(|axis| if sides[axis] == 0 { foot.held[axis] } else { HeldBound::No });
+            let candidate = FootPoint { held, ..FootPoint::at(self, x, place) };
             if squareness(&candidate) > squareness(&best) {
                 best = candidate;
             }

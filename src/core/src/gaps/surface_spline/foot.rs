@@ -15,7 +15,7 @@ const STATIONARY: f64 = 1e-9;
 
 /// Which bound of a sheet a coordinate is held at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Held {
+pub(super) enum HeldBound {
     No,
     Low,
     High,
@@ -23,20 +23,20 @@ pub(super) enum Held {
 
 /// A point of the surface as seen from the node.
 #[derive(Clone, Copy)]
-pub(super) struct Foot {
+pub(super) struct FootPoint {
     pub place: ClosestPoint,
     pub evaluation: Evaluation,
     /// x − S.
     pub residual: [f64; 3],
     /// ½|x − S|².
     pub half_square: f64,
-    pub held: [Held; 2],
+    pub held: [HeldBound; 2],
 }
 
 /// Range of the parameters of a patch that lies on the same smooth sheet, [[low, high] of s, of t].
 pub(super) type Room = [[f64; 2]; 2];
 
-impl Foot {
+impl FootPoint {
     pub fn at(surface: &SurfaceSpline, x: [f64; 3], place: ClosestPoint) -> Self {
         Self::seen(x, place, surface.evaluate(place))
     }
@@ -44,7 +44,7 @@ impl Foot {
     #[inline(always)]
     pub fn seen(x: [f64; 3], place: ClosestPoint, evaluation: Evaluation) -> Self {
         let residual: [f64; 3] = std::array::from_fn(|i| x[i] - evaluation.point[i]);
-        Self { place, evaluation, residual, half_square: 0.5 * dot(residual, residual), held: [Held::No; 2] }
+        Self { place, evaluation, residual, half_square: 0.5 * dot(residual, residual), held: [HeldBound::No; 2] }
     }
 
     #[inline]
@@ -88,11 +88,11 @@ impl Foot {
         let position = [self.place.s, self.place.t];
         for axis in 0..2 {
             self.held[axis] = if position[axis] <= room[axis][0] && gradient[axis] > 0.0 {
-                Held::Low
+                HeldBound::Low
             } else if position[axis] >= room[axis][1] && gradient[axis] < 0.0 {
-                Held::High
+                HeldBound::High
             } else {
-                Held::No
+                HeldBound::No
             };
         }
         let alone = |axis: usize| {
@@ -104,7 +104,7 @@ impl Foot {
             }
             step
         };
-        match self.held.map(|held| held == Held::No) {
+        match self.held.map(|held| held == HeldBound::No) {
             [false, false] => return Some([0.0; 2]),
             [true, false] => return Some(alone(0)),
             [false, true] => return Some(alone(1)),
@@ -167,7 +167,7 @@ fn escape(gradient: [f64; 2], hessian: [f64; 3], metric: [f64; 3], determinant: 
 }
 
 /// Rounding error of ½|x − S|² for an error of the coordinates.
-pub(super) fn noise(foot: &Foot, rounding: f64) -> f64 {
+pub(super) fn noise(foot: &FootPoint, rounding: f64) -> f64 {
     rounding * ((2.0 * foot.half_square).sqrt() + rounding)
 }
 

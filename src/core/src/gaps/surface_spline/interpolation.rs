@@ -8,14 +8,14 @@ use super::SurfaceSpline;
 
 /// Interpolation problem of one row of data points.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Line {
-    kind: Kind,
+pub(super) struct InterpolationRow {
+    kind: RowEnds,
     /// Reciprocal pivots of the tridiagonal matrix.
     pivots: Vec<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Kind {
+enum RowEnds {
     /// Control points are the data points.
     Facets,
     /// Cyclic matrix = tridiagonal one + rank one; the vector is A'⁻¹u/(1 + vᵀA'⁻¹u) of Sherman and Morrison.
@@ -28,10 +28,10 @@ enum Kind {
 const CORNER: [f64; 2] = [-4.0, 1.0];
 const MIRROR: f64 = -0.25;
 
-impl Line {
+impl InterpolationRow {
     /// No interpolation problem.
     pub fn facets() -> Self {
-        Self { kind: Kind::Facets, pivots: Vec::new() }
+        Self { kind: RowEnds::Facets, pivots: Vec::new() }
     }
 
     /// Closed with continuous first and second derivatives.
@@ -39,31 +39,31 @@ impl Line {
         let mut diagonal = vec![4.0; count];
         diagonal[0] -= CORNER[0];
         diagonal[count - 1] -= CORNER[1] * MIRROR;
-        let mut line = Self { kind: Kind::Facets, pivots: pivots(&diagonal) };
+        let mut line = Self { kind: RowEnds::Facets, pivots: pivots(&diagonal) };
         let mut image = vec![[0.0; 3]; count];
         (image[0][0], image[count - 1][0]) = (CORNER[0], CORNER[1]);
         line.solve_tridiagonal(&mut image, 0, 1);
         let scale = 1.0 + image[0][0] + MIRROR * image[count - 1][0];
-        line.kind = Kind::Closed { correction: image.iter().map(|value| value[0] / scale).collect() };
+        line.kind = RowEnds::Closed { correction: image.iter().map(|value| value[0] / scale).collect() };
         line
     }
 
     /// Free ends at the first and the last point.
     pub fn free_ends(count: usize) -> Self {
-        Self { kind: Kind::Free { last: count - 1 }, pivots: pivots(&vec![4.0; count - 2]) }
+        Self { kind: RowEnds::Free { last: count - 1 }, pivots: pivots(&vec![4.0; count - 2]) }
     }
 
     /// Free ends that both lie at the first point.
     pub fn free_ends_meeting(count: usize) -> Self {
-        Self { kind: Kind::Free { last: 0 }, pivots: pivots(&vec![4.0; count - 1]) }
+        Self { kind: RowEnds::Free { last: 0 }, pivots: pivots(&vec![4.0; count - 1]) }
     }
 
     /// Data points to control points, at `start`, `start + stride`, …
     pub fn interpolate(&self, values: &mut [[f64; 3]], start: usize, stride: usize) {
         match &self.kind {
-            Kind::Facets => {}
-            Kind::Closed { correction } => self.solve_closed(correction, values, start, stride),
-            Kind::Free { last } => {
+            RowEnds::Facets => {}
+            RowEnds::Closed { correction } => self.solve_closed(correction, values, start, stride),
+            RowEnds::Free { last } => {
                 let inner = start + stride;
                 let unknowns = self.pivots.len();
                 for index in 0..unknowns {
@@ -78,12 +78,12 @@ impl Line {
         }
     }
 
-    /// Forces on control points to forces on data points: the transpose of [`Line::interpolate`].
+    /// Forces on control points to forces on data points: the transpose of [`InterpolationRow::interpolate`].
     pub fn transfer(&self, forces: &mut [[f64; 3]], start: usize, stride: usize) {
         match &self.kind {
-            Kind::Facets => {}
-            Kind::Closed { correction } => self.solve_closed(correction, forces, start, stride),
-            Kind::Free { last } => {
+            RowEnds::Facets => {}
+            RowEnds::Closed { correction } => self.solve_closed(correction, forces, start, stride),
+            RowEnds::Free { last } => {
                 let inner = start + stride;
                 let unknowns = self.pivots.len();
                 self.solve_tridiagonal(forces, inner, stride);

@@ -32,7 +32,7 @@ pub use projection::Projection;
 
 use crate::settings::{Closure, Interpolation};
 use crate::{Error, Result};
-use interpolation::Line;
+use interpolation::InterpolationRow;
 
 /// Fewest data points around: below them the four control points of a patch would not be different ones.
 pub const FEWEST_AROUND: usize = 4;
@@ -84,7 +84,7 @@ pub struct SurfaceSpline {
     reach: f64,
     interpolation: Interpolation,
     /// Interpolation problems around and along.
-    lines: [Line; 2],
+    lines: [InterpolationRow; 2],
     /// Control points (m), one per data point.
     control: Vec<[f64; 3]>,
     /// Control points with phantoms and repetitions, (along + 2) rings of (around + 3), so that a patch is a window of
@@ -147,14 +147,14 @@ impl SurfaceSpline {
             return Err(Error::invalid("surface spline", format!("{counts}, but {} data points", data.len()), remedy));
         }
         let lines = match interpolation {
-            Interpolation::Facets => [Line::facets(), Line::facets()],
+            Interpolation::Facets => [InterpolationRow::facets(), InterpolationRow::facets()],
             Interpolation::Spline => {
                 let ring = match ends {
-                    Ends::Smooth => Line::closed(around),
-                    Ends::Meeting => Line::free_ends_meeting(around),
-                    Ends::Open => Line::free_ends(around),
+                    Ends::Smooth => InterpolationRow::closed(around),
+                    Ends::Meeting => InterpolationRow::free_ends_meeting(around),
+                    Ends::Open => InterpolationRow::free_ends(around),
                 };
-                [ring, Line::free_ends(along)]
+                [ring, InterpolationRow::free_ends(along)]
             }
         };
         let mut surface = Self {

@@ -39,13 +39,13 @@ impl Weights {
 }
 
 /// The functions that multiply control points −1..=2 of a direction: values, first and second derivatives.
-type Basis = [[f64; 4]; 3];
+type SplineBasis = [[f64; 4]; 3];
 
 const SIXTH: f64 = 1.0 / 6.0;
 
 /// The columns of (s³, s², s, 1) H and its derivatives.
 #[inline(always)]
-fn cubic(s: f64) -> Basis {
+fn cubic(s: f64) -> SplineBasis {
     let r = 1.0 - s;
     let (ss, rr) = (s * s, r * r);
     [
@@ -58,7 +58,7 @@ fn cubic(s: f64) -> Basis {
 /// [`cubic`] along the axis: beyond t = 0 and 1 the tangent goes on, S(s, t) = S(s, 1) + (t − 1) S_t(s, 1). At a free edge,
 /// the only place where a patch ends so, S_tt = 0: the surface stays twice continuously differentiable.
 #[inline(always)]
-fn cubic_and_beyond(t: f64) -> Basis {
+fn cubic_and_beyond(t: f64) -> SplineBasis {
     let edge = t.clamp(0.0, 1.0);
     let mut basis = cubic(edge);
     let [values, slopes, _] = &mut basis;

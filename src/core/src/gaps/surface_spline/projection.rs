@@ -6,7 +6,7 @@
 //! of facets, the seam of free ends), the step is projected onto the sheet between them; neighbouring sheets are then
 //! searched for a closer point.
 
-use super::foot::{CONVEX, DEGENERATE, Foot, Held, Room, noise, solve};
+use super::foot::{CONVEX, DEGENERATE, FootPoint, HeldBound, Room, noise, solve};
 use super::{ClosestPoint, EDGE_TOLERANCE, Ends, SurfaceSpline};
 use crate::gaps::dot;
 use crate::settings::Interpolation;
@@ -85,7 +85,7 @@ impl SurfaceSpline {
         if self.interpolation == Interpolation::Facets {
             return None;
         }
-        let mut foot = Foot::seen(x, guess, self.evaluate_bicubic::<true>(guess));
+        let mut foot = FootPoint::seen(x, guess, self.evaluate_bicubic::<true>(guess));
         let metric = foot.metric();
         let (hessian, determinant) = foot.hessian(metric);
         let area = metric[0] * metric[2] - metric[1] * metric[1];
@@ -107,13 +107,13 @@ impl SurfaceSpline {
             if !(stays && is_within(0.1)) {
                 return None;
             }
-            foot = Foot::seen(x, place, self.evaluate_bicubic::<false>(place));
+            foot = FootPoint::seen(x, place, self.evaluate_bicubic::<false>(place));
         }
         None
     }
 
     /// Whether the seam of free ends is too far away to hold a closer point on its other side.
-    fn is_far_from_seam(&self, foot: &Foot, length_s: f64) -> bool {
+    fn is_far_from_seam(&self, foot: &FootPoint, length_s: f64) -> bool {
         let column = foot.place.patch[0];
         self.ends != Ends::Meeting || (column > 0 && column + 1 < self.around && 8.0 * foot.half_square < length_s)
     }
@@ -122,12 +122,12 @@ impl SurfaceSpline {
         self.interpolation == Interpolation::Facets || self.ends == Ends::Meeting
     }
 
-    fn is_over_edge(&self, foot: &Foot) -> bool {
+    fn is_over_edge(&self, foot: &FootPoint) -> bool {
         let ([column, ring], smooth) = (foot.place.patch, self.interpolation == Interpolation::Spline);
-        let over = |held: Held, first: bool, last: bool| match held {
-            Held::No => false,
-            Held::Low => smooth || first,
-            Held::High => smooth || last,
+        let over = |held: HeldBound, first: bool, last: bool| match held {
+            HeldBound::No => false,
+            HeldBound::Low => smooth || first,
+            HeldBound::High => smooth || last,
         };
         over(foot.held[1], ring == 0, ring + 2 == self.along)
             || (self.ends == Ends::Open && over(foot.held[0], column == 0, column + 2 == self.around))
@@ -186,7 +186,7 @@ impl SurfaceSpline {
     /// Rounding of the coordinates of x − S (m), and of the place of S. A node inside a casing is near the surface and as
     /// far from the axis. One that faces an open surface may be anywhere, and so may that: rounding of the tangents, which
     /// is that of the coordinates over a patch, moves the closest point in proportion to the distance.
-    pub(super) fn rounding(&self, x: [f64; 3], foot: &Foot) -> f64 {
+    pub(super) fn rounding(&self, x: [f64; 3], foot: &FootPoint) -> f64 {
         let size = dot(x, x).sqrt();
         if self.ends != Ends::Open {
             return ROUNDING * size;
@@ -196,9 +196,9 @@ impl SurfaceSpline {
     }
 
     /// Minimum of f on the sheet of `start`.
-    pub(super) fn descend(&self, x: [f64; 3], start: ClosestPoint) -> Option<Foot> {
+    pub(super) fn descend(&self, x: [f64; 3], start: ClosestPoint) -> Option<FootPoint> {
         let longest = (0.125 * super::real(self.around)).max(1.0);
-        let mut foot = Foot::at(self, x, start);
+        let mut foot = FootPoint::at(self, x, start);
         let rounding = self.rounding(x, &foot);
         for _ in 0..MAX_ITERATIONS {
             let room = self.room(foot.place);
@@ -221,12 +221,19 @@ impl SurfaceSpline {
 
     /// The first of the halved steps that lowers f enough (Armijo's condition on the projected step).
     #[inline]
-    fn search_line(&self, x: [f64; 3], from: &Foot, step: [f64; 2], room: &Room, rounding: f64) -> Option<Foot> {
+    fn search_line(
+        &self,
+        x: [f64; 3],
+        from: &FootPoint,
+        step: [f64; 2],
+        room: &Room,
+        rounding: f64,
+    ) -> Option<FootPoint> {
         let mut factor = 1.0;
         for _ in 0..MAX_HALVINGS {
             let s = (from.place.s + factor * step[0]).clamp(room[0][0], room[0][1]);
             let t = (from.place.t + factor * step[1]).clamp(room[1][0], room[1][1]);
-            let foot = Foot::at(self, x, self.settle(from.place.patch, s, t));
+            let foot = FootPoint::at(self, x, self.settle(from.place.patch, s, t));
             let gain = 1e-4 * from.slope([s - from.place.s, t - from.place.t]).min(0.0);
             if foot.half_square <= from.half_square + gain
                 || foot.half_square <= from.half_square + noise(from, rounding)
@@ -243,7 +250,7 @@ impl SurfaceSpline {
 mod tests {
     use super::*;
     use crate::settings::Closure;
-    use tiprub_test_models::Random;
+    use tiprub_test_models::SeededRandom;
 
     /// Nodes of a run start from where they were a step ago: the short way ends there, and where the long one does.
     #[test]
@@ -256,12 +263,12 @@ mod tests {
         };
         let points: Vec<[f64; 3]> = (0..4).flat_map(ring).collect();
         let surface = SurfaceSpline::new(&points, 24, 4, Closure::Smooth, Interpolation::Spline).unwrap();
-        let mut random = Random(4);
+        let mut random = SeededRandom(4);
         for _ in 0..500 {
             let patch = [random.below(24), random.below(3)];
             let mut within = || random.within(0.1, 0.9);
             let guess = ClosestPoint { patch, s: within(), t: within() };
-            let foot = Foot::at(&surface, [0.0; 3], guess);
+            let foot = FootPoint::at(&surface, [0.0; 3], guess);
             let (normal, moved) = (foot.normal(), random.vector(2e-4));
             let x = std::array::from_fn(|i| foot.evaluation.point[i] + 3e-4 * normal[i] + moved[i]);
             let Some(Projection::Found { gap, .. }) = surface.project_nearby(x, guess) else { panic!("{guess:?}") };

@@ -6,17 +6,17 @@
 //! that for every P-matrix the number of violated contacts falls to zero. Needs about as many factorisations as
 //! contacts change, where block exchanges, when they work, need a handful for all.
 
-use super::{ContactSolver, Outcome, ZERO_FRACTION};
+use super::{ContactSolver, SolverOutcome, ZERO_FRACTION};
 
 impl ContactSolver {
     /// Solve from the current active set, with up to `limit` factorisations.
-    pub(super) fn drive_all(&mut self, gap_scale: f64, limit: usize) -> Outcome {
+    pub(super) fn drive_all(&mut self, gap_scale: f64, limit: usize) -> SolverOutcome {
         let mut factorisations = 0;
         while factorisations < limit {
             factorisations += self.start_drive();
             let violated = |slack: &f64| *slack < -ZERO_FRACTION * gap_scale;
             if !self.slack[..self.size].iter().any(violated) {
-                return Outcome::direct(self.settle(gap_scale), factorisations);
+                return SolverOutcome::direct(self.settle(gap_scale), factorisations);
             }
             while factorisations < limit {
                 let open = (0..self.size).filter(|node| !self.active[*node] && violated(&self.slack[*node]));
@@ -24,11 +24,11 @@ impl ContactSolver {
                 let spent = self.drive(deepest, gap_scale, limit - factorisations);
                 factorisations += spent.factorisations;
                 if !spent.solved {
-                    return Outcome::direct(false, factorisations);
+                    return SolverOutcome::direct(false, factorisations);
                 }
             }
         }
-        Outcome::direct(false, factorisations)
+        SolverOutcome::direct(false, factorisations)
     }
 
     /// Open contacts that pull until none does; multipliers and slacks of that set are the start. Returns the number of
@@ -54,13 +54,13 @@ impl ContactSolver {
     }
 
     /// Press one violated contact until it is closed. Not solved when that does not open it, or the limit is reached.
-    fn drive(&mut self, driven: usize, gap_scale: f64, limit: usize) -> Outcome {
+    fn drive(&mut self, driven: usize, gap_scale: f64, limit: usize) -> SolverOutcome {
         for factorisations in 1..=limit {
             self.solve_active(Some(driven));
             self.correct_by(driven);
             let opening = self.corrected[driven];
             if opening.is_nan() || opening <= ZERO_FRACTION * self.delassus[(driven, driven)] {
-                return Outcome::direct(false, factorisations);
+                return SolverOutcome::direct(false, factorisations);
             }
             let (step, blocking) = self.blocking(driven, -self.slack[driven] / opening, gap_scale);
             for node in 0..self.size {
@@ -71,11 +71,11 @@ impl ContactSolver {
             self.active[blocking] = !self.active[blocking];
             self.slack[blocking] = 0.0;
             if blocking == driven {
-                return Outcome::direct(true, factorisations);
+                return SolverOutcome::direct(true, factorisations);
             }
             self.pressure[blocking] = 0.0;
         }
-        Outcome::direct(false, limit)
+        SolverOutcome::direct(false, limit)
     }
 
     /// Gap of every node per multiplier of the driven one, the closed contacts following; 0 for those.

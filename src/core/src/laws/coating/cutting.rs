@@ -6,8 +6,8 @@
 //! depth of its part ahead does not. The way of one step may lie in two cells, each with the share of the way in it. So forces
 //! do not know how wide cells are.
 
-use super::{Branch, CellContact, CoatedProblem, Coating, Rod, Row, place};
-use crate::persist::{Persist, Reader, Writer};
+use super::{Branch, CellContact, CellRow, CoatedProblem, Coating, RodMaterial, place};
+use crate::persist::{Persist, StateReader, StateWriter};
 use crate::settings::CuttingSettings;
 
 /// What one row of a blade is cutting.
@@ -35,7 +35,7 @@ struct Chip {
 
 /// How a blade moves along the coating.
 #[derive(Debug, Clone, Copy)]
-pub struct Way<'a> {
+pub struct BladePassage<'a> {
     /// Which blade.
     pub blade: usize,
     /// Angles at which its contact nodes face the casing (rad).
@@ -46,7 +46,7 @@ pub struct Way<'a> {
 
 /// The cutting of a coating.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Cutting {
+pub(super) struct CoatingCut {
     /// Specific cutting energy (J/m³).
     energy: f64,
     /// Tangential per normal force.
@@ -61,7 +61,7 @@ pub(super) struct Cutting {
     ways: Vec<f64>,
 }
 
-impl Cutting {
+impl CoatingCut {
     pub(super) fn new(settings: CuttingSettings, blades: usize, rows: usize, nodes: usize) -> Self {
         Self {
             energy: settings.specific_energy,
@@ -74,9 +74,9 @@ impl Cutting {
     }
 
     /// The normal force κ·u·b·a as that of a rod: of the area b·h₀ it has the modulus κ·u, and it never yields.
-    pub(super) fn rod(settings: CuttingSettings) -> Rod {
+    pub(super) fn rod(settings: CuttingSettings) -> RodMaterial {
         let modulus = settings.normal_ratio * settings.specific_energy;
-        Rod { modulus, yield_stress: f64::INFINITY, hardening: 0.0 }
+        RodMaterial { modulus, yield_stress: f64::INFINITY, hardening: 0.0 }
     }
 
     pub(super) fn reset(&mut self) {
@@ -84,11 +84,11 @@ impl Cutting {
         self.forget();
     }
 
-    pub(super) fn save(&self, writer: &mut Writer) {
+    pub(super) fn save(&self, writer: &mut StateWriter) {
         self.edges.save(writer);
     }
 
-    pub(super) fn restore(&mut self, reader: &mut Reader) {
+    pub(super) fn restore(&mut self, reader: &mut StateReader) {
         self.edges.restore(reader);
         self.forget();
     }
@@ -100,7 +100,7 @@ impl Cutting {
         self.ways.fill(0.0);
     }
 
-    pub(super) fn check(&self, reader: &mut Reader, cells: usize) {
+    pub(super) fn check(&self, reader: &mut StateReader, cells: usize) {
         let mut bytes = reader.clone();
         self.edges.check(reader);
         for _ in &self.edges {
@@ -125,7 +125,7 @@ impl Coating {
     }
 
     /// As [`Coating::locate`], of a blade that cuts: the one or two cells of each row in which its way of the step lies.
-    pub fn locate_cut(&self, problem: &mut CoatedProblem, way: Way) {
+    pub fn locate_cut(&self, problem: &mut CoatedProblem, way: BladePassage) {
         let Some(cutting) = &self.cutting else { return };
         let first = problem.append_nodes(self.nodes);
         for (index, row) in self.rows.iter().enumerate() {
@@ -198,7 +198,7 @@ impl Coating {
         let Some(cutting) = &mut self.cutting else { return 0.0 };
         let mut energy = 0.0;
         for Chip { cell, row, blade, force } in cutting.chips.drain(..) {
-            let (Row { nodes, weights, area, .. }, first) = (self.rows[row], blade * self.nodes);
+            let (CellRow { nodes, weights, area, .. }, first) = (self.rows[row], blade * self.nodes);
             let way = (0..2).map(|end| weights[end] * cutting.ways[first + nodes[end]]).sum::<f64>().max(0.0);
             energy += force * way;
             self.plastic[cell] += force * way / (cutting.energy * area * self.thickness);

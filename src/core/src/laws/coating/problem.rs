@@ -13,8 +13,8 @@ mod linear;
 
 use nalgebra::DMatrix;
 
-use super::{Branch, CellContact, Rod, number};
-use crate::laws::active_set::Outcome;
+use super::{Branch, CellContact, RodMaterial, number};
+use crate::laws::active_set::SolverOutcome;
 use crate::laws::proximal::{ROUNDS, Yielding};
 
 /// Depths and forces within this fraction of their scale count as zero.
@@ -28,7 +28,7 @@ const GOLDEN: f64 = 1.618_033_988_749_895;
 
 /// One step of the path.
 #[derive(Debug, Clone, Copy)]
-enum Change {
+enum PathStep {
     Rod(usize, Branch),
     Node(usize),
 }
@@ -39,7 +39,7 @@ enum Change {
 /// and (as a guess) `closed` of the first [`size`](Self::size) nodes, then [`solve`](Self::solve).
 #[derive(Debug, Clone)]
 pub struct CoatedProblem {
-    rod: Rod,
+    rod: RodMaterial,
     thickness: f64,
     size: usize,
     /// Normal gap of node i per multiplier of node j (m/N), friction included; capacity × capacity, the leading
@@ -74,7 +74,7 @@ pub struct CoatedProblem {
 }
 
 impl CoatedProblem {
-    pub(super) fn new(rod: Rod, thickness: f64, nodes: usize, contacts: usize) -> Self {
+    pub(super) fn new(rod: RodMaterial, thickness: f64, nodes: usize, contacts: usize) -> Self {
         Self {
             rod,
             thickness,
@@ -137,10 +137,10 @@ impl CoatedProblem {
     }
 
     /// Gaps, coating and hard forces of the step.
-    pub fn solve(&mut self) -> Outcome {
+    pub fn solve(&mut self) -> SolverOutcome {
         self.guess();
         let solved = self.exchange_blocks() || self.follow_path() || self.monotone && self.approach();
-        Outcome { solved, factorisations: self.factorisations, ..Outcome::default() }
+        SolverOutcome { solved, factorisations: self.factorisations, ..SolverOutcome::default() }
     }
 
     /// Start from the prediction and from the nodes that the caller says are closed.
@@ -211,8 +211,8 @@ impl CoatedProblem {
                 hard[node] += share * (self.hard[node] - hard[node]);
             }
             match change {
-                Change::Rod(index, next) => self.contacts[index].branch = next,
-                Change::Node(node) => self.closed[node] = !self.closed[node],
+                PathStep::Rod(index, next) => self.contacts[index].branch = next,
+                PathStep::Node(node) => self.closed[node] = !self.closed[node],
             }
         }
         false
@@ -220,13 +220,13 @@ impl CoatedProblem {
 
     /// Which branch ends first between the point reached and the solution of the present branches, and after which
     /// share of the way; `None` if all hold at that solution.
-    fn first_end(&self) -> Option<(f64, Change)> {
+    fn first_end(&self) -> Option<(f64, PathStep)> {
         let share = |from: f64, to: f64, end: f64| ((end - from) / (to - from)).clamp(0.0, 1.0);
         let rods = (0..self.contacts.len()).filter_map(|index| {
             let (contact, next) = (&self.contacts[index], self.next_branch(index)?);
             let end = self.rod.border(contact.branch, next, contact.plastic);
             let way = share(self.strain(contact, &self.reached[0]), self.strain(contact, &self.corrected), end);
-            Some((way, Change::Rod(index, next)))
+            Some((way, PathStep::Rod(index, next)))
         });
         let nodes = (0..self.size).filter(|node| self.node_violated(*node)).map(|node| {
             let way = if self.closed[node] {
@@ -234,7 +234,7 @@ impl CoatedProblem {
             } else {
                 share(self.reached[0][node], self.corrected[node], -self.thickness)
             };
-            (way, Change::Node(node))
+            (way, PathStep::Node(node))
         });
         rods.chain(nodes).min_by(|a, b| a.0.total_cmp(&b.0))
     }

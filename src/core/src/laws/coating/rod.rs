@@ -17,13 +17,13 @@ pub enum Branch {
 /// Material of the rods (Legrand, Batailly, Pierre, J. Comput. Nonlinear Dyn. 2012): σ = E(ε − ε_p) ≥ 0 up to
 /// σ = Y + Kε_p; beyond it ε_p grows. The hardening variable equals the plastic strain in monotonic compression.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rod {
+pub struct RodMaterial {
     pub(super) modulus: f64,
     pub(super) yield_stress: f64,
     pub(super) hardening: f64,
 }
 
-impl Rod {
+impl RodMaterial {
     /// Material of a coating.
     pub fn new(settings: &CoatingSettings) -> Self {
         let &CoatingSettings { modulus, yield_stress, hardening, .. } = settings;

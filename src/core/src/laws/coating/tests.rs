@@ -32,8 +32,8 @@ fn material(
 }
 
 /// A tip on radius 1, as wide as a cell.
-fn tip(settings: &CoatingSettings, axial: &[f64]) -> Tip {
-    Tip::new(axial, &vec![1.0; axial.len()], TAU / number(settings.cells_around))
+fn tip(settings: &CoatingSettings, axial: &[f64]) -> BladeTip {
+    BladeTip::new(axial, &vec![1.0; axial.len()], TAU / number(settings.cells_around))
 }
 
 /// One blade with nodes at z = 0, 1, ...
@@ -49,7 +49,7 @@ fn middle(settings: &CoatingSettings) -> f64 {
 
 fn set_wear(coating: &mut Coating, plastic: &[f64]) {
     let bytes: Vec<u8> = (0..coating.cells()).flat_map(|cell| plastic[cell % plastic.len()].to_le_bytes()).collect();
-    coating.restore(&mut Reader::new(&bytes));
+    coating.restore(&mut StateReader::new(&bytes));
 }
 
 /// The rod with its node moved as prescribed: no flexibility, so the gap stays. Returns the force.
@@ -172,7 +172,7 @@ fn interpolation_does_the_same_work_on_both_sides() {
     let settings = material(1.0, 0.1, 0.2, 100, 7);
     let axial = [0.03, 0.0, 0.011, 0.024]; // not in order
     let width = 1e-3; // a sixteenth of a cell
-    let coating = Coating::new(&settings, &Tip::new(&axial, &[0.25, 0.26, 0.258, 0.252], width), 36).unwrap();
+    let coating = Coating::new(&settings, &BladeTip::new(&axial, &[0.25, 0.26, 0.258, 0.252], width), 36).unwrap();
     let mut problem = coating.problem(1);
     coating.locate(&mut problem, &[0.1, 0.11, 0.09, 0.12]);
     let displacement = [0.3, -0.7, 0.45, 1.1];
@@ -208,7 +208,7 @@ fn interpolation_does_the_same_work_on_both_sides() {
 #[test]
 fn cells_follow_the_angle_of_the_blade() {
     let width = 1e-3 * TAU / 10.0;
-    let tip = Tip::new(&[0.0, 1.0], &[1.0; 2], width).with_extent([-0.2, 1.2]);
+    let tip = BladeTip::new(&[0.0, 1.0], &[1.0; 2], width).with_extent([-0.2, 1.2]);
     let coating = Coating::new(&material(1.0, 0.1, 0.2, 10, 3), &tip, 1).unwrap();
     let cells = |first: f64, second: f64| {
         let mut problem = coating.problem(1);
@@ -232,7 +232,7 @@ fn cells_follow_the_angle_of_the_blade() {
 /// Shares of cells by the overlap of intervals, whatever the angle and the width.
 #[test]
 fn shares_of_covered_cells_add_up_to_the_width_of_the_tip() {
-    let mut random = tiprub_test_models::Random(3);
+    let mut random = tiprub_test_models::SeededRandom(3);
     for _ in 0..3000 {
         let (around, angle) = (40, 30.0 * (random.unit() - 0.5));
         let width = random.scale(1e-3, 30.0);
@@ -259,7 +259,7 @@ fn shares_of_covered_cells_add_up_to_the_width_of_the_tip() {
 fn force_does_not_depend_on_the_width_of_cells() {
     for (cells, angle) in [4, 7, 50, 720, 10_007].into_iter().flat_map(|cells| [0.1, 2.0, -3.3].map(|at| (cells, at))) {
         let settings = material(2.0, 0.3, 0.4, cells, 3);
-        let tip = Tip::new(&[0.0, 1.0], &[1.0; 2], 0.2).with_extent([-0.2, 1.2]);
+        let tip = BladeTip::new(&[0.0, 1.0], &[1.0; 2], 0.2).with_extent([-0.2, 1.2]);
         let coating = Coating::new(&settings, &tip, 1).unwrap();
         let mut problem = coating.problem(1);
         coating.locate(&mut problem, &[angle, angle + 0.03]);
@@ -286,14 +286,14 @@ fn patch_width_is_thickness_over_cosine_of_stagger() {
         };
         let nodes: Vec<_> = [3, 0, 4, 1, 2].map(node).into();
         let settings = material(1.0, 0.1, 0.1, 8, 2);
-        let tip = Tip::of(&nodes.iter().collect::<Vec<_>>(), &settings);
+        let tip = BladeTip::of(&nodes.iter().collect::<Vec<_>>(), &settings);
         for width in &tip.widths {
             assert!((width * stagger.cos() / thickness - 1.0).abs() < 1e-12, "{width}");
         }
         let given = CoatingSettings { contact_width: Some(0.7), ..settings };
-        assert_eq!(Tip::of(&nodes.iter().collect::<Vec<_>>(), &given).widths, [0.7; 5]);
+        assert_eq!(BladeTip::of(&nodes.iter().collect::<Vec<_>>(), &given).widths, [0.7; 5]);
         // One by itself: its area over the strip that it stands for.
-        let alone = Tip::of(&[&nodes[0]], &settings);
+        let alone = BladeTip::of(&[&nodes[0]], &settings);
         let [low, high] = alone.extent;
         assert!((alone.widths[0] * (high - low) / nodes[0].area - 1.0).abs() < 1e-12);
     }
@@ -328,12 +328,12 @@ fn the_wear_map_survives_saving_bit_for_bit() {
         worn.commit(&problem);
     }
     let mut bytes = vec![0; 8 * worn.cells()];
-    let mut writer = Writer::new(&mut bytes);
+    let mut writer = StateWriter::new(&mut bytes);
     worn.save(&mut writer);
     assert_eq!(writer.written(), 8 * worn.cells());
     let mut other = coating(&settings, 2);
     assert_ne!(other, worn);
-    other.restore(&mut Reader::new(&bytes));
+    other.restore(&mut StateReader::new(&bytes));
     let bits = |coating: &Coating| coating.plastic.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(&other), bits(&worn));
     assert_eq!(other.worn_volume().to_bits(), worn.worn_volume().to_bits());
@@ -346,7 +346,7 @@ fn the_wear_map_survives_saving_bit_for_bit() {
 fn blades_of_one_group_are_coupled_and_find_their_own_cells() {
     let settings = material(3.0, 0.1, 0.7, 16, 4);
     let axial = [0.0, 1.0];
-    let coating = Coating::new(&settings, &Tip::new(&axial, &[1.0; 2], 0.5 * TAU / 16.0), 4).unwrap();
+    let coating = Coating::new(&settings, &BladeTip::new(&axial, &[1.0; 2], 0.5 * TAU / 16.0), 4).unwrap();
     let w = p_matrix(&[0.1, 0.9, -0.3, 0.4, 0.8, -0.5, 0.2, 0.6, 0.7, -0.2, 0.3, -0.8, 0.5, 0.1, -0.6, 0.9], 4);
     let gaps = [-0.4, 0.1, -0.9, -2.5];
     let solve = |blades: [usize; 2], w: &DMatrix<f64>| {
@@ -404,7 +404,7 @@ fn what_cannot_be_a_coating_is_refused() {
     refused(made(&[0.0, 1.0], 5), "8 x 2 cells for 5 blades");
     refused(made(&[0.0, f64::NAN], 1), "m along the axis");
     let as_wide = |cells: f64, blades: usize| {
-        Coating::new(&settings, &Tip::new(&[0.0, 1.0], &[1.0; 2], cells * TAU / 8.0), blades)
+        Coating::new(&settings, &BladeTip::new(&[0.0, 1.0], &[1.0; 2], cells * TAU / 8.0), blades)
     };
     assert!(as_wide(2.999, 2).is_ok());
     refused(as_wide(3.001, 2), "the tip is as wide as 3.001 cells, of 8 that 2 blades share");

@@ -12,7 +12,7 @@ const FLAT: f64 = 1e-6;
 
 /// The tip of one blade: its contact nodes, in any order.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tip {
+pub struct BladeTip {
     /// Axial positions z (m).
     pub(super) axial: Vec<f64>,
     /// Radii (m).
@@ -24,7 +24,7 @@ pub struct Tip {
     pub(super) extent: [f64; 2],
 }
 
-impl Tip {
+impl BladeTip {
     /// Nodes at axial positions and radii (m), all as wide as `width` (m), with cells from the first to the last.
     pub fn new(axial: &[f64], radii: &[f64], width: f64) -> Self {
         let low = axial.iter().copied().fold(f64::INFINITY, f64::min);

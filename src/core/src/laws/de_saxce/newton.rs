@@ -12,7 +12,7 @@
 
 use super::linear::Eliminate;
 use super::one_contact::length;
-use super::problem::Problem;
+use super::problem::ScaledProblem;
 
 /// Steps of one attempt.
 const STEPS: usize = 20;
@@ -60,7 +60,7 @@ impl Newton {
 
     /// Newton steps from the reactions of the problem until the residual is below the tolerance. When it gives up,
     /// the reactions are those of the last step, projected on the cones.
-    pub(super) fn attempt(&mut self, problem: &mut Problem, proximal: f64, tolerance: f64) -> bool {
+    pub(super) fn attempt(&mut self, problem: &mut ScaledProblem, proximal: f64, tolerance: f64) -> bool {
         let mut memory = [0.0_f64; MEMORY];
         memory[0] = merit(problem, self.stretch);
         let mut uphill = 0;
@@ -86,7 +86,7 @@ impl Newton {
     }
 
     /// Project a copy on the cones; keep it when it solves the problem.
-    fn finished(&mut self, problem: &mut Problem, tolerance: f64) -> bool {
+    fn finished(&mut self, problem: &mut ScaledProblem, tolerance: f64) -> bool {
         let order = problem.order();
         self.start_reaction[..order].copy_from_slice(&problem.reaction[..order]);
         self.start_relative[..order].copy_from_slice(&problem.relative[..order]);
@@ -99,7 +99,7 @@ impl Newton {
         false
     }
 
-    fn close(&self, problem: &mut Problem) {
+    fn close(&self, problem: &mut ScaledProblem) {
         for contact in 0..problem.size {
             problem.project(contact);
         }
@@ -107,7 +107,7 @@ impl Newton {
     }
 
     /// Newton direction at the current reactions. False when the system is singular.
-    fn direct(&mut self, problem: &Problem, proximal: f64) -> bool {
+    fn direct(&mut self, problem: &ScaledProblem, proximal: f64) -> bool {
         self.active.clear();
         self.active.extend((0..problem.size).filter(|contact| trial(problem, self.stretch, *contact)[0] > 0.0));
         self.assemble(problem, proximal);
@@ -131,7 +131,7 @@ impl Newton {
         regular
     }
 
-    fn assemble(&mut self, problem: &Problem, proximal: f64) {
+    fn assemble(&mut self, problem: &ScaledProblem, proximal: f64) {
         let order = 3 * self.active.len();
         for (local, contact) in self.active.iter().enumerate() {
             for i in 0..3 {
@@ -189,7 +189,7 @@ impl Newton {
     }
 
     /// Go along the direction as far as the merit allows; returns the merit reached.
-    fn search(&mut self, problem: &mut Problem, allowed: f64) -> Option<f64> {
+    fn search(&mut self, problem: &mut ScaledProblem, allowed: f64) -> Option<f64> {
         let order = problem.order();
         self.moved[..order].fill(0.0);
         problem.add_product(&self.direction[..order], &mut self.moved[..order]);
@@ -207,7 +207,7 @@ impl Newton {
     }
 
     /// Go a part of the direction from the start of the step; returns the merit there.
-    fn go(&self, problem: &mut Problem, step: f64) -> f64 {
+    fn go(&self, problem: &mut ScaledProblem, step: f64) -> f64 {
         for k in 0..problem.order() {
             problem.reaction[k] = self.start_reaction[k] + step * self.direction[k];
             problem.relative[k] = self.start_relative[k] + step * self.moved[k];
@@ -217,7 +217,7 @@ impl Newton {
 }
 
 /// v = r − ρu of one contact.
-fn trial(problem: &Problem, stretch: f64, contact: usize) -> [f64; 3] {
+fn trial(problem: &ScaledProblem, stretch: f64, contact: usize) -> [f64; 3] {
     let k = 3 * contact;
     let (normal, tangent) = problem.flexibility(contact);
     let (normal, tangent) = (stretch * normal, stretch * tangent);
@@ -229,7 +229,7 @@ fn trial(problem: &Problem, stretch: f64, contact: usize) -> [f64; 3] {
 }
 
 /// ‖F‖².
-fn merit(problem: &Problem, stretch: f64) -> f64 {
+fn merit(problem: &ScaledProblem, stretch: f64) -> f64 {
     let mut sum = 0.0;
     for contact in 0..problem.size {
         let v = trial(problem, stretch, contact);

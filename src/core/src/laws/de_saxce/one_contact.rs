@@ -23,7 +23,7 @@ pub(super) fn solve(a: &[[f64; 3]; 3], b: [f64; 3], friction: f64) -> [f64; 3] {
     if friction <= 0.0 {
         return [-b[0] / a[0][0], 0.0, 0.0];
     }
-    let contact = Sliding::new(a, b, friction);
+    let contact = TangentialProblem::new(a, b, friction);
     if let Some(reaction) = contact.stick() {
         return reaction;
     }
@@ -31,7 +31,7 @@ pub(super) fn solve(a: &[[f64; 3]; 3], b: [f64; 3], friction: f64) -> [f64; 3] {
 }
 
 /// One contact after elimination of the normal reaction.
-struct Sliding {
+struct TangentialProblem {
     schur: [[f64; 2]; 2],
     right: [f64; 2],
     /// A_NT/A_NN.
@@ -41,7 +41,7 @@ struct Sliding {
     friction: f64,
 }
 
-impl Sliding {
+impl TangentialProblem {
     fn new(a: &[[f64; 3]; 3], b: [f64; 3], friction: f64) -> Self {
         let coupling = [a[0][1] / a[0][0], a[0][2] / a[0][0]];
         let alone = -b[0] / a[0][0];

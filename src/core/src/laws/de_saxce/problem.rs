@@ -20,7 +20,7 @@ const LARGEST_TERMS: f64 = 1e5;
 
 /// A problem of `size` contacts in scaled variables; entries contact by contact (normal, tangent 1, tangent 2).
 #[derive(Debug, Clone)]
-pub(super) struct Problem {
+pub(super) struct ScaledProblem {
     pub(super) size: usize,
     /// Ŵ by columns, 3·size rows.
     matrix: Vec<f64>,
@@ -39,7 +39,7 @@ pub(super) struct Problem {
     pub(super) instructions: InstructionSet,
 }
 
-impl Problem {
+impl ScaledProblem {
     pub(super) fn new(capacity: usize) -> Self {
         let order = 3 * capacity;
         Self {

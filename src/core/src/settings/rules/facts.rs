@@ -1,7 +1,7 @@
 //! What a scene can have, so that something else is needed or excluded.
 
-use super::place::Place;
-use crate::settings::{Closure, InputInterpolation, Meridian, Motion, Scheme, Shape, Solver};
+use super::place::ScenePlace;
+use crate::settings::{BodyMotion, Closure, InputInterpolation, Meridian, Scheme, Shape, Solver};
 
 /// Something a scene can have at a place.
 pub struct Fact {
@@ -9,10 +9,10 @@ pub struct Fact {
     pub(super) key: &'static str,
     /// What it is there, where the key alone does not say it.
     pub(super) words: &'static str,
-    pub(super) holds: fn(&Place) -> bool,
+    pub(super) holds: fn(&ScenePlace) -> bool,
 }
 
-const fn fact(key: &'static str, words: &'static str, holds: fn(&Place) -> bool) -> Fact {
+const fn fact(key: &'static str, words: &'static str, holds: fn(&ScenePlace) -> bool) -> Fact {
     Fact { key, words, holds }
 }
 
@@ -41,9 +41,10 @@ pub(super) const INITIAL: Fact = fact("structure.initial", "", |at| !at.structur
 pub(super) const INITIAL_SECTOR: Fact =
     fact("structure.initial.sector", "", |at| at.structure().initial.iter().any(|one| one.sector.is_some()));
 pub(super) const ROM_AROUND: Fact =
-    fact("structure.rom", "around an axis", |at| at.meets(|motion| motion != Motion::Free));
-pub(super) const ROM_FREE: Fact =
-    fact("structure.rom", "of a free structure, or of what it meets", |at| at.meets(|motion| motion == Motion::Free));
+    fact("structure.rom", "around an axis", |at| at.meets(|motion| motion != BodyMotion::Free));
+pub(super) const ROM_FREE: Fact = fact("structure.rom", "of a free structure, or of what it meets", |at| {
+    at.meets(|motion| motion == BodyMotion::Free)
+});
 
 pub(super) const SHAPE: Fact = fact("surface.shape", "", |at| at.surface().shape != Shape::default());
 pub(super) const MOVING: Fact = fact("surface.moving", "", |at| at.surface().moving);

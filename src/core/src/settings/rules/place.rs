@@ -3,13 +3,13 @@
 use crate::Rom;
 use crate::settings::relations::{Relations, structure};
 use crate::settings::{
-    CoatingSettings, ContactSettings, Motion, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings,
+    BodyMotion, CoatingSettings, ContactSettings, OutputSettings, SceneSettings, Scheme, Solver, StructureSettings,
     SurfaceSettings,
 };
 
 /// A place of a scene: one of its structures or contacts, or the scene as a whole.
 #[derive(Clone, Copy)]
-pub struct Place<'a> {
+pub struct ScenePlace<'a> {
     pub(super) settings: &'a SceneSettings,
     pub(super) relations: &'a Relations,
     /// As the structures; empty before ROMs are known.
@@ -21,7 +21,7 @@ pub struct Place<'a> {
 }
 
 /// The key with the number of its structure, surface or contact.
-pub(super) fn path(at: &Place, key: &str) -> String {
+pub(super) fn path(at: &ScenePlace, key: &str) -> String {
     let (table, rest) = key.split_once('.').unwrap_or((key, ""));
     let number = match table {
         "structure" | "contact" => at.index,
@@ -31,7 +31,7 @@ pub(super) fn path(at: &Place, key: &str) -> String {
     format!("{table}[{}].{rest}", number + 1)
 }
 
-impl<'a> Place<'a> {
+impl<'a> ScenePlace<'a> {
     /// The places of a key: structures, contacts, or the scene.
     pub(super) fn all_of(self, key: &str) -> impl Iterator<Item = Self> {
         let count = match key.split('.').next() {
@@ -71,7 +71,7 @@ impl<'a> Place<'a> {
 
     /// Whether the master of the contact flies freely.
     pub(super) fn is_free(&self) -> bool {
-        self.master().is_some_and(|master| master.motion == Motion::Free)
+        self.master().is_some_and(|master| master.motion == BodyMotion::Free)
     }
 
     pub(super) fn is_coated(&self) -> bool {
@@ -134,7 +134,7 @@ impl<'a> Place<'a> {
     }
 
     /// Whether the structure takes part in a contact whose master moves like this.
-    pub(super) fn meets(&self, moves: fn(Motion) -> bool) -> bool {
+    pub(super) fn meets(&self, moves: fn(BodyMotion) -> bool) -> bool {
         let own = self.relations.contacts[self.index].iter();
         own.filter_map(|contact| Self { index: *contact, ..*self }.master()).any(|master| moves(master.motion))
     }

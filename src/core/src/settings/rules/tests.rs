@@ -1,14 +1,17 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::all;
-use crate::rom::{ContactGrid, ContactNode, Frame, Harmonic, Patch, RomChecks, RomExtras, Spin, Thermal, Watched};
+use crate::rom::{
+    ContactGrid, ContactNode, DisplacementFrame, Harmonic, RomChecks, RomExtras, Spin, Thermal, ThermalPatch,
+    WatchedPoints,
+};
 use crate::settings::*;
 use crate::{Rom, Scene};
 
-fn rom(frame: Frame) -> Rom {
+fn rom(frame: DisplacementFrame) -> Rom {
     let node =
         ContactNode { name: "tip".into(), position: [0.25, 0.0, 0.0], meridional_slope: 0.0, ..ContactNode::default() };
-    let grid = Some(ContactGrid { around: 8, along: 2, closed: frame == Frame::Cylindrical });
+    let grid = Some(ContactGrid { around: 8, along: 2, closed: frame == DisplacementFrame::Cylindrical });
     Rom {
         name: "rom".into(),
         origin: String::new(),
@@ -25,14 +28,14 @@ fn rom(frame: Frame) -> Rom {
 }
 
 /// `master` before a surface of `under`, which stands still.
-fn scene(motion: Motion, frame: Frame) -> Scene {
+fn scene(motion: BodyMotion, frame: DisplacementFrame) -> Scene {
     let structure = |name: &str, motion| StructureSettings { name: name.into(), motion, ..Default::default() };
     let settings = SceneSettings {
         name: "scene".into(),
         preset: Preset::None,
         accept_implausible: false,
         silence: Vec::new(),
-        structures: vec![structure("master", motion), structure("under", Motion::Still)],
+        structures: vec![structure("master", motion), structure("under", BodyMotion::Still)],
         surfaces: vec![SurfaceSettings {
             name: "surface".into(),
             structure: Some("under".into()),
@@ -52,17 +55,17 @@ fn contact(surface: &str) -> ContactSettings {
 }
 
 fn rotor() -> Scene {
-    scene(Motion::Rotating, Frame::Cylindrical)
+    scene(BodyMotion::Rotating, DisplacementFrame::Cylindrical)
 }
 
 fn flight() -> Scene {
-    scene(Motion::Free, Frame::Cartesian)
+    scene(BodyMotion::Free, DisplacementFrame::Cartesian)
 }
 
 /// A master whose stress is asked for.
 fn stressed(scene: &mut Scene) {
     let points = scene.roms[0].contact_nodes.clone();
-    scene.roms[0].extras.stress = Some(Watched { map: DMatrix::zeros(6, 4), points });
+    scene.roms[0].extras.stress = Some(WatchedPoints { map: DMatrix::zeros(6, 4), points });
     (scene.settings.outputs.stress, scene.settings.outputs.watched_sectors) = (true, vec![1]);
 }
 
@@ -210,7 +213,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
     }),
     ("outputs.stress: with `structure.thermal` of a rotor needs static thermal stress", |scene| {
         stressed(scene);
-        let patches = vec![Patch { angle: [0.0, 1.0], axial: [0.0, 1.0] }];
+        let patches = vec![ThermalPatch { angle: [0.0, 1.0], axial: [0.0, 1.0] }];
         scene.roms[0].extras.thermal = Some(Thermal { loads: DMatrix::zeros(4, 1), patches });
         scene.settings.structures[0].thermal = true;
     }),
@@ -274,7 +277,9 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.time.scheme = Scheme::MasslessBoundary;
         scene.roms[0].mass = DMatrix::identity(3, 3);
     }),
-    ("structure[1].rom: around an axis needs `frame = cylindrical`", |scene| scene.roms[0].frame = Frame::Cartesian),
+    ("structure[1].rom: around an axis needs `frame = cylindrical`", |scene| {
+        scene.roms[0].frame = DisplacementFrame::Cartesian
+    }),
     ("structure[1].spin.growth: needs spin matrices", |scene| scene.settings.structures[0].spin.growth = true),
     ("structure[1].frequency_factors: excludes a ROM whose sectors", |scene| {
         scene.settings.structures[0].frequency_factors = vec![1.0];
@@ -319,7 +324,7 @@ const OF_FREE_MASTERS: &[(&str, Change)] = &[
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
     ("structure[2].rom: of a free structure, or of what it meets needs `frame = cartesian`", |scene| {
-        scene.roms[1].frame = Frame::Cylindrical;
+        scene.roms[1].frame = DisplacementFrame::Cylindrical;
     }),
     ("structure[1].rom: of a free structure, or of what it meets needs `sectors = 1`", |scene| {
         scene.roms[0].sectors = 2;

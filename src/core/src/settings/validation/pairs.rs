@@ -3,13 +3,13 @@
 use std::collections::HashSet;
 
 use crate::settings::relations::Relations;
-use crate::settings::{ContactSettings, Motion, SceneSettings, StructureSettings};
+use crate::settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings};
 use crate::{Error, Result};
 
 impl SceneSettings {
     /// The first free structure whose contact nodes touch something; `None` in scenes of rotors.
     pub fn free_master(&self) -> Option<&StructureSettings> {
-        let free = |structure: &&StructureSettings| structure.motion == Motion::Free;
+        let free = |structure: &&StructureSettings| structure.motion == BodyMotion::Free;
         self.touching().into_iter().map(|structure| &self.structures[structure]).find(free)
     }
 
@@ -47,7 +47,7 @@ impl StructureSettings {
     fn validate_part(&self, part: [bool; 2], at: String) -> Result<()> {
         let (name, what) = (&self.name, format!("{at}.name"));
         match part {
-            [false, false] if self.motion == Motion::Free => Err(Error::invalid(
+            [false, false] if self.motion == BodyMotion::Free => Err(Error::invalid(
                 format!("{at}.motion"),
                 format!("`{name}` flies freely and is the master of no contact"),
                 "Make it the master of a [[contact]], or remove it",

@@ -3,7 +3,7 @@
 use super::Parameters;
 use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::ModalModel;
-use crate::gaps::frame::Frame;
+use crate::gaps::frame::PolarFrame;
 use crate::gaps::spline::SplineGap;
 use crate::gaps::{GapLaw, dot};
 use crate::settings::{Meridian, Scheme, Solver};
@@ -37,7 +37,7 @@ fn slave_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) ->
     let mut seen = (zeros(), zeros());
     for (row, &node) in nodes.iter().enumerate().filter(|(_, node)| law.nodes.contains(node)) {
         let turned = angle + law.layout.angles[node * law.layout.lanes];
-        let frame = Frame::new(turned);
+        let frame = PolarFrame::new(turned);
         let place = law.surface.locate(frame.fixed([law.layout.radii[node], 0.0, law.layout.axial[node]]));
         for (index, weight) in law.surface.weights(place).iter() {
             for mode in 0..modes.len() {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::gaps::shape::Surface;
+use crate::gaps::shape::CompiledShape;
 use crate::settings::SpinSettings;
 use crate::simulation::compile::Compiled;
 
@@ -42,7 +42,8 @@ impl Closing {
                 return f64::INFINITY;
             }
             let closest = contact.sector_gaps.iter().copied().fold(contact.nominal_gap(), f64::min);
-            Surface::new(&surface.shape, contact.nominal_gap()).map_or(f64::INFINITY, |shape| widest(&shape, closest))
+            CompiledShape::new(&surface.shape, contact.nominal_gap())
+                .map_or(f64::INFINITY, |shape| widest(&shape, closest))
         };
         let arc = pairs.map(arc).fold(0.0, f64::max);
         Self { arc, after: PI / compiled.bodies[body].lowest_frequency(), ..Self::of_run(compiled) }
@@ -57,7 +58,7 @@ impl Closing {
 }
 
 /// Widest angle (rad) over which a shape reaches further in than `gap` (m); infinite where it does all around.
-fn widest(shape: &Surface, gap: f64) -> f64 {
+fn widest(shape: &CompiledShape, gap: f64) -> f64 {
     let spacing = TAU / f64::from(ANGLES);
     let is_inside = |place: u32| gap + shape.evaluate(spacing * f64::from(place)).0 <= 0.0;
     let (mut widest, mut now) = (0_u32, 0_u32);
@@ -76,14 +77,14 @@ mod tests {
 
     #[test]
     fn arcs_are_those_of_the_shape() {
-        let lobes = |amplitude| Surface::new(&Shape::Lobes { amplitude, order: 2, phase: 0.3 }, 1e-3).unwrap();
+        let lobes = |amplitude| CompiledShape::new(&Shape::Lobes { amplitude, order: 2, phase: 0.3 }, 1e-3).unwrap();
         // −A cos 2θ reaches A/√2 over half a right angle, one spacing more at most.
         let found = widest(&lobes(1e-3), 1e-3 / 2.0_f64.sqrt());
         assert!((PI / 4.0..PI / 4.0 + 0.005).contains(&found), "{found}");
         assert!(widest(&lobes(1e-3), 2e-3) < 0.002);
-        assert!(widest(&Surface::Circular, 0.0).is_infinite());
+        assert!(widest(&CompiledShape::Circular, 0.0).is_infinite());
         // Across the start of the angle.
-        let across = Surface::new(&Shape::Lobes { amplitude: 1e-3, order: 1, phase: 0.0 }, 1e-3).unwrap();
+        let across = CompiledShape::new(&Shape::Lobes { amplitude: 1e-3, order: 1, phase: 0.0 }, 1e-3).unwrap();
         assert!((widest(&across, 0.0) - PI).abs() < 0.005);
         let closing = Closing { arc: 0.1, after: 1e-4, run: 1e-2 };
         for (speed, expected) in [(-1000.0, 2e-4), (0.0, 1e-2), (1e-3, 1e-2)] {

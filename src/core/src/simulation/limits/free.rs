@@ -32,7 +32,7 @@ const RIGID: f64 = 1e-9;
 const ROUNDING: f64 = -1e-10;
 
 /// Nodes that are inside their surface somewhere on the flight.
-struct Met {
+struct NodesInside {
     nodes: Vec<usize>,
     directions: ContactDirections,
     geometry: Geometry,
@@ -45,7 +45,7 @@ impl Compiled {
         let own = std::iter::once_with(|| stability::unresolved::limit_along_axes(model));
         let unresolved = self.unresolved(body, own, parameters.scheme);
         let resolved = stability::unresolved::check(step, unresolved, model.largest_frequency());
-        let flight = Flight { compiled: self, system, body, parameters };
+        let flight = FlightCheck { compiled: self, system, body, parameters };
         // What a step of galerkin cannot solve it halves.
         let outcome = match parameters.scheme {
             Scheme::Galerkin => Ok(self.rigid_directions(body, model).into_iter().collect()),
@@ -88,14 +88,14 @@ impl Compiled {
 }
 
 /// A structure about to fly.
-struct Flight<'a> {
+struct FlightCheck<'a> {
     compiled: &'a Compiled,
     system: &'a System,
     body: usize,
     parameters: &'a Parameters,
 }
 
-impl Flight<'_> {
+impl FlightCheck<'_> {
     fn warnings(&self, step: f64) -> Result<Vec<Warning>> {
         let (compiled, scheme) = (self.compiled, self.parameters.scheme);
         let largest = compiled.bodies[self.body].model.largest_frequency();
@@ -146,7 +146,7 @@ impl Flight<'_> {
     /// Lowest eigenvalue of the symmetric part of the Delassus matrix with unit diagonal.
     fn solvability(
         &self,
-        met: &Met,
+        met: &NodesInside,
         friction: f64,
         laws: &[OpenGap],
         carriers: &[Option<(usize, ModalModel)>],
@@ -183,7 +183,7 @@ impl Flight<'_> {
 
 /// Where the undeformed structure touches on its flight; slip directions are as long as `frictions` of the pairs are against the
 /// largest.
-fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: f64) -> Vec<Met> {
+fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: f64) -> Vec<NodesInside> {
     let speed = dot(velocity, velocity).sqrt();
     let Some(extent) = laws.first().map(OpenGap::largest).filter(|_| speed != 0.0) else { return Vec::new() };
     let nodes = laws[0].positions().len();
@@ -210,7 +210,7 @@ fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: 
             (normal, tangent(velocity, normal).map(|value| share * value))
         };
         let directions = inside.iter().map(direction).collect();
-        met.push(Met { nodes: inside, directions, geometry });
+        met.push(NodesInside { nodes: inside, directions, geometry });
     }
     met
 }
@@ -218,7 +218,7 @@ fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: 
 /// The modes of a carrier at the places of the contacts; zero for contacts with other surfaces.
 fn seen_by(
     carrier: usize,
-    met: &Met,
+    met: &NodesInside,
     laws: &[OpenGap],
     carriers: &[Option<(usize, ModalModel)>],
 ) -> Option<ModalModel> {

@@ -6,9 +6,9 @@ use super::in_range;
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
 use crate::simulation::SAME_STEP;
-use crate::stability::judged::{self, Judged};
+use crate::stability::judged::{self, SetGrowth};
 use crate::stability::{self, ContactDirections, Fastest, digging};
-use crate::warning::{Level, Topic};
+use crate::warning::{Severity, Topic};
 use crate::{Error, Result, Warning, shown};
 
 /// Growth by this factor before contact opens takes what does not matter, a thousandth of the clearance, to all of it.
@@ -36,7 +36,7 @@ pub struct Sense {
 }
 
 /// A step (s), and of the sets of closed nodes the one to which it adds most.
-type Looked<'a> = (f64, Option<(&'a [usize], Judged)>);
+type Looked<'a> = (f64, Option<(&'a [usize], SetGrowth)>);
 
 /// Growth that steps of one range, or shorter ones, add.
 #[derive(Debug, Clone)]
@@ -77,7 +77,7 @@ impl Sense {
             Topic::Flutter if opens_before => warning
                 .clone()
                 .with_remedy(format!("Contact opens after {closed:.2e} s at most, before that matters: nothing to do"))
-                .at_level(Level::Note),
+                .at_level(Severity::Note),
             _ => warning.clone(),
         })
     }
@@ -97,11 +97,11 @@ impl Sense {
 
 /// The model that grows most at the step to expect with some nodes closed, and its growth with time continuous, which no step changes.
 /// At other steps only this one is looked at: with all nodal diameters of a disk at all steps the check would take a minute.
-struct Watched {
+struct FastestGrowth {
     nodes: Vec<usize>,
     model: usize,
     continuous: Fastest,
-    judged: Judged,
+    judged: SetGrowth,
 }
 
 /// The motion that grows fastest by the equations.
@@ -149,9 +149,9 @@ impl Checking<'_> {
         let sign = [1.0, -1.0][sense];
         let (watched, physics) = self.watched(expected, sign);
         let steps = looked_at(self.largest_frequency(), self.parameters.step);
-        let most = |of: &dyn Fn(&Watched) -> Option<Judged>| {
+        let most = |of: &dyn Fn(&FastestGrowth) -> Option<SetGrowth>| {
             let judged = watched.iter().filter_map(|watched| Some((watched.nodes.as_slice(), of(watched)?)));
-            judged.fold(None, |most: Option<(&[usize], Judged)>, found| match most {
+            judged.fold(None, |most: Option<(&[usize], SetGrowth)>, found| match most {
                 Some(known) if known.1.within(judged::TOLD) <= found.1.within(judged::TOLD) => Some(known),
                 _ => Some(found),
             })
@@ -172,7 +172,7 @@ impl Checking<'_> {
     }
 
     /// Everything at the step to expect.
-    fn watched(&self, expected: f64, sign: f64) -> (Vec<Watched>, Physics) {
+    fn watched(&self, expected: f64, sign: f64) -> (Vec<FastestGrowth>, Physics) {
         let (mut watched, mut physics) = (Vec::new(), Physics::default());
         // The equations of galerkin are those of massless-boundary.
         let scheme = match self.parameters.scheme {
@@ -181,7 +181,7 @@ impl Checking<'_> {
         };
         let noise = 1e-7 / self.parameters.step;
         for nodes in self.combinations() {
-            let mut most: Option<Watched> = None;
+            let mut most: Option<FastestGrowth> = None;
             for model in 0..self.models.len() {
                 let (seen, directions) = self.closed_at(model, &nodes, sign);
                 let largest = self.parameters.step;
@@ -204,8 +204,8 @@ impl Checking<'_> {
                 let found = stability::stepped(&seen, scheme, expected, self.friction, &directions, continuous);
                 let Some(growth) = found else { continue };
                 if most.as_ref().is_none_or(|most| growth.stepped > most.judged.growth.stepped) {
-                    let judged = Judged::new(&seen, scheme, expected, &directions, growth);
-                    most = Some(Watched { nodes: nodes.clone(), model, continuous, judged });
+                    let judged = SetGrowth::new(&seen, scheme, expected, &directions, growth);
+                    most = Some(FastestGrowth { nodes: nodes.clone(), model, continuous, judged });
                 }
             }
             watched.extend(most);
@@ -213,11 +213,11 @@ impl Checking<'_> {
         (watched, physics)
     }
 
-    fn judged(&self, watched: &Watched, step: f64, sign: f64) -> Option<Judged> {
+    fn judged(&self, watched: &FastestGrowth, step: f64, sign: f64) -> Option<SetGrowth> {
         let (seen, directions) = self.closed_at(watched.model, &watched.nodes, sign);
         let (scheme, friction) = (self.parameters.scheme, self.friction);
         let growth = stability::stepped(&seen, scheme, step, friction, &directions, watched.continuous)?;
-        Some(Judged::new(&seen, scheme, step, &directions, growth))
+        Some(SetGrowth::new(&seen, scheme, step, &directions, growth))
     }
 
     /// One of the models seen at closed nodes (at both parts of a nodal diameter), and their directions.
@@ -235,7 +235,7 @@ impl Checking<'_> {
         let mut added: Vec<(f64, Option<Added>)> = Vec::new();
         let (mut allowed, mut quiet) = (f64::INFINITY, f64::INFINITY);
         let (mut accepted, mut silent) = (None, None);
-        let mut worst: Option<(f64, &[usize], Judged)> = None;
+        let mut worst: Option<(f64, &[usize], SetGrowth)> = None;
         for (step, found) in ranges.iter().rev() {
             if let Some((nodes, judged)) = found {
                 let own = judged.within(judged::TOLD);
@@ -313,7 +313,7 @@ impl Checking<'_> {
         Sense { grows: lock_up.into_iter().chain(flutter).collect(), rate, expected, ranges: Vec::new() }
     }
 
-    fn warning(&self, (step, nodes, judged): (f64, &[usize], Judged), silent: Option<f64>, sign: f64) -> Warning {
+    fn warning(&self, (step, nodes, judged): (f64, &[usize], SetGrowth), silent: Option<f64>, sign: f64) -> Warning {
         let problem = format!(
             "the step makes sliding contact grow: {} at {:.2e} 1/s with steps of {} s, where the equations have {:.2e} 1/s; that may \
              displace the tips by {:.0} % of what contact does",
@@ -330,7 +330,7 @@ impl Checking<'_> {
         Warning::new(Topic::StepGrowth, problem, remedy)
     }
 
-    fn refusal(&self, (step, nodes, judged): (f64, &[usize], Judged), accepted: Option<f64>, sign: f64) -> Error {
+    fn refusal(&self, (step, nodes, judged): (f64, &[usize], SetGrowth), accepted: Option<f64>, sign: f64) -> Error {
         let step_remedy = accepted.map_or(String::new(), |step| {
             format!("Set `time.step` (in the FMU `internal_step_max`) to {} or less, or use", shown(below(step)))
         });
@@ -402,13 +402,13 @@ mod tests {
         let lock_up = Warning::new(Topic::LockUp, "locks up", "Use less friction");
         let sense = Sense { grows: vec![lock_up, flutter], rate: 1e3, ..Sense::default() };
         // ln 1000 = 6.9 at 1000 1/s.
-        for (closed, level) in [(6e-3, Level::Note), (7e-3, Level::Warning), (f64::INFINITY, Level::Warning)] {
+        for (closed, level) in [(6e-3, Severity::Note), (7e-3, Severity::Warning), (f64::INFINITY, Severity::Warning)] {
             let found: Vec<Warning> = sense.grows(closed).collect();
-            assert_eq!(found[0].level(), Level::Warning, "self-locking is never a note");
+            assert_eq!(found[0].level(), Severity::Warning, "self-locking is never a note");
             assert_eq!(found[1].level(), level, "{closed} s");
             for text in [&found[1].lines()[1], &*found[1]] {
-                assert_eq!(text.contains("nothing to do"), level == Level::Note, "{text}");
-                assert_eq!(text.contains("Use less friction"), level == Level::Warning, "{text}");
+                assert_eq!(text.contains("nothing to do"), level == Severity::Note, "{text}");
+                assert_eq!(text.contains("Use less friction"), level == Severity::Warning, "{text}");
             }
         }
     }

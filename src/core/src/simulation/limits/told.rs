@@ -20,7 +20,7 @@ const KINDS: usize = 5;
 
 /// What was told since the start.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct WarningState {
     /// Longest step told about (s), per kind and structure: kinds of those that touch, and one of those that carry surfaces.
     steps: [Vec<f64>; KINDS],
     /// Senses of slip, + and −, of each structure that touches.
@@ -45,7 +45,7 @@ pub struct Told {
     pub(in crate::simulation) missed: bool,
 }
 
-impl Told {
+impl WarningState {
     /// Nothing, of so many structures that touch, and that carry surfaces.
     pub(in crate::simulation) fn new(bodies: usize, carriers: usize) -> Self {
         Self {
@@ -68,7 +68,7 @@ impl Simulation {
     /// Warnings of the start are told; those of the step to expect among them.
     pub(in crate::simulation) fn begin_telling(&mut self, parameters: &Parameters) {
         let expected = self.compiled.expected_step(parameters.step);
-        self.told = Told::new(self.rotors.len(), self.compiled.carriers.len());
+        self.told = WarningState::new(self.rotors.len(), self.compiled.carriers.len());
         for kind in 0..KINDS {
             for of in 0..self.told.steps[kind].len() {
                 self.told.steps[kind][of] = if self.doubt(kind, of, expected).is_some() { expected } else { 0.0 };

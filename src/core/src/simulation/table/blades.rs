@@ -1,15 +1,15 @@
 //! Rows of what acts on blades beside contact: excitation, heat, motion at the start; and of damping by modes.
 
-use super::builder::Builder;
+use super::builder::TableBuilder;
 use super::features::LARGEST_TEMPERATURE;
-use super::parts::{Body, Parts};
+use super::parts::{BodyFacts, TableFacts};
 use crate::ranges;
 use crate::settings::StructureSettings;
 use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINEAR_SPEED, TEMPERATURE};
-use crate::variables::{Kind, Quantity, Start};
+use crate::variables::{DataType, Quantity, StartValue};
 
 /// Excitation and temperature.
-pub fn inputs(table: &mut Builder, parts: &Parts, body: &Body) {
+pub fn inputs(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     if let Some(excitation) = &body.structure.excitation {
         let text = "Amplitude of the excitation of each blade by an engine order";
         let (name, quantity) = ("excitation_amplitude", Quantity::Excitation(0));
@@ -30,12 +30,12 @@ pub fn inputs(table: &mut Builder, parts: &Parts, body: &Body) {
 }
 
 /// Engine order, and motion at the start.
-pub fn parameters(table: &mut Builder, body: &Body) {
+pub fn parameters(table: &mut TableBuilder, body: &BodyFacts) {
     if let Some(excitation) = &body.structure.excitation {
         let text = "Engine order of the excitation of the blades";
         let row = table.parameter(Quantity::ExcitationOrder, "excitation_order", None, 0.0, text);
-        (row.kind, row.min, row.max) = (Kind::Integer, Some(0.0), Some(ranges::ENGINE_ORDER));
-        row.start = Some(Start::Integer(i32::try_from(excitation.order).unwrap_or(i32::MAX)));
+        (row.kind, row.min, row.max) = (DataType::Integer, Some(0.0), Some(ranges::ENGINE_ORDER));
+        row.start = Some(StartValue::Integer(i32::try_from(excitation.order).unwrap_or(i32::MAX)));
     }
     let initial = &body.structure.initial;
     if initial.is_empty() {
@@ -47,19 +47,25 @@ pub fn parameters(table: &mut Builder, body: &Body) {
     let (name, quantity) = ("initial_displacement", Quantity::InitialDisplacement);
     let row = table.parameter(quantity, name, Some(&LENGTH), 0.0, text);
     (row.dimension, row.start, row.nominal, row.display) =
-        (Some(initial.len()), Some(Start::Real(displacements)), Some(1e-4), Some(1));
+        (Some(initial.len()), Some(StartValue::Real(displacements)), Some(1e-4), Some(1));
     (row.min, row.max) = (Some(-ranges::POSITION), Some(ranges::POSITION));
     let text = "Velocity of the blades at the start, of each [[structure.initial]]";
     let row = table.parameter(Quantity::InitialRate, "initial_velocity", Some(&LINEAR_SPEED), 0.0, text);
-    (row.dimension, row.start, row.nominal) = (Some(initial.len()), Some(Start::Real(velocities)), Some(1.0));
+    (row.dimension, row.start, row.nominal) = (Some(initial.len()), Some(StartValue::Real(velocities)), Some(1.0));
     (row.min, row.max) = (Some(-ranges::VELOCITY), Some(ranges::VELOCITY));
 }
 
 /// Damping ratios of the first modes.
-pub fn mode_damping(table: &mut Builder, quantity: Quantity, name: &str, structure: &StructureSettings, told: &str) {
+pub fn mode_damping(
+    table: &mut TableBuilder,
+    quantity: Quantity,
+    name: &str,
+    structure: &StructureSettings,
+    told: &str,
+) {
     let ratios = &structure.damping_ratios;
     if !ratios.is_empty() {
         let row = table.damping(quantity, name, 0.0, &format!("Modal damping ratios of the first modes of {told}"));
-        (row.dimension, row.start) = (Some(ratios.len()), Some(Start::Real(ratios.clone())));
+        (row.dimension, row.start) = (Some(ratios.len()), Some(StartValue::Real(ratios.clone())));
     }
 }

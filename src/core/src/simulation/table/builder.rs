@@ -4,10 +4,10 @@ use crate::laws::SOLVERS;
 use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP, TURNED};
 use crate::schemes::SCHEMES;
 use crate::settings::{ContactSettings, SceneSettings, TOLERANCE};
-use crate::simulation::outputs::Reader;
+use crate::simulation::outputs::OutputReader;
 use crate::simulation::units::{ANGLE, INPUT_INTERPOLATIONS, STEP_DERIVATIVES, TIME};
 use crate::variables::{
-    Causality, Enumeration, Kind, Quantity, Span, Start, Unit, Variability, Variable, VariableTable,
+    Causality, DataType, Enumeration, Quantity, Span, StartValue, Variability, Variable, VariableTable, VariableUnit,
 };
 use crate::{Result, ranges};
 
@@ -18,17 +18,17 @@ const RAMPED_ANGLE: &str = "; reached at the end of the step (input_interpolatio
 
 /// Collects rows and hands out references.
 #[derive(Default)]
-pub struct Builder {
+pub struct TableBuilder {
     variables: Vec<Variable>,
     /// Of the outputs, in their order.
-    readers: Vec<Reader>,
+    readers: Vec<OutputReader>,
     next: u32,
     /// What rows from here on belong to, and what their names start with.
     of: usize,
     prefix: String,
 }
 
-impl Builder {
+impl TableBuilder {
     /// Rows from here on belong to structure or pair `of`, and their names start with `prefix`.
     pub fn belongs(&mut self, of: usize, prefix: String) {
         (self.of, self.prefix) = (of, prefix);
@@ -50,7 +50,7 @@ impl Builder {
             name: format!("{}{}", self.prefix, name.into()),
             reference: self.next,
             dimension: None,
-            kind: Kind::Real,
+            kind: DataType::Real,
             causality: Causality::Output,
             variability: Variability::Continuous,
             span: Span::Point,
@@ -79,14 +79,14 @@ impl Builder {
         &mut self,
         quantity: Quantity,
         name: &str,
-        unit: Option<&'static Unit>,
+        unit: Option<&'static VariableUnit>,
         start: f64,
         text: &str,
     ) -> &mut Variable {
         let variable = self.push(quantity, name, text);
         variable.causality = Causality::Input;
         variable.unit = unit;
-        variable.start = Some(Start::Real(vec![start]));
+        variable.start = Some(StartValue::Real(vec![start]));
         if unit == Some(&ANGLE) {
             (variable.min, variable.max) = (Some(-TURNED), Some(TURNED));
         }
@@ -98,7 +98,7 @@ impl Builder {
         &mut self,
         quantity: Quantity,
         name: &str,
-        unit: Option<&'static Unit>,
+        unit: Option<&'static VariableUnit>,
         start: f64,
         text: &str,
     ) -> &mut Variable {
@@ -111,7 +111,7 @@ impl Builder {
         &mut self,
         quantity: Quantity,
         name: &str,
-        unit: Option<&'static Unit>,
+        unit: Option<&'static VariableUnit>,
         start: f64,
         text: &str,
     ) -> &mut Variable {
@@ -123,8 +123,8 @@ impl Builder {
 
     pub fn choice(&mut self, quantity: Quantity, name: &str, choices: &'static Enumeration, start: i32, text: &str) {
         let variable = self.parameter(quantity, name, None, 0.0, text);
-        variable.kind = Kind::Enumeration(choices);
-        variable.start = Some(Start::Integer(start));
+        variable.kind = DataType::Enumeration(choices);
+        variable.start = Some(StartValue::Integer(start));
     }
 
     /// An output with what fills it.
@@ -132,9 +132,9 @@ impl Builder {
         &mut self,
         name: impl Into<String>,
         span: Span,
-        unit: Option<(&'static Unit, f64)>,
+        unit: Option<(&'static VariableUnit, f64)>,
         text: impl Into<String>,
-        read: Reader,
+        read: OutputReader,
     ) -> &mut Variable {
         self.readers.push(read);
         let variable = self.push(Quantity::Output, name, text);
@@ -192,9 +192,10 @@ impl Builder {
         let text = "Most internal steps of one communication step, those tried in vain included (0: any number); a step that takes \
                     more is discarded";
         let most = self.parameter(Quantity::StepsAtMost, "steps_at_most", None, 0.0, text);
-        (most.kind, most.variability) = (Kind::Integer, Variability::Tunable);
+        (most.kind, most.variability) = (DataType::Integer, Variability::Tunable);
         (most.min, most.max) = (Some(0.0), Some(ranges::STEPS));
-        most.start = Some(Start::Integer(i32::try_from(settings.time.steps_at_most.unwrap_or(0)).unwrap_or(i32::MAX)));
+        most.start =
+            Some(StartValue::Integer(i32::try_from(settings.time.steps_at_most.unwrap_or(0)).unwrap_or(i32::MAX)));
     }
 
     /// How inputs run between communication points.
@@ -215,8 +216,8 @@ impl Builder {
     /// Name of the scene.
     pub fn scene_name(&mut self, settings: &SceneSettings) {
         let name = self.push(Quantity::SceneName, "scene", "Name of the scene this FMU was made from");
-        (name.kind, name.causality, name.variability) = (Kind::String, Causality::Local, Variability::Constant);
-        name.start = Some(Start::String(settings.name.clone()));
+        (name.kind, name.causality, name.variability) = (DataType::String, Causality::Local, Variability::Constant);
+        name.start = Some(StartValue::String(settings.name.clone()));
     }
 
     /// Time, the independent variable.
@@ -230,7 +231,7 @@ impl Builder {
     ///
     /// # Errors
     /// Names given twice.
-    pub fn finish(self) -> Result<(VariableTable, Vec<Reader>)> {
+    pub fn finish(self) -> Result<(VariableTable, Vec<OutputReader>)> {
         Ok((VariableTable::new(self.variables)?, self.readers))
     }
 }

@@ -1,20 +1,20 @@
 //! Outputs that every scene has.
 
-use super::builder::Builder;
+use super::builder::TableBuilder;
 use super::features;
-use super::parts::{Body, Parts};
-use crate::settings::{Motion, SceneSettings};
-use crate::simulation::outputs::{View, scalar};
+use super::parts::{BodyFacts, TableFacts};
+use crate::settings::{BodyMotion, SceneSettings};
+use crate::simulation::outputs::{OutputView, scalar};
 use crate::simulation::units::{ENERGY, FORCE, IMPULSE, POWER, TIME};
-use crate::variables::{Kind, Quantity, Span, Unit, Variability};
+use crate::variables::{DataType, Quantity, Span, Variability, VariableUnit};
 
-pub fn smallest_clearance(table: &mut Builder, unit: Option<(&'static Unit, f64)>, text: &str) {
+pub fn smallest_clearance(table: &mut TableBuilder, unit: Option<(&'static VariableUnit, f64)>, text: &str) {
     let read = scalar(|view| view.lowest());
     table.output("clearance_minimum", Span::Window, unit, text, read).display = Some(1);
 }
 
 /// Forces and contacts as a whole.
-pub fn totals(table: &mut Builder, friction: bool) {
+pub fn totals(table: &mut TableBuilder, friction: bool) {
     let peak = table.output(
         "normal_force_peak",
         Span::Window,
@@ -46,7 +46,8 @@ pub fn totals(table: &mut Builder, friction: bool) {
         "Contact nodes touching at the communication point",
         scalar(|view| view.contacts()),
     );
-    (count.kind, count.variability, count.quantity) = (Kind::Integer, Variability::Discrete, Quantity::ContactCount);
+    (count.kind, count.variability, count.quantity) =
+        (DataType::Integer, Variability::Discrete, Quantity::ContactCount);
     count.min = Some(0.0);
     let touching = table.output(
         "in_contact",
@@ -55,11 +56,11 @@ pub fn totals(table: &mut Builder, friction: bool) {
         "Whether any contact node touches at the communication point",
         scalar(|view| f64::from(u8::from(!view.system.events().is_empty()))),
     );
-    (touching.kind, touching.variability) = (Kind::Boolean, Variability::Discrete);
+    (touching.kind, touching.variability) = (DataType::Boolean, Variability::Discrete);
 }
 
 /// Name, span, quantity where other code looks for it, text, and the term of the ledger or of the instant.
-type Energy = (&'static str, Span, Quantity, &'static str, fn(&View) -> f64);
+type Energy = (&'static str, Span, Quantity, &'static str, fn(&OutputView) -> f64);
 
 /// All rows of the ledger; what has no text is told in other words of rotors and of free bodies.
 const ENERGIES: [Energy; 19] = [
@@ -167,7 +168,7 @@ const ENERGIES: [Energy; 19] = [
 ];
 
 /// The ledger's rows that exist.
-pub fn energies(table: &mut Builder, parts: &Parts) {
+pub fn energies(table: &mut TableBuilder, parts: &TableFacts) {
     let mut words = words(parts).into_iter();
     for (name, span, quantity, text, read) in ENERGIES.into_iter().filter(|row| exists(parts, row.0)) {
         let text = if text.is_empty() { words.next().unwrap_or_default() } else { text };
@@ -188,12 +189,12 @@ pub fn energies(table: &mut Builder, parts: &Parts) {
 const SOFTENED: &str =
     "Strain energy that changes of speed and temperature add by stiffening and softening since the start";
 
-fn softens(parts: &Parts) -> bool {
+fn softens(parts: &TableFacts) -> bool {
     parts.bodies().iter().any(|body| body.structure.softening != 0.0)
 }
 
 /// Of kinetic energy, strain energy and impacts.
-fn words(parts: &Parts) -> [&'static str; 3] {
+fn words(parts: &TableFacts) -> [&'static str; 3] {
     if parts.bodies().iter().any(|body| body.free) {
         return [
             "Kinetic energy of all structures, flight included",
@@ -208,9 +209,9 @@ fn words(parts: &Parts) -> [&'static str; 3] {
     ]
 }
 
-fn exists(parts: &Parts, name: &str) -> bool {
+fn exists(parts: &TableFacts, name: &str) -> bool {
     let (bodies, pairs) = (parts.bodies(), parts.pairs());
-    let turns = |body: &Body| body.structure.motion == Motion::Rotating;
+    let turns = |body: &BodyFacts| body.structure.motion == BodyMotion::Rotating;
     match name {
         "friction_loss" => parts.has_friction(),
         "wear_work" => pairs.iter().any(|pair| pair.contact.coating.is_some()),
@@ -229,7 +230,7 @@ fn exists(parts: &Parts, name: &str) -> bool {
 }
 
 /// Name, text, and the count.
-type Count = (&'static str, &'static str, fn(&View) -> f64);
+type Count = (&'static str, &'static str, fn(&OutputView) -> f64);
 
 /// What a tolerance has taken since the start.
 const EFFORTS: [Count; 3] = [
@@ -249,7 +250,7 @@ const EFFORTS: [Count; 3] = [
 ];
 
 /// Internal step in use and number of steps; with a tolerance, what it takes.
-pub fn internal_steps(table: &mut Builder, settings: &SceneSettings) {
+pub fn internal_steps(table: &mut TableBuilder, settings: &SceneSettings) {
     let with_tolerance = settings.takes_a_tolerance();
     let internal = table.output(
         "internal_step",

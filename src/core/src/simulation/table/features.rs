@@ -1,28 +1,28 @@
 //! Rows of what only some scenes ask for.
 
 use super::blades;
-use super::builder::Builder;
-use super::parts::{AXES, Body, Carrier, Pair, Parts, largest_length};
+use super::builder::TableBuilder;
+use super::parts::{AXES, BodyFacts, CarrierFacts, PairFacts, TableFacts, largest_length};
 use crate::laws::coating::Coating;
 use crate::ranges;
 use crate::settings::{CoatingSettings, StructureSettings};
 use crate::simulation::outputs::{each, scalar, whole};
 use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
-use crate::variables::{Kind, Quantity, Span, Start, Variability};
+use crate::variables::{DataType, Quantity, Span, StartValue, Variability};
 
 /// Temperatures beyond this are not what a linear expansion describes (K).
 pub const LARGEST_TEMPERATURE: f64 = 3000.0;
 
 /// Whether centrifugal, thermal or nodal-diameter loads act.
-pub fn is_loaded(parts: &Parts) -> bool {
-    let loaded = |carrier: &Carrier| carrier.structure.thermal || carrier.structure.load.is_some();
-    let heated = |body: &Body| body.structure.spin.growth || body.structure.thermal;
+pub fn is_loaded(parts: &TableFacts) -> bool {
+    let loaded = |carrier: &CarrierFacts| carrier.structure.thermal || carrier.structure.load.is_some();
+    let heated = |body: &BodyFacts| body.structure.spin.growth || body.structure.thermal;
     parts.bodies().iter().any(heated) || parts.carriers().iter().any(loaded)
 }
 
 /// Whether inputs move or load something; growth and stiffening follow the speed as such an input.
-pub fn has_moving_inputs(parts: &Parts) -> bool {
-    let moves = |body: &Body| {
+pub fn has_moving_inputs(parts: &TableFacts) -> bool {
+    let moves = |body: &BodyFacts| {
         let StructureSettings { whirl, axial_shift, spin, excitation, .. } = body.structure;
         *whirl || *axial_shift || spin.stiffening || spin.coriolis || excitation.is_some()
     };
@@ -30,7 +30,7 @@ pub fn has_moving_inputs(parts: &Parts) -> bool {
 }
 
 /// Whirl, axial shift, excitation, temperatures, nodal-diameter load.
-pub fn inputs(table: &mut Builder, parts: &Parts) {
+pub fn inputs(table: &mut TableBuilder, parts: &TableFacts) {
     for body in &parts.bodies() {
         table.belongs(body.index, parts.of_body(body));
         shaft(table, body);
@@ -42,7 +42,7 @@ pub fn inputs(table: &mut Builder, parts: &Parts) {
     }
 }
 
-fn shaft(table: &mut Builder, body: &Body) {
+fn shaft(table: &mut TableBuilder, body: &BodyFacts) {
     let largest = largest_length(body.rom);
     let rows = [
         (body.structure.whirl, "whirl_x", "Displacement of the shaft's centre along fixed x"),
@@ -59,7 +59,7 @@ fn shaft(table: &mut Builder, body: &Body) {
     }
 }
 
-fn loads(table: &mut Builder, Carrier { structure, rom, .. }: &Carrier) {
+fn loads(table: &mut TableBuilder, CarrierFacts { structure, rom, .. }: &CarrierFacts) {
     if let Some(thermal) = rom.extras.thermal.as_ref().filter(|_| structure.thermal) {
         let row = table.moving_input(
             Quantity::CasingTemperature,
@@ -70,7 +70,7 @@ fn loads(table: &mut Builder, Carrier { structure, rom, .. }: &Carrier) {
         );
         let patches = thermal.patches.len();
         row.dimension = Some(patches);
-        row.start = Some(Start::Real(vec![0.0; patches]));
+        row.start = Some(StartValue::Real(vec![0.0; patches]));
         row.nominal = Some(100.0);
         (row.min, row.max) = (Some(-LARGEST_TEMPERATURE), Some(LARGEST_TEMPERATURE));
     }
@@ -86,7 +86,7 @@ fn loads(table: &mut Builder, Carrier { structure, rom, .. }: &Carrier) {
 }
 
 /// Damping of a structure that carries surfaces.
-pub fn damping(table: &mut Builder, carrier: &Carrier, prefix: String, name: &str) {
+pub fn damping(table: &mut TableBuilder, carrier: &CarrierFacts, prefix: String, name: &str) {
     table.belongs(carrier.index, prefix);
     let ratio = carrier.structure.damping_ratio.unwrap_or(carrier.rom.damping_ratio);
     let row = if carrier.open { "damping_ratio" } else { "casing_damping_ratio" };
@@ -95,7 +95,7 @@ pub fn damping(table: &mut Builder, carrier: &Carrier, prefix: String, name: &st
 }
 
 /// Damping of casings, share of the friction heat.
-pub fn parameters(table: &mut Builder, parts: &Parts) {
+pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
     let carriers = parts.carriers();
     for carrier in carriers.iter().filter(|carrier| !carrier.open) {
         let name = if carriers.len() > 1 { &carrier.structure.name } else { "the casing" };
@@ -106,8 +106,8 @@ pub fn parameters(table: &mut Builder, parts: &Parts) {
             table.belongs(carrier.index, parts.of_carrier(carrier));
             let text = "Number of nodal diameters of the radial line load on the casing";
             let row = table.parameter(Quantity::LoadOrder, "casing_load_order", None, 0.0, text);
-            (row.kind, row.min) = (Kind::Integer, Some(0.0));
-            row.start = Some(Start::Integer(i32::try_from(load.order).unwrap_or(i32::MAX)));
+            (row.kind, row.min) = (DataType::Integer, Some(0.0));
+            row.start = Some(StartValue::Integer(i32::try_from(load.order).unwrap_or(i32::MAX)));
         }
     }
     for pair in parts.pairs() {
@@ -121,7 +121,7 @@ pub fn parameters(table: &mut Builder, parts: &Parts) {
 }
 
 /// Heat, wear, casing displacement.
-pub fn outputs(table: &mut Builder, parts: &Parts) {
+pub fn outputs(table: &mut TableBuilder, parts: &TableFacts) {
     let pairs = parts.pairs();
     for pair in pairs.iter().filter(|_| parts.has_friction()) {
         table.belongs(pair.index, parts.of_pair(pair));
@@ -156,7 +156,7 @@ pub fn outputs(table: &mut Builder, parts: &Parts) {
 }
 
 /// Force and moment on a surface: opposite to those on the rotor, at the same points.
-fn casing_forces(table: &mut Builder, pair: &Pair) {
+fn casing_forces(table: &mut TableBuilder, pair: &PairFacts) {
     let index = pair.index;
     for (axis, letter) in AXES.into_iter().enumerate() {
         let text = format!("Contact force on the casing along fixed {letter}, mean over the communication step");
@@ -174,7 +174,7 @@ fn casing_forces(table: &mut Builder, pair: &Pair) {
 }
 
 /// Force and moment of the support on a casing.
-fn support(table: &mut Builder, carrier: &Carrier) {
+fn support(table: &mut TableBuilder, carrier: &CarrierFacts) {
     let index = carrier.index;
     for (row, (axis, letter)) in (0..2).flat_map(|_| AXES.into_iter().enumerate()).enumerate() {
         let (name, text, unit) = if row < 3 {
@@ -193,7 +193,7 @@ fn support(table: &mut Builder, carrier: &Carrier) {
     }
 }
 
-fn heat(table: &mut Builder, pair: &Pair) {
+fn heat(table: &mut TableBuilder, pair: &PairFacts) {
     let (index, power) = (pair.index, Some((&POWER, 100.0)));
     if pair.patches > 0 {
         let text = "Friction power into each casing patch, mean over the communication step";
@@ -209,7 +209,7 @@ fn heat(table: &mut Builder, pair: &Pair) {
     }
 }
 
-fn wear(table: &mut Builder, parts: &Parts, pair: &Pair, coating: &CoatingSettings) {
+fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating: &CoatingSettings) {
     let (index, depth) = (pair.index, Some((&LENGTH, coating.thickness)));
     let read = scalar(move |view| view.coating(index, Coating::largest_wear_depth));
     let text = "Largest wear depth of the coating";

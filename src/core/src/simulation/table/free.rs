@@ -1,16 +1,16 @@
 //! Rows of structures that fly freely.
 
-use super::builder::Builder;
-use super::parts::{AXES, Body, Parts};
+use super::builder::TableBuilder;
+use super::parts::{AXES, BodyFacts, TableFacts};
 use super::rotor::watched_rows;
 use crate::Rom;
 use crate::ranges;
 use crate::simulation::outputs::{each, scalar};
 use crate::simulation::units::{FORCE, LENGTH, LINEAR_SPEED};
-use crate::variables::{Quantity, Span, Unit};
+use crate::variables::{Quantity, Span, VariableUnit};
 
 /// Velocity at the start.
-pub fn velocity(table: &mut Builder, body: &Body) {
+pub fn velocity(table: &mut TableBuilder, body: &BodyFacts) {
     for (axis, name) in AXES.into_iter().enumerate() {
         let velocity = table.parameter(
             Quantity::InitialVelocity(axis),
@@ -25,7 +25,7 @@ pub fn velocity(table: &mut Builder, body: &Body) {
 }
 
 /// Rigid motion and contact nodes.
-pub fn bodies(table: &mut Builder, parts: &Parts) {
+pub fn bodies(table: &mut TableBuilder, parts: &TableFacts) {
     for body in parts.bodies().iter().filter(|body| body.free) {
         table.belongs(body.index, format!("{}.", body.structure.name));
         motion(table, body);
@@ -35,7 +35,7 @@ pub fn bodies(table: &mut Builder, parts: &Parts) {
     }
 }
 
-fn motion(table: &mut Builder, body: &Body) {
+fn motion(table: &mut TableBuilder, body: &BodyFacts) {
     let (index, name) = (body.index, &body.structure.name);
     for (axis, letter) in AXES.into_iter().enumerate() {
         let text = format!("Velocity of the centre of mass of {name} along {letter}, mean over the last internal step");
@@ -52,9 +52,9 @@ fn motion(table: &mut Builder, body: &Body) {
 }
 
 /// Arrays over the contact nodes.
-fn nodes(table: &mut Builder, parts: &Parts, body: &Body) {
+fn nodes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let (list, count, index) = (node_list(body.rom), body.rom.contact_nodes.len(), body.index);
-    let units: [Option<(&'static Unit, f64)>; 2] = [Some((&LENGTH, 1e-3)), Some((&FORCE, 100.0))];
+    let units: [Option<(&'static VariableUnit, f64)>; 2] = [Some((&LENGTH, 1e-3)), Some((&FORCE, 100.0))];
     for row in watched_rows(index, 0, units) {
         if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_friction()) {
             let text = match row.name {

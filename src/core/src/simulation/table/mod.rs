@@ -11,23 +11,23 @@ mod free;
 mod parts;
 mod rotor;
 
-use super::outputs::{Reader, scalar};
-use super::plan::Plan;
+use super::outputs::{OutputReader, scalar};
+use super::plan::SteppingOrder;
 use super::units::{ANGLE, ANGULAR_SPEED, FORCE, LENGTH, TIME, TORQUE};
-use crate::gaps::shape::Surface;
-use crate::settings::{InputInterpolation, Motion, Scene, SceneSettings, Shape};
+use crate::gaps::shape::CompiledShape;
+use crate::settings::{BodyMotion, InputInterpolation, Scene, SceneSettings, Shape};
 use crate::variables::{Quantity, Span, Variability, VariableTable};
 use crate::{Result, Rom, ranges};
-use builder::{Builder, RAMPED};
-use parts::{AXES, Body, Pair, Parts, largest_length};
+use builder::{RAMPED, TableBuilder};
+use parts::{AXES, BodyFacts, PairFacts, TableFacts, largest_length};
 
 /// Build the table of a validated scene, and what fills its outputs, in their order.
 ///
 /// # Errors
 /// A watched sector or nodal diameter that no ROM has; pairs that do not fit the ROMs.
-pub fn build(scene: &Scene) -> Result<(VariableTable, Vec<Reader>)> {
-    let parts = &Parts { scene, settings: &scene.settings, plan: Plan::new(scene)? };
-    let mut table = Builder::default();
+pub fn build(scene: &Scene) -> Result<(VariableTable, Vec<OutputReader>)> {
+    let parts = &TableFacts { scene, settings: &scene.settings, plan: SteppingOrder::new(scene)? };
+    let mut table = TableBuilder::default();
     table.time();
     inputs(&mut table, parts)?;
     features::inputs(&mut table, parts);
@@ -46,8 +46,8 @@ pub fn build(scene: &Scene) -> Result<(VariableTable, Vec<Reader>)> {
     table.finish()
 }
 
-fn inputs(table: &mut Builder, parts: &Parts) -> Result<()> {
-    for body in parts.bodies().iter().filter(|body| body.structure.motion == Motion::Rotating) {
+fn inputs(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
+    for body in parts.bodies().iter().filter(|body| body.structure.motion == BodyMotion::Rotating) {
         table.belongs(body.index, parts.of_body(body));
         let text = format!("Speed of {} about +z; held over a step, or linear with a derivative", parts.rotor(body));
         let speed = table.input(Quantity::Speed, "speed", Some(&ANGULAR_SPEED), body.structure.speed, &text);
@@ -72,7 +72,7 @@ fn inputs(table: &mut Builder, parts: &Parts) -> Result<()> {
         }
         let text = "Factor on the casing shape (0 = round, 1 = as in the scene)";
         let factor = table.moving_input(Quantity::ShapeFactor, "casing_shape_factor", None, 1.0, text);
-        let change = Surface::new(&pair.surface.shape, pair.contact.nominal_gap())?.largest_change();
+        let change = CompiledShape::new(&pair.surface.shape, pair.contact.nominal_gap())?.largest_change();
         let largest = if change > 0.0 { largest / change } else { 1.0 };
         (factor.min, factor.max) = (Some(-largest), Some(largest));
         if pair.carrier.is_none() {
@@ -83,7 +83,7 @@ fn inputs(table: &mut Builder, parts: &Parts) -> Result<()> {
     Ok(())
 }
 
-fn parameters(table: &mut Builder, parts: &Parts) {
+fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
     let (settings, bodies, pairs) = (parts.settings, parts.bodies(), parts.pairs());
     for body in bodies.iter().filter(|body| body.free) {
         table.belongs(body.index, parts.of_body(body));
@@ -129,7 +129,7 @@ fn parameters(table: &mut Builder, parts: &Parts) {
 }
 
 /// One coefficient where all pairs have the same, else one each.
-fn friction(table: &mut Builder, parts: &Parts) {
+fn friction(table: &mut TableBuilder, parts: &TableFacts) {
     if !parts.has_friction() {
         return;
     }
@@ -158,7 +158,7 @@ pub fn has_one_friction(settings: &SceneSettings) -> bool {
     settings.contacts.iter().all(|contact| contact.friction.to_bits() == first)
 }
 
-fn gap_offset(table: &mut Builder, rom: &Rom) {
+fn gap_offset(table: &mut TableBuilder, rom: &Rom) {
     let text = "Added to the radial clearance of every sector";
     let offset = table.parameter(Quantity::GapOffset, "gap_offset", Some(&LENGTH), 0.0, text);
     offset.description += RAMPED;
@@ -167,7 +167,7 @@ fn gap_offset(table: &mut Builder, rom: &Rom) {
 }
 
 /// Angles, clearances, forces and moments of structures and pairs, and what all contacts do together.
-fn totals(table: &mut Builder, parts: &Parts) {
+fn totals(table: &mut TableBuilder, parts: &TableFacts) {
     let (bodies, pairs) = (parts.bodies(), parts.pairs());
     let rotors = || bodies.iter().filter(|body| !body.free);
     for body in rotors() {
@@ -192,7 +192,7 @@ fn totals(table: &mut Builder, parts: &Parts) {
     contacts::totals(table, parts.has_friction());
 }
 
-fn smallest_clearance(table: &mut Builder, parts: &Parts) {
+fn smallest_clearance(table: &mut TableBuilder, parts: &TableFacts) {
     let free = parts.bodies().iter().any(|body| body.free);
     let gap = if free { 1e-3 } else { parts.settings.contacts[0].nominal_gap() };
     let text = match (free, parts.plan.pairs.len()) {
@@ -207,7 +207,7 @@ fn smallest_clearance(table: &mut Builder, parts: &Parts) {
 }
 
 /// Force on a structure, and its moment: of a rotor about the shaft's centre.
-fn forces(table: &mut Builder, parts: &Parts, body: &Body) {
+fn forces(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let (index, name) = (body.index, parts.rotor(body));
     for (axis, letter) in AXES.into_iter().enumerate() {
         let text = if body.free {
@@ -230,7 +230,7 @@ fn forces(table: &mut Builder, parts: &Parts, body: &Body) {
 }
 
 /// Name and text of a moment.
-fn moment(parts: &Parts, body: &Body, axis: usize) -> (String, String) {
+fn moment(parts: &TableFacts, body: &BodyFacts, axis: usize) -> (String, String) {
     let (name, letter) = (parts.rotor(body), AXES[axis]);
     let row = format!("moment_{letter}");
     match (body.free, axis) {
@@ -258,7 +258,7 @@ fn moment(parts: &Parts, body: &Body, axis: usize) -> (String, String) {
 }
 
 /// Force of one surface on what touches it, and its moment.
-fn pair_forces(table: &mut Builder, pair: &Pair) {
+fn pair_forces(table: &mut TableBuilder, pair: &PairFacts) {
     let (index, surface, master) = (pair.index, &pair.surface.name, &pair.body.structure.name);
     let point = if pair.body.free { "the origin" } else { "the shaft's centre" };
     for (axis, letter) in AXES.into_iter().enumerate() {

@@ -1,22 +1,22 @@
 //! What of a scene the variables depend on: structures that touch, contact pairs, structures that carry surfaces.
 
 use crate::settings::{ContactSettings, Scene, SceneSettings, StructureSettings, SurfaceSettings};
-use crate::simulation::patches::Patches;
-use crate::simulation::plan::{PairPlan, Plan, prefix};
+use crate::simulation::patches::HeatPatches;
+use crate::simulation::plan::{PairPlan, SteppingOrder, prefix};
 use crate::{Error, Result, Rom, ranges};
 
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// What of a scene the variables depend on.
-pub struct Parts<'a> {
+pub struct TableFacts<'a> {
     pub scene: &'a Scene,
     pub settings: &'a SceneSettings,
-    pub plan: Plan,
+    pub plan: SteppingOrder,
 }
 
 /// A structure that touches.
 #[derive(Clone, Copy)]
-pub struct Body<'a> {
+pub struct BodyFacts<'a> {
     pub index: usize,
     pub structure: &'a StructureSettings,
     pub rom: &'a Rom,
@@ -24,11 +24,11 @@ pub struct Body<'a> {
 }
 
 /// A contact pair.
-pub struct Pair<'a> {
+pub struct PairFacts<'a> {
     pub index: usize,
     pub contact: &'a ContactSettings,
     pub surface: &'a SurfaceSettings,
-    pub body: Body<'a>,
+    pub body: BodyFacts<'a>,
     /// Structure that deforms the surface.
     pub carrier: Option<usize>,
     /// Patches that friction power is gathered for.
@@ -36,7 +36,7 @@ pub struct Pair<'a> {
 }
 
 /// A structure that carries surfaces.
-pub struct Carrier<'a> {
+pub struct CarrierFacts<'a> {
     pub index: usize,
     pub structure: &'a StructureSettings,
     pub rom: &'a Rom,
@@ -44,30 +44,30 @@ pub struct Carrier<'a> {
     pub open: bool,
 }
 
-impl<'a> Parts<'a> {
-    pub fn bodies(&self) -> Vec<Body<'a>> {
+impl<'a> TableFacts<'a> {
+    pub fn bodies(&self) -> Vec<BodyFacts<'a>> {
         let body = |index: usize| {
             let (structure, rom) = self.plan.structure(self.scene, index);
-            Body { index, structure, rom, free: self.plan.is_free(self.scene, index) }
+            BodyFacts { index, structure, rom, free: self.plan.is_free(self.scene, index) }
         };
         (0..self.plan.bodies.len()).map(body).collect()
     }
 
-    pub fn pairs(&self) -> Vec<Pair<'a>> {
+    pub fn pairs(&self) -> Vec<PairFacts<'a>> {
         let bodies = self.bodies();
-        let pair = |(index, plan): (usize, &PairPlan)| Pair {
+        let pair = |(index, plan): (usize, &PairPlan)| PairFacts {
             index,
             contact: &self.settings.contacts[index],
             surface: &self.settings.surfaces[plan.surface],
             body: bodies[plan.body],
             carrier: plan.carrier,
-            patches: Patches::new(self.scene, &self.plan, plan).as_ref().map_or(0, Patches::len),
+            patches: HeatPatches::new(self.scene, &self.plan, plan).as_ref().map_or(0, HeatPatches::len),
         };
         self.plan.pairs.iter().enumerate().map(pair).collect()
     }
 
-    pub fn carriers(&self) -> Vec<Carrier<'a>> {
-        let carrier = |(index, structure): (usize, &usize)| Carrier {
+    pub fn carriers(&self) -> Vec<CarrierFacts<'a>> {
+        let carrier = |(index, structure): (usize, &usize)| CarrierFacts {
             index,
             structure: &self.settings.structures[*structure],
             rom: &self.scene.roms[*structure],
@@ -96,20 +96,20 @@ impl<'a> Parts<'a> {
         self.has_friction() || self.is_cut()
     }
 
-    pub fn of_body(&self, body: &Body) -> String {
+    pub fn of_body(&self, body: &BodyFacts) -> String {
         prefix(self.plan.bodies.len(), &body.structure.name)
     }
 
-    pub fn of_pair(&self, pair: &Pair) -> String {
+    pub fn of_pair(&self, pair: &PairFacts) -> String {
         prefix(self.plan.pairs.len(), &pair.surface.name)
     }
 
-    pub fn of_carrier(&self, carrier: &Carrier) -> String {
+    pub fn of_carrier(&self, carrier: &CarrierFacts) -> String {
         prefix(self.plan.carriers.len(), &carrier.structure.name)
     }
 
     /// The structure that a text speaks of: the rotor, or its name.
-    pub fn rotor(&self, body: &Body) -> String {
+    pub fn rotor(&self, body: &BodyFacts) -> String {
         if body.free || self.plan.bodies.len() > 1 { body.structure.name.clone() } else { "the rotor".to_owned() }
     }
 }

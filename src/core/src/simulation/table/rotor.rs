@@ -1,14 +1,14 @@
 //! Outputs of a rotor, one row each with what fills it.
 
-use super::builder::Builder;
-use super::parts::{Body, Parts, refuse};
+use super::builder::TableBuilder;
+use super::parts::{BodyFacts, TableFacts, refuse};
 use crate::Result;
-use crate::rom::{ContactNode, Frame, STRESSES};
-use crate::simulation::outputs::{Reader, each, scalar, whole};
+use crate::rom::{ContactNode, DisplacementFrame, STRESSES};
+use crate::simulation::outputs::{OutputReader, each, scalar, whole};
 use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINE_LOAD, PRESSURE, STRESS};
-use crate::variables::{Quantity, Span, Unit};
+use crate::variables::{Quantity, Span, VariableUnit};
 
-pub fn angle(table: &mut Builder, parts: &Parts, body: &Body) {
+pub fn angle(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let index = body.index;
     let text = format!("Angle of {} about +z", parts.rotor(body));
     let read = scalar(move |view| view.rotor_angle(index));
@@ -17,13 +17,13 @@ pub fn angle(table: &mut Builder, parts: &Parts, body: &Body) {
 }
 
 /// Clearance that the outputs of a rotor are as large as (m): that of its first pair.
-fn nominal(parts: &Parts, body: &Body) -> Option<(&'static Unit, f64)> {
+fn nominal(parts: &TableFacts, body: &BodyFacts) -> Option<(&'static VariableUnit, f64)> {
     let mut pairs = parts.plan.pairs_of(body.index);
     let gap = pairs.next().map_or(0.0, |(pair, _)| parts.settings.contacts[pair].nominal_gap());
     Some((&LENGTH, gap))
 }
 
-pub fn clearances(table: &mut Builder, parts: &Parts, body: &Body) {
+pub fn clearances(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let index = body.index;
     let each_node = table.output(
         "node_clearance_minimum",
@@ -40,17 +40,17 @@ pub fn clearances(table: &mut Builder, parts: &Parts, body: &Body) {
 }
 
 /// What clearances are where there is nothing to touch.
-fn untouched(parts: &Parts, body: &Body) -> &'static str {
+fn untouched(parts: &TableFacts, body: &BodyFacts) -> &'static str {
     let paired: usize = parts.plan.pairs_of(body.index).map(|(_, pair)| pair.nodes.len()).sum();
     if paired < body.rom.contact_nodes.len() { "; 1e9 m at nodes of no contact" } else { "" }
 }
 
-fn node_list(body: &Body) -> String {
+fn node_list(body: &BodyFacts) -> String {
     let names: Vec<&str> = body.rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
     names.join(", ")
 }
 
-pub fn watched(table: &mut Builder, parts: &Parts) -> Result<()> {
+pub fn watched(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
     let bodies = parts.bodies();
     let most = bodies.iter().map(|body| body.rom.sectors).max().unwrap_or(0);
     for sector in &parts.settings.outputs.watched_sectors {
@@ -76,7 +76,7 @@ pub fn watched(table: &mut Builder, parts: &Parts) -> Result<()> {
     Ok(())
 }
 
-fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
+fn watch(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: usize) {
     watched_points(table, parts, body, sector);
     if parts.settings.outputs.stress {
         stresses(table, body, sector);
@@ -100,10 +100,11 @@ fn watch(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
 const COMPONENTS: [[&str; 3]; 2] = [["radial", "tangential", "axial"], ["x", "y", "z"]];
 
 /// Displacements and clearances of the points that a ROM has beside its contact nodes.
-fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
+fn watched_points(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: usize) {
     let Some(watched) = &body.rom.extras.watched else { return };
     let names: Vec<&str> = watched.points.iter().map(|point| point.name.as_str()).collect();
-    for (axis, name) in COMPONENTS[usize::from(body.rom.frame == Frame::Cartesian)].into_iter().enumerate() {
+    for (axis, name) in COMPONENTS[usize::from(body.rom.frame == DisplacementFrame::Cartesian)].into_iter().enumerate()
+    {
         let index = body.index;
         let text = format!("Displacement of watched points, {name} ({})", names.join(", "));
         let read = each(move |view, point| view.watched_displacement(index, sector - 1, point, axis));
@@ -111,7 +112,7 @@ fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize
             table.output(format!("blade[{sector}].{name}_displacement"), Span::Point, nominal(parts, body), text, read);
         (row.dimension, row.display) = (Some(names.len()), Some(1));
     }
-    if body.rom.frame == Frame::Cartesian {
+    if body.rom.frame == DisplacementFrame::Cartesian {
         return;
     }
     let index = body.index;
@@ -127,7 +128,7 @@ fn watched_points(table: &mut Builder, parts: &Parts, body: &Body, sector: usize
 }
 
 /// Amplitudes of the lowest modes.
-fn modes(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
+fn modes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: usize) {
     let Some(count) = parts.settings.outputs.modal_amplitudes else { return };
     let index = body.index;
     let text = format!(
@@ -140,9 +141,10 @@ fn modes(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
 }
 
 /// Displacements of the contact nodes.
-fn tips(table: &mut Builder, parts: &Parts, body: &Body, sector: usize) {
+fn tips(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: usize) {
     let index = body.index;
-    for (axis, name) in COMPONENTS[usize::from(body.rom.frame == Frame::Cartesian)].into_iter().enumerate() {
+    for (axis, name) in COMPONENTS[usize::from(body.rom.frame == DisplacementFrame::Cartesian)].into_iter().enumerate()
+    {
         let text = format!("Displacement of contact nodes, {name} ({})", node_list(body));
         let read = each(move |view, node| view.displacement(index, sector - 1, node, axis));
         let name = format!("blade[{sector}].tip_{name}_displacement");
@@ -158,18 +160,19 @@ const STRESS_COMPONENTS: [[&str; STRESSES]; 2] = [
 ];
 
 /// Stress at the places that a ROM recovers it at.
-fn stresses(table: &mut Builder, body: &Body, sector: usize) {
+fn stresses(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
     let Some(stress) = &body.rom.extras.stress else { return };
     let (index, places) = (body.index, stress.points.len());
     let names: Vec<&str> = stress.points.iter().map(|point| point.name.as_str()).collect();
     let list = names.join(", ");
-    let mut add = |name: String, text: String, read: Reader| {
+    let mut add = |name: String, text: String, read: OutputReader| {
         let row = table.output(format!("blade[{sector}].{name}"), Span::Point, Some((&STRESS, 1e8)), text, read);
         (row.dimension, row.display) = (Some(places), Some(0));
     };
     let read = each(move |view, place| view.von_mises(index, sector - 1, place));
     add("von_mises_stress".to_owned(), format!("Equivalent stress of von Mises ({list})"), read);
-    for (component, name) in STRESS_COMPONENTS[usize::from(body.rom.frame == Frame::Cartesian)].into_iter().enumerate()
+    for (component, name) in
+        STRESS_COMPONENTS[usize::from(body.rom.frame == DisplacementFrame::Cartesian)].into_iter().enumerate()
     {
         let text = format!(
             "{} stress, {} ({list})",
@@ -182,7 +185,7 @@ fn stresses(table: &mut Builder, body: &Body, sector: usize) {
 }
 
 /// A force over what a patch stands for: name, words, unit, nominal value, and the extent of a contact node.
-type PerExtent = (&'static str, &'static str, &'static Unit, f64, fn(&ContactNode) -> f64);
+type PerExtent = (&'static str, &'static str, &'static VariableUnit, f64, fn(&ContactNode) -> f64);
 
 const PER_EXTENT: [PerExtent; 2] = [
     ("normal_pressure", "pressure", &PRESSURE, 1e6, |node| node.area),
@@ -190,7 +193,7 @@ const PER_EXTENT: [PerExtent; 2] = [
 ];
 
 /// Pressure and force per length, of contact patches.
-fn patches(table: &mut Builder, body: &Body, sector: usize) {
+fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
     for (name, told, unit, nominal, extent) in PER_EXTENT {
         let extents: Vec<f64> = body.rom.contact_nodes.iter().map(extent).collect();
         if extents.contains(&0.0) {
@@ -211,11 +214,11 @@ pub struct NodeRow {
     quantity: Quantity,
     pub name: &'static str,
     span: Span,
-    unit: Option<(&'static Unit, f64)>,
+    unit: Option<(&'static VariableUnit, f64)>,
     pub text: &'static str,
     /// Only with friction, and only where instantaneous forces are asked for.
     needs: [bool; 2],
-    read: Reader,
+    read: OutputReader,
 }
 
 impl NodeRow {
@@ -228,7 +231,7 @@ impl NodeRow {
         self.unit.is_some_and(|(unit, _)| *unit == LENGTH)
     }
 
-    pub fn add(&self, table: &mut Builder, name: String, text: String, nodes: usize) {
+    pub fn add(&self, table: &mut TableBuilder, name: String, text: String, nodes: usize) {
         let row = table.output(name, self.span, self.unit, text, self.read.clone());
         (row.dimension, row.quantity) = (Some(nodes), self.quantity);
         row.display = self.is_length().then_some(1);
@@ -236,7 +239,11 @@ impl NodeRow {
 }
 
 /// Outputs over the contact nodes of a sector of a structure (0-based); units of gaps and forces.
-pub fn watched_rows(body: usize, sector: usize, [gap, force]: [Option<(&'static Unit, f64)>; 2]) -> [NodeRow; 6] {
+pub fn watched_rows(
+    body: usize,
+    sector: usize,
+    [gap, force]: [Option<(&'static VariableUnit, f64)>; 2],
+) -> [NodeRow; 6] {
     [
         NodeRow {
             quantity: Quantity::Clearance(sector),
@@ -295,7 +302,7 @@ pub fn watched_rows(body: usize, sector: usize, [gap, force]: [Option<(&'static 
     ]
 }
 
-pub fn fields(table: &mut Builder, parts: &Parts) -> Result<()> {
+pub fn fields(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
     for body in parts.bodies().iter().filter(|body| !body.free) {
         table.belongs(body.index, parts.of_body(body));
         if parts.settings.outputs.all_sectors {
@@ -308,7 +315,7 @@ pub fn fields(table: &mut Builder, parts: &Parts) -> Result<()> {
     Ok(())
 }
 
-fn all_sectors(table: &mut Builder, parts: &Parts, body: &Body) {
+fn all_sectors(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let (index, sectors) = (body.index, body.rom.sectors);
     let clearance = table.output(
         "sector_clearance_minimum",
@@ -331,7 +338,7 @@ fn all_sectors(table: &mut Builder, parts: &Parts, body: &Body) {
     force.dimension = Some(sectors);
 }
 
-fn nodal_diameters(table: &mut Builder, parts: &Parts, body: &Body, largest: usize) -> Result<()> {
+fn nodal_diameters(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, largest: usize) -> Result<()> {
     let (index, sectors, rows) = (body.index, body.rom.sectors, body.rom.rows());
     if largest > sectors / 2 {
         let remedy = format!("Use at most {}", sectors / 2);

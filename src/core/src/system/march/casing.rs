@@ -5,20 +5,20 @@ use crate::dynamics::dispatch::InstructionSet;
 use crate::galerkin::basis::POINTS;
 use crate::galerkin::compliance::Lanes;
 use crate::galerkin::kernels::{Combine, PADDED};
-use crate::galerkin::trial::Kind;
-use crate::galerkin::whole::{Coordinates, Whole};
-use crate::gaps::frame::Frame;
+use crate::galerkin::trial::ForceInterpolation;
+use crate::galerkin::whole::{Coordinates, SharedBody};
+use crate::gaps::frame::PolarFrame;
 use crate::settings::Scheme;
 use crate::system::carrier::Spot;
 use crate::system::pair::at_place;
 
 /// Tables, state and scratch of such a structure.
 #[derive(Debug, Clone)]
-pub struct Casing {
+pub struct CarrierIntegrator {
     /// Which structure.
     pub structure: usize,
     /// Its modes.
-    pub whole: Whole,
+    pub whole: SharedBody,
     /// `[row][mode]` of the rows that move control points, modes filled up to whole registers.
     shapes: Vec<f64>,
     /// `[mode][row]`, rows filled up to whole registers.
@@ -40,12 +40,12 @@ pub struct Casing {
     seen: [Vec<f64>; 3],
     along: Vec<f64>,
     facing: Vec<bool>,
-    frames: Vec<Frame>,
+    frames: Vec<PolarFrame>,
     /// Modes under a unit of λ of one lane.
     force: Vec<f64>,
 }
 
-impl Casing {
+impl CarrierIntegrator {
     /// With polynomials of degree `degree`, seen by sectors of at most so many lanes.
     pub fn new(structure: usize, bank: &ModalBank, degree: usize, lanes: Lanes) -> Self {
         let coordinates = coordinates(bank);
@@ -77,12 +77,12 @@ impl Casing {
             seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
             along: vec![0.0; lanes.len() * stride],
             facing: vec![false; lanes.len()],
-            frames: vec![Frame::FIXED; lanes.len()],
+            frames: vec![PolarFrame::FIXED; lanes.len()],
             force: vec![0.0; stride],
             whole: if bank.is_loaded() {
-                Whole::new(coordinates, degree).loaded()
+                SharedBody::new(coordinates, degree).loaded()
             } else {
-                Whole::new(coordinates, degree)
+                SharedBody::new(coordinates, degree)
             },
         }
     }
@@ -155,7 +155,7 @@ impl Casing {
         self.impulses.fill(0.0);
     }
 
-    /// See [`Casing::clear_impulses`].
+    /// See [`CarrierIntegrator::clear_impulses`].
     pub fn add_impulse(&mut self, spot: Spot, impulse: [f64; 3]) {
         self.find_force(spot, impulse);
         self.impulses.iter_mut().zip(&self.force).for_each(|(sum, force)| *sum += force);
@@ -206,7 +206,7 @@ impl Casing {
     /// By how much it gives way at all lanes (m, along their normals) per λ of one with the force `direction` per λ: added to `given`.
     pub fn give(
         &mut self,
-        (level, kind): (usize, Kind),
+        (level, kind): (usize, ForceInterpolation),
         lanes: Lanes,
         lane: usize,
         direction: [f64; 3],
@@ -223,7 +223,14 @@ impl Casing {
     }
 
     /// The same in the directions of each lane, under a `force` on one at the end of the step (N), where that is all there is.
-    pub fn give_way(&mut self, at: (usize, Kind), lanes: Lanes, lane: usize, force: [f64; 3], given: &mut [f64]) {
+    pub fn give_way(
+        &mut self,
+        at: (usize, ForceInterpolation),
+        lanes: Lanes,
+        lane: usize,
+        force: [f64; 3],
+        given: &mut [f64],
+    ) {
         let padded = self.force.len();
         self.move_modes(at, lanes, (1, lane), force);
         for other in (0..lanes.nodes).filter(|node| self.facing[*node]) {
@@ -233,7 +240,13 @@ impl Casing {
     }
 
     /// How modes move at point i under a force on a lane, in its directions.
-    fn move_modes(&mut self, (level, kind): (usize, Kind), lanes: Lanes, (i, lane): (usize, usize), force: [f64; 3]) {
+    fn move_modes(
+        &mut self,
+        (level, kind): (usize, ForceInterpolation),
+        lanes: Lanes,
+        (i, lane): (usize, usize),
+        force: [f64; 3],
+    ) {
         if !self.facing[lane] {
             return self.force.fill(0.0);
         }
@@ -243,8 +256,8 @@ impl Casing {
         let [a, b, c] = self.frames[lane].fixed(force);
         let (influence, coordinates) = (self.whole.influence(level), self.whole.coordinates());
         for (mode, by) in influence.iter().enumerate() {
-            let inert =
-                coordinates.inertia[mode] * if kind == Kind::Constant { by.constant } else { by.points[i - 1][k] };
+            let inert = coordinates.inertia[mode]
+                * if kind == ForceInterpolation::Constant { by.constant } else { by.points[i - 1][k] };
             let soft = if i == k { coordinates.softness[mode] } else { 0.0 };
             self.force[mode] = (inert + soft) * (a * x[mode] + b * y[mode] + c * z[mode]);
         }

@@ -3,16 +3,16 @@
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::sectors::Sectors;
 use crate::galerkin::basis::POINTS;
-use crate::galerkin::whole::Whole;
+use crate::galerkin::whole::SharedBody;
 use crate::system::Structure;
 
 /// A disk of coupled sectors.
 #[derive(Debug, Clone)]
-pub struct Disk {
+pub struct CoupledDisk {
     /// Which structure.
     pub structure: usize,
     /// Its modes.
-    pub whole: Whole,
+    pub whole: SharedBody,
     /// Displacements of all contact rows at the points of the step (m), and velocities at its start (m/s), `[row][lane of sector]`.
     pub moved: [Vec<f64>; POINTS],
     pub velocity: Vec<f64>,
@@ -24,7 +24,7 @@ pub struct Disk {
     pub error: f64,
 }
 
-impl Disk {
+impl CoupledDisk {
     /// Of a structure, with polynomials of degree `degree`.
     pub fn new(structure: usize, bank: &CyclicBank, degree: usize) -> Self {
         let (coordinates, shapes) = bank.coordinates_of();
@@ -37,7 +37,7 @@ impl Disk {
             amplitudes: vec![0.0; coordinates.inertia.len()],
             reach: vec![0.0; bank.rows()],
             error: 0.0,
-            whole: Whole::new(coordinates, degree),
+            whole: SharedBody::new(coordinates, degree),
         }
     }
 

@@ -2,15 +2,15 @@
 
 use super::Galerkin;
 use crate::dynamics::sectors::Sectors;
-use crate::gaps::Drive;
+use crate::gaps::PrescribedMotion;
 use crate::gaps::wrench::At;
-use crate::system::{Pair, Structure, System};
+use crate::system::{ContactPair, Structure, System};
 
 impl System {
     /// Fly for `length` (s) to the instant described by `drives`, rotors turned by `turns` against the shapes (rad), both one per pair;
     /// on the way prescribed motion is linear in time, but for the rotor's. False where something may come near, or where blades swing
     /// by more than the tolerance: nothing has moved then.
-    pub(crate) fn fly(&mut self, drives: &[Drive], turns: &[f64], length: f64) -> bool {
+    pub(crate) fn fly(&mut self, drives: &[PrescribedMotion], turns: &[f64], length: f64) -> bool {
         let Self { structures, pairs, .. } = self;
         for structure in structures.iter_mut() {
             let Some(mut galerkin) = structure.galerkin.take() else { return false };
@@ -46,8 +46,8 @@ impl Structure {
         &self,
         galerkin: &mut Galerkin,
         lowest: &mut [f64],
-        pairs: &[Pair],
-        (ends, turns): (&[Drive], &[f64]),
+        pairs: &[ContactPair],
+        (ends, turns): (&[PrescribedMotion], &[f64]),
     ) -> bool {
         let Galerkin { tables, marcher, state, demand, .. } = galerkin;
         let Some(bank) = self.bank() else { return false };

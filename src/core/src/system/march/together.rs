@@ -1,23 +1,23 @@
 //! Sectors that step together: those of one disk, and those that touch a surface which a structure carries.
 
-use super::casing::{Casing, coordinates};
-use super::disk::Disk;
+use super::casing::{CarrierIntegrator, coordinates};
+use super::disk::CoupledDisk;
 use super::{PRECISION, failure, modes_of};
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::sectors::Sectors;
 use crate::galerkin::advance::Advance;
 use crate::galerkin::basis::MOST;
 use crate::galerkin::compliance::Lanes;
-use crate::galerkin::level::Modes;
-use crate::galerkin::march::{Marched, Step};
-use crate::galerkin::sector::{Demand, Stopped, Tables, Taken, Witness};
+use crate::galerkin::level::ContactModes;
+use crate::galerkin::march::{AdaptiveStepper, SpanStep};
+use crate::galerkin::sector::{AcceptedStep, StepGoal, Stopped, Tables, Witness};
 use crate::galerkin::state::SectorState;
-use crate::galerkin::trial::{Kind, Obstacle, Trial, Verdict};
-use crate::galerkin::whole::Whole;
+use crate::galerkin::trial::{ForceInterpolation, Obstacle, Trial, TrialResult};
+use crate::galerkin::whole::SharedBody;
 use crate::settings::Scheme;
-use crate::system::facing::{Facing, Ground};
-use crate::system::record::Record;
-use crate::system::{Pair, StepFailure, Structure};
+use crate::system::facing::{CarriersInStep, ObstacleView};
+use crate::system::record::SpanRecord;
+use crate::system::{ContactPair, StepFailure, Structure};
 
 /// Most evaluations of the gaps of one trial: others move as well.
 const PASSES: usize = 16;
@@ -26,17 +26,17 @@ const CLOSE: f64 = 1e-2;
 
 /// Scratch and tables of a set of structures whose sectors step together; allocates only when made.
 #[derive(Debug, Clone)]
-pub struct Together {
+pub struct CoupledSet {
     /// The set.
     pub set: usize,
-    pub sectors: Vec<One>,
-    disks: Vec<Disk>,
-    casings: Vec<Casing>,
+    pub sectors: Vec<CoupledSector>,
+    disks: Vec<CoupledDisk>,
+    casings: Vec<CarrierIntegrator>,
     /// Which of these carries the surface of each pair.
     casing_of: Vec<Option<usize>>,
     /// Of each touching structure.
     tables: Vec<Vec<Tables>>,
-    pub demand: Demand,
+    pub demand: StepGoal,
     bank: f64,
     /// Largest energy that this has been compared with (J).
     largest: f64,
@@ -51,7 +51,7 @@ pub struct Together {
 
 /// One sector of a touching structure.
 #[derive(Debug, Clone)]
-pub struct One {
+pub struct CoupledSector {
     pub structure: usize,
     pub sector: usize,
     /// Tables of its structure, and which of them are its own.
@@ -61,48 +61,48 @@ pub struct One {
     trial: Trial,
     state: SectorState,
     advance: Advance,
-    pub record: Record,
+    pub record: SpanRecord,
     /// Nothing pushes it, and its gaps are wider than others penetrate: others move it by less in a step.
     far: bool,
 }
 
 /// Everything that is not scratch.
-struct World<'a> {
+struct SceneMut<'a> {
     structures: &'a mut [Structure],
-    pairs: &'a mut [Pair],
+    pairs: &'a mut [ContactPair],
 }
 
 /// What is marched.
-pub struct Marching<'a> {
-    together: &'a mut Together,
-    world: World<'a>,
+pub struct CoupledStepper<'a> {
+    together: &'a mut CoupledSet,
+    world: SceneMut<'a>,
 }
 
-impl Together {
+impl CoupledSet {
     /// Of the structures of a set, for spans up to `longest` (s) and errors of `tolerance` (m).
     pub fn new(
         set: usize,
         members: &[usize],
-        (structures, pairs): (&[Structure], &[Pair]),
+        (structures, pairs): (&[Structure], &[ContactPair]),
         (longest, sticks): (f64, bool),
         tolerance: f64,
     ) -> Self {
         let touching: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() > 0).collect();
         let carrying: Vec<usize> = members.iter().copied().filter(|one| structures[*one].nodes() == 0).collect();
-        let kinds: Vec<Vec<Modes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
+        let kinds: Vec<Vec<ContactModes>> = touching.iter().map(|one| kinds_of(structures[*one].modes())).collect();
         let banks: Vec<&ModalBank> = carrying.iter().filter_map(|one| structures[*one].bank()).collect();
-        let degree = |modes: &Modes| if sticks { 1 } else { modes.degree_up_to(longest) };
+        let degree = |modes: &ContactModes| if sticks { 1 } else { modes.degree_up_to(longest) };
         let carried = banks.iter().map(|bank| degree(&coordinates(bank).seen_at(&bank.model().contact_modes)));
         let degree = kinds.iter().flatten().map(degree).chain(carried).min().unwrap_or(MOST);
         let own = pairs.iter().filter(|pair| touching.contains(&pair.structure()));
         let rounding = own.map(|pair| pair.gap().rounding()).fold(0.0, f64::max);
         let nodes = touching.iter().map(|one| structures[*one].nodes()).max().unwrap_or(0);
         let lanes = Lanes { points: MOST, nodes };
-        let casings: Vec<Casing> =
-            carrying.iter().zip(banks).map(|(one, bank)| Casing::new(*one, bank, degree, lanes)).collect();
+        let casings: Vec<CarrierIntegrator> =
+            carrying.iter().zip(banks).map(|(one, bank)| CarrierIntegrator::new(*one, bank, degree, lanes)).collect();
         let place = |structure: usize| casings.iter().position(|casing| casing.structure == structure);
-        let disk = |one: &usize| structures[*one].modes().coupled().map(|bank| Disk::new(*one, bank, degree));
-        let disks: Vec<Disk> = touching.iter().filter_map(disk).collect();
+        let disk = |one: &usize| structures[*one].modes().coupled().map(|bank| CoupledDisk::new(*one, bank, degree));
+        let disks: Vec<CoupledDisk> = touching.iter().filter_map(disk).collect();
         let mut sectors = Vec::new();
         for (number, structure) in touching.iter().enumerate() {
             let of = &structures[*structure];
@@ -111,7 +111,7 @@ impl Together {
                 let kind = of.bank().map_or(0, |bank| bank.set_number(sector));
                 let modes = if disk.is_some() { 0 } else { kinds[number][kind].len() };
                 let (trial, state) = (Trial::new(modes, of.nodes()), SectorState::new(modes, of.nodes()));
-                sectors.push(One {
+                sectors.push(CoupledSector {
                     structure: *structure,
                     sector,
                     table: [number, kind],
@@ -119,12 +119,12 @@ impl Together {
                     trial: if sticks { trial.sticking() } else { trial },
                     state: if sticks { state.sticking() } else { state },
                     advance: Advance::new(modes, of.nodes()),
-                    record: Record::new(of.nodes(), pairs.len(), tolerance),
+                    record: SpanRecord::new(of.nodes(), pairs.len(), tolerance),
                     far: false,
                 });
             }
         }
-        let made = |kinds: Vec<Modes>| kinds.into_iter().map(|kind| Tables::of_degree(kind, degree)).collect();
+        let made = |kinds: Vec<ContactModes>| kinds.into_iter().map(|kind| Tables::of_degree(kind, degree)).collect();
         Self {
             set,
             sectors,
@@ -132,7 +132,7 @@ impl Together {
             casing_of: pairs.iter().map(|pair| place(pair.carrier()?.structure)).collect(),
             casings,
             tables: kinds.into_iter().map(made).collect(),
-            demand: Demand { tolerance, precision: (CLOSE * PRECISION * tolerance).max(rounding), most: u64::MAX },
+            demand: StepGoal { tolerance, precision: (CLOSE * PRECISION * tolerance).max(rounding), most: u64::MAX },
             bank: 0.0,
             largest: 0.0,
             level: 0,
@@ -156,7 +156,7 @@ impl Together {
     /// Why it is not marched to the end.
     pub fn failure(&self, stopped: Stopped) -> StepFailure {
         let (index, is_lost) = self.failed.unwrap_or((0, false));
-        let Some(One { structure, sector, trial, .. }) = self.sectors.get(index) else {
+        let Some(CoupledSector { structure, sector, trial, .. }) = self.sectors.get(index) else {
             return StepFailure::NonFinite;
         };
         let (structure, sector) = (*structure, *sector);
@@ -168,7 +168,11 @@ impl Together {
     }
 
     /// To be marched from where the structures are.
-    pub fn begin<'a>(&'a mut self, structures: &'a mut [Structure], pairs: &'a mut [Pair]) -> Marching<'a> {
+    pub fn begin<'a>(
+        &'a mut self,
+        structures: &'a mut [Structure],
+        pairs: &'a mut [ContactPair],
+    ) -> CoupledStepper<'a> {
         for one in &mut self.sectors {
             let structure = &structures[one.structure];
             structure.read_contacts(one.sector, &mut one.state);
@@ -196,14 +200,14 @@ impl Together {
         (self.fresh, self.failed) = (true, None);
         (self.bank, self.largest, self.level) =
             first.map_or((0.0, 0.0, 0), |pace| (pace.bank[0], pace.largest[0], pace.level_of(0)));
-        let mut marching = Marching { together: self, world: World { structures, pairs } };
+        let mut marching = CoupledStepper { together: self, world: SceneMut { structures, pairs } };
         marching.find_start();
         marching
     }
 }
 
 /// Modes of the sectors, kind by kind.
-fn kinds_of(modes: &Sectors) -> Vec<Modes> {
+fn kinds_of(modes: &Sectors) -> Vec<ContactModes> {
     match modes {
         Sectors::Uncoupled(bank) => {
             let count = bank.model().dynamic_modes(Scheme::Galerkin);
@@ -216,26 +220,26 @@ fn kinds_of(modes: &Sectors) -> Vec<Modes> {
     }
 }
 
-impl One {
+impl CoupledSector {
     /// It faces its surfaces.
     fn facing<'a>(
         &'a mut self,
-        (structures, pairs): (&'a [Structure], &'a mut [Pair]),
-        ground: Option<Ground<'a>>,
-    ) -> (Facing<'a>, &'a mut Trial, &'a mut SectorState) {
+        (structures, pairs): (&'a [Structure], &'a mut [ContactPair]),
+        ground: Option<CarriersInStep<'a>>,
+    ) -> (ObstacleView<'a>, &'a mut Trial, &'a mut SectorState) {
         let structure = &structures[self.structure];
         let (pair_of, lanes) = (&structure.pair_of[..], structure.lanes());
-        let facing = Facing { ground, pairs, pair_of, lanes, sector: self.sector, record: &mut self.record };
+        let facing = ObstacleView { ground, pairs, pair_of, lanes, sector: self.sector, record: &mut self.record };
         (facing, &mut self.trial, &mut self.state)
     }
 }
 
-impl Marching<'_> {
+impl CoupledStepper<'_> {
     /// All sectors, facing their surfaces and the surfaces' structures at a step; none is far any more.
     fn each(
         &mut self,
-        at: (Step, Kind),
-        to: impl FnMut(&mut Facing, (&mut Trial, &mut SectorState), &Tables, Option<&mut Disk>),
+        at: (SpanStep, ForceInterpolation),
+        to: impl FnMut(&mut ObstacleView, (&mut Trial, &mut SectorState), &Tables, Option<&mut CoupledDisk>),
     ) {
         self.together.sectors.iter_mut().for_each(|one| one.far = false);
         self.each_of(false, at, to);
@@ -245,12 +249,12 @@ impl Marching<'_> {
     fn each_of(
         &mut self,
         far: bool,
-        (step, kind): (Step, Kind),
-        mut to: impl FnMut(&mut Facing, (&mut Trial, &mut SectorState), &Tables, Option<&mut Disk>),
+        (step, kind): (SpanStep, ForceInterpolation),
+        mut to: impl FnMut(&mut ObstacleView, (&mut Trial, &mut SectorState), &Tables, Option<&mut CoupledDisk>),
     ) {
-        let Together { sectors, casings, casing_of, tables, disks, .. } = &mut *self.together;
+        let CoupledSet { sectors, casings, casing_of, tables, disks, .. } = &mut *self.together;
         for one in sectors.iter_mut().filter(|one| one.far == far) {
-            let ground = (!casings.is_empty()).then_some(Ground {
+            let ground = (!casings.is_empty()).then_some(CarriersInStep {
                 casings,
                 casing_of,
                 level: step.level,
@@ -265,7 +269,7 @@ impl Marching<'_> {
 
     /// Displacements and velocities of what several sectors see, at the start of a step.
     fn find_start(&mut self) {
-        let Together { disks, casings, .. } = &mut *self.together;
+        let CoupledSet { disks, casings, .. } = &mut *self.together;
         for disk in disks {
             disk.whole.settle();
             if let Sectors::Coupled(bank) = &mut self.world.structures[disk.structure].modes {
@@ -294,7 +298,7 @@ impl Marching<'_> {
     }
 
     /// A step begins: prescribed motion at its points, motion without forces, and a guess of these.
-    fn prepare(&mut self, step: Step, kind: Kind) {
+    fn prepare(&mut self, step: SpanStep, kind: ForceInterpolation) {
         for disk in &mut self.together.disks {
             disk.whole.begin(step, kind);
         }
@@ -317,7 +321,7 @@ impl Marching<'_> {
     }
 
     /// Forces at some points of the step are handed to what carries surfaces.
-    fn react(&mut self, points: std::ops::RangeInclusive<usize>, at: (Step, Kind)) {
+    fn react(&mut self, points: std::ops::RangeInclusive<usize>, at: (SpanStep, ForceInterpolation)) {
         for casing in &mut self.together.casings {
             points.clone().for_each(|point| casing.whole.forces_mut(point).fill(0.0));
         }
@@ -333,8 +337,8 @@ impl Marching<'_> {
     }
 
     /// Everything moves under the forces of now.
-    fn push(&mut self, step: Step, kind: Kind, points: usize) {
-        let Together { disks, sectors, .. } = &mut *self.together;
+    fn push(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) {
+        let CoupledSet { disks, sectors, .. } = &mut *self.together;
         for (number, disk) in disks.iter_mut().enumerate() {
             let Sectors::Coupled(bank) = &mut self.world.structures[disk.structure].modes else { continue };
             let lanes = bank.lanes();
@@ -366,7 +370,7 @@ impl Marching<'_> {
     }
 
     /// Gaps at all points, of sectors that are far or are not: the smallest, the largest of a contact that pushes, and whether nothing does.
-    fn find_gaps(&mut self, step: Step, kind: Kind, points: usize, far: bool) -> (f64, f64, bool) {
+    fn find_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize, far: bool) -> (f64, f64, bool) {
         if self.together.casings.is_empty() {
             self.each_of(far, (step, kind), |facing, (trial, _), _, _| {
                 trial.find_gaps(facing);
@@ -397,7 +401,7 @@ impl Marching<'_> {
     }
 
     /// Sectors that are far are looked at again. True where one of them touches; it is far no more.
-    fn look_again(&mut self, step: Step, kind: Kind, points: usize) -> bool {
+    fn look_again(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
         let (lowest, ..) = self.find_gaps(step, kind, points, true);
         // What is no number is found out by the next look at all that are near.
         let found = lowest.is_nan() || lowest < 0.0;
@@ -410,7 +414,7 @@ impl Marching<'_> {
 
     /// Surfaces that are carried are as at a point of the step.
     fn bend_surfaces(&mut self, point: usize) {
-        let Together { casings, casing_of, sectors, .. } = &*self.together;
+        let CoupledSet { casings, casing_of, sectors, .. } = &*self.together;
         for (number, pair) in self.world.pairs.iter_mut().enumerate() {
             let Some(casing) = casing_of[number].map(|casing| &casings[casing]) else { continue };
             let Some(one) = sectors.iter().find(|one| one.structure == pair.structure()) else { continue };
@@ -419,12 +423,12 @@ impl Marching<'_> {
     }
 
     /// The first sector of which this holds is what the step fails for.
-    fn blame(&mut self, holds: impl Fn(&One) -> bool, is_lost: bool) {
+    fn blame(&mut self, holds: impl Fn(&CoupledSector) -> bool, is_lost: bool) {
         self.together.failed = self.together.sectors.iter().position(holds).map(|index| (index, is_lost));
     }
 
     /// Forces that close what penetrates, sector by sector.
-    fn solve(&mut self, step: Step, kind: Kind, verdict: &mut Verdict) -> bool {
+    fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, verdict: &mut TrialResult) -> bool {
         let (mut solved, mut failed) = (true, None);
         self.each_of(false, (step, kind), |facing, (trial, _), tables, _| {
             let (lowest, _) = trial.extremes();
@@ -441,11 +445,11 @@ impl Marching<'_> {
     }
 
     /// Error, switches and near misses of all.
-    fn judge(&mut self, step: Step, points: usize, verdict: &mut Verdict) {
-        self.together.casings.iter_mut().for_each(Casing::clear_impulses);
+    fn judge(&mut self, step: SpanStep, points: usize, verdict: &mut TrialResult) {
+        self.together.casings.iter_mut().for_each(CarrierIntegrator::clear_impulses);
         self.together.disks.iter_mut().for_each(|disk| disk.error = 0.0);
-        self.each((step, Kind::Polynomial), |facing, (trial, _), tables, disk| {
-            let mut own = Verdict::default();
+        self.each((step, ForceInterpolation::Polynomial), |facing, (trial, _), tables, disk| {
+            let mut own = TrialResult::default();
             trial.judge((&tables.levels[step.level], &tables.rows), facing, &mut own);
             match disk {
                 // What one sector leaves all of them swing by.
@@ -462,7 +466,7 @@ impl Marching<'_> {
                 }
             }
         });
-        let errors = self.together.casings.iter().map(Casing::error);
+        let errors = self.together.casings.iter().map(CarrierIntegrator::error);
         let errors = errors.chain(self.together.disks.iter().map(|disk| disk.error));
         verdict.error = errors.fold(verdict.error, f64::max);
     }
@@ -470,7 +474,7 @@ impl Marching<'_> {
     /// The state goes back to the structures. Work of loads on the way (J).
     pub fn finish(self) -> f64 {
         let mut load_work = 0.0;
-        let Self { together, world: World { structures, .. } } = self;
+        let Self { together, world: SceneMut { structures, .. } } = self;
         for one in &mut together.sectors {
             let structure = &mut structures[one.structure];
             structure.write_contacts(one.sector, &one.state, |node| one.record.tallies[node].lowest);
@@ -505,7 +509,7 @@ impl Marching<'_> {
     }
 }
 
-impl Marched for Marching<'_> {
+impl AdaptiveStepper for CoupledStepper<'_> {
     fn pace(&mut self) -> (&mut f64, &mut usize) {
         (&mut self.together.bank, &mut self.together.level)
     }
@@ -524,8 +528,8 @@ impl Marched for Marching<'_> {
         self.together.sectors.len() as u64
     }
 
-    fn fly(&mut self, step: Step) -> bool {
-        let pushed = |one: &One| one.state.multipliers.iter().any(|value| *value != 0.0);
+    fn fly(&mut self, step: SpanStep) -> bool {
+        let pushed = |one: &CoupledSector| one.state.multipliers.iter().any(|value| *value != 0.0);
         if !self.together.casings.is_empty() || self.together.sectors.iter().any(pushed) {
             return false;
         }
@@ -535,7 +539,7 @@ impl Marched for Marching<'_> {
             }
         }
         let mut clear = true;
-        self.each((step, Kind::Polynomial), |facing, _, _, disk| {
+        self.each((step, ForceInterpolation::Polynomial), |facing, _, _, disk| {
             clear = clear && disk.is_some_and(|disk| facing.is_clear(step.from, step.length, &disk.reach));
         });
         if !clear {
@@ -548,11 +552,14 @@ impl Marched for Marching<'_> {
         true
     }
 
-    fn attempt(&mut self, step: Step, kind: Kind) -> Verdict {
+    fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
         self.prepare(step, kind);
-        let points =
-            if kind == Kind::Constant { 1 } else { self.together.tables[0][0].levels[step.level].basis.degree };
-        let (precision, mut verdict) = (self.together.demand.precision, Verdict::default());
+        let points = if kind == ForceInterpolation::Constant {
+            1
+        } else {
+            self.together.tables[0][0].levels[step.level].basis.degree
+        };
+        let (precision, mut verdict) = (self.together.demand.precision, TrialResult::default());
         for pass in 0..PASSES {
             self.push(step, kind, points);
             let (lowest, largest, rests) = self.find_gaps(step, kind, points, false);
@@ -577,34 +584,34 @@ impl Marched for Marching<'_> {
                 return verdict;
             }
         }
-        if kind == Kind::Polynomial {
+        if kind == ForceInterpolation::Polynomial {
             self.judge(step, points, &mut verdict);
         }
         verdict
     }
 
-    fn take(&mut self, step: Step, kind: Kind, verdict: &Verdict) -> f64 {
+    fn take(&mut self, step: SpanStep, kind: ForceInterpolation, verdict: &TrialResult) -> f64 {
         let level = &self.together.tables[0][0].levels[step.level];
-        let points = if kind == Kind::Constant { 1 } else { level.basis.degree };
+        let points = if kind == ForceInterpolation::Constant { 1 } else { level.basis.degree };
         self.together.casings.iter_mut().for_each(|casing| casing.weigh(points));
         let (mut dropped, mut closed) = (0.0, 0.0);
         let before: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
         for whole in self.together.wholes() {
-            dropped += if kind == Kind::Constant { whole.dropped() } else { 0.0 };
+            dropped += if kind == ForceInterpolation::Constant { whole.dropped() } else { 0.0 };
         }
         let (mut of_wholes, tolerance) = (dropped, self.together.demand.tolerance);
         let is_resolved = verdict.resolves_motion(kind, tolerance);
         self.each((step, kind), |facing, (trial, state), tables, disk| {
-            let own = if kind == Kind::Constant && disk.is_none() {
+            let own = if kind == ForceInterpolation::Constant && disk.is_none() {
                 trial.dropped(tables.rows.residual(), state)
             } else {
                 0.0
             };
-            closed += if kind == Kind::Constant { trial.closed() } else { 0.0 };
+            closed += if kind == ForceInterpolation::Constant { trial.closed() } else { 0.0 };
             dropped += own;
             let level = &tables.levels[step.level];
             trial.find_minima(&level.basis, is_resolved, tolerance);
-            facing.took(&Taken {
+            facing.took(&AcceptedStep {
                 level,
                 kind,
                 trial,
@@ -615,21 +622,21 @@ impl Marched for Marching<'_> {
         self.go_on(step, kind);
         // What gaps within the precision of contacts that stay closed give is paid as well.
         let after: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
-        if kind == Kind::Constant { dropped + closed } else { after - before }
+        if kind == ForceInterpolation::Constant { dropped + closed } else { after - before }
     }
 }
 
-impl Marching<'_> {
+impl CoupledStepper<'_> {
     /// Find gaps within a step of free flight, where a node may come closer there than at its ends.
-    fn pass(&mut self, step: Step) {
+    fn pass(&mut self, step: SpanStep) {
         let mut closer = false;
-        self.each((step, Kind::Polynomial), |facing, _, _, disk| {
+        self.each((step, ForceInterpolation::Polynomial), |facing, _, _, disk| {
             closer = closer || disk.is_some_and(|disk| facing.may_come_closer(step.from, step.length, &disk.reach));
         });
         if !closer {
             return;
         }
-        let (kind, tolerance) = (Kind::Polynomial, self.together.demand.tolerance);
+        let (kind, tolerance) = (ForceInterpolation::Polynomial, self.together.demand.tolerance);
         let points = self.together.tables[0][0].levels[step.level].basis.degree;
         self.prepare(step, kind);
         self.push(step, kind, points);
@@ -642,7 +649,7 @@ impl Marching<'_> {
     }
 
     /// All states go to the end of the step.
-    fn go_on(&mut self, step: Step, kind: Kind) {
+    fn go_on(&mut self, step: SpanStep, kind: ForceInterpolation) {
         self.together.fresh = false;
         for one in &mut self.together.sectors {
             if one.disk.is_none() {
@@ -659,19 +666,19 @@ impl Marching<'_> {
     }
 }
 
-impl Together {
+impl CoupledSet {
     /// Kinetic and strain energy of all bodies at the start of the step (J).
     fn energy(&self) -> f64 {
         let own = self.sectors.iter().filter(|one| one.disk.is_none());
         let sectors = own.map(|one| self.tables[one.table[0]][one.table[1]].energy(&one.state));
-        sectors.chain(self.wholes().map(Whole::energy)).sum()
+        sectors.chain(self.wholes().map(SharedBody::energy)).sum()
     }
 
-    fn wholes(&self) -> impl Iterator<Item = &Whole> {
+    fn wholes(&self) -> impl Iterator<Item = &SharedBody> {
         self.disks.iter().map(|disk| &disk.whole).chain(self.casings.iter().map(|casing| &casing.whole))
     }
 
-    fn wholes_mut(&mut self) -> impl Iterator<Item = &mut Whole> {
+    fn wholes_mut(&mut self) -> impl Iterator<Item = &mut SharedBody> {
         let disks = self.disks.iter_mut().map(|disk| &mut disk.whole);
         disks.chain(self.casings.iter_mut().map(|casing| &mut casing.whole))
     }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use elements::{GmshElement, gmsh_element};
 use numbers::Numbers;
 
-use super::draft::{Draft, DraftElement};
+use super::draft::{DraftElement, MeshDraft};
 use super::source::{SourceLine, about};
 use crate::Result;
 
@@ -21,8 +21,8 @@ use crate::Result;
 type Entity = (i64, i64);
 
 /// Read a mesh.
-pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Draft> {
-    let mut reader = Reader { names: BTreeMap::new(), groups: BTreeMap::new(), draft: Draft::default() };
+pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<MeshDraft> {
+    let mut reader = GmshReader { names: BTreeMap::new(), groups: BTreeMap::new(), draft: MeshDraft::default() };
     let mut sections = Sections::open(path, bytes)?;
     let mut found = BTreeSet::new();
     while let Some((name, mut numbers)) = sections.next()? {
@@ -161,15 +161,15 @@ impl<'a> Sections<'a> {
     }
 }
 
-struct Reader {
+struct GmshReader {
     /// Names of physical groups by dimension and tag.
     names: BTreeMap<Entity, String>,
     /// Physical groups of each entity.
     groups: BTreeMap<Entity, Vec<i64>>,
-    draft: Draft,
+    draft: MeshDraft,
 }
 
-impl Reader {
+impl GmshReader {
     fn physical_names(&mut self, numbers: &mut Numbers<'_>) -> Result<()> {
         let Numbers::Text { rest, .. } = numbers else { return Ok(()) };
         // Names may hold blanks: line by line, DIMENSION TAG "NAME".

@@ -18,9 +18,7 @@ impl<'a> Numbers<'a> {
     /// What is wrong with the number just read or to be read.
     pub(super) fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         match self {
-            Self::Text { file, line, .. } => {
-                SourceLine { file: Arc::clone(file), line: *line }.error(problem, remedy)
-            }
+            Self::Text { file, line, .. } => SourceLine { file: Arc::clone(file), line: *line }.error(problem, remedy),
             Self::Bytes { file, offset, .. } => {
                 Error::Read { place: format!("{file}, byte {offset}"), problem: problem.into(), remedy: remedy.into() }
             }

@@ -5,7 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::super::source::{SourceLine, Open, beside, text_of};
+use super::super::source::{Open, SourceLine, beside, text_of};
 use crate::Result;
 
 /// Files included within each other at most this deep, and this many in all.
@@ -80,7 +80,7 @@ impl Card {
 
 /// All cards of a file and of the files it includes.
 pub(super) fn cards(path: &Path, bytes: &[u8], open: Open<'_>) -> Result<Vec<Card>> {
-    let mut reader = Reader {
+    let mut reader = LineReader {
         open,
         cards: Vec::new(),
         active: Vec::new(),
@@ -98,7 +98,7 @@ pub(super) fn cards(path: &Path, bytes: &[u8], open: Open<'_>) -> Result<Vec<Car
     Ok(reader.cards)
 }
 
-struct Reader<'a> {
+struct LineReader<'a> {
     open: Open<'a>,
     cards: Vec<Card>,
     active: Vec<PathBuf>,
@@ -112,7 +112,7 @@ struct Reader<'a> {
     before_first_keyword: Option<SourceLine>,
 }
 
-impl Reader<'_> {
+impl LineReader<'_> {
     fn file(&mut self, path: PathBuf, bytes: &[u8]) -> Result<()> {
         let (text, name) = (text_of(bytes), Arc::from(path.display().to_string()));
         self.active.push(path);

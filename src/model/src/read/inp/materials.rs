@@ -7,7 +7,7 @@ use crate::material::Material;
 
 /// Values at temperatures: one row, or several with ascending temperatures.
 #[derive(Debug)]
-struct Table<const N: usize> {
+struct TemperatureTable<const N: usize> {
     rows: Vec<([f64; N], Option<f64>)>,
     place: SourceLine,
 }
@@ -17,9 +17,9 @@ struct Table<const N: usize> {
 pub(super) struct DeckMaterial {
     name: String,
     place: SourceLine,
-    elastic: Option<Table<2>>,
-    density: Option<Table<1>>,
-    expansion: Option<Table<1>>,
+    elastic: Option<TemperatureTable<2>>,
+    density: Option<TemperatureTable<1>>,
+    expansion: Option<TemperatureTable<1>>,
 }
 
 impl DeckMaterial {
@@ -46,9 +46,9 @@ impl DeckMaterial {
                 .error(problem, "Only isotropic materials are computed: give the matrices of the model"));
         }
         match card.keyword.as_str() {
-            "ELASTIC" => self.elastic = Some(Table::read(card)?),
-            "DENSITY" => self.density = Some(Table::read(card)?),
-            _ => self.expansion = Some(Table::read(card)?),
+            "ELASTIC" => self.elastic = Some(TemperatureTable::read(card)?),
+            "DENSITY" => self.density = Some(TemperatureTable::read(card)?),
+            _ => self.expansion = Some(TemperatureTable::read(card)?),
         }
         Ok(())
     }
@@ -67,7 +67,7 @@ impl DeckMaterial {
     }
 }
 
-impl<const N: usize> Table<N> {
+impl<const N: usize> TemperatureTable<N> {
     fn read(card: &Card) -> Result<Self> {
         let mut rows = Vec::new();
         for line in &card.data {

@@ -14,11 +14,11 @@ use std::path::Path;
 
 use lines::{Card, DataLine, cards};
 use materials::DeckMaterial;
-use sets::Sets;
-use vocabulary::{ElementType, Unread, element_type, unread};
+use sets::InpSets;
+use vocabulary::{ElementType, UnreadKeyword, element_type, unread};
 
-use super::draft::{Draft, DraftElement};
-use super::source::{SourceLine, Open, number};
+use super::draft::{DraftElement, MeshDraft};
+use super::source::{Open, SourceLine, number};
 use crate::Result;
 use crate::material::Material;
 
@@ -26,7 +26,7 @@ use crate::material::Material;
 #[derive(Debug, Default)]
 pub(super) struct Deck {
     /// Nodes, elements, sets.
-    pub draft: Draft,
+    pub draft: MeshDraft,
     /// Materials in the order of the file, in its units.
     pub materials: Vec<Material>,
     /// What `*BOUNDARY` holds, for a hint: set names or node numbers, as written.
@@ -35,7 +35,7 @@ pub(super) struct Deck {
 
 /// Read an input file; a table of properties over temperature is read at `temperature`.
 pub(super) fn read(path: &Path, bytes: &[u8], temperature: Option<f64>, open: Open<'_>) -> Result<Deck> {
-    let mut reader = Reader::default();
+    let mut reader = InpReader::default();
     for card in cards(path, bytes, open)? {
         reader.card(&card)?;
     }
@@ -43,18 +43,18 @@ pub(super) fn read(path: &Path, bytes: &[u8], temperature: Option<f64>, open: Op
 }
 
 #[derive(Debug)]
-struct Section {
+struct InpSection {
     set: String,
     material: String,
     place: SourceLine,
 }
 
 #[derive(Debug, Default)]
-struct Reader {
-    draft: Draft,
-    sets: Sets,
+struct InpReader {
+    draft: MeshDraft,
+    sets: InpSets,
     materials: Vec<DeckMaterial>,
-    sections: Vec<Section>,
+    sections: Vec<InpSection>,
     held: Vec<String>,
     skipped: BTreeMap<String, (usize, usize)>,
     near: BTreeMap<String, usize>,
@@ -65,7 +65,7 @@ struct Reader {
     in_assembly: bool,
 }
 
-impl Reader {
+impl InpReader {
     fn card(&mut self, card: &Card) -> Result<()> {
         match card.keyword.as_str() {
             "BOUNDARY" => {
@@ -101,14 +101,14 @@ impl Reader {
 
     fn unread(&mut self, keyword: &str, card: &Card) -> Result<()> {
         match unread(keyword) {
-            Unread::Harmless => self.skip(card),
-            Unread::Changes => {
+            UnreadKeyword::Harmless => self.skip(card),
+            UnreadKeyword::Changes => {
                 let problem = format!("*{keyword} changes what is computed and is not supported");
                 let remedy =
                     "Remove it if it is not meant here, or give the matrices of the model: --stiffness and --mass";
                 return Err(card.place.error(problem, remedy));
             }
-            Unread::Unknown => {
+            UnreadKeyword::Unknown => {
                 let problem = format!("keyword *{keyword} is not known");
                 return Err(card.place.error(problem, "Remove it if it changes neither stiffness nor mass"));
             }
@@ -220,7 +220,7 @@ impl Reader {
             return Err(card.place.error("composite sections are not computed", "Give the matrices of the model"));
         }
         let (set, material) = (card.required("ELSET")?.to_uppercase(), card.required("MATERIAL")?.to_uppercase());
-        self.sections.push(Section { set, material, place: card.place.clone() });
+        self.sections.push(InpSection { set, material, place: card.place.clone() });
         Ok(())
     }
 
@@ -255,7 +255,7 @@ impl Reader {
     /// Give every element the material of its section.
     fn assign_materials(&mut self) -> Result<()> {
         for section in core::mem::take(&mut self.sections) {
-            let Section { set, material, place } = &section;
+            let InpSection { set, material, place } = &section;
             let Some(index) = self.materials.iter().position(|known| known.is_named(material)) else {
                 let names: Vec<&str> = self.materials.iter().map(|known| known.name()).collect();
                 let problem = format!("the section names material `{material}`, which is not defined");

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::draft::Draft;
+use super::super::draft::MeshDraft;
 use super::super::source::SourceLine;
 use super::lines::Card;
 use crate::Result;
@@ -13,7 +13,7 @@ pub(super) fn local_name(name: &str) -> &str {
 }
 
 #[derive(Debug)]
-enum Member {
+enum SetMember {
     Number(u64),
     /// A number written in a set of its own, which must exist.
     Written(u64, SourceLine),
@@ -24,24 +24,24 @@ enum Member {
 
 /// Sets of one kind by name, in upper case.
 #[derive(Debug, Default)]
-pub(super) struct Family {
-    sets: BTreeMap<String, Vec<Member>>,
+pub(super) struct NamedSets {
+    sets: BTreeMap<String, Vec<SetMember>>,
 }
 
 /// Node sets and element sets.
 #[derive(Debug, Default)]
-pub(super) struct Sets {
-    pub nodes: Family,
-    pub elements: Family,
+pub(super) struct InpSets {
+    pub nodes: NamedSets,
+    pub elements: NamedSets,
 }
 
-impl Family {
+impl NamedSets {
     /// A member that is defined on the spot.
     pub(super) fn add(&mut self, set: &str, number: u64) {
-        self.entry(set).push(Member::Number(number));
+        self.entry(set).push(SetMember::Number(number));
     }
 
-    fn entry(&mut self, set: &str) -> &mut Vec<Member> {
+    fn entry(&mut self, set: &str) -> &mut Vec<SetMember> {
         let name = local_name(set).to_uppercase();
         self.sets.entry(name).or_default()
     }
@@ -66,13 +66,13 @@ impl Family {
                     let problem = format!("`{}` is not FIRST, LAST, INCREMENT", line.text);
                     return Err(line.place.error(problem, "Give whole numbers with LAST ≥ FIRST ≥ 1, INCREMENT ≥ 1"));
                 }
-                members.push(Member::Range(first, last, step));
+                members.push(SetMember::Range(first, last, step));
                 continue;
             }
             for text in line.values().filter(|text| !text.is_empty()) {
                 members.push(match text.parse() {
-                    Ok(number) => Member::Written(number, line.place.clone()),
-                    Err(_) => Member::Set(local_name(text).to_uppercase(), line.place.clone()),
+                    Ok(number) => SetMember::Written(number, line.place.clone()),
+                    Err(_) => SetMember::Set(local_name(text).to_uppercase(), line.place.clone()),
                 });
             }
         }
@@ -81,7 +81,7 @@ impl Family {
     }
 
     /// Numbers of the members of a set that exist.
-    pub(super) fn members(&self, set: &str, place: &SourceLine, draft: &Draft) -> Result<BTreeSet<u64>> {
+    pub(super) fn members(&self, set: &str, place: &SourceLine, draft: &MeshDraft) -> Result<BTreeSet<u64>> {
         let every: Vec<u64> = draft.elements.iter().map(|element| element.number).collect();
         self.resolve(local_name(set), place, &every, &|number| !draft.nodes_of(number).is_empty())
     }
@@ -106,21 +106,21 @@ impl Family {
             };
             for member in members {
                 match member {
-                    Member::Number(number) => _ = found.insert(*number),
-                    Member::Written(number, place) => {
+                    SetMember::Number(number) => _ = found.insert(*number),
+                    SetMember::Written(number, place) => {
                         if !exists(*number) {
                             let problem = format!("set `{name}` names {number}, which is not defined");
                             return Err(place.error(problem, "Correct the set, or export the mesh again, complete"));
                         }
                         found.insert(*number);
                     }
-                    Member::Range(first, last, step) => {
+                    SetMember::Range(first, last, step) => {
                         let inside = |number: &&u64| {
                             (*first..=*last).contains(number) && (*number - first).is_multiple_of(*step)
                         };
                         found.extend(every.iter().filter(inside));
                     }
-                    Member::Set(other, place) => open.push((other.clone(), place.clone())),
+                    SetMember::Set(other, place) => open.push((other.clone(), place.clone())),
                 }
             }
         }
@@ -128,9 +128,9 @@ impl Family {
     }
 }
 
-impl Sets {
+impl InpSets {
     /// Every node set, and every element set as the set of its nodes.
-    pub(crate) fn into_node_sets(self, draft: &mut Draft) -> Result<()> {
+    pub(crate) fn into_node_sets(self, draft: &mut MeshDraft) -> Result<()> {
         let nowhere = SourceLine { file: "".into(), line: 0 };
         let mut node_sets = BTreeMap::new();
         for name in self.elements.sets.keys() {

@@ -54,7 +54,7 @@ pub(super) fn element_type(name: &str) -> ElementType {
 
 /// What is done with a keyword that is not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Unread {
+pub(super) enum UnreadKeyword {
     /// It changes neither stiffness nor mass nor sets.
     Harmless,
     /// It changes what is computed.
@@ -169,12 +169,12 @@ const CHANGING: &[&str] = &[
 ];
 
 /// What is done with a keyword that the reader does not act on.
-pub(super) fn unread(keyword: &str) -> Unread {
+pub(super) fn unread(keyword: &str) -> UnreadKeyword {
     if HARMLESS.contains(&keyword) {
-        Unread::Harmless
+        UnreadKeyword::Harmless
     } else if CHANGING.contains(&keyword) {
-        Unread::Changes
+        UnreadKeyword::Changes
     } else {
-        Unread::Unknown
+        UnreadKeyword::Unknown
     }
 }

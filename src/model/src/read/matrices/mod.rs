@@ -22,7 +22,7 @@ use node_table::{NodeTable, read_nodes};
 
 use super::entries::{Entries, symmetric_pair};
 use super::source::{about, open_file};
-use super::{Axis, Imported, Units};
+use super::{EngineAxis, Imported, Units};
 use crate::Result;
 use crate::fe_model::FeModel;
 use crate::sparse::SparseMatrix;
@@ -41,7 +41,7 @@ pub struct MatrixFiles {
     /// Units of matrices and coordinates.
     pub units: Units,
     /// The engine axis in the files.
-    pub axis: Axis,
+    pub axis: EngineAxis,
     /// Sets of nodes whose dofs the matrices leave out, for formats whose rows name no nodes.
     pub left_out: Vec<String>,
 }
@@ -54,7 +54,7 @@ pub struct MatrixFiles {
 pub fn read_matrices(files: &MatrixFiles) -> Result<Imported> {
     let table = read_nodes(&files.nodes, files.units, files.axis)?;
     let dofs = dof_file(files)?;
-    let rows = Rows::new(files, &table)?;
+    let rows = DofRows::new(files, &table)?;
     let stiffness = located(&files.stiffness, dofs.as_deref(), &rows)?;
     let mass = located(&files.mass, dofs.as_deref(), &rows)?;
     let mut notes = table.notes;
@@ -103,7 +103,7 @@ fn dof_file(files: &MatrixFiles) -> Result<Option<Vec<(u64, u64)>>> {
 }
 
 /// What row a dof has.
-struct Rows<'a> {
+struct DofRows<'a> {
     table: &'a NodeTable,
     index: HashMap<u64, usize>,
     /// Nodes without those left out, in the order of the table.
@@ -111,7 +111,7 @@ struct Rows<'a> {
     files: &'a MatrixFiles,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> DofRows<'a> {
     fn new(files: &'a MatrixFiles, table: &'a NodeTable) -> Result<Self> {
         let index = table.numbers.iter().enumerate().map(|(index, &number)| (number, index)).collect();
         let mut left_out = vec![false; table.numbers.len()];
@@ -169,7 +169,7 @@ impl<'a> Rows<'a> {
 }
 
 /// Entries of a matrix file by dofs of all nodes.
-fn located(path: &Path, dofs: Option<&[(u64, u64)]>, rows: &Rows<'_>) -> Result<Entries> {
+fn located(path: &Path, dofs: Option<&[(u64, u64)]>, rows: &DofRows<'_>) -> Result<Entries> {
     let RawMatrix { entries, labels } = read_matrix(path, &open_file(path)?)?;
     let dof_of = match (labels, dofs) {
         (Labels::Named(labels), _) => {
@@ -195,7 +195,7 @@ const HELD: f64 = 1e35;
 const ASYMMETRY: f64 = 1e-8;
 
 /// A place above the diagonal (or on it) and its mirror image.
-struct Pair {
+struct MirrorPair {
     low: usize,
     high: usize,
     /// Sums of the entries above and below the diagonal.
@@ -205,14 +205,14 @@ struct Pair {
 }
 
 /// Entries by pairs of places, in the order of rows and columns.
-fn pairs(entries: &Entries, scale: f64) -> Vec<Pair> {
+fn pairs(entries: &Entries, scale: f64) -> Vec<MirrorPair> {
     let place = |&(i, j, value): &(usize, usize, f64)| (i.min(j), i.max(j), usize::from(i > j), scale * value);
     let mut items: Vec<(usize, usize, usize, f64)> = entries.items.iter().map(place).collect();
     items.sort_by_key(|&(low, high, side, _)| (low, high, side));
-    let mut pairs: Vec<Pair> = Vec::new();
+    let mut pairs: Vec<MirrorPair> = Vec::new();
     for (low, high, side, value) in items {
         if pairs.last().is_none_or(|pair| (pair.low, pair.high) != (low, high)) {
-            pairs.push(Pair { low, high, sums: [0.0; 2], given: [false; 2] });
+            pairs.push(MirrorPair { low, high, sums: [0.0; 2], given: [false; 2] });
         }
         if let Some(pair) = pairs.last_mut() {
             pair.sums[side] += value;
@@ -234,7 +234,7 @@ fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(
     pairs.iter().filter(|pair| pair.low == pair.high).for_each(|pair| diagonal[pair.low] = pair.sums[0].abs());
     let square = pairs.iter().any(|pair| pair.given == [true; 2]);
     let mut items = Vec::with_capacity(2 * pairs.len());
-    for Pair { low, high, sums: [above, below], .. } in pairs {
+    for MirrorPair { low, high, sums: [above, below], .. } in pairs {
         let share = (above - below).abs() / diagonal[low].max(diagonal[high]).max(f64::MIN_POSITIVE);
         if square && low != high && share > ASYMMETRY {
             let (row, column) = (low + 1, high + 1);

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::source::{SourceLine, about, number, open_file, text_of};
-use super::super::{Axis, Units, mesh_file};
+use super::super::{EngineAxis, Units, mesh_file};
 use crate::Result;
 
 /// Nodes with their numbers and sets.
@@ -21,7 +21,7 @@ pub(super) struct NodeTable {
 }
 
 /// Read a table `node,x,y,z[,sets]` (sets separated by blanks or semicolons), or the nodes and sets of a mesh file.
-pub(super) fn read_nodes(path: &Path, units: Units, axis: Axis) -> Result<NodeTable> {
+pub(super) fn read_nodes(path: &Path, units: Units, axis: EngineAxis) -> Result<NodeTable> {
     let bytes = open_file(path)?;
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
     let table = match extension.to_str() {
@@ -37,7 +37,7 @@ pub(super) fn read_nodes(path: &Path, units: Units, axis: Axis) -> Result<NodeTa
 
 fn of_mesh(path: &Path, bytes: &[u8]) -> Result<NodeTable> {
     let file = mesh_file(path, bytes, Some(0.0), &open_file)?;
-    let (numbered, mut notes, _) = file.draft.into_mesh(1.0, Axis::Z, &path.display().to_string())?;
+    let (numbered, mut notes, _) = file.draft.into_mesh(1.0, EngineAxis::Z, &path.display().to_string())?;
     let mut order: Vec<usize> = (0..numbered.nodes.len()).collect();
     order.sort_by_key(|&index| numbered.nodes[index]);
     let mut position = vec![0; order.len()];

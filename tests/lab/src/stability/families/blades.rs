@@ -6,14 +6,16 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, DVector};
-use tiprub_core::rom::{Patch, Spin, Thermal};
-use tiprub_core::settings::{CoatingSettings, CuttingSettings, Direction, ExcitationSettings, InitialSettings, Solver};
+use tiprub_core::rom::{Spin, Thermal, ThermalPatch};
+use tiprub_core::settings::{
+    CoatingSettings, CuttingSettings, ExcitationSettings, ForceDirection, InitialSettings, Solver,
+};
 use tiprub_core::{Result, Rom, Scene, Simulation};
 
 use super::super::{
-    Case, Cases, Check, Expected,
-    models::{GAP, Method, RADIUS, Tower, allowed, blade, round},
-    observe::{Watch, begin, real, set, steps, worse},
+    Cases, Check, Expected, StabilityCase,
+    models::{GAP, RADIUS, StabilityMethod, Tower, allowed, blade, round},
+    observe::{StabilityWatch, begin, real, set, steps, worse},
     press::pressed,
 };
 use super::decay::modes;
@@ -24,13 +26,13 @@ const STEP: f64 = 1e-6;
 const FAR: f64 = 0.02;
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [spin(), mistuning(), excitation(), temperature(), cutting()].into_iter().flatten().collect()
 }
 
 /// All methods with one solver; those that a rule excludes are expected to name it.
-fn methods() -> impl Iterator<Item = Method> {
-    Method::all_with(Solver::Lcp)
+fn methods() -> impl Iterator<Item = StabilityMethod> {
+    StabilityMethod::all_with(Solver::Lcp)
 }
 
 /// A right answer, or the rule that excludes the scheme.
@@ -63,7 +65,7 @@ fn spinning() -> Rom {
     rom
 }
 
-fn far(rom: Rom, method: Method) -> Scene {
+fn far(rom: Rom, method: StabilityMethod) -> Scene {
     let mut scene = method.stepping(round(rom), STEP);
     scene.settings.contacts[0].gap = FAR;
     scene
@@ -80,7 +82,7 @@ fn solved(matrix: DMatrix<f64>, load: &DVector<f64>) -> DVector<f64> {
     matrix.lu().solve(load).unwrap_or_else(|| DVector::from_element(load.len(), f64::NAN))
 }
 
-fn spin() -> Vec<Case> {
+fn spin() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         let (galerkin, name) = (method.is_galerkin(), method.integration());
@@ -104,7 +106,7 @@ fn spin() -> Vec<Case> {
     cases
 }
 
-fn grown(method: Method, speed: f64, stiffening: bool) -> Result<Vec<Check>> {
+fn grown(method: StabilityMethod, speed: f64, stiffening: bool) -> Result<Vec<Check>> {
     let mut scene = far(spinning(), method);
     let rotor = &mut scene.settings.structures[0];
     (rotor.speed, rotor.spin.growth, rotor.spin.stiffening) = (speed, true, stiffening);
@@ -130,7 +132,7 @@ fn grown(method: Method, speed: f64, stiffening: bool) -> Result<Vec<Check>> {
 }
 
 /// A blade that is let go in its first mode; no damping.
-fn turned(method: Method, speed: f64) -> Result<Vec<Check>> {
+fn turned(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
     let mut scene = far(spinning(), method);
     let rotor = &mut scene.settings.structures[0];
     (rotor.speed, rotor.spin.coriolis, rotor.spin.stiffening) = (speed, true, true);
@@ -188,9 +190,9 @@ fn propagator(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, damping: &DMatrix<f
     (0..16).fold(series, |power, _| &power * &power)
 }
 
-fn mistuning() -> Vec<Case> {
+fn mistuning() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         for spread in [1e-6, 0.01, 0.3] {
             let against = "static λ of every blade, with the square of its factor";
             let name = format!("mistuning/{spread}/{}", method.name());
@@ -202,7 +204,7 @@ fn mistuning() -> Vec<Case> {
 }
 
 /// Close a round casing on the blades of a scene and wait until they are at rest.
-fn at_rest(scene: &Scene, depth: f64) -> Result<(Simulation, Watch)> {
+fn at_rest(scene: &Scene, depth: f64) -> Result<(Simulation, StabilityWatch)> {
     let mut scene = scene.clone();
     scene.settings.structures[0].damping_ratio = Some(0.3);
     let length = scene.settings.time.step.max(20.0 * STEP);
@@ -220,7 +222,7 @@ fn near(scene: &Scene, depth: f64) -> f64 {
     1e-6 + 1e-3 * allowed(scene) / depth
 }
 
-fn mistuned(method: Method, spread: f64) -> Result<Vec<Check>> {
+fn mistuned(method: StabilityMethod, spread: f64) -> Result<Vec<Check>> {
     let (sectors, depth) = (4, 3e-5);
     let rom = Tower { sectors, ..tower() }.rom();
     let exact = pressed(&rom, 0.0, depth).multipliers[0];
@@ -234,7 +236,7 @@ fn mistuned(method: Method, spread: f64) -> Result<Vec<Check>> {
     Ok([watch.books_of(method.scheme), vec![check]].concat())
 }
 
-fn excitation() -> Vec<Case> {
+fn excitation() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         let name = method.integration();
@@ -251,7 +253,7 @@ fn excitation() -> Vec<Case> {
 }
 
 /// A tangential force on the tips of five blades, of `ratio` times their first frequency.
-fn excited(method: Method, order: u32, ratio: f64) -> Result<Vec<Check>> {
+fn excited(method: StabilityMethod, order: u32, ratio: f64) -> Result<Vec<Check>> {
     let (sectors, damping, force, phase) = (5, 0.05, 20.0, 0.6);
     let rom = Tower { sectors, ..tower() }.rom();
     let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
@@ -264,7 +266,7 @@ fn excited(method: Method, order: u32, ratio: f64) -> Result<Vec<Check>> {
         order,
         mode: None,
         node: Some("node_0".into()),
-        direction: Some(Direction::Tangential),
+        direction: Some(ForceDirection::Tangential),
         amplitude: force,
         phase,
     });
@@ -305,7 +307,7 @@ fn excited(method: Method, order: u32, ratio: f64) -> Result<Vec<Check>> {
     ])
 }
 
-fn temperature() -> Vec<Case> {
+fn temperature() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         let name = method.integration();
@@ -321,11 +323,11 @@ fn temperature() -> Vec<Case> {
     cases
 }
 
-fn warm(method: Method, degrees: f64, softening: f64) -> Result<Vec<Check>> {
+fn warm(method: StabilityMethod, degrees: f64, softening: f64) -> Result<Vec<Check>> {
     let depth = 4e-5;
     let mut rom = tower().rom();
     let load = DVector::from_row_slice(&[2.0, 1.0, -1.0, 0.4, -0.2, 0.1]);
-    let patches = vec![Patch { angle: [0.0, TAU], axial: [-1.0, 1.0] }];
+    let patches = vec![ThermalPatch { angle: [0.0, TAU], axial: [-1.0, 1.0] }];
     rom.extras.thermal = Some(Thermal { loads: DMatrix::from_column_slice(6, 1, load.as_slice()), patches });
     let expansion = &rom.contact_map * solved(rom.stiffness.clone(), &(&load * degrees));
     let mut softer = rom.clone();
@@ -350,9 +352,9 @@ fn warm(method: Method, degrees: f64, softening: f64) -> Result<Vec<Check>> {
     ])
 }
 
-fn cutting() -> Vec<Case> {
+fn cutting() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         for energy in [1e5, 1e8, 1e11] {
             let against = "work u V, cell by cell and in all; wear only grows; signs of the ledger";
             let excluded = method.is_massless() || method.is_galerkin();
@@ -372,7 +374,7 @@ fn cutting() -> Vec<Case> {
     cases
 }
 
-fn cut(method: Method, specific_energy: f64) -> Result<Vec<Check>> {
+fn cut(method: StabilityMethod, specific_energy: f64) -> Result<Vec<Check>> {
     let mut scene = method.stepping(round(blade(4)), STEP);
     scene.settings.structures[0].damping_ratio = Some(0.05);
     scene.settings.contacts[0].coating = Some(CoatingSettings {

@@ -9,16 +9,16 @@ use tiprub_shell::console::Console;
 
 use super::{
     super::{
-        Case, Cases, Check, Expected, Happened,
-        models::{Method, Tower, round, with_step},
-        observe::{Watch, apart, begin, displacements, set},
+        CaseEnd, Cases, Check, Expected, StabilityCase,
+        models::{StabilityMethod, Tower, round, with_step},
+        observe::{StabilityWatch, apart, begin, displacements, set},
         press::Press,
     },
     limits::massless_step,
 };
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [rotor37(), stage(), exchanged()].into_iter().flatten().collect()
 }
 
@@ -26,9 +26,9 @@ fn model(name: &str) -> Option<Rom> {
     builtin::rom(name, &RomCache::of_user(), &Console::new(true, false))?.ok()
 }
 
-fn rotor37() -> Vec<Case> {
+fn rotor37() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         let factors: &[f64] = if method.is_adaptive() { &[1.0] } else { &[0.9, 0.999, 1.001, 1.5, 10.0, 100.0] };
         for factor in factors.iter().copied() {
             let name = format!("rotor37/step-limit/{}/h={factor}", method.name());
@@ -46,7 +46,7 @@ fn rotor37() -> Vec<Case> {
                 _ => Expected::right(against),
             };
             let work = move |_: &_| at_limit(method, factor);
-            cases.push(Case::new(name, expected, work).within(300.0));
+            cases.push(StabilityCase::new(name, expected, work).within(300.0));
         }
     }
     for share in [0.1, 0.2, 0.24, 0.3, 0.39, 0.5, 0.6, 0.79] {
@@ -54,10 +54,10 @@ fn rotor37() -> Vec<Case> {
             let name = format!("rotor37/massless/{share}-of-limit/ξ={damping}");
             let expected = Expected::either("static contact", ["massless-boundary", "internal step"]);
             let work = move |_: &_| share_of_limit(share, damping);
-            cases.push(Case::new(name, expected, work).within(300.0));
+            cases.push(StabilityCase::new(name, expected, work).within(300.0));
         }
     }
-    for method in Method::common() {
+    for method in StabilityMethod::common() {
         for friction in [0.0, 0.15, 0.5, 1.0, 1.5, 2.0] {
             for sense in [1.0, -1.0] {
                 let sign = if sense > 0.0 { '+' } else { '−' };
@@ -65,19 +65,19 @@ fn rotor37() -> Vec<Case> {
                 // Rejected at the start by µ, or ended in a step because of friction.
                 let against = "the same in a finer run, complementarity";
                 let expected = Expected::either_as(against, &[&["µ"], &["less friction"]]);
-                let work = move |_: &_| Happened::of(rubbed(method, friction, sense));
-                cases.push(Case::new(name, expected, work).within(300.0));
+                let work = move |_: &_| CaseEnd::of(rubbed(method, friction, sense));
+                cases.push(StabilityCase::new(name, expected, work).within(300.0));
             }
         }
     }
     // Steps at which growth by the mass of contact nodes goes up and down, whatever it does to the run.
-    for method in Method::common().filter(|method| method.solver == Solver::Lcp && !method.is_adaptive()) {
+    for method in StabilityMethod::common().filter(|method| method.solver == Solver::Lcp && !method.is_adaptive()) {
         for friction in [0.15, 0.4, 0.8] {
             for step in [5e-7, 1e-6, 2e-6, 4e-6] {
                 let expected = Expected::either_as("the same in a finer run", &[&["time.step"], &["µ below"]]);
                 let name = format!("rotor37/growth/µ={friction}/h={step:e}/{}", method.integration());
-                let work = move |_: &_| Happened::of(grown(method, friction, step));
-                cases.push(Case::new(name, expected, work).within(300.0));
+                let work = move |_: &_| CaseEnd::of(grown(method, friction, step));
+                cases.push(StabilityCase::new(name, expected, work).within(300.0));
             }
         }
     }
@@ -85,7 +85,7 @@ fn rotor37() -> Vec<Case> {
 }
 
 /// Against bumps that nothing moves.
-fn grown(method: Method, friction: f64, step: f64) -> Result<Vec<Check>> {
+fn grown(method: StabilityMethod, friction: f64, step: f64) -> Result<Vec<Check>> {
     let Some(rom) = model("rotor37-one-row") else { return Ok(Vec::new()) };
     let mut scene = super::super::models::bumps(rom);
     scene.settings.contacts[0].friction = friction;
@@ -94,8 +94,8 @@ fn grown(method: Method, friction: f64, step: f64) -> Result<Vec<Check>> {
     against_finer(&scene, method, step, 150, 0.1)
 }
 
-fn at_limit(method: Method, factor: f64) -> Happened {
-    let Some(rom) = model("rotor37-one-row") else { return Happened::refused("there is no rotor 37") };
+fn at_limit(method: StabilityMethod, factor: f64) -> CaseEnd {
+    let Some(rom) = model("rotor37-one-row") else { return CaseEnd::refused("there is no rotor 37") };
     let fastest = tiprub_core::dynamics::modal::ModalModel::from_rom(&rom, 0.0)
         .map_or(f64::NAN, |model| model.largest_frequency());
     let mut scene = method.on(round(rom));
@@ -104,16 +104,16 @@ fn at_limit(method: Method, factor: f64) -> Happened {
         Scheme::MasslessBoundary => massless_step(&scene),
         _ => Some(2.0 / fastest),
     };
-    let Some(limit) = limit else { return Happened::refused("no limit was named") };
+    let Some(limit) = limit else { return CaseEnd::refused("no limit was named") };
     let press = Press { depth: 2e-5, ..Press::new(with_step(scene, method.step(factor * limit))) };
-    Happened::of(press.run())
+    CaseEnd::of(press.run())
 }
 
 /// At a share of the limit of closed contact that a refusal tells.
-fn share_of_limit(share: f64, damping: f64) -> Happened {
+fn share_of_limit(share: f64, damping: f64) -> CaseEnd {
     // With few nodes: lightly damped blades come to rest after a second of steps near the limit.
-    let Some(rom) = model("rotor37-paper") else { return Happened::refused("there is no rotor 37") };
-    let method = Method { scheme: Scheme::MasslessBoundary, ..Method::exact(Solver::Lcp) };
+    let Some(rom) = model("rotor37-paper") else { return CaseEnd::refused("there is no rotor 37") };
+    let method = StabilityMethod { scheme: Scheme::MasslessBoundary, ..StabilityMethod::exact(Solver::Lcp) };
     let mut scene = method.on(round(rom));
     scene.settings.structures[0].damping_ratio = Some(damping);
     let long = with_step(scene.clone(), 1e-2);
@@ -123,17 +123,17 @@ fn share_of_limit(share: f64, damping: f64) -> Happened {
         .map(|error| error.to_string());
     let limit =
         refusal.as_deref().and_then(|text| text.split("stable below ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
-    let Some(limit) = limit else { return Happened::refused("no limit was named") };
+    let Some(limit) = limit else { return CaseEnd::refused("no limit was named") };
     let press = Press {
         depth: 2e-5,
         hold: 12e-3 * (0.3 / damping).max(1.0),
         tolerance: 1e-4,
         ..Press::new(with_step(scene, share * limit))
     };
-    Happened::of(press.run())
+    CaseEnd::of(press.run())
 }
 
-fn rubbed(method: Method, friction: f64, sense: f64) -> Result<Vec<Check>> {
+fn rubbed(method: StabilityMethod, friction: f64, sense: f64) -> Result<Vec<Check>> {
     let Some(rom) = model("rotor37-one-row") else { return Ok(Vec::new()) };
     let mut scene = super::super::models::bumps(rom);
     scene.settings.contacts[0].friction = friction;
@@ -142,8 +142,8 @@ fn rubbed(method: Method, friction: f64, sense: f64) -> Result<Vec<Check>> {
 }
 
 /// A scene against itself with a fourth of the step, or a sixteenth of the tolerance.
-fn against_finer(scene: &Scene, method: Method, step: f64, count: usize, bound: f64) -> Result<Vec<Check>> {
-    let run = |method: Method, step: f64| -> Result<(Vec<f64>, Watch)> {
+fn against_finer(scene: &Scene, method: StabilityMethod, step: f64, count: usize, bound: f64) -> Result<Vec<Check>> {
+    let run = |method: StabilityMethod, step: f64| -> Result<(Vec<f64>, StabilityWatch)> {
         let mut scene = method.stepping(scene.clone(), step);
         scene.settings.experiment.communication_step = 1e-5;
         let (mut simulation, mut watch) = begin(&scene)?;
@@ -171,14 +171,14 @@ fn against_finer(scene: &Scene, method: Method, step: f64, count: usize, bound: 
     Ok(checks)
 }
 
-fn stage() -> Vec<Case> {
+fn stage() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::common() {
+    for method in StabilityMethod::common() {
         for friction in [0.0, 0.15, 1.0, 2.0] {
             let expected = Expected::either("the same in a finer run, complementarity", ["µ"]);
             let name = format!("stage/oval/µ={friction}/{}", method.name());
-            let work = move |_: &_| Happened::of(on_stage(method, friction, 1.35e5));
-            cases.push(Case::new(name, expected, work).within(600.0));
+            let work = move |_: &_| CaseEnd::of(on_stage(method, friction, 1.35e5));
+            cases.push(StabilityCase::new(name, expected, work).within(600.0));
         }
         for load in [1e7, 1e9, 1e12, 1e300] {
             let expected = Expected::refused_as(&[
@@ -189,14 +189,14 @@ fn stage() -> Vec<Case> {
                 &["load.amplitude", "between"],
             ]);
             let name = format!("stage/load={load:e}/{}", method.name());
-            let work = move |_: &_| Happened::of(on_stage(method, 0.15, load));
-            cases.push(Case::new(name, expected, work).within(600.0));
+            let work = move |_: &_| CaseEnd::of(on_stage(method, 0.15, load));
+            cases.push(StabilityCase::new(name, expected, work).within(600.0));
         }
     }
     cases
 }
 
-fn on_stage(method: Method, friction: f64, load: f64) -> Result<Vec<Check>> {
+fn on_stage(method: StabilityMethod, friction: f64, load: f64) -> Result<Vec<Check>> {
     let mut scene = scene_source::stage_scene(true, &RomCache::of_user(), &Console::new(true, false))
         .map_err(|failure| tiprub_core::Error::invalid("builtin:stage", failure.to_string(), ""))?;
     scene.settings.contacts[0].friction = friction;
@@ -210,7 +210,7 @@ fn on_stage(method: Method, friction: f64, load: f64) -> Result<Vec<Check>> {
     against_finer(&scene, method, step, count, 0.1)
 }
 
-fn exchanged() -> Vec<Case> {
+fn exchanged() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for (name, swap) in [("exchanged", true), ("as-they-are", false)] {
         let expected = if swap {

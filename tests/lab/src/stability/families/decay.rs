@@ -13,8 +13,8 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Cases, Check, Expected,
-    models::{GAP, Method, RADIUS, Tower, allowed, on_ring, round},
+    Cases, Check, Expected, StabilityCase,
+    models::{GAP, RADIUS, StabilityMethod, Tower, allowed, on_ring, round},
     observe::{amplitudes, real, set, worse},
     press::pressed,
 };
@@ -25,9 +25,9 @@ const DEPTH: f64 = 5e-5;
 const LEFT: f64 = 1e-4;
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         for ratio in [1e-3, 0.005, 0.05, 0.3, 0.9] {
             for (kind, turned) in [("straight", 0.0), ("turned", 0.45)] {
                 let released = Released { method, turned, ratio, told: ratio };
@@ -50,7 +50,7 @@ pub(crate) fn cases() -> Vec<Case> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Released {
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Turn of the principal axes of the base (rad).
     pub turned: f64,
     /// Damping ratio of the scene.
@@ -225,7 +225,7 @@ fn close(simulation: &mut Simulation, settle: f64) -> Result<()> {
 ///
 /// # Errors
 /// The scene is refused.
-pub(crate) fn ring(method: Method, order: u32, ratio: f64, told: f64) -> Result<Vec<Check>> {
+pub(crate) fn ring(method: StabilityMethod, order: u32, ratio: f64, told: f64) -> Result<Vec<Check>> {
     let step = 2e-6;
     let mut scene = method.stepping(round(Tower { slope: 0.0, ..Tower::default() }.rom()), step);
     on_ring(&mut scene, ratio);

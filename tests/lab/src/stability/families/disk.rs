@@ -13,8 +13,8 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Cases, Check, Expected,
-    models::{GAP, Method, Tower, allowed, round},
+    Cases, Check, Expected, StabilityCase,
+    models::{GAP, StabilityMethod, Tower, allowed, round},
     observe::{apart, begin, displacements, set, steps, worse},
 };
 
@@ -24,9 +24,9 @@ const COUPLING: f64 = 8e6;
 const DEPTH: f64 = 5e-5;
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         let quick = method.solver == Solver::Lcp;
         for sectors in [2, 3, 8, 12] {
             for friction in [0.0, 0.3] {
@@ -85,7 +85,7 @@ fn disk(sectors: usize, mirrored: bool, conjugate: bool) -> Rom {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Still {
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Number of sectors.
     pub sectors: usize,
     /// Coefficient µ.
@@ -180,7 +180,7 @@ impl Still {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mirrored {
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Number of sectors.
     pub sectors: usize,
     /// The mirrored disk has the complex conjugate harmonics; without it must be found out.

@@ -6,9 +6,9 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Cases, Check, Expected, Happened,
-    bodies::{Body, FURTHEST, HALF, Plate, Throw, vector},
-    models::{LONGEST, Method},
+    CaseEnd, Cases, Check, Expected, StabilityCase,
+    bodies::{FURTHEST, HALF, LumpChain, Plate, Throw, vector},
+    models::{LONGEST, StabilityMethod},
     observe::{real, worse},
 };
 use super::decay::modes;
@@ -16,12 +16,12 @@ use super::decay::modes;
 /// Internal step of most cases (s).
 pub(crate) const STEP: f64 = 1e-6;
 /// Methods of free bodies.
-pub(crate) fn methods() -> impl Iterator<Item = Method> {
-    Method::all().filter(|method| !method.is_massless())
+pub(crate) fn methods() -> impl Iterator<Item = StabilityMethod> {
+    StabilityMethod::all().filter(|method| !method.is_massless())
 }
 
 /// A right answer, or the rule that excludes bodies with as few modes as contact nodes have directions.
-pub(crate) fn unless_few_modes(method: Method, expected: Expected) -> Expected {
+pub(crate) fn unless_few_modes(method: StabilityMethod, expected: Expected) -> Expected {
     if method.is_galerkin() {
         Expected::refused(["galerkin", "more than three modes per contact node"])
     } else {
@@ -30,13 +30,13 @@ pub(crate) fn unless_few_modes(method: Method, expected: Expected) -> Expected {
 }
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [flights(), tunnels(), impacts(), rebounds(), bounces()].into_iter().flatten().collect()
 }
 
 /// Thrown without friction.
-pub(crate) fn throw(body: Body, velocity: [f64; 3], plates: Vec<Plate>) -> Throw {
-    Throw { body, velocity, plates, friction: 0.0, method: Method::exact(Solver::Lcp), step: STEP }
+pub(crate) fn throw(body: LumpChain, velocity: [f64; 3], plates: Vec<Plate>) -> Throw {
+    Throw { body, velocity, plates, friction: 0.0, method: StabilityMethod::exact(Solver::Lcp), step: STEP }
 }
 
 /// At time 0.
@@ -61,7 +61,7 @@ pub(crate) fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
     size(std::array::from_fn(|i| a[i] - b[i]))
 }
 
-fn flights() -> Vec<Case> {
+fn flights() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods().filter(|method| method.solver == Solver::Lcp) {
         let name = method.integration();
@@ -78,10 +78,10 @@ fn flights() -> Vec<Case> {
     cases
 }
 
-fn flight(method: Method, speed: f64, mass: f64) -> Result<Vec<Check>> {
+fn flight(method: StabilityMethod, speed: f64, mass: f64) -> Result<Vec<Check>> {
     let velocity = [speed, -2.0 / 3.0 * speed, 0.1 * speed];
     // ω h is the same whatever the mass.
-    let body = Body::elastic(&[0.2 * mass, 0.5 * mass, 0.3 * mass], 1e9 * mass);
+    let body = LumpChain::elastic(&[0.2 * mass, 0.5 * mass, 0.3 * mass], 1e9 * mass);
     let body = if method.is_galerkin() { body.with_middles() } else { body };
     let count = 2 * body.corners;
     let throw = Throw { method, ..throw(body, velocity, vec![Plate::left(9.0), Plate::right(9.0)]) };
@@ -110,7 +110,7 @@ fn flight(method: Method, speed: f64, mass: f64) -> Result<Vec<Check>> {
     ])
 }
 
-fn tunnels() -> Vec<Case> {
+fn tunnels() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for (way, direction) in [("at-it", [-1.0, 0.0, 0.0]), ("along", [0.0, -1.0, 0.0]), ("oblique", [-1.0, 0.7, 0.7])] {
         for speed in [1.001 * FURTHEST / STEP, 1e4, 1e5, 1e6, 1e100, 1e308] {
@@ -120,14 +120,14 @@ fn tunnels() -> Vec<Case> {
                 Expected::refused(["in one internal step", "smaller internal step"])
             };
             let work = move |_: &_| {
-                let body = Body::rigid(1.0);
+                let body = LumpChain::rigid(1.0);
                 let velocity = direction.map(|component| component * speed);
-                Happened::of(started(&throw(body, velocity, vec![Plate::left(0.06)])).and_then(|mut simulation| {
+                CaseEnd::of(started(&throw(body, velocity, vec![Plate::left(0.06)])).and_then(|mut simulation| {
                     simulation.do_step(0.0, 10.0 * STEP)?;
                     Ok(vec![Check::so("it was told", false)])
                 }))
             };
-            cases.push(Case::new(format!("free/tunnel/{way}/{speed:e}"), expected, work).quick(true));
+            cases.push(StabilityCase::new(format!("free/tunnel/{way}/{speed:e}"), expected, work).quick(true));
         }
     }
     cases
@@ -137,7 +137,7 @@ fn tunnels() -> Vec<Case> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Impact {
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Towards the plate (m/s).
     pub speed: f64,
     /// Mass (kg).
@@ -150,7 +150,7 @@ pub(crate) struct Impact {
     pub share: f64,
 }
 
-fn impacts() -> Vec<Case> {
+fn impacts() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         for speed in [1e-6, 1e-3, 1.0, 100.0, 0.9 * FURTHEST / STEP] {
@@ -186,7 +186,7 @@ impl Impact {
         let throw = Throw {
             friction: self.friction,
             method: self.method,
-            ..throw(Body::rigid(self.mass), velocity, vec![plate])
+            ..throw(LumpChain::rigid(self.mass), velocity, vec![plate])
         };
         let mut simulation = started(&throw)?;
         let (mut impulse, mut peak) = ([0.0_f64; 3], 0.0_f64);
@@ -227,7 +227,7 @@ impl Impact {
     }
 }
 
-fn rebounds() -> Vec<Case> {
+fn rebounds() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         for ratio in [1e-6, 1e-2, 1.0, 10.0] {
@@ -249,7 +249,7 @@ fn rebounds() -> Vec<Case> {
 }
 
 /// Three lumps with one node on each face, none of whose own modes has inertia with galerkin.
-fn bounces() -> Vec<Case> {
+fn bounces() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods().filter(|method| method.is_galerkin()) {
         for speed in [1e-6, 1e-3, 0.1, 1.0] {
@@ -271,8 +271,8 @@ fn bounces() -> Vec<Case> {
 }
 
 /// A mass on the static flexibility G of its front node leaves a plate after π√(GM), as fast as it came.
-fn bounce(method: Method, speed: f64, friction: f64) -> Result<Vec<Check>> {
-    let body = Body::elastic(&[0.05, 0.1, 0.05], 1e6).with_middles();
+fn bounce(method: StabilityMethod, speed: f64, friction: f64) -> Result<Vec<Check>> {
+    let body = LumpChain::elastic(&[0.05, 0.1, 0.05], 1e6).with_middles();
     let (rom, mass) = (body.rom(), body.mass());
     let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
     let flexible: f64 = (3..9).map(|mode| (shapes[(0, mode)] / frequencies[mode]).powi(2)).sum();
@@ -309,12 +309,12 @@ const BOUNCED: f64 = 1e-4;
 const ROUNDED: f64 = 4e-12;
 
 /// Two lumps: the front one is stopped by the plate, the rear one swings back on the spring and pulls it off after T = π/ω.
-fn rebound(method: Method, ratio: f64, speed: f64) -> Result<Vec<Check>> {
+fn rebound(method: StabilityMethod, ratio: f64, speed: f64) -> Result<Vec<Check>> {
     let (rear, spring) = (0.1, 1e5);
     let front = ratio * rear;
     let (omega, fastest) = ((spring / rear).sqrt(), (spring * (1.0 / rear + 1.0 / front)).sqrt());
     let step = (2e-3 / omega).min(0.5 / fastest).min(STEP);
-    let body = Body::elastic(&[front, rear], spring);
+    let body = LumpChain::elastic(&[front, rear], spring);
     let gap = 10.37 * speed * step;
     let throw = Throw { method, step, ..throw(body, [-speed, 0.0, 0.0], vec![Plate::left(HALF + gap)]) };
     let mut simulation = started(&throw)?;

@@ -6,16 +6,16 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Cases, Check, Expected, Happened,
-    models::{GAP, Method, RADIUS, Tower, allowed, blade, bumps, round},
-    observe::{Watch, apart, begin, displacements, real, set, steps},
+    CaseEnd, Cases, Check, Expected, StabilityCase,
+    models::{GAP, RADIUS, StabilityMethod, Tower, allowed, blade, bumps, round},
+    observe::{StabilityWatch, apart, begin, displacements, real, set, steps},
     press::{Press, pressed},
 };
 
 const COEFFICIENTS: [f64; 6] = [0.0, 0.15, 0.5, 1.0, 1.5, 2.0];
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     coefficients().into_iter().chain(speeds()).collect()
 }
 
@@ -32,10 +32,10 @@ fn turned_limit() -> f64 {
     across / ((b - a) * sine * cosine)
 }
 
-fn coefficients() -> Vec<Case> {
+fn coefficients() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for friction in COEFFICIENTS {
-        for method in Method::all() {
+        for method in StabilityMethod::all() {
             for sense in [1.0, -1.0] {
                 for model in ["straight", "turned"] {
                     let sign = if sense > 0.0 { "+" } else { "−" };
@@ -46,7 +46,7 @@ fn coefficients() -> Vec<Case> {
                     let scheme = method.scheme == Scheme::ModalExact || method.is_adaptive();
                     let quick = scheme && sense > 0.0 && method.solver == Solver::Lcp && (0.1..0.3).contains(&friction);
                     let work = move |_: &_| sliding(model, friction, method, sense);
-                    cases.push(Case::new(name, expected, work).quick(quick));
+                    cases.push(StabilityCase::new(name, expected, work).quick(quick));
                 }
             }
         }
@@ -54,7 +54,7 @@ fn coefficients() -> Vec<Case> {
     cases
 }
 
-fn sliding(model: &str, friction: f64, method: Method, sense: f64) -> Happened {
+fn sliding(model: &str, friction: f64, method: StabilityMethod, sense: f64) -> CaseEnd {
     let turned = if model == "turned" { TURNED } else { 0.0 };
     let tower = Tower { turned, slope: 0.0, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 1e-6);
@@ -68,7 +68,7 @@ fn sliding(model: &str, friction: f64, method: Method, sense: f64) -> Happened {
                 let text = format!("along −θ, or µ below −w_rr/w_rθ = {limit:.3}: there W > 0");
                 checks.push(Check::so(text, sense < 0.0 || friction < limit));
             }
-            Happened::answer(checks)
+            CaseEnd::answer(checks)
         }
         Err(error) => {
             // A refusal is right where W loses its sign statically, or where the scheme or the contact grows.
@@ -76,14 +76,14 @@ fn sliding(model: &str, friction: f64, method: Method, sense: f64) -> Happened {
             let lost = sense > 0.0 && friction >= 0.99 * turned_limit();
             let text = format!("statically lost at µ = {:.3}, or growth is named", turned_limit());
             let checks = vec![Check::so(text, lost || message.contains("grows") || message.contains("film"))];
-            Happened { checks, ..Happened::refused(message) }
+            CaseEnd { checks, ..CaseEnd::refused(message) }
         }
     }
 }
 
-fn speeds() -> Vec<Case> {
+fn speeds() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::common() {
+    for method in StabilityMethod::common() {
         let (solver, name) = (method.solver, method.name());
         let lcp = solver == Solver::Lcp;
         for speed in [1e-300, 1e-200, 1e-100, 1e-12, 1e-3, 1.0, 1e4, 1e6, 1e100, 1e200, 1e300, 1.7e308] {
@@ -130,7 +130,7 @@ fn slow(solver: Solver, speed: f64, against: &str) -> Expected {
 }
 
 /// A pressed round casing at one speed. The normal forces do not know of it; friction is at most µλ.
-fn steady(method: Method, speed: f64) -> Result<Vec<Check>> {
+fn steady(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
     let tower = Tower { slope: 0.0, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 2e-6);
     scene.settings.contacts[0].friction = 0.15;
@@ -174,7 +174,7 @@ fn near(scene: &Scene) -> f64 {
 }
 
 /// Speed changes while pressed: friction turns round with the sense of sliding and knows nothing of its size.
-fn changing(method: Method, course: &str) -> Result<Vec<Check>> {
+fn changing(method: StabilityMethod, course: &str) -> Result<Vec<Check>> {
     let tower = Tower { slope: 0.0, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 2e-6);
     scene.settings.contacts[0].friction = 0.15;
@@ -212,8 +212,8 @@ fn changing(method: Method, course: &str) -> Result<Vec<Check>> {
 }
 
 /// Speed changes while blades rub on two bumps: compared with a finer step before small differences have grown.
-fn on_bumps(method: Method, course: &'static str) -> Result<Vec<Check>> {
-    let run = |method: Method, step: f64| -> Result<(Vec<f64>, Watch)> {
+fn on_bumps(method: StabilityMethod, course: &'static str) -> Result<Vec<Check>> {
+    let run = |method: StabilityMethod, step: f64| -> Result<(Vec<f64>, StabilityWatch)> {
         let mut scene = method.stepping(bumps(blade(12)), step);
         scene.settings.surfaces[0].shape = Shape::TwoLobe { depth: 0.7, width: 0.15, phase: 0.0 };
         scene.settings.structures[0].damping_ratio = Some(0.05);

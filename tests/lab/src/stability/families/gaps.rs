@@ -3,26 +3,26 @@
 use tiprub_core::{Result, Scene, Simulation, settings::Solver};
 
 use super::super::{
-    Case, Cases, Check, Expected, Happened,
-    models::{GAP, Method, Tower, allowed, on_ring, round},
-    observe::{Watch, begin, real, set, steps},
+    CaseEnd, Cases, Check, Expected, StabilityCase,
+    models::{GAP, StabilityMethod, Tower, allowed, on_ring, round},
+    observe::{StabilityWatch, begin, real, set, steps},
     press::Press,
 };
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [clearances(), redundant(), sectors(), whole_casing(), scales()].into_iter().flatten().collect()
 }
 
-fn tower_scene(method: Method) -> Scene {
+fn tower_scene(method: StabilityMethod) -> Scene {
     let mut scene = method.stepping(round(Tower::default().rom()), 2e-6);
     scene.settings.contacts[0].friction = 0.15;
     scene
 }
 
-fn clearances() -> Vec<Case> {
+fn clearances() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::common() {
+    for method in StabilityMethod::common() {
         let (lcp, name) = (method.solver == Solver::Lcp, method.name());
         for gap in [1e-6, 1e-12, 1e-30, 1e-300, f64::MIN_POSITIVE, 5e-324, 0.02] {
             let against = "static contact, signs of the ledger";
@@ -36,7 +36,7 @@ fn clearances() -> Vec<Case> {
                 Expected::right(against)
             };
             let work = move |_: &_| pressed_from(method, gap);
-            cases.push(Case::new(format!("gap/{name}/{gap:e}"), expected, work).quick(lcp));
+            cases.push(StabilityCase::new(format!("gap/{name}/{gap:e}"), expected, work).quick(lcp));
         }
         for (what, gap, words) in [
             ("zero", 0.0, "contact[1].gap"),
@@ -49,7 +49,7 @@ fn clearances() -> Vec<Case> {
             let work = move |_: &_| pressed_from(method, gap);
             let rule: &[&str] = if method.is_galerkin() { &["galerkin", "clearance above 0"] } else { &[] };
             let expected = Expected::refused_as(&[&[words], rule]);
-            cases.push(Case::new(format!("gap/{name}/{what}"), expected, work).quick(lcp));
+            cases.push(StabilityCase::new(format!("gap/{name}/{what}"), expected, work).quick(lcp));
         }
         for (what, offset) in
             [("all-just-closed", -GAP), ("all-inside", -1.0001 * GAP), ("all-deep-inside", -10.0 * GAP)]
@@ -67,18 +67,18 @@ fn clearances() -> Vec<Case> {
     cases
 }
 
-fn pressed_from(method: Method, gap: f64) -> Happened {
+fn pressed_from(method: StabilityMethod, gap: f64) -> CaseEnd {
     let mut scene = tower_scene(method);
     scene.settings.contacts[0].gap = gap;
-    Happened::of(Press::new(scene).run())
+    CaseEnd::of(Press::new(scene).run())
 }
 
-fn offset_at_start(method: Method, offset: f64) -> Result<Vec<Check>> {
+fn offset_at_start(method: StabilityMethod, offset: f64) -> Result<Vec<Check>> {
     let scene = tower_scene(method);
     let mut simulation = Simulation::new(&scene)?;
     set(&mut simulation, "gap_offset", offset)?;
     simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let mut watch = StabilityWatch::new(&scene);
     for _ in 0..500 {
         watch.step(&mut simulation, scene.settings.experiment.communication_step)?;
     }
@@ -86,7 +86,7 @@ fn offset_at_start(method: Method, offset: f64) -> Result<Vec<Check>> {
     Ok([watch.laws(), vec![Check::so("no energy, no impulse", energy == 0.0 && watch.impulse == 0.0)]].concat())
 }
 
-fn one_inside(method: Method) -> Result<Vec<Check>> {
+fn one_inside(method: StabilityMethod) -> Result<Vec<Check>> {
     let mut scene = tower_scene(method);
     scene.settings.contacts[0].sector_gaps = (0..12).map(|sector| if sector == 3 { 1e-5 } else { GAP }).collect();
     let mut simulation = Simulation::new(&scene)?;
@@ -95,10 +95,10 @@ fn one_inside(method: Method) -> Result<Vec<Check>> {
     Ok(vec![Check::so("it started", true)])
 }
 
-fn redundant() -> Vec<Case> {
+fn redundant() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for copies in [2, 3, 10] {
-        for method in Method::all() {
+        for method in StabilityMethod::all() {
             for friction in [0.0, 0.15, 0.5] {
                 let against = "static contact (sum over coincident nodes), signs of the ledger";
                 let expected = if method.is_massless() {
@@ -113,21 +113,21 @@ fn redundant() -> Vec<Case> {
                     let tower = Tower { sectors: 4, copies, ..Tower::default() };
                     let mut scene = method.stepping(round(tower.rom()), 2e-6);
                     scene.settings.contacts[0].friction = friction;
-                    Happened::of(Press::new(scene).run())
+                    CaseEnd::of(Press::new(scene).run())
                 };
                 let name = format!("redundant/{copies}-nodes/{}/µ={friction}", method.name());
                 let quick = !method.is_massless() && method.solver == Solver::Lcp && friction > 0.0;
-                cases.push(Case::new(name, expected, work).quick(quick));
+                cases.push(StabilityCase::new(name, expected, work).quick(quick));
             }
         }
     }
     cases
 }
 
-fn sectors() -> Vec<Case> {
+fn sectors() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for count in [1, 2, 3, 5, 8, 9, 36, 200] {
-        for method in Method::common() {
+        for method in StabilityMethod::common() {
             for neighbour in [0.0, 1e6] {
                 // One sector has no neighbours.
                 if count == 1 && neighbour > 0.0 {
@@ -139,18 +139,18 @@ fn sectors() -> Vec<Case> {
                     let step = if neighbour > 0.0 && count > 100 { 2e-5 } else { 2e-6 };
                     let mut scene = method.stepping(round(tower.rom()), step);
                     scene.settings.contacts[0].friction = 0.15;
-                    Happened::of(Press::new(scene).run())
+                    CaseEnd::of(Press::new(scene).run())
                 };
                 let kind = if neighbour > 0.0 { "coupled" } else { "uncoupled" };
                 let expected = Expected::right("static contact, all sectors alike, no resultant");
                 let lcp = method.solver == Solver::Lcp;
                 let quick = lcp && count < 5 || (count == 200 && neighbour == 0.0 && lcp && method.is_adaptive());
                 let name = format!("sectors/{count}/{kind}/{}", method.name());
-                cases.push(Case::new(name, expected, work).quick(quick).within(600.0));
+                cases.push(StabilityCase::new(name, expected, work).quick(quick).within(600.0));
             }
         }
     }
-    for method in Method::common() {
+    for method in StabilityMethod::common() {
         let expected = Expected::right("no force on it, the others bit by bit as without");
         let name = format!("sectors/one-blade-missing/{}", method.name());
         cases.add(method.solver == Solver::Lcp, name, expected, move || missing(method));
@@ -159,7 +159,7 @@ fn sectors() -> Vec<Case> {
 }
 
 /// A blade that is missing is one far from the casing; uncoupled sectors do not feel it.
-fn missing(method: Method) -> Result<Vec<Check>> {
+fn missing(method: StabilityMethod) -> Result<Vec<Check>> {
     let run = |gaps: Vec<f64>| -> Result<Vec<f64>> {
         let mut scene = tower_scene(method);
         scene.settings.contacts[0].sector_gaps = gaps;
@@ -191,17 +191,17 @@ fn missing(method: Method) -> Result<Vec<Check>> {
 /// A cubic through 36 points of the circle is off it by at most R (2π/36)⁴/384 (m).
 const ROUNDNESS: f64 = 6.1e-7;
 
-fn whole_casing() -> Vec<Case> {
+fn whole_casing() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         for friction in [0.0, 0.15] {
             for (surface, flexible) in [("rigid", false), ("ring", true)] {
                 let expected = Expected::right("forces of blades and casing in equilibrium, all alike, 36 nodes");
                 let lcp = method.solver == Solver::Lcp && friction > 0.0;
                 let quick = lcp && method.is_adaptive();
                 let name = format!("whole-casing/{surface}/{}/µ={friction}", method.name());
-                let work = move |_: &_| Happened::of(closed_long(method, friction, flexible));
-                cases.push(Case::new(name, expected, work).quick(quick).within(300.0));
+                let work = move |_: &_| CaseEnd::of(closed_long(method, friction, flexible));
+                cases.push(StabilityCase::new(name, expected, work).quick(quick).within(300.0));
             }
         }
     }
@@ -210,7 +210,7 @@ fn whole_casing() -> Vec<Case> {
 
 /// All nodes of all blades closed for long. Twelve blades on a ring of 36 nodes are alike, so that the ring answers with its
 /// two round modes alone: its flexibility per blade is 12 (0.5)²/ω² at the node's place along the axis.
-fn closed_long(method: Method, friction: f64, flexible: bool) -> Result<Vec<Check>> {
+fn closed_long(method: StabilityMethod, friction: f64, flexible: bool) -> Result<Vec<Check>> {
     let tower = Tower { slope: 0.0, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 2e-6);
     scene.settings.contacts[0].friction = friction;
@@ -251,10 +251,10 @@ fn closed_long(method: Method, friction: f64, flexible: bool) -> Result<Vec<Chec
     Ok(checks)
 }
 
-fn scales() -> Vec<Case> {
+fn scales() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for exponent in [-20, -60, -100, -200, -300, -400, -450, -500, -700, -900, -1000, -1060] {
-        for method in Method::common() {
+        for method in StabilityMethod::common() {
             for friction in [0.0, 0.15] {
                 let against = "every λ scaled by the same power of two; time per step";
                 // A tolerance of such lengths is near the smallest numbers.
@@ -274,7 +274,7 @@ fn scales() -> Vec<Case> {
 
 /// Round contact without inertia of sliding is homogeneous: lengths times 2ⁿ give forces times 2ⁿ, in floating point bit by
 /// bit until numbers leave the normal range.
-fn scaled(exponent: i32, method: Method, friction: f64) -> Result<Vec<Check>> {
+fn scaled(exponent: i32, method: StabilityMethod, friction: f64) -> Result<Vec<Check>> {
     let (plain, calm) = small_rub(0, method, friction)?;
     let (small, time) = small_rub(exponent, method, friction)?;
     let scale = power_of_two(exponent);
@@ -310,7 +310,7 @@ fn power_of_two(exponent: i32) -> f64 {
 }
 
 /// λ of a casing that swings into blades, all lengths times 2ⁿ, and processor time per step (s).
-fn small_rub(exponent: i32, method: Method, friction: f64) -> Result<(Vec<f64>, f64)> {
+fn small_rub(exponent: i32, method: StabilityMethod, friction: f64) -> Result<(Vec<f64>, f64)> {
     let scale = power_of_two(exponent);
     // Without coupling of radius and circumference the sense of sliding does not change.
     let tower = Tower { slope: 0.0, ..Tower::default() };

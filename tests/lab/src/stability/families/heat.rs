@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 use tiprub_core::{Result, Simulation, settings::Solver};
 
 use super::super::{
-    Case, Cases, Check, Expected,
-    models::{GAP, Method, RADIUS, Tower, round},
+    Cases, Check, Expected, StabilityCase,
+    models::{GAP, RADIUS, StabilityMethod, Tower, round},
     observe::{real, set, steps, worse},
 };
 
@@ -17,9 +17,9 @@ const STEP: f64 = 1e-6;
 
 /// Blades that a casing touches twice.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Heat {
+pub(crate) struct HeatedBlades {
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Coefficient µ.
     pub friction: f64,
     /// Speed (rad/s).
@@ -29,12 +29,12 @@ pub(crate) struct Heat {
 }
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         for friction in [1e-6, 0.15, 1.0, 2.0] {
             for speed in [300.0, 1300.0, -1300.0, 1e5] {
-                let heat = Heat { method, friction, speed, share: 1.0 };
+                let heat = HeatedBlades { method, friction, speed, share: 1.0 };
                 let expected = Expected::right("∫ µ λ |v| dt from forces and places, the integral of the power");
                 let name = format!("friction/heat/µ={friction}/Ω={speed}/{}", method.name());
                 let quick = method.solver == Solver::Lcp && (friction - 0.15).abs() < 0.1;
@@ -45,7 +45,7 @@ pub(crate) fn cases() -> Vec<Case> {
     cases
 }
 
-impl Heat {
+impl HeatedBlades {
     /// Rub, and add up.
     ///
     /// # Errors

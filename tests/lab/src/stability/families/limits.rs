@@ -6,15 +6,15 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Expected, Happened,
-    models::{Method, Tower, blade, round, with_methods, with_step},
+    CaseEnd, Expected, StabilityCase,
+    models::{StabilityMethod, Tower, blade, round, with_methods, with_step},
     press::Press,
 };
 
 const FACTORS: [f64; 5] = [0.9, 0.999, 1.001, 1.5, 10.0];
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [step_limit(), ratios(), massless()].into_iter().flatten().collect()
 }
 
@@ -25,9 +25,9 @@ pub(crate) fn massless_step(scene: &Scene) -> Option<f64> {
     refusal.split("`internal_step_max`) below ").nth(1)?.split(' ').next()?.parse().ok()
 }
 
-fn step_limit() -> Vec<Case> {
+fn step_limit() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         for (friction, model) in [(0.0, "tower"), (0.15, "tower"), (0.0, "blade"), (0.15, "blade")] {
             let against = "static contact, signs of the ledger";
             let quick = model == "tower" && friction > 0.0 && method.solver == Solver::Lcp;
@@ -36,7 +36,7 @@ fn step_limit() -> Vec<Case> {
                 for tolerance in [1e-9, 1e-6, 1e-3, 0.1] {
                     let name = format!("step-limit/{}/{model}/µ={friction}/tolerance={tolerance:e}", method.name());
                     let work = move |_: &_| at(method.within(tolerance), friction, model, 1.0);
-                    cases.push(Case::new(name, Expected::right(against), work).quick(quick));
+                    cases.push(StabilityCase::new(name, Expected::right(against), work).quick(quick));
                 }
                 continue;
             }
@@ -64,14 +64,16 @@ fn step_limit() -> Vec<Case> {
                     }
                     _ => Expected::right(against),
                 };
-                cases.push(Case::new(name, expected, move |_| at(method, friction, model, factor)).quick(quick));
+                cases.push(
+                    StabilityCase::new(name, expected, move |_| at(method, friction, model, factor)).quick(quick),
+                );
             }
         }
     }
     cases
 }
 
-fn at(method: Method, friction: f64, model: &str, factor: f64) -> Happened {
+fn at(method: StabilityMethod, friction: f64, model: &str, factor: f64) -> CaseEnd {
     let tower = Tower::default();
     let rom = if model == "tower" { tower.rom() } else { blade(12) };
     let fastest = if model == "tower" { tower.largest_frequency() } else { rom.stiffness.diagonal().max().sqrt() };
@@ -86,14 +88,14 @@ fn at(method: Method, friction: f64, model: &str, factor: f64) -> Happened {
         }
         _ => Some(2.0 / fastest),
     };
-    let Some(limit) = limit else { return Happened::refused("no limit was named") };
-    Happened::of(Press::new(with_step(scene, method.step(factor * limit))).run())
+    let Some(limit) = limit else { return CaseEnd::refused("no limit was named") };
+    CaseEnd::of(Press::new(with_step(scene, method.step(factor * limit))).run())
 }
 
-fn ratios() -> Vec<Case> {
+fn ratios() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for exponent in 2..=8 {
-        for method in Method::all() {
+        for method in StabilityMethod::all() {
             for kind in ["stiff node", "light node"] {
                 let name = format!("stiffness/{}/1e{exponent}/{}", kind.replace(' ', "-"), method.name());
                 let against = "static contact, signs of the ledger";
@@ -105,7 +107,7 @@ fn ratios() -> Vec<Case> {
                 let central = method.scheme == Scheme::CentralDifference;
                 let quick = method.solver == Solver::Lcp && exponent % 3 == 2 && !central;
                 let work = move |_: &_| ratio(kind, 10_f64.powi(exponent), method);
-                cases.push(Case::new(name, expected, work).quick(quick).within(300.0));
+                cases.push(StabilityCase::new(name, expected, work).quick(quick).within(300.0));
             }
         }
     }
@@ -113,7 +115,7 @@ fn ratios() -> Vec<Case> {
 }
 
 /// Ratio of the squares of the highest to the lowest frequency: by stiffness, or by mass.
-fn ratio(kind: &str, ratio: f64, method: Method) -> Happened {
+fn ratio(kind: &str, ratio: f64, method: StabilityMethod) -> CaseEnd {
     let soft = 4e6 / 0.1;
     let mut tower = Tower { sectors: 2, ..Tower::default() };
     if kind == "stiff node" {
@@ -135,12 +137,12 @@ fn ratio(kind: &str, ratio: f64, method: Method) -> Happened {
             }
         }
     };
-    Happened::of(Press::new(with_step(scene, step)).run())
+    CaseEnd::of(Press::new(with_step(scene, step)).run())
 }
 
 /// Up to which share of the limit of closed contact, with how stiff a contact node and how much damping, does
 /// massless-boundary come to rest?
-fn massless() -> Vec<Case> {
+fn massless() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for share in [0.2, 0.24, 0.26, 0.5, 0.7, 0.79] {
         for exponent in 2..=7 {
@@ -148,14 +150,15 @@ fn massless() -> Vec<Case> {
                 let name = format!("massless/{share}-of-limit/tip-1e{exponent}/ξ={damping}");
                 let expected = Expected::either("static contact", ["massless-boundary", "internal step"]);
                 let work = move |_: &_| at_share(share, 10_f64.powi(exponent), damping);
-                cases.push(Case::new(name, expected, work).quick(exponent == 6 && damping > 0.1).within(300.0));
+                cases
+                    .push(StabilityCase::new(name, expected, work).quick(exponent == 6 && damping > 0.1).within(300.0));
             }
         }
     }
     cases
 }
 
-fn at_share(share: f64, ratio: f64, damping: f64) -> Happened {
+fn at_share(share: f64, ratio: f64, damping: f64) -> CaseEnd {
     let mut tower = Tower { sectors: 2, ..Tower::default() };
     tower.tip = ratio * 4e7 * tower.mass[1];
     let mut scene = with_methods(round(tower.rom()), Scheme::MasslessBoundary, Solver::Lcp);
@@ -176,5 +179,5 @@ fn at_share(share: f64, ratio: f64, damping: f64) -> Happened {
     let mut press = Press::new(with_step(scene, share * low));
     press.hold = 12e-3 * 0.3 / damping;
     press.tolerance = 1e-4;
-    Happened::of(press.run())
+    CaseEnd::of(press.run())
 }

@@ -8,17 +8,17 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Cases, Check, Expected, Happened,
-    models::{GAP, LONGEST, Method, RADIUS, Tower, blade, bumps, on_ring, round, with_step},
-    observe::{Watch, amplitudes, apart, begin, displacements, real, set, steps},
+    CaseEnd, Cases, Check, Expected, StabilityCase,
+    models::{GAP, LONGEST, RADIUS, StabilityMethod, Tower, blade, bumps, on_ring, round, with_step},
+    observe::{StabilityWatch, amplitudes, apart, begin, displacements, real, set, steps},
 };
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [loads(), coatings(), shapes()].into_iter().flatten().collect()
 }
 
-fn ringed(method: Method) -> Scene {
+fn ringed(method: StabilityMethod) -> Scene {
     let mut scene = method.stepping(round(Tower { slope: 0.0, ..Tower::default() }.rom()), 2e-6);
     on_ring(&mut scene, 0.03);
     scene.settings.structures[1].thermal = true;
@@ -30,11 +30,11 @@ fn ringed(method: Method) -> Scene {
 }
 
 /// Modal-exact and both ways of galerkin, which differ in how loads enter.
-fn methods() -> impl Iterator<Item = Method> {
-    Method::common().filter(|method| method.solver == Solver::Lcp)
+fn methods() -> impl Iterator<Item = StabilityMethod> {
+    StabilityMethod::common().filter(|method| method.solver == Solver::Lcp)
 }
 
-fn loads() -> Vec<Case> {
+fn loads() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         for order in [1, 2, 3, 4] {
@@ -74,7 +74,7 @@ fn loads() -> Vec<Case> {
             cases.add(method.is_adaptive(), name, expected, move || heated(method, temperature));
         }
     }
-    for method in Method::all_with(Solver::Lcp) {
+    for method in StabilityMethod::all_with(Solver::Lcp) {
         for step in ["load", "heat"] {
             let expected = Expected::right("twice the static displacement after a sudden load, undamped; ledger");
             let name = format!("loads/sudden-{step}/{}", method.integration());
@@ -84,7 +84,7 @@ fn loads() -> Vec<Case> {
     cases
 }
 
-fn nodal(method: Method, order: u32, size: f64) -> Result<Vec<Check>> {
+fn nodal(method: StabilityMethod, order: u32, size: f64) -> Result<Vec<Check>> {
     let mut scene = ringed(method);
     scene.settings.structures[1].load = Some(LoadSettings { order, amplitude: size, phase: 0.0 });
     let mut simulation = Simulation::new(&scene)?;
@@ -105,7 +105,7 @@ fn nodal(method: Method, order: u32, size: f64) -> Result<Vec<Check>> {
     ])
 }
 
-fn heated(method: Method, temperature: f64) -> Result<Vec<Check>> {
+fn heated(method: StabilityMethod, temperature: f64) -> Result<Vec<Check>> {
     let scene = ringed(method);
     let mut simulation = Simulation::new(&scene)?;
     set(&mut simulation, "casing_temperature", temperature)?;
@@ -134,7 +134,7 @@ fn heated(method: Method, temperature: f64) -> Result<Vec<Check>> {
 }
 
 /// A load put on at once: without damping the ring swings to twice its static place and back.
-fn sudden(method: Method, what: &str) -> Result<Vec<Check>> {
+fn sudden(method: StabilityMethod, what: &str) -> Result<Vec<Check>> {
     let mut scene = ringed(method);
     scene.settings.time.input_interpolation = InputInterpolation::Hold;
     scene.settings.structures[1].damping_ratio = Some(0.0);
@@ -168,7 +168,7 @@ fn sudden(method: Method, what: &str) -> Result<Vec<Check>> {
     Ok(checks)
 }
 
-fn coatings() -> Vec<Case> {
+fn coatings() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     let plain = tiprub_test_models::coating_of(1.5e-4, [500, 7]);
     type Change = fn(CoatingSettings) -> CoatingSettings;
@@ -199,13 +199,13 @@ fn coatings() -> Vec<Case> {
         ("infinite-hardening", "hardening", |c| CoatingSettings { hardening: f64::INFINITY, ..c }),
         ("1e308-modulus", "modulus", |c| CoatingSettings { modulus: 1e308, ..c }),
     ];
-    for method in Method::all_with(Solver::Lcp) {
+    for method in StabilityMethod::all_with(Solver::Lcp) {
         for (name, change) in accepted {
             let coating = change(plain);
             let work = move |_: &_| {
                 let mut scene = method.stepping(round(blade(12)), 1e-6);
                 scene.settings.contacts[0].coating = Some(coating);
-                Happened::of(worn(scene, coating))
+                CaseEnd::of(worn(scene, coating))
             };
             let against = "wear only grows, ∫σdε ≥ Y V, signs of the ledger, hard casing not passed";
             let expected = if method.is_galerkin() {
@@ -213,20 +213,20 @@ fn coatings() -> Vec<Case> {
             } else {
                 Expected::right(against)
             };
-            let quick = (method == Method::exact(Solver::Lcp) && name != "1e6-cells")
+            let quick = (method == StabilityMethod::exact(Solver::Lcp) && name != "1e6-cells")
                 || (method.is_galerkin() && name == "plain");
             let name = format!("coating/{name}/{}", method.integration());
-            cases.push(Case::new(name, expected, work).quick(quick));
+            cases.push(StabilityCase::new(name, expected, work).quick(quick));
         }
     }
     for (name, word, change) in refused {
         let coating = change(plain);
         let work = move |_: &_| {
-            let mut scene = Method::exact(Solver::Lcp).stepping(round(blade(12)), 1e-6);
+            let mut scene = StabilityMethod::exact(Solver::Lcp).stepping(round(blade(12)), 1e-6);
             scene.settings.contacts[0].coating = Some(coating);
-            Happened::of(worn(scene, coating))
+            CaseEnd::of(worn(scene, coating))
         };
-        cases.push(Case::new(format!("coating/{name}"), Expected::refused([word]), work).quick(true));
+        cases.push(StabilityCase::new(format!("coating/{name}"), Expected::refused([word]), work).quick(true));
     }
     cases
 }
@@ -269,10 +269,10 @@ fn worn(mut scene: Scene, coating: CoatingSettings) -> Result<Vec<Check>> {
     Ok(checks)
 }
 
-fn shapes() -> Vec<Case> {
+fn shapes() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     let against = "the same with a fourth of the step, or a sixteenth of the tolerance";
-    for method in Method::common() {
+    for method in StabilityMethod::common() {
         let (lcp, name) = (method.solver == Solver::Lcp, method.name());
         for width in [1e-3, 0.01, 0.05, 0.15, 0.25] {
             for depth in [-1.0, 0.1, 0.51, 0.6, 1.0, 3.0, 30.0] {
@@ -330,14 +330,14 @@ fn shapes() -> Vec<Case> {
 }
 
 /// A rub on a shape against itself with finer steps, over the first contacts.
-fn shaped(method: Method, shape: Shape) -> Result<Vec<Check>> {
+fn shaped(method: StabilityMethod, shape: Shape) -> Result<Vec<Check>> {
     // A bump or a lobe takes at least two hundred steps to pass.
     let feature = match shape {
         Shape::TwoLobe { width, .. } => 2.0 * PI * width,
         Shape::Lobes { order, .. } => TAU / f64::from(order.min(300)),
         _ => TAU / 36.0,
     };
-    let run = |method: Method, step: f64| -> Result<(Vec<f64>, Watch)> {
+    let run = |method: StabilityMethod, step: f64| -> Result<(Vec<f64>, StabilityWatch)> {
         // The longest adaptive step is short beside what the rotor turns past, as every scene is asked for.
         let longest = if method.is_adaptive() { (0.1 * feature / 1300.0).min(LONGEST) } else { step };
         let mut scene = with_step(method.on(bumps(blade(6))), longest);

@@ -18,10 +18,10 @@ pub(crate) mod surfaces;
 pub(crate) mod turning;
 pub(crate) mod values;
 
-use super::{Case, Expected, models::Method};
+use super::{Expected, StabilityCase, models::StabilityMethod};
 
 /// Every case of the full table.
-pub(crate) fn all() -> Vec<Case> {
+pub(crate) fn all() -> Vec<StabilityCase> {
     let families = [
         limits::cases(),
         friction::cases(),
@@ -47,16 +47,16 @@ pub(crate) fn all() -> Vec<Case> {
 const SHORT: [&str; 6] = ["step-limit", "redundant", "jump", "resolution", "curved", "free"];
 
 /// Longest steps as short as those of recurrences take long: elsewhere adaptive ones stand for them.
-fn short(case: Case) -> Case {
-    let fixed = Method::in_name(&case.name).0 == Some("galerkin-fixed");
+fn short(case: StabilityCase) -> StabilityCase {
+    let fixed = StabilityMethod::in_name(&case.name).0 == Some("galerkin-fixed");
     let keep = case.quick && (!fixed || SHORT.contains(&case.family()));
     case.quick(keep)
 }
 
 /// A case of film without the inertia of contact nodes, which every scene rejects.
-fn without_film(mut case: Case) -> Case {
+fn without_film(mut case: StabilityCase) -> StabilityCase {
     let without = [("massless", "massless-boundary"), ("galerkin", "galerkin"), ("galerkin-fixed", "galerkin")];
-    if let (Some(integration), Some("film")) = Method::in_name(&case.name)
+    if let (Some(integration), Some("film")) = StabilityMethod::in_name(&case.name)
         && let Some((_, scheme)) = without.iter().find(|(name, _)| *name == integration)
     {
         // Some scenes are rejected by another rule before.

@@ -7,16 +7,16 @@ use tiprub_core::{
 
 use super::{
     super::{
-        Case, Cases, Check, Expected,
-        bodies::{Body, HALF, PLATE, Plate, Throw, vector},
-        models::{Method, SOLVERS},
+        Cases, Check, Expected, StabilityCase,
+        bodies::{HALF, LumpChain, PLATE, Plate, Throw, vector},
+        models::{SOLVERS, StabilityMethod},
         observe::{outputs, real, worse},
     },
     free::{STEP, apart, methods, size, started, throw, unless_few_modes},
 };
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [balances(), mirrors(), edges(), starts()].into_iter().flatten().collect()
 }
 
@@ -24,7 +24,7 @@ pub(crate) fn cases() -> Vec<Case> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Balance {
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Coefficient µ.
     pub friction: f64,
     /// Speed (m/s).
@@ -33,7 +33,7 @@ pub(crate) struct Balance {
     pub share: f64,
 }
 
-fn balances() -> Vec<Case> {
+fn balances() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         for friction in [0.0, 0.15, 1.0] {
@@ -68,7 +68,7 @@ impl Balance {
     /// # Errors
     /// The scene is refused.
     pub(crate) fn run(self) -> Result<Vec<Check>> {
-        let body = Body::elastic(&[0.1, 0.15, 0.05], 2e7);
+        let body = LumpChain::elastic(&[0.1, 0.15, 0.05], 2e7);
         let mass = body.mass() * self.share;
         let gap = 30.4 * self.speed * STEP;
         let left = Plate { stiffness: 1e7, ..Plate::left(HALF + gap) };
@@ -111,7 +111,7 @@ impl Balance {
     }
 }
 
-fn mirrors() -> Vec<Case> {
+fn mirrors() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         for friction in [0.0, 0.15, 0.5] {
@@ -125,9 +125,9 @@ fn mirrors() -> Vec<Case> {
 }
 
 /// A body 0.2 mm too wide on each side that is thrown between two cylinders.
-fn symmetric(method: Method, friction: f64) -> Result<Vec<Check>> {
+fn symmetric(method: StabilityMethod, friction: f64) -> Result<Vec<Check>> {
     let plate = |side: f64| Plate { side, radius: 0.18, stiffness: 1e7, ..Plate::left(HALF - 2e-4) };
-    let body = Body::elastic(&[0.1, 0.1, 0.1], 2e7).at([0.0, 0.045, 0.0]);
+    let body = LumpChain::elastic(&[0.1, 0.1, 0.1], 2e7).at([0.0, 0.045, 0.0]);
     let throw = Throw { friction, method, ..throw(body, [0.0, -40.0, 0.0], vec![plate(-1.0), plate(1.0)]) };
     let mut simulation = started(&throw)?;
     let (mut off, mut largest, mut across, mut pushed) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
@@ -151,7 +151,7 @@ fn symmetric(method: Method, friction: f64) -> Result<Vec<Check>> {
     ])
 }
 
-fn edges() -> Vec<Case> {
+fn edges() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     // From beyond the edge y = 0.09 m inwards, the face so far in front of the plate.
     let beyond = PLATE + HALF + 1e-4;
@@ -188,8 +188,8 @@ fn edges() -> Vec<Case> {
 fn edge(solver: Solver, centre: [f64; 3], distance: f64, velocity: [f64; 3]) -> Result<Vec<Check>> {
     let throw = Throw {
         friction: 0.15,
-        method: Method::exact(solver),
-        ..throw(Body::rigid(0.3).at(centre), velocity, vec![Plate::left(distance)])
+        method: StabilityMethod::exact(solver),
+        ..throw(LumpChain::rigid(0.3).at(centre), velocity, vec![Plate::left(distance)])
     };
     let mut simulation = started(&throw)?;
     let (mut impulse, mut residual) = ([0.0_f64; 3], 0.0_f64);
@@ -215,11 +215,11 @@ fn edge(solver: Solver, centre: [f64; 3], distance: f64, velocity: [f64; 3]) -> 
     Ok(checks)
 }
 
-fn starts() -> Vec<Case> {
-    let rigid = || throw(Body::rigid(1.0), [-1.0, 0.0, 0.0], vec![Plate::left(0.021)]);
-    let elastic = || throw(Body::elastic(&[0.1, 0.2, 0.1], 1e7), [-1.0, 0.0, 0.0], vec![Plate::left(0.021)]);
+fn starts() -> Vec<StabilityCase> {
+    let rigid = || throw(LumpChain::rigid(1.0), [-1.0, 0.0, 0.0], vec![Plate::left(0.021)]);
+    let elastic = || throw(LumpChain::elastic(&[0.1, 0.2, 0.1], 1e7), [-1.0, 0.0, 0.0], vec![Plate::left(0.021)]);
     let fastest = (1e7_f64 * (1.0 / 0.1 + 2.0 / 0.2)).sqrt();
-    let scheme = |scheme: Scheme| Method { scheme, ..Method::exact(Solver::Lcp) };
+    let scheme = |scheme: Scheme| StabilityMethod { scheme, ..StabilityMethod::exact(Solver::Lcp) };
     let central =
         |factor: f64| Throw { method: scheme(Scheme::CentralDifference), step: factor * 2.0 / fastest, ..elastic() };
     let refused: Vec<(&str, Throw, Expected)> = vec![
@@ -240,7 +240,7 @@ fn starts() -> Vec<Case> {
         ),
         (
             "held",
-            Throw { body: Body { ground: 1e5, ..elastic().body }, ..elastic() },
+            Throw { body: LumpChain { ground: 1e5, ..elastic().body }, ..elastic() },
             Expected::refused(["the structure is held", "without supports"]),
         ),
         ("step-beyond-limit", central(1.001), Expected::refused(["central-difference", "ω_max", "internal step"])),
@@ -255,19 +255,25 @@ fn starts() -> Vec<Case> {
             Throw { velocity: [0.0, f64::NAN, 0.0], ..rigid() },
             Expected::refused(["velocity", "finite"]),
         ),
-        ("no-mass", Throw { body: Body::rigid(0.0), ..rigid() }, Expected::refused(["mass", "not positive definite"])),
+        (
+            "no-mass",
+            Throw { body: LumpChain::rigid(0.0), ..rigid() },
+            Expected::refused(["mass", "not positive definite"]),
+        ),
         (
             "negative-mass",
-            Throw { body: Body::rigid(-1.0), ..rigid() },
+            Throw { body: LumpChain::rigid(-1.0), ..rigid() },
             Expected::refused(["mass", "not positive definite"]),
         ),
         ("too-much-friction", Throw { friction: 2.1, ..rigid() }, Expected::refused(["friction", "between 0 and 2"])),
     ];
     let case = |(name, throw, expected): (&str, Throw, Expected)| {
-        Case::new(format!("free/start/{name}"), expected, move |_: &_| super::super::Happened::of(begin(&throw)))
-            .quick(true)
+        StabilityCase::new(format!("free/start/{name}"), expected, move |_: &_| {
+            super::super::CaseEnd::of(begin(&throw))
+        })
+        .quick(true)
     };
-    let mut cases: Vec<Case> = refused.into_iter().map(case).collect();
+    let mut cases: Vec<StabilityCase> = refused.into_iter().map(case).collect();
     for factor in [0.9, 0.999] {
         let throw = central(factor);
         let expected = Expected::right("momentum balance near the step limit");

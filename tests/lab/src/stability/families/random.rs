@@ -6,20 +6,20 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Check, Expected, Happened,
-    models::{GAP, Method, Random, SOLVERS, Tower, blade, on_ring, round, with_methods, with_step},
-    observe::{MASSLESS_RETURN, Watch, apart, begin, displacements, set},
+    CaseEnd, Check, Expected, StabilityCase,
+    models::{GAP, SOLVERS, SeededRandom, StabilityMethod, Tower, blade, on_ring, round, with_methods, with_step},
+    observe::{MASSLESS_RETURN, StabilityWatch, apart, begin, displacements, set},
 };
 
 /// Scenes in the quick table and in the full one.
 const COUNT: [u64; 2] = [12, 100];
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
-    let case = |method: Option<Method>, index: u64| {
+pub(crate) fn cases() -> Vec<StabilityCase> {
+    let case = |method: Option<StabilityMethod>, index: u64| {
         // Of a scene, or another way to integrate it with its solver.
         let drawn = method_of(&scene(index).0);
-        let method = method.map_or(drawn, |method| Method { solver: drawn.solver, ..method });
+        let method = method.map_or(drawn, |method| StabilityMethod { solver: drawn.solver, ..method });
         let against = "signs of the ledger, complementarity, the same with a fourth of the step";
         let expected = Expected::either_as(
             against,
@@ -34,12 +34,12 @@ pub(crate) fn cases() -> Vec<Case> {
             ],
         );
         let name = format!("random/{index:03}/{}", method.name());
-        let case = Case::new(name, expected, move |_| happened(method, index));
+        let case = StabilityCase::new(name, expected, move |_| happened(method, index));
         // Some take as long as all others.
         case.quick(index < COUNT[0] && ![5, 9, 11].contains(&index)).within(300.0)
     };
-    let mut cases: Vec<Case> = (0..COUNT[1]).map(|index| case(None, index)).collect();
-    for method in Method::all_with(Solver::Lcp).filter(|method| method.is_galerkin()) {
+    let mut cases: Vec<StabilityCase> = (0..COUNT[1]).map(|index| case(None, index)).collect();
+    for method in StabilityMethod::all_with(Solver::Lcp).filter(|method| method.is_galerkin()) {
         cases.extend((0..COUNT[1]).map(|index| case(Some(method), index)));
     }
     cases
@@ -47,7 +47,7 @@ pub(crate) fn cases() -> Vec<Case> {
 
 /// Scene, and by how much and how fast the casing swings (m, rad/s).
 fn scene(index: u64) -> (Scene, f64, f64) {
-    let mut random = Random(0x9e37_79b9_7f4a_7c15 ^ (index + 1).wrapping_mul(0xd134_2543_de82_ef95));
+    let mut random = SeededRandom(0x9e37_79b9_7f4a_7c15 ^ (index + 1).wrapping_mul(0xd134_2543_de82_ef95));
     for _ in 0..8 {
         random.unit();
     }
@@ -87,21 +87,21 @@ fn scene(index: u64) -> (Scene, f64, f64) {
 }
 
 /// Method that a scene has been drawn with.
-fn method_of(scene: &Scene) -> Method {
-    Method { scheme: scene.settings.time.scheme, ..Method::exact(scene.settings.contacts[0].solver) }
+fn method_of(scene: &Scene) -> StabilityMethod {
+    StabilityMethod { scheme: scene.settings.time.scheme, ..StabilityMethod::exact(scene.settings.contacts[0].solver) }
 }
 
-fn happened(method: Method, index: u64) -> Happened {
+fn happened(method: StabilityMethod, index: u64) -> CaseEnd {
     let (scene, ..) = scene(index);
     let contact = &scene.settings.contacts[0];
     let remark = format!(
         "{} sectors of {}, µ = {}, h = {:.1e} s",
         scene.roms[0].sectors, scene.roms[0].name, contact.friction, scene.settings.time.step
     );
-    Happened::of(checked(method, index)).remark(remark)
+    CaseEnd::of(checked(method, index)).remark(remark)
 }
 
-fn checked(method: Method, index: u64) -> Result<Vec<Check>> {
+fn checked(method: StabilityMethod, index: u64) -> Result<Vec<Check>> {
     let massless = method.is_massless();
     let (coarse, watch) = run(method, index, 1.0)?;
     let (fine, finer) = run(method, index, 0.25)?;
@@ -130,7 +130,7 @@ fn checked(method: Method, index: u64) -> Result<Vec<Check>> {
 }
 
 /// 1.5 ms with the step, or the root of the tolerance, times `factor`; displacements every 50 µs.
-fn run(method: Method, index: u64, factor: f64) -> Result<(Vec<f64>, Watch)> {
+fn run(method: StabilityMethod, index: u64, factor: f64) -> Result<(Vec<f64>, StabilityWatch)> {
     let (scene, swing, rate) = scene(index);
     let step = scene.settings.time.step * factor;
     let mut scene = method.within(1e-4 * factor * factor).stepping(scene, step);

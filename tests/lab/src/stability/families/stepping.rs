@@ -7,22 +7,22 @@ use tiprub_core::{
 
 use super::{
     super::{
-        Case, Cases, Check, Expected, Happened,
-        models::{GAP, Method, Random, Tower, allowed, blade, bumps, round, with_methods, with_step},
-        observe::{MASSLESS_RETURN, Watch, apart, begin, bits, displacements, real, set, steps},
+        CaseEnd, Cases, Check, Expected, StabilityCase,
+        models::{GAP, SeededRandom, StabilityMethod, Tower, allowed, blade, bumps, round, with_methods, with_step},
+        observe::{MASSLESS_RETURN, StabilityWatch, apart, begin, bits, displacements, real, set, steps},
     },
     gaps::processor_time,
     limits::massless_step,
 };
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [communication(), long(), jumps(), restore()].into_iter().flatten().collect()
 }
 
-fn communication() -> Vec<Case> {
+fn communication() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         let lcp = method.solver == Solver::Lcp;
         for ratio in [1e-3, 0.1, 0.7, 1.0, 2.0, 3.3, 10.0, 1e3] {
             let expected = if ratio < 1.0 {
@@ -31,14 +31,14 @@ fn communication() -> Vec<Case> {
                 Expected::right("the same with H = h, one step at a time")
             };
             let name = format!("communication/H={ratio}h/{}", method.name());
-            let quick = lcp && (method == Method::exact(Solver::Lcp) || method.is_galerkin());
+            let quick = lcp && (method == StabilityMethod::exact(Solver::Lcp) || method.is_galerkin());
             cases.add(quick && ratio > 0.5, name, expected, move || lengths(method, ratio));
         }
         let expected = Expected::right("the same with even steps a quarter as long; signs of the ledger");
         let name = format!("communication/wild/{}", method.name());
         cases.add(false, name, expected, move || wildly(method));
     }
-    for method in Method::all_with(Solver::Lcp) {
+    for method in StabilityMethod::all_with(Solver::Lcp) {
         let name = method.integration();
         let expected = Expected::right("energy of free blades without damping, and their phase against ω t");
         cases.add(false, format!("communication/H=1e6h/{name}"), expected, move || huge(method));
@@ -72,12 +72,12 @@ fn communication() -> Vec<Case> {
 }
 
 /// A step after a start at 1 s, so that the shortest ones do not change the time.
-fn beyond(method: Method, length: f64) -> Result<Vec<Check>> {
+fn beyond(method: StabilityMethod, length: f64) -> Result<Vec<Check>> {
     from(1.0, method, length)
 }
 
 /// A step from `start` (s).
-fn from(start: f64, method: Method, length: f64) -> Result<Vec<Check>> {
+fn from(start: f64, method: StabilityMethod, length: f64) -> Result<Vec<Check>> {
     let scene = method.stepping(round(Tower::default().rom()), 1e-6);
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(start)?;
@@ -86,7 +86,7 @@ fn from(start: f64, method: Method, length: f64) -> Result<Vec<Check>> {
     Ok(vec![Check::so("all outputs finite", finite)])
 }
 
-fn rub(method: Method, step: f64) -> Scene {
+fn rub(method: StabilityMethod, step: f64) -> Scene {
     let mut scene = method.stepping(bumps(blade(6)), step);
     scene.settings.structures[0].damping_ratio = Some(0.02);
     // The bumps stand still at the start and are there at once where the blades are not.
@@ -94,10 +94,10 @@ fn rub(method: Method, step: f64) -> Scene {
 }
 
 /// March a rub to 2 ms by communication steps of these lengths; displacements every 0.1 ms.
-fn history(scene: &Scene, mut length: impl FnMut() -> f64) -> Result<(Vec<f64>, Watch)> {
+fn history(scene: &Scene, mut length: impl FnMut() -> f64) -> Result<(Vec<f64>, StabilityWatch)> {
     let mut simulation = Simulation::new(scene)?;
     simulation.initialise(0.0)?;
-    let mut watch = Watch::new(scene);
+    let mut watch = StabilityWatch::new(scene);
     let mut history = Vec::new();
     for mark in 1..=20 {
         let end = 1e-4 * f64::from(mark);
@@ -115,7 +115,7 @@ fn history(scene: &Scene, mut length: impl FnMut() -> f64) -> Result<(Vec<f64>, 
 
 const STEP: f64 = 1e-6;
 
-fn lengths(method: Method, ratio: f64) -> Result<Vec<Check>> {
+fn lengths(method: StabilityMethod, ratio: f64) -> Result<Vec<Check>> {
     let length = (ratio * STEP).min(1e-4);
     let (found, watch) = if ratio < 0.01 {
         // A thousand times as many: the first two marks are enough.
@@ -145,7 +145,7 @@ fn lengths(method: Method, ratio: f64) -> Result<Vec<Check>> {
 }
 
 /// h/1000 for a tenth of a microsecond in contact, continued from a state at h, against ten times as long steps.
-fn short(method: Method, length: f64) -> Result<Vec<Check>> {
+fn short(method: StabilityMethod, length: f64) -> Result<Vec<Check>> {
     let mut scene = rub(method, STEP);
     scene.settings.surfaces[0].ramp_time = 0.0;
     scene.settings.surfaces[0].shape = tiprub_core::settings::Shape::Circular {};
@@ -173,8 +173,8 @@ fn short(method: Method, length: f64) -> Result<Vec<Check>> {
     ])
 }
 
-fn wildly(method: Method) -> Result<Vec<Check>> {
-    let mut random = Random(11);
+fn wildly(method: StabilityMethod) -> Result<Vec<Check>> {
+    let mut random = SeededRandom(11);
     let (found, watch) = history(&rub(method, STEP), || random.scale(1e-8, 5e-5))?;
     let (even, _) = history(&rub(method, STEP / 4.0), || STEP / 4.0)?;
     let mut checks = vec![
@@ -189,7 +189,7 @@ fn wildly(method: Method) -> Result<Vec<Check>> {
 }
 
 /// A blade in free motion: kicked by the casing, which then leaves.
-fn kicked(method: Method, step: f64) -> Result<(Simulation, f64)> {
+fn kicked(method: StabilityMethod, step: f64) -> Result<(Simulation, f64)> {
     let tower = Tower { sectors: 1, ..Tower::default() };
     let mut scene = method.on(round(tower.rom()));
     scene.settings.structures[0].damping_ratio = Some(0.0);
@@ -221,7 +221,7 @@ fn energy(simulation: &Simulation) -> f64 {
     real(simulation, "scheme_energy")
 }
 
-fn huge(method: Method) -> Result<Vec<Check>> {
+fn huge(method: StabilityMethod) -> Result<Vec<Check>> {
     let (mut simulation, step) = kicked(method, 2e-6)?;
     let mut twin = simulation.clone();
     let before = energy(&simulation);
@@ -240,26 +240,28 @@ fn huge(method: Method) -> Result<Vec<Check>> {
     ])
 }
 
-fn long() -> Vec<Case> {
+fn long() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all_with(Solver::Lcp) {
+    for method in StabilityMethod::all_with(Solver::Lcp) {
         let name = method.integration();
         for (steps, quick) in [(1e5, true), (1e7, false)] {
             let expected = Expected::right("energy of free undamped blades");
             let work = move |_: &_| match drift(method, steps) {
-                Ok((checks, remark)) => Happened::answer(checks).remark(remark),
-                Err(error) => Happened::refused(error),
+                Ok((checks, remark)) => CaseEnd::answer(checks).remark(remark),
+                Err(error) => CaseEnd::refused(error),
             };
-            cases.push(Case::new(format!("long/{steps:e}-steps/{name}"), expected, work).quick(quick).within(600.0));
+            cases.push(
+                StabilityCase::new(format!("long/{steps:e}-steps/{name}"), expected, work).quick(quick).within(600.0),
+            );
         }
         let expected = Expected::right("energy at most what the casing did; signs of the ledger");
-        let work = move |_: &_| Happened::of(chatter(method));
-        cases.push(Case::new(format!("long/chatter/{name}"), expected, work).within(600.0));
+        let work = move |_: &_| CaseEnd::of(chatter(method));
+        cases.push(StabilityCase::new(format!("long/chatter/{name}"), expected, work).within(600.0));
     }
     cases
 }
 
-fn drift(method: Method, steps: f64) -> Result<(Vec<Check>, String)> {
+fn drift(method: StabilityMethod, steps: f64) -> Result<(Vec<Check>, String)> {
     let (mut simulation, step) = kicked(method, 2e-6)?;
     let (before, clock) = (energy(&simulation), processor_time());
     let mut most: f64 = 0.0;
@@ -275,7 +277,7 @@ fn drift(method: Method, steps: f64) -> Result<(Vec<Check>, String)> {
 }
 
 /// Blades without damping that bounce in a round casing for long: contact may take energy, never give it.
-fn chatter(method: Method) -> Result<Vec<Check>> {
+fn chatter(method: StabilityMethod) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 4, ..Tower::default() };
     let mut scene = method.stepping(round(tower.rom()), 2e-6);
     scene.settings.structures[0].damping_ratio = Some(if method.is_massless() { 1e-3 } else { 0.0 });
@@ -299,9 +301,9 @@ fn chatter(method: Method) -> Result<Vec<Check>> {
     .concat())
 }
 
-fn jumps() -> Vec<Case> {
+fn jumps() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         for jump in [1e-6, 1e-5, 1e-4, 1e-3, -1e-4] {
             let expected = Expected::right("impulse = W⁻¹ jump, energy of the casing = impact loss + energy left");
             let name = format!("jump/gap-offset/{jump:e}/{}", method.name());
@@ -313,7 +315,7 @@ fn jumps() -> Vec<Case> {
 
 /// The casing jumps onto resting blades by a distance. In that step the force is the jump over W, an impulse p = λh; the casing
 /// does λ·jump/2 of work twice over two steps, what stays is in the blade.
-fn jumped(method: Method, jump: f64) -> Result<Vec<Check>> {
+fn jumped(method: StabilityMethod, jump: f64) -> Result<Vec<Check>> {
     let tower = Tower { sectors: 3, slope: 0.0, ..Tower::default() };
     let mut scene = with_step(method.on(round(tower.rom())), 2e-6);
     scene.settings.structures[0].damping_ratio = Some(0.0);
@@ -372,23 +374,25 @@ fn pushed(rom: &tiprub_core::Rom, jump: f64, step: f64) -> f64 {
     (jump - seen(moving) * moved) / flexible
 }
 
-fn restore() -> Vec<Case> {
+fn restore() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         let expected = Expected::right("the same bits as where it was saved, whatever the parameters there were");
         let name = format!("restore/other-parameters/{}", method.name());
         cases.add(method.solver == Solver::Lcp, name, expected, move || elsewhere(method));
     }
     let expected = Expected::right("refused, set back, and then the same bits as of a fresh instance");
-    cases.push(Case::new("restore/refused-scheme", expected, |_| Happened::of(after_refusal())).quick(true));
+    cases.push(StabilityCase::new("restore/refused-scheme", expected, |_| CaseEnd::of(after_refusal())).quick(true));
     let expected = Expected::right("a warning for the step taken, once; none for the step proposed");
-    cases.push(Case::new("communication/other-step-than-proposed", expected, |_| Happened::of(told())).quick(true));
+    cases.push(
+        StabilityCase::new("communication/other-step-than-proposed", expected, |_| CaseEnd::of(told())).quick(true),
+    );
     let expected = Expected::refused(["another scene"]);
-    cases.push(Case::new("restore/other-scene", expected, |_| Happened::of(other_scene())).quick(true));
+    cases.push(StabilityCase::new("restore/other-scene", expected, |_| CaseEnd::of(other_scene())).quick(true));
     cases
 }
 
-fn elsewhere(method: Method) -> Result<Vec<Check>> {
+fn elsewhere(method: StabilityMethod) -> Result<Vec<Check>> {
     let scene = rub(method, STEP);
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
@@ -430,7 +434,7 @@ fn elsewhere(method: Method) -> Result<Vec<Check>> {
 /// A scheme that leaves no mode, asked for and taken back as an FMU does in Initialization Mode.
 fn after_refusal() -> Result<Vec<Check>> {
     // As many modes as three contact nodes have directions.
-    let mut scene = rub(Method::exact(Solver::Lcp), STEP);
+    let mut scene = rub(StabilityMethod::exact(Solver::Lcp), STEP);
     let rom = &mut scene.roms[0];
     for matrix in [&mut rom.mass, &mut rom.stiffness, &mut rom.contact_map] {
         *matrix = matrix.view((0, 0), (9, 9)).into_owned();
@@ -477,7 +481,7 @@ fn told() -> Result<Vec<Check>> {
 }
 
 fn other_scene() -> Result<Vec<Check>> {
-    let scene = rub(Method::exact(Solver::Lcp), STEP);
+    let scene = rub(StabilityMethod::exact(Solver::Lcp), STEP);
     let mut changed = scene.clone();
     changed.roms[0].stiffness[(0, 0)] *= 1.0 + 1e-15;
     let [first, mut second] = [Simulation::new(&scene)?, Simulation::new(&changed)?];

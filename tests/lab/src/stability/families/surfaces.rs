@@ -6,17 +6,17 @@ use tiprub_core::{
 };
 
 use super::super::{
-    Case, Cases, Check, Expected,
-    models::{GAP, Method, RADIUS, Tower, blade, round},
-    observe::{Watch, begin, real, set, steps},
+    Cases, Check, Expected, StabilityCase,
+    models::{GAP, RADIUS, StabilityMethod, Tower, blade, round},
+    observe::{StabilityWatch, begin, real, set, steps},
 };
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [edges(), resolution(), curved()].into_iter().flatten().collect()
 }
 
-fn rubbing(method: Method) -> Scene {
+fn rubbing(method: StabilityMethod) -> Scene {
     let mut scene = method.stepping(round(blade(4)), 1e-6);
     scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.meridional_slope = 0.0);
     scene.settings.structures[0].axial_shift = true;
@@ -24,9 +24,9 @@ fn rubbing(method: Method) -> Scene {
 }
 
 /// A cylinder: beyond the edge the spline goes on as what has no edge, a surface of revolution.
-fn edges() -> Vec<Case> {
+fn edges() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all_with(Solver::Lcp).filter(|method| !method.is_massless()) {
+    for method in StabilityMethod::all_with(Solver::Lcp).filter(|method| !method.is_massless()) {
         let name = method.integration();
         // Rings reach 7.5 mm beyond the contact nodes, and the surface goes on for 11.25 mm.
         for (shift, expected) in [
@@ -41,7 +41,7 @@ fn edges() -> Vec<Case> {
     cases
 }
 
-fn over_the_edge(method: Method, shift: f64) -> Result<Vec<Check>> {
+fn over_the_edge(method: StabilityMethod, shift: f64) -> Result<Vec<Check>> {
     let run = |spline: Option<SplineSettings>| {
         let mut scene = rubbing(method);
         scene.settings.surfaces[0].spline = spline;
@@ -69,9 +69,9 @@ fn over_the_edge(method: Method, shift: f64) -> Result<Vec<Check>> {
 }
 
 /// A step is refused once it passes over modes that carry the contact; not one that passes over a stiff node alone.
-fn resolution() -> Vec<Case> {
+fn resolution() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all_with(Solver::Lcp) {
+    for method in StabilityMethod::all_with(Solver::Lcp) {
         let galerkin = method.is_galerkin();
         if method.is_adaptive() || !(galerkin || method.scheme == Scheme::ModalExact) {
             continue;
@@ -96,7 +96,7 @@ fn resolution() -> Vec<Case> {
 }
 
 /// Blades of one mass and spring, met by a casing that closes in: their only mode carries everything.
-fn at_product(method: Method, product: f64, friction: f64) -> Result<Vec<Check>> {
+fn at_product(method: StabilityMethod, product: f64, friction: f64) -> Result<Vec<Check>> {
     let mut scene = method.on(round(blade(4)));
     let fastest = scene.roms[0].stiffness.diagonal().max();
     // All modes at one frequency.
@@ -105,7 +105,7 @@ fn at_product(method: Method, product: f64, friction: f64) -> Result<Vec<Check>>
     let step = product / fastest.sqrt();
     let mut simulation = Simulation::new(&method.stepping(scene.clone(), step))?;
     simulation.initialise(0.0)?;
-    let mut watch = Watch::new(&scene);
+    let mut watch = StabilityWatch::new(&scene);
     let mut negative = 0.0_f64;
     for index in 0..400 {
         set(&mut simulation, "casing_radius_change", -1.05 * GAP * (f64::from(index) / 200.0).min(1.0))?;
@@ -116,9 +116,9 @@ fn at_product(method: Method, product: f64, friction: f64) -> Result<Vec<Check>>
 }
 
 /// Blades dragged around by friction: told from 5 % of the clearance on, refused at 100 %.
-fn curved() -> Vec<Case> {
+fn curved() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::common().filter(|method| method.solver == Solver::Lcp) {
+    for method in StabilityMethod::common().filter(|method| method.solver == Solver::Lcp) {
         for (what, share) in [("small", 0.02), ("told", 0.2), ("refused", 1.5)] {
             let expected = if share < 1.0 {
                 Expected::right("u²/2r against the clearance")
@@ -133,7 +133,7 @@ fn curved() -> Vec<Case> {
 }
 
 /// A blade whose root is soft around the axis, pressed until friction has moved it by so much.
-fn dragged(method: Method, share: f64) -> Result<Vec<Check>> {
+fn dragged(method: StabilityMethod, share: f64) -> Result<Vec<Check>> {
     let mut scene = method.on(round(Tower::default().rom()));
     scene.settings.contacts[0].friction = 0.3;
     let mut simulation = Simulation::new(&method.stepping(scene.clone(), 2e-6))?;

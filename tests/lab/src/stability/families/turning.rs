@@ -14,9 +14,9 @@ use tiprub_core::{
 
 use super::{
     super::{
-        Case, Cases, Check, Expected,
-        models::{GAP, LONGEST, Method, RADIUS, Tower, allowed, on_ring, round, with_step},
-        observe::{Watch, amplitudes, real, set, worse},
+        Cases, Check, Expected, StabilityCase,
+        models::{GAP, LONGEST, RADIUS, StabilityMethod, Tower, allowed, on_ring, round, with_step},
+        observe::{StabilityWatch, amplitudes, real, set, worse},
     },
     decay::modes,
 };
@@ -31,7 +31,7 @@ const LOAD_STEP: f64 = 0.05;
 const BESIDE: f64 = 5e-4;
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     [loads(), lobes(), flanks()].into_iter().flatten().collect()
 }
 
@@ -62,7 +62,7 @@ fn mode(frequency: f64, ratio: f64, omega: f64) -> Complex<f64> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Travelling {
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Nodal diameters.
     pub order: u32,
     /// Ω over the natural frequency, with the sense.
@@ -76,9 +76,9 @@ fn ring_frequency(order: u32) -> f64 {
     TAU * [9000.0, 900.0, 400.0, 1100.0, 2100.0][order as usize]
 }
 
-fn loads() -> Vec<Case> {
+fn loads() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all_with(Solver::Lcp) {
+    for method in StabilityMethod::all_with(Solver::Lcp) {
         for order in [1, 2, 3, 4] {
             for ratio in [0.01, 0.3, 1.0, 1.7, 10.0, -0.3, -1.0, -1.7] {
                 let travelling = Travelling { method, order, ratio, early: 0.0 };
@@ -146,9 +146,9 @@ impl Travelling {
 
 /// A rotor all of whose blades are pressed on a casing with lobes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Pressed {
+pub(crate) struct PressedRotor {
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Lobes.
     pub order: u32,
     /// Speed that the closed form is told (rad/s).
@@ -159,14 +159,14 @@ pub(crate) struct Pressed {
     pub early: f64,
 }
 
-fn lobes() -> Vec<Case> {
+fn lobes() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         for order in [1, 3, 12, 40] {
             for speed in [0.1, 50.0, 1300.0, -1300.0, 5000.0] {
                 // Lobes move the tip by less than a tolerance that is enough elsewhere.
                 let method = method.within(1e-7);
-                let pressed = Pressed { method, order, speed, factor: 1.0, early: 0.0 };
+                let pressed = PressedRotor { method, order, speed, factor: 1.0, early: 0.0 };
                 let expected = Expected::right("λ of every blade from the dynamic stiffness, over a pass of a lobe");
                 let name = format!("turning/lobes/{order}/Ω={speed}/{}", method.name());
                 let quick = method.solver == Solver::Lcp && order == 3 && speed > 2000.0;
@@ -177,7 +177,7 @@ fn lobes() -> Vec<Case> {
     cases
 }
 
-impl Pressed {
+impl PressedRotor {
     fn scene(self) -> (Tower, Scene, f64) {
         // Hardly any tangential motion: the blade is where the rotor is.
         let tower = Tower { sectors: 7, base: [4e7, 1e10, 2e7], tip: 2e8, slope: 0.0, ..Tower::default() };
@@ -245,7 +245,7 @@ impl Pressed {
         simulation.do_step(simulation.time(), 2e-2)?;
         let stiffness = self.stiffness(&tower, step, omega);
         let at_rest = depth / (1.0 / tower.base[0] + 1.0 / tower.tip);
-        let mut watch = Watch::new(&scene);
+        let mut watch = StabilityWatch::new(&scene);
         // λ is the force at the beginning of its step; that of galerkin is one of the instant.
         let galerkin = self.method.is_galerkin();
         let late = if galerkin { 0.0 } else { omega * step };
@@ -288,16 +288,16 @@ impl Pressed {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Flank {
     /// Method.
-    pub method: Method,
+    pub method: StabilityMethod,
     /// Slope of the flank, ds/dθ/R.
     pub slope: f64,
     /// Share of the tangential part of the normal that the closed form is told: another than 1 must be found out.
     pub share: f64,
 }
 
-fn flanks() -> Vec<Case> {
+fn flanks() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
-    for method in Method::all() {
+    for method in StabilityMethod::all() {
         for slope in [1e-6, -1e-3, 0.05, -0.3, 0.9, 1.1, -2.0] {
             let flank = Flank { method, slope, share: 1.0 };
             let expected = if slope.abs() > 1.0 {
@@ -352,7 +352,7 @@ impl Flank {
         let mut simulation = Simulation::new(&scene)?;
         simulation.initialise(0.0)?;
         let row = simulation.table().find("casing_radius_change").map_or(0, |row| row.reference);
-        let mut watch = Watch::new(&scene);
+        let mut watch = StabilityWatch::new(&scene);
         simulation.set_input_derivative(row, 1, -(GAP + depth) / 4e-3)?;
         watch.step(&mut simulation, 4e-3)?;
         simulation.set_real(row, -(GAP + depth))?;

@@ -4,13 +4,13 @@
 use tiprub_core::{
     Error, Result, Scene, Simulation,
     settings::{LoadSettings, Solver},
-    variables::{Causality, Kind, Quantity, Variable},
+    variables::{Causality, DataType, Quantity, Variable},
 };
 use tiprub_fmi_host::{Session, UnpackedFmu};
 
 use super::super::{
-    Case, Check, Context, Expected, Happened,
-    models::{Method, Tower, blade, bumps, on_ring, round},
+    CaseContext, CaseEnd, Check, Expected, StabilityCase,
+    models::{StabilityMethod, Tower, blade, bumps, on_ring, round},
     observe::{bits, outputs},
 };
 
@@ -61,18 +61,19 @@ pub(crate) fn scene(name: &str) -> Scene {
     };
     scene.settings.name = name.into();
     scene.settings.outputs.all_sectors = true;
-    let adaptive = |method: &Method| method.is_adaptive() == (name == ADAPTIVE);
-    let method = Method::common().filter(|method| method.solver == Solver::Lcp).find(adaptive);
-    method.unwrap_or(Method::exact(Solver::Lcp)).on(scene)
+    let adaptive = |method: &StabilityMethod| method.is_adaptive() == (name == ADAPTIVE);
+    let method = StabilityMethod::common().filter(|method| method.solver == Solver::Lcp).find(adaptive);
+    method.unwrap_or(StabilityMethod::exact(Solver::Lcp)).on(scene)
 }
 
 /// All of them.
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for name in SCENES {
         // The table of a scene is cheap to make, and the only list of what can be set.
         let Ok(simulation) = Simulation::new(&scene(name)) else { continue };
-        for variable in simulation.table().variables().iter().filter(|row| row.is_settable() && row.kind == Kind::Real)
+        for variable in
+            simulation.table().variables().iter().filter(|row| row.is_settable() && row.kind == DataType::Real)
         {
             for (text, value) in VALUES {
                 cases.extend(of_variable(name, variable, text, value));
@@ -83,7 +84,7 @@ pub(crate) fn cases() -> Vec<Case> {
     cases
 }
 
-fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64) -> Vec<Case> {
+fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64) -> Vec<StabilityCase> {
     let against = "as with the nearest ordinary value, or finite and in order; nothing changed by a refusal";
     let name = variable.name.clone();
     let word = match name.as_str() {
@@ -116,9 +117,9 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
             continue;
         }
         let owned = name.clone();
-        let work = move |_: &Context| by_setter(scene, &owned, value, during);
+        let work = move |_: &CaseContext| by_setter(scene, &owned, value, during);
         // Steps must be positive: the shortest numbers are out of range.
-        let case = Case::new(format!("values/{scene}/{name}/{text}/{when}"), expected(), work);
+        let case = StabilityCase::new(format!("values/{scene}/{name}/{text}/{when}"), expected(), work);
         let scene = scene == "round" || (scene == "ring" && during) || scene == ADAPTIVE;
         cases.push(case.quick(common(text) && scene));
     }
@@ -129,14 +130,15 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
         } else {
             Expected::refused([&variable.name])
         };
-        let work = move |_: &Context| by_slope(scene, &owned, value);
-        let case = Case::new(format!("values/{scene}/{name}/{text}/slope"), expected, work);
+        let work = move |_: &CaseContext| by_slope(scene, &owned, value);
+        let case = StabilityCase::new(format!("values/{scene}/{name}/{text}/slope"), expected, work);
         cases.push(case.quick(scene == "round" && common(text)));
     }
     for version in [2_u8, 3] {
         let owned = name.clone();
-        let work = move |context: &Context| by_import(context, scene, version, &owned, value);
-        let case = Case::new(format!("values/{scene}/{name}/{text}/fmi{version}"), expected(), work).importing();
+        let work = move |context: &CaseContext| by_import(context, scene, version, &owned, value);
+        let case =
+            StabilityCase::new(format!("values/{scene}/{name}/{text}/fmi{version}"), expected(), work).importing();
         let quick = scene == ADAPTIVE && common(text);
         cases.push(case.quick(quick));
     }
@@ -163,9 +165,9 @@ fn started(scene: &Scene) -> Result<Simulation> {
 
 /// Set before initialisation or in a run; the answer must be that of an ordinary value where there is one, and else finite
 /// and within the bounds of mechanics.
-fn by_setter(name: &str, variable: &str, value: f64, during: bool) -> Happened {
+fn by_setter(name: &str, variable: &str, value: f64, during: bool) -> CaseEnd {
     let scene = scene(name);
-    let outcome = (|| -> Result<Happened> {
+    let outcome = (|| -> Result<CaseEnd> {
         let (mut simulation, mut twin) = if during {
             (started(&scene)?, started(&scene)?)
         } else {
@@ -195,9 +197,9 @@ fn by_setter(name: &str, variable: &str, value: f64, during: bool) -> Happened {
                 1e-6,
             ));
         }
-        Ok(Happened::answer(checks))
+        Ok(CaseEnd::answer(checks))
     })();
-    outcome.unwrap_or_else(Happened::refused)
+    outcome.unwrap_or_else(CaseEnd::refused)
 }
 
 /// The value that an extreme one should be as good as: nothing, or of an angle the rest of whole turns.
@@ -251,7 +253,7 @@ fn refused(
     row: u32,
     before: f64,
     during: bool,
-) -> Happened {
+) -> CaseEnd {
     let mut checks = Vec::new();
     let outcome = (|| -> Result<bool> {
         if during && simulation.set_real(row, before).is_ok() && go_on(&mut simulation).is_ok() {
@@ -270,29 +272,29 @@ fn refused(
         Ok(bits(&simulation) == bits(&twin))
     })();
     checks.push(Check::so("goes on bit by bit as if never asked", outcome == Ok(true)));
-    Happened { checks, ..Happened::refused(error) }
+    CaseEnd { checks, ..CaseEnd::refused(error) }
 }
 
 /// A derivative of an input.
-fn by_slope(name: &str, variable: &str, value: f64) -> Happened {
+fn by_slope(name: &str, variable: &str, value: f64) -> CaseEnd {
     let scene = scene(name);
-    let outcome = (|| -> Result<Happened> {
+    let outcome = (|| -> Result<CaseEnd> {
         let (mut simulation, twin) = (started(&scene)?, started(&scene)?);
         let row = simulation.table().find(variable).map_or(0, |row| row.reference);
         let before = simulation.real(row)?;
         let stepped = simulation.set_input_derivative(row, 1, value).and_then(|()| go_on(&mut simulation));
         Ok(match stepped {
             Err(refusal) => refused(&refusal, simulation, twin, row, before, true),
-            Ok(()) => Happened::answer(sane(&simulation)),
+            Ok(()) => CaseEnd::answer(sane(&simulation)),
         })
     })();
-    outcome.unwrap_or_else(Happened::refused)
+    outcome.unwrap_or_else(CaseEnd::refused)
 }
 
 /// Through a packaged FMU: set after the start, step, read everything.
-fn by_import(context: &Context, scene: &str, version: u8, variable: &str, value: f64) -> Happened {
-    let Some(directory) = &context.fmus else { return Happened::refused("no FMUs were packaged") };
-    let outcome = (|| -> tiprub_shell::Result<Happened> {
+fn by_import(context: &CaseContext, scene: &str, version: u8, variable: &str, value: f64) -> CaseEnd {
+    let Some(directory) = &context.fmus else { return CaseEnd::refused("no FMUs were packaged") };
+    let outcome = (|| -> tiprub_shell::Result<CaseEnd> {
         let fmu = UnpackedFmu::open(&directory.join(format!("{scene}-{version}.fmu")))?;
         let mut session = Session::new(&fmu)?;
         let set = session.set_real(variable, value);
@@ -301,10 +303,7 @@ fn by_import(context: &Context, scene: &str, version: u8, variable: &str, value:
             (0..5).try_for_each(|index| session.do_step(f64::from(index) * LENGTH, LENGTH))
         });
         if let Err(refusal) = stepped {
-            return Ok(Happened {
-                checks: vec![Check::so("told through a status", true)],
-                ..Happened::refused(refusal)
-            });
+            return Ok(CaseEnd { checks: vec![Check::so("told through a status", true)], ..CaseEnd::refused(refusal) });
         }
         let values = session.outputs()?;
         let mut checks = vec![Check::so("all outputs finite", values.iter().all(|value| value.is_finite()))];
@@ -318,9 +317,9 @@ fn by_import(context: &Context, scene: &str, version: u8, variable: &str, value:
         let same =
             expected.len() == values.len() && expected.iter().zip(&values).all(|(a, b)| a.to_bits() == b.to_bits());
         checks.push(Check::so("the bits of the run without FMI", same));
-        Ok(Happened::answer(checks))
+        Ok(CaseEnd::answer(checks))
     })();
-    outcome.unwrap_or_else(Happened::refused)
+    outcome.unwrap_or_else(CaseEnd::refused)
 }
 
 /// How a finite but extreme value of a setting may be refused: the field, and what is wrong or what to do.
@@ -377,7 +376,7 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
 }
 
 /// Settings of a scene, which have no setter.
-fn settings() -> Vec<Case> {
+fn settings() -> Vec<StabilityCase> {
     type Change = fn(&mut Scene, f64);
     let fields: [(&str, &str, Change); 20] = [
         ("speed", "speed", |scene, value| scene.settings.structures[0].speed = value),
@@ -424,10 +423,10 @@ fn settings() -> Vec<Case> {
             } else {
                 Expected::refused([word])
             };
-            let work = move |_: &Context| {
+            let work = move |_: &CaseContext| {
                 let mut scene = scene("bumps");
                 change(&mut scene, value);
-                Happened::of((|| {
+                CaseEnd::of((|| {
                     // As the ROM file is read.
                     scene.roms[0].validate()?;
                     let mut simulation = Simulation::new(&scene)?;
@@ -436,7 +435,7 @@ fn settings() -> Vec<Case> {
                     Ok(sane(&simulation))
                 })())
             };
-            cases.push(Case::new(format!("settings/{field}/{text}"), expected, work).quick(common(text)));
+            cases.push(StabilityCase::new(format!("settings/{field}/{text}"), expected, work).quick(common(text)));
         }
     }
     cases

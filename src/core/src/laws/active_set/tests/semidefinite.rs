@@ -5,9 +5,9 @@ use super::*;
 use proptest::test_runner::TestCaseResult;
 
 /// Numbers from −1 to 1.
-struct Random(u64);
+struct SignedRandom(u64);
 
-impl Random {
+impl SignedRandom {
     fn signed(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / 4_503_599_627_370_496.0 - 1.0
@@ -23,7 +23,7 @@ impl Random {
 
 /// What makes W hard.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
+enum HardMatrix {
     Regular,
     FewModes,
     /// Own flexibilities over six powers of ten.
@@ -41,21 +41,21 @@ enum Kind {
     Turning,
 }
 
-const KINDS: [Kind; 10] = [
-    Kind::Regular,
-    Kind::FewModes,
-    Kind::StiffBesideSoft,
-    Kind::StiffBesideSoftFewModes,
-    Kind::NearlyTwice,
-    Kind::Twice,
-    Kind::StiffModes,
-    Kind::StiffModesFew,
-    Kind::Smooth,
-    Kind::Turning,
+const KINDS: [HardMatrix; 10] = [
+    HardMatrix::Regular,
+    HardMatrix::FewModes,
+    HardMatrix::StiffBesideSoft,
+    HardMatrix::StiffBesideSoftFewModes,
+    HardMatrix::NearlyTwice,
+    HardMatrix::Twice,
+    HardMatrix::StiffModes,
+    HardMatrix::StiffModesFew,
+    HardMatrix::Smooth,
+    HardMatrix::Turning,
 ];
 
-impl Kind {
-    fn delassus(self, n: usize, random: &mut Random) -> DMatrix<f64> {
+impl HardMatrix {
+    fn delassus(self, n: usize, random: &mut SignedRandom) -> DMatrix<f64> {
         let modes = match self {
             Self::FewModes | Self::StiffBesideSoftFewModes | Self::StiffModesFew | Self::Turning => n.div_ceil(2),
             Self::Smooth => n.div_ceil(3),
@@ -92,7 +92,7 @@ impl Kind {
 }
 
 /// Gaps that some forces open, a third of the contacts that carry nothing at exactly zero.
-fn solvable_gaps(w: &DMatrix<f64>, random: &mut Random) -> Vec<f64> {
+fn solvable_gaps(w: &DMatrix<f64>, random: &mut SignedRandom) -> Vec<f64> {
     let n = w.nrows();
     let forces: Vec<f64> =
         (0..n).map(|node| if random.unit() < 0.5 { random.unit() / w[(node, node)] } else { 0.0 }).collect();
@@ -113,8 +113,8 @@ fn check(w: &DMatrix<f64>, gaps: &[f64], solver: &ContactSolver) -> TestCaseResu
     Ok(())
 }
 
-fn solved(kind: Kind, n: usize, seed: u64) -> TestCaseResult {
-    let mut random = Random(seed);
+fn solved(kind: HardMatrix, n: usize, seed: u64) -> TestCaseResult {
+    let mut random = SignedRandom(seed);
     (0..4).for_each(|_| {
         random.signed();
     });

@@ -5,9 +5,9 @@ use nalgebra::DMatrix;
 use super::*;
 
 /// Numbers from 0 to 1.
-struct Random(u64);
+struct UnitRandom(u64);
 
-impl Random {
+impl UnitRandom {
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / 9_007_199_254_740_992.0
@@ -16,7 +16,7 @@ impl Random {
 
 /// One blade of `n` nodes on `modes` modes, pressed through a coating of that modulus onto the hard casing.
 fn check(n: usize, modes: usize, modulus: f64, seed: u64) -> Result<(), String> {
-    let mut random = Random(seed);
+    let mut random = UnitRandom(seed);
     (0..4).for_each(|_| {
         random.unit();
     });

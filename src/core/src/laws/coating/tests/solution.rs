@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::laws::active_set::ContactSolver;
-use tiprub_test_models::Random;
+use tiprub_test_models::SeededRandom;
 
 pub fn materials() -> impl Strategy<Value = CoatingSettings> {
     let exponent = -2.0..2.0_f64;
@@ -177,7 +177,7 @@ fn every_combination(coating: &Coating, cells: &[CellContact], w: &DMatrix<f64>,
         system.view_mut((0, n + c), (n, n)).copy_from(&-w);
         right.rows_mut(0, n).copy_from_slice(gaps);
         for (row, cell) in cells.iter().enumerate() {
-            let Rod { modulus: e, yield_stress: y, hardening: k } = coating.rod;
+            let RodMaterial { modulus: e, yield_stress: y, hardening: k } = coating.rod;
             // F = area·(stress at zero strain + tangent·strain), written out anew.
             let (stress, tangent) =
                 [(0.0, 0.0), (-e * cell.plastic, e), (e * y / (e + k), e * k / (e + k))][branches[row]];
@@ -305,7 +305,7 @@ fn redundant_nodes_share_the_hard_contact() {
 /// Lengths across the coating a power of two as long: the same way, to the last bit.
 #[test]
 fn the_path_does_not_know_the_unit_of_length() {
-    let mut random = Random(12);
+    let mut random = SeededRandom(12);
     for _ in 0..100 {
         let plastic: Vec<f64> = (0..9).map(|_| 0.2 * random.unit()).collect();
         let (w, gaps) = (p_matrix(random.matrix(6, 6).as_slice(), 6), random.matrix(6, 1) * 1.5);
@@ -356,7 +356,7 @@ fn rods_that_move_alike_do_not_lead_the_path_in_circles() {
 /// Rods that load and unload again: more exchanges than they have branches.
 #[test]
 fn a_path_back_and_forth_is_followed_to_its_end() {
-    let mut random = Random(77);
+    let mut random = SeededRandom(77);
     let mut most = 0.0_f64;
     for _ in 0..4 {
         let modulus = random.scale(1e-4, 1e2);
