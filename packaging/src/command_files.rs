@@ -76,7 +76,7 @@ fn fmus(targets: &[(FmiVersion, PathBuf)]) -> Vec<NamedFile> {
 
 /// The libraries that are named on the command line.
 fn libraries(arguments: &LibraryArguments) -> Result<Vec<NamedFile>> {
-    Ok(library::given(arguments)?.into_iter().map(|path| NamedFile::new("--library", path)).collect())
+    Ok(library::given_libraries(arguments)?.into_iter().map(|path| NamedFile::new("--library", path)).collect())
 }
 
 /// The files of a scene.

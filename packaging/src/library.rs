@@ -131,7 +131,7 @@ pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) 
         let problem = format!("none of {} is among the files given", unit.names().1);
         return Err(Failure::new("FMU library", problem, "Make it with packaging/libraries.sh and give --library DIR"));
     }
-    wanted(&arguments.platform, found.keys().copied().collect())?;
+    check_platforms(&arguments.platform, found.keys().copied().collect())?;
     Ok(found
         .into_iter()
         .filter(|(platform, _)| {
@@ -142,7 +142,7 @@ pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) 
 }
 
 /// Each platform asked for is there.
-fn wanted(asked: &[PlatformChoice], found: Vec<Platform>) -> Result<()> {
+fn check_platforms(asked: &[PlatformChoice], found: Vec<Platform>) -> Result<()> {
     let Some(missing) = asked.iter().find(|choice| !found.contains(&choice.0)) else { return Ok(()) };
     let names: Vec<&str> = found.into_iter().map(Platform::tuple).collect();
     Err(Failure::new(
@@ -180,7 +180,7 @@ impl clap::ValueEnum for PlatformChoice {
 ///
 /// # Errors
 /// A directory that cannot be read, or is empty.
-pub fn given(arguments: &LibraryArguments) -> Result<Vec<PathBuf>> {
+pub fn given_libraries(arguments: &LibraryArguments) -> Result<Vec<PathBuf>> {
     Ok(arguments.library.iter().map(|path| files(path)).collect::<Result<Vec<_>>>()?.concat())
 }
 
@@ -217,7 +217,7 @@ fn origin<'a>(unit: LibraryUnit, executable: &'a Path, sources: Option<&'a Path>
 /// Files, and the directory that they are in where it goes when they are read.
 fn find(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> Result<(Vec<PathBuf>, Option<TempDir>)> {
     if !arguments.library.is_empty() {
-        return Ok((given(arguments)?, None));
+        return Ok((given_libraries(arguments)?, None));
     }
     let (executable, cache) = (env::current_exe().unwrap_or_default(), RomCache::of_user());
     let sources = WORKSPACE.map(Path::new).filter(|workspace| workspace.join("fmi/Cargo.toml").is_file());

@@ -217,7 +217,7 @@ impl RomFacts {
         self.write_responses(&mut text);
         let estimates = estimate::of_rom(rom);
         if !estimates.is_empty() {
-            let _ = writeln!(text, "\n  {}", estimate::told(&estimates));
+            let _ = writeln!(text, "\n  {}", estimate::errors_text(&estimates));
         }
         text
     }

@@ -96,7 +96,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<CommandOutcom
         let label = format!("FMI {}.0", version.digit());
         let path = fmu_path(directory, version);
         watch.measure(&format!("packaging, {label}"), || {
-            console.say(format_args!("Packaging {}", path.display()));
+            console.print_progress(format_args!("Packaging {}", path.display()));
             package.write(&path, version, None)
         })?;
         let run = watch.measure(&format!("import and run, {label}"), || import(&path, &label, &schedule, console))?;
@@ -253,7 +253,7 @@ impl Demo<'_> {
             self.native.recording.names.len(),
             self.native.recording.rows(),
             STUDY,
-            estimate::told(&self.estimates),
+            estimate::errors_text(&self.estimates),
             report.display()
         );
         let json = json!({

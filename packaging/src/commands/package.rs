@@ -31,7 +31,7 @@ pub fn run(arguments: &PackageArguments, console: &Console) -> Result<CommandOut
         FmuPackage::new(&scene, &libraries).map_err(|failure| scene_source::located(&arguments.scene, failure))?;
     let arrays = (arguments.arrays || arguments.scalars).then_some(arguments.arrays);
     for (version, path) in &targets {
-        console.say(format_args!("Writing {}", path.display()));
+        console.print_progress(format_args!("Writing {}", path.display()));
         package.write(path, *version, arrays)?;
     }
     let platforms: Vec<&str> = libraries.iter().map(|library| library.platform.tuple()).collect();

@@ -104,7 +104,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         let outputs = outputs(&run.recording.names, run.recording.row(rows - 1));
         format!("\n{outputs}\n{}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
     } else {
-        let told = if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::told(&estimates)) };
+        let told = if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::errors_text(&estimates)) };
         let hint =
             if arguments.estimate { "" } else { "\nerrors of this run, estimated from coarser runs: --estimate" };
         format!("{}{told}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))
@@ -152,7 +152,7 @@ fn lines(estimates: &[Estimate]) -> String {
         return String::new();
     }
     let why = estimates.iter().filter_map(|one| Some(format!("\n  {}: {}", one.direction, one.left.as_ref().err()?)));
-    format!("\n{}{}", estimate::told(estimates), why.collect::<String>())
+    format!("\n{}{}", estimate::errors_text(estimates), why.collect::<String>())
 }
 
 /// Longer arrays are told by their range.

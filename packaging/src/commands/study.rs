@@ -62,7 +62,7 @@ fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOut
         outcome.json["rom"] = shown_path(path).into();
         outcome.text.push_str(&format!("\nwritten: {}", path.display()));
         if known {
-            outcome.text.push_str(&format!("\n{}", estimate::told(&estimate::of_rom(&rom))));
+            outcome.text.push_str(&format!("\n{}", estimate::errors_text(&estimate::of_rom(&rom))));
         } else {
             let warning = format!(
                 "{} is the ROM as it was: no error by its modes, patches or mesh was found, for the reasons above",

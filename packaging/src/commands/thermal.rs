@@ -70,7 +70,7 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<CommandOut
     let libraries = library::load(LibraryUnit::Thermal, &arguments.libraries, console)?;
     let package = ThermalPackage::new(&reduced.model, &libraries)?;
     for (version, path) in &targets {
-        console.say(format_args!("Writing {}", path.display()));
+        console.print_progress(format_args!("Writing {}", path.display()));
         package.write(path, *version, arguments.arrays)?;
     }
     let mut text = facts(&reduced);

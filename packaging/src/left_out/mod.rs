@@ -80,20 +80,20 @@ fn cost(scene: &Scene, with: fn(&mut Scene), own: &SceneSizes, measure: bool) ->
 
 /// Why a scene is rejected. The rules are also asked about one with adaptive steps if it had fixed ones.
 fn refusal(mut scene: Scene, error: Error) -> FeatureRefusal {
-    let mut reason = words(error);
+    let mut reason = reason_of(error);
     let time = &mut scene.settings.time;
     if time.scheme != Scheme::Galerkin {
         return FeatureRefusal { reason, allowed_with_fixed_steps: false };
     }
     (time.scheme, time.tolerance) = (Scheme::ModalExact, None);
-    let with_fixed_steps = Simulation::new(&scene).map_err(words);
+    let with_fixed_steps = Simulation::new(&scene).map_err(reason_of);
     if let Some(other) = with_fixed_steps.as_ref().err().filter(|other| **other != reason) {
         let _ = write!(reason, ". With fixed steps, {other}");
     }
     FeatureRefusal { reason, allowed_with_fixed_steps: with_fixed_steps.is_ok() }
 }
 
-fn words(error: Error) -> String {
+fn reason_of(error: Error) -> String {
     match error {
         Error::Invalid { what, problem, .. } => format!("{what}: {problem}"),
         other => other.to_string(),
@@ -127,13 +127,13 @@ pub fn text(all: &[LeftOut]) -> String {
     for (group, title) in [(RowGroup::Physics, "left out here"), (RowGroup::Machinery, "machinery that is off")] {
         let _ = writeln!(text, "\n{title:<53} what it needs");
         for LeftOut { effect, cost } in all.iter().filter(|one| one.effect.group == group) {
-            let _ = writeln!(text, "  {:<51} {}{}", effect.name, effect.takes, told(cost.as_ref()));
+            let _ = writeln!(text, "  {:<51} {}{}", effect.name, effect.takes, cost_text(cost.as_ref()));
         }
     }
     text
 }
 
-fn told(cost: Option<&Result<Cost, FeatureRefusal>>) -> String {
+fn cost_text(cost: Option<&Result<Cost, FeatureRefusal>>) -> String {
     match cost {
         None => String::new(),
         Some(Err(FeatureRefusal { reason, allowed_with_fixed_steps })) => {

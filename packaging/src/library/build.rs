@@ -37,7 +37,7 @@ pub(super) fn build_once(
     let place = place.map_or_else(env::temp_dir, Path::to_path_buf);
     let target = TempDir::with_prefix_in("tiprub-library-", &place)
         .map_err(|error| Failure::file(&place, "no temporary directory can be made", &error))?;
-    console.say(
+    console.print_progress(
         "Building the FMU library from the sources that tiprub was installed from; this takes some minutes, only once",
     );
     let built = build(unit, workspace, target.path(), console)?;
@@ -56,7 +56,7 @@ pub(super) fn build_once(
     match output_file::only_a_file(&library).and_then(|()| output_file::write(&library, bytes)) {
         Ok(()) => Ok((vec![library], None)),
         Err(failure) => {
-            console.say(format_args!("The library is not cached: {failure}"));
+            console.print_progress(format_args!("The library is not cached: {failure}"));
             Ok((vec![built], Some(target)))
         }
     }

@@ -185,11 +185,11 @@ fn run_section(input: &ReportInput<'_>) -> String {
     let mut html = format!("<section><h2>The run</h2>{}", table(&rows));
     for warning in &native.warnings {
         let [problem, remedy] = warning.lines();
-        let (word, id) = (warning.level().word(), warning.topic().id());
+        let (word, id) = (warning.level().name(), warning.topic().id());
         let _ = write!(html, "<p class=\"warning\"><b>{word} [{id}]</b> {}<br>{}</p>", escape(problem), escape(remedy));
     }
     if !input.estimates.is_empty() {
-        let _ = write!(html, "<p>{}.</p>", escape(&estimate::told(input.estimates)));
+        let _ = write!(html, "<p>{}.</p>", escape(&estimate::errors_text(input.estimates)));
     }
     html.push_str(&paper_part(input, &results));
     html.push_str("<h3>Where the time went</h3>");

@@ -64,7 +64,7 @@ pub fn blade(
     let choose = |imported: &Imported| {
         Ok(Chosen { stress: choose::stress(imported, asked)?, ..choose::tips(imported, source.model, tips, None)? })
     };
-    told(&source, imported, choose, |model, chosen, clamped| {
+    reduce_clamped(&source, imported, choose, |model, chosen, clamped| {
         Ok(ReducedModel::general(general(&source, asked, model, chosen, console)?, clamped))
     })
 }
@@ -114,7 +114,7 @@ pub fn sector(asked: &SectorArguments, console: &Console) -> Result<ReducedModel
     let source = asked.source();
     let imported = import(&source, console)?;
     let choose = |imported: &Imported| choose::tips(imported, source.model, &asked.tips, Some(asked));
-    told(&source, imported, choose, |model, chosen, clamped| cyclic((&source, asked), model, chosen, clamped, console))
+    reduce_clamped(&source, imported, choose, |model, chosen, clamped| cyclic((&source, asked), model, chosen, clamped, console))
 }
 
 /// A casing whose contact nodes form a grid.
@@ -126,7 +126,7 @@ pub fn casing(asked: &CasingMeshArguments, console: &Console) -> Result<ReducedM
     let imported = import(&source, console)?;
     let materials = imported.materials.len();
     let choose = |imported: &Imported| choose::grid(imported, asked);
-    told(&source, imported, choose, |model, chosen, clamped| {
+    reduce_clamped(&source, imported, choose, |model, chosen, clamped| {
         if materials != 1 {
             return Err(no_mesh());
         }
@@ -166,7 +166,7 @@ fn no_mesh() -> Failure {
 }
 
 /// Judge and choose, reduce with the set of clamped nodes, and tell of all.
-fn told(
+fn reduce_clamped(
     source: &MeshSource,
     imported: Imported,
     choose: impl FnOnce(&Imported) -> Result<Chosen>,
@@ -319,7 +319,7 @@ fn import(source: &MeshSource, console: &Console) -> Result<Imported> {
         axis: asked.axis(),
         left_out: asked.clamp_set.clone(),
     };
-    console.say(format_args!("Reading {} and {}", stiffness.display(), mass.display()));
+    console.print_progress(format_args!("Reading {} and {}", stiffness.display(), mass.display()));
     read_matrices(&files).map_err(failure)
 }
 

@@ -25,7 +25,7 @@ impl System {
         // Eqs 3 and 10: gaps at the predicted places.
         let step = self.step_size();
         for (pair, drive) in self.pairs.iter_mut().zip(drives) {
-            pair.go_to(drive, step);
+            pair.move_to(drive, step);
         }
         self.find_gaps(true);
         self.check_edges()?;

@@ -16,7 +16,7 @@ pub enum Severity {
 
 impl Severity {
     /// The word that stands before its text.
-    pub fn word(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Note => "note",
             Self::Warning => "warning",

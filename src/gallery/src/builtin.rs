@@ -69,12 +69,12 @@ pub(crate) const NAMES: [&str; 13] = [
 pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
     if let Some(options) = rotor37(name) {
         let reduced = cache.get(name, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom));
-        return Some(reduced.map(|rom| known::told(&options, rom)));
+        return Some(reduced.map(|rom| known::with_known_errors(&options, rom)));
     }
     let disk = || {
         let model = DiskModel::named(name);
         let rom = cache.get(name, &model, console, &|| Ok(model.reduce(console)?.0.rom))?;
-        Ok(known::told(&model.options, rom))
+        Ok(known::with_known_errors(&model.options, rom))
     };
     Some(match name {
         CASING37 => {
@@ -132,7 +132,7 @@ pub struct ModelVariant {
 
 impl ModelVariant {
     /// For the name of what is kept.
-    fn told(&self, name: &str) -> String {
+    fn cache_name(&self, name: &str) -> String {
         let tip = match self.tip {
             TipContact::Nodes(count) => format!("nodes-{count}"),
             TipContact::Patches(count) => format!("patches-{count}"),
@@ -151,7 +151,7 @@ pub fn refined(name: &str, other: ModelVariant, cache: &RomCache, console: &Cons
         other => other,
     };
     let keep = |options: &dyn core::fmt::Debug, make: &dyn Fn() -> Result<Rom>| {
-        cache.get(&other.told(name), options, console, make)
+        cache.get(&other.cache_name(name), options, console, make)
     };
     if let Some(defaults) = rotor37(name) {
         let mesh = rotor37_mesh(defaults.mesh, other.mesh);

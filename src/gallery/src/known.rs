@@ -85,7 +85,7 @@ fn rows() -> [KnownModel; 5] {
 }
 
 /// The ROM of a model with these options, with what is known of it.
-pub(crate) fn told(options: &dyn Debug, mut rom: Rom) -> Rom {
+pub(crate) fn with_known_errors(options: &dyn Debug, mut rom: Rom) -> Rom {
     let options = format!("{options:?}");
     let known = rows().into_iter().find(|row| row.options == options);
     rom.checks.rub_errors = known.map(|row| {
@@ -115,27 +115,27 @@ mod tests {
         };
         let rom = reduction::rotor37(&small, &console).unwrap().rom;
         assert_eq!(rom.checks.rub_errors, None);
-        let rom = told(&own, rom);
+        let rom = with_known_errors(&own, rom);
         let errors = rom.checks.rub_errors.clone().expect("a row of the blade that ships");
         assert!(
             errors.found_on.contains("light rub") && errors.rows == Some(0.0046) && errors.mesh == Some(0.0485),
             "{errors:?}"
         );
         assert!(
-            told(&Rotor37Options::paper(), rom.clone())
+            with_known_errors(&Rotor37Options::paper(), rom.clone())
                 .checks
                 .rub_errors
                 .is_some_and(|errors| errors.patches == Some(0.34))
         );
-        let one = told(&Rotor37Options::one_row(), rom.clone()).checks.rub_errors;
+        let one = with_known_errors(&Rotor37Options::one_row(), rom.clone()).checks.rub_errors;
         assert!(one.is_some_and(|errors| errors.rows == Some(0.274) && errors.mesh.is_some()));
-        let stage = told(&StageOptions::default(), rom.clone()).checks.rub_errors;
+        let stage = with_known_errors(&StageOptions::default(), rom.clone()).checks.rub_errors;
         assert!(stage.is_some_and(|errors| errors.patches == Some(0.102) && errors.rows.is_none()));
-        let stage = told(&builtin::stage().1, rom.clone()).checks.rub_errors;
+        let stage = with_known_errors(&builtin::stage().1, rom.clone()).checks.rub_errors;
         assert!(stage.is_some_and(|errors| errors.modes == Some(0.0014) && errors.mesh == Some(0.0084)));
         let wider = StageOptions { tip: TipContact::Rows([5, 2]), ..builtin::stage().1 };
         for other in [StageOptions::coarse(), wider] {
-            assert_eq!(told(&other, rom.clone()).checks.rub_errors, None, "{other:?}");
+            assert_eq!(with_known_errors(&other, rom.clone()).checks.rub_errors, None, "{other:?}");
         }
         let mesh = MeshCounts { span: own.mesh.span + 2, ..own.mesh };
         for other in [
@@ -144,7 +144,7 @@ mod tests {
             Rotor37Options { mesh, ..own.clone() },
             Rotor37Options { kind: ReductionKind::FixedInterface, ..own },
         ] {
-            assert_eq!(told(&other, rom.clone()).checks.rub_errors, None, "{other:?}");
+            assert_eq!(with_known_errors(&other, rom.clone()).checks.rub_errors, None, "{other:?}");
         }
     }
 }

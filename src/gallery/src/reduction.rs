@@ -32,7 +32,7 @@ const STAGES: [ReductionStage; 7] = [
 /// Counts that the mesh cannot serve, and whatever the reduction refuses.
 pub fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduction> {
     let reduction = with_progress("Reducing rotor 37", console, &|listener| reduce_rotor37(options, listener))?;
-    Ok(Reduction { rom: known::told(options, reduction.rom), ..reduction })
+    Ok(Reduction { rom: known::with_known_errors(options, reduction.rom), ..reduction })
 }
 
 /// Reduce a casing, showing stage and share done.

@@ -78,19 +78,19 @@ impl RomCache {
         let path = directory.join(format!("{name}-{}.rom", &key[..32]));
         match read(&path, &key) {
             Ok(rom) => {
-                console.say(format_args!(
+                console.print_progress(format_args!(
                     "Model {name} as made before, from {} (--no-cache makes it anew)",
                     path.display()
                 ));
                 return Ok(rom);
             }
-            Err(Some(problem)) => console.say(format_args!("{}: {problem}; making it anew", path.display())),
+            Err(Some(problem)) => console.print_progress(format_args!("{}: {problem}; making it anew", path.display())),
             Err(None) => {}
         }
         let rom = make()?;
         let kept = output_file::only_a_file(&path).and_then(|()| output_file::write(&path, content(&rom, &key)));
         if let Err(failure) = kept {
-            console.say(format_args!("Model {name} is not cached: {failure}"));
+            console.print_progress(format_args!("Model {name} is not cached: {failure}"));
         }
         prune(directory, name);
         Ok(rom)

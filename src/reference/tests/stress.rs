@@ -21,7 +21,7 @@ fn recorded() -> Vec<StressRow> {
 #[test]
 fn stress_of_a_pushed_blade_is_that_of_calculix() {
     let blade = PushedBlade::new().unwrap();
-    let told = blade.told().unwrap();
+    let told = blade.unit_stresses().unwrap();
     let rows = recorded();
     assert_eq!(
         rows.iter().map(|row| row.0).collect::<Vec<_>>(),

@@ -63,7 +63,7 @@ pub struct CommandOutcome {
 pub fn warnings_json(warnings: &[Warning]) -> [serde_json::Value; 2] {
     let each = |warning: &Warning| {
         let [problem, remedy] = warning.lines();
-        let (id, level) = (warning.topic().id(), warning.level().word());
+        let (id, level) = (warning.topic().id(), warning.level().name());
         serde_json::json!({ "id": id, "level": level, "problem": problem, "remedy": remedy })
     };
     [warning::texts(warnings).into(), warnings.iter().map(each).collect()]
@@ -77,7 +77,7 @@ fn warning_lines(warnings: &[Warning]) -> Vec<String> {
         let alike = warnings.iter().filter(|other| other.topic() == warning.topic()).count();
         let more = if alike > 1 { format!(" ({} more of this kind: --all)", alike - 1) } else { String::new() };
         let [problem, remedy] = warning.lines();
-        format!("{} [{}] {problem}\n    {remedy}{more}", warning.level().word(), warning.topic().id())
+        format!("{} [{}] {problem}\n    {remedy}{more}", warning.level().name(), warning.topic().id())
     };
     warnings.iter().enumerate().filter(first).map(lines).collect()
 }
@@ -102,7 +102,7 @@ impl Console {
     }
 
     /// One line of progress on stderr.
-    pub fn say(&self, line: impl std::fmt::Display) {
+    pub fn print_progress(&self, line: impl std::fmt::Display) {
         if !self.quiet {
             // A closed stderr must not stop the work.
             let _ = writeln!(std::io::stderr(), "{}", printable(&line.to_string()));
@@ -131,7 +131,7 @@ impl Console {
             return Task { bar: ProgressBar::hidden(), lines: false };
         }
         if !self.terminal {
-            self.say(format!("{title} ..."));
+            self.print_progress(format!("{title} ..."));
             return Task { bar: ProgressBar::hidden(), lines: true };
         }
         let bar = total.map_or_else(ProgressBar::new_spinner, ProgressBar::new);

@@ -66,7 +66,7 @@ impl WorkPlan {
     }
 
     /// Time that the rest takes (s).
-    pub fn left(&self) -> f64 {
+    pub fn remaining(&self) -> f64 {
         let measured = self.kinds.iter().filter(|kind| kind.done > 0.0);
         let (units, seconds) = measured.fold((0.0, 0.0), |(units, all), kind| (units + kind.done, all + kind.seconds));
         let usual = if units > 0.0 { seconds / units } else { self.rate };
@@ -81,7 +81,7 @@ impl WorkPlan {
     pub fn share(&mut self) -> f64 {
         let spent: f64 = self.kinds.iter().map(|kind| kind.seconds).sum();
         let is_done = self.kinds.iter().all(|kind| kind.done >= kind.planned);
-        let now = if is_done { 1.0 } else { spent / (spent + self.left()).max(f64::MIN_POSITIVE) };
+        let now = if is_done { 1.0 } else { spent / (spent + self.remaining()).max(f64::MIN_POSITIVE) };
         self.shown = self.shown.max(if is_done { now } else { now.min(MOST_SHOWN) });
         self.shown
     }
@@ -107,9 +107,9 @@ struct ForecastState {
 impl Forecast {
     /// Show planned work, and say how long it takes where that is long.
     pub fn new(console: &Console, title: &str, ledger: WorkPlan) -> Self {
-        let seconds = ledger.left();
+        let seconds = ledger.remaining();
         if seconds >= LONG {
-            console.say(format_args!("{title}: about {}, a first estimate", duration(seconds)));
+            console.print_progress(format_args!("{title}: about {}, a first estimate", duration(seconds)));
         }
         let (last, line) = (Instant::now(), (0.0, Instant::now()));
         let task = console.task(title, Some(PARTS));
@@ -128,7 +128,7 @@ impl Forecast {
         let seconds = (now - state.last).as_secs_f64();
         state.last = now;
         state.ledger.done(kind, units, seconds);
-        let (share, left) = (state.ledger.share(), state.ledger.left());
+        let (share, left) = (state.ledger.share(), state.ledger.remaining());
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ share ≤ 1")]
         self.task.at((share * PARTS as f64) as u64);
         let text = format!("{:.0} %, about {} left", (100.0 * share).floor(), duration(left));
@@ -175,7 +175,7 @@ mod tests {
                 assert!(share >= last && (share < 1.0 || index == 59), "{index}: {share} after {last}");
                 last = share;
             }
-            assert!((last - 1.0).abs() < 1e-12 && ledger.left() == 0.0, "{last}");
+            assert!((last - 1.0).abs() < 1e-12 && ledger.remaining() == 0.0, "{last}");
         }
     }
 
@@ -184,15 +184,15 @@ mod tests {
         let mut ledger = WorkPlan::new(1.0);
         ledger.plan(0, 10.0);
         ledger.plan(1, 10.0);
-        assert!((ledger.left() - 20.0).abs() < 1e-12);
+        assert!((ledger.remaining() - 20.0).abs() < 1e-12);
         // Five times slower than thought, of both kinds until the second is measured.
         ledger.done(0, 2.0, 10.0);
-        assert!((ledger.left() - 5.0 * 18.0).abs() < 1e-12);
+        assert!((ledger.remaining() - 5.0 * 18.0).abs() < 1e-12);
         ledger.done(1, 1.0, 0.5);
-        assert!((ledger.left() - (8.0 * 5.0 + 9.0 * 0.5)).abs() < 1e-12);
+        assert!((ledger.remaining() - (8.0 * 5.0 + 9.0 * 0.5)).abs() < 1e-12);
         // Work that is found on the way.
         ledger.plan(1, 1.0);
-        assert!((ledger.left() - (8.0 * 5.0 + 10.0 * 0.5)).abs() < 1e-12);
+        assert!((ledger.remaining() - (8.0 * 5.0 + 10.0 * 0.5)).abs() < 1e-12);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use tiprub_shell::{Result, console::Console};
 use crate::convergence::{
     Refined, Runner,
     coarsen::{coarsened, fewer_rows},
-    refine::{OF_CLEARANCE, RefinementDirection, RefinementLevel, SECONDS, goes_by_tolerance, with_division},
+    refine::{OF_CLEARANCE, RefinementDirection, RefinementLevel, SECONDS, is_adaptive, with_division},
     truncate::{Truncation, truncated},
 };
 use crate::error::own::own_division;
@@ -95,15 +95,15 @@ impl Estimate {
         (self.direction.to_owned(), value)
     }
 
-    fn words(&self) -> &'static str {
+    fn source_text(&self) -> &'static str {
         WORDS.iter().find(|(name, _)| *name == self.direction).map_or(self.direction, |(_, words)| words)
     }
 
     /// "modes 1.2 %"; "mesh unknown".
-    pub fn told(&self) -> String {
+    pub fn text(&self) -> String {
         match self.left {
-            Ok(left) => format!("{} {:.2} %", self.words(), 100.0 * left),
-            Err(_) => format!("{} unknown", self.words()),
+            Ok(left) => format!("{} {:.2} %", self.source_text(), 100.0 * left),
+            Err(_) => format!("{} unknown", self.source_text()),
         }
     }
 }
@@ -117,9 +117,9 @@ fn ratio(before: f64, last: f64, [least, most]: [f64; 2]) -> Option<f64> {
 }
 
 /// What a ROM says of its modes, patches and mesh, in one line; `None` where it says nothing.
-pub fn told_of_rom(estimates: &[Estimate]) -> Option<String> {
+pub fn rom_errors_text(estimates: &[Estimate]) -> Option<String> {
     let of_model: Vec<Estimate> = estimates.iter().filter(|one| one.direction != "steps").cloned().collect();
-    (!of_model.is_empty()).then(|| told(&of_model))
+    (!of_model.is_empty()).then(|| errors_text(&of_model))
 }
 
 /// Names and values for programs.
@@ -128,10 +128,10 @@ pub fn json_of(estimates: &[Estimate]) -> Value {
 }
 
 /// One line for reports: errors of this run, then those that the ROM has from another run.
-pub fn told(estimates: &[Estimate]) -> String {
+pub fn errors_text(estimates: &[Estimate]) -> String {
     let list = |of_rom: bool| {
         let chosen = estimates.iter().filter(|one| one.found_on.is_some() == of_rom);
-        chosen.map(Estimate::told).collect::<Vec<_>>().join(", ")
+        chosen.map(Estimate::text).collect::<Vec<_>>().join(", ")
     };
     let found_on = estimates.iter().find_map(|one| one.found_on.as_ref());
     let of_rom = found_on.map(|found_on| {
@@ -160,7 +160,7 @@ fn direction(title: &str, unit: &'static str, levels: Vec<RefinementLevel>) -> R
 
 fn steps(scene: &Scene, own: u32, divisions: [u32; 3]) -> RefinementDirection {
     let interval = scene.settings.experiment.communication_step;
-    let tolerant = goes_by_tolerance(scene);
+    let tolerant = is_adaptive(scene);
     let level = |division: u32| {
         let changed = if division == own { scene.clone() } else { with_division(scene, division) };
         let whole = if tolerant { 1.0 } else { interval };
@@ -173,7 +173,7 @@ fn steps(scene: &Scene, own: u32, divisions: [u32; 3]) -> RefinementDirection {
 /// Of the steps: from longer ones, or from shorter ones where there are no longer ones, or they are refused. Of a tolerance: from smaller
 /// ones, a decade apart, since errors follow it in steps.
 fn of_steps(scene: &Scene, own: u32, runner: &Runner) -> Result<Estimate> {
-    if goes_by_tolerance(scene) {
+    if is_adaptive(scene) {
         let decades = [1, 10, 100].map(|times| own.saturating_mul(times));
         return Ok(Estimate::of("steps", &runner.as_it_is(steps(scene, own, decades))?));
     }
@@ -309,7 +309,7 @@ mod tests {
     fn a_line_tells_what_is_known() {
         let of = |direction, left| Estimate { direction, left: Ok(left), found_on: None };
         let all = [of("steps", 1.2e-3), Estimate::unknown("mesh", "no other")];
-        assert_eq!(told(&all), "estimated error of the displacements: steps 0.12 %, mesh unknown");
+        assert_eq!(errors_text(&all), "estimated error of the displacements: steps 0.12 %, mesh unknown");
     }
 
     #[test]
@@ -325,12 +325,12 @@ mod tests {
         let all = [Estimate::unknown("modes", "refused"), known.clone(), Estimate::unknown("mesh", "no other")];
         let all = all.map(|estimate| estimate.or_of(&rom));
         assert_eq!(all[1], known, "what the run tells stays");
-        let told = told(&all);
+        let told = errors_text(&all);
         assert!(
             told.ends_with("modes unknown, patches along the chord 1.00 %; from the ROM, for a light rub: mesh 5.00 %"),
             "{told}"
         );
-        let told = super::told(&of_rom(&rom));
+        let told = super::errors_text(&of_rom(&rom));
         assert!(
             told.contains(
                 "steps unknown, modes unknown, rows of patches across the thickness unknown; from the ROM, for a light rub: \
@@ -339,7 +339,7 @@ mod tests {
             "{told}"
         );
         rom.checks.rub_errors = Some(RubErrors { rows: Some(0.28), ..RubErrors::default() });
-        let told = super::told(&of_rom(&rom));
+        let told = super::errors_text(&of_rom(&rom));
         assert!(
             told.ends_with(
                 "mesh unknown; from the ROM, for an unnamed rub: rows of patches across the thickness 28.00 %"

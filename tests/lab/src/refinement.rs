@@ -133,7 +133,7 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
     let asked = |standard: &Standard| arguments.scenes.is_empty() || arguments.scenes.contains(&standard.name);
     let mut cases = Vec::new();
     for standard in standards()?.iter().filter(|standard| asked(standard)) {
-        console.say(&standard.title);
+        console.print_progress(&standard.title);
         let clock = std::time::Instant::now();
         let scene = standard.scene(&cache, console)?;
         let of = ConvergenceRequest {

@@ -262,7 +262,7 @@ impl Slave {
             }
             former.push((element, before));
         }
-        self.hear();
+        self.collect_notes();
         Ok(())
     }
 

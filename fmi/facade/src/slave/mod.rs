@@ -169,7 +169,7 @@ impl Slave {
     }
 
     /// Hand on what the unit has to say since it was last asked.
-    pub(super) fn hear(&mut self) {
+    pub(super) fn collect_notes(&mut self) {
         self.notes.extend(self.unit.take_notes().iter().map(logged));
     }
 

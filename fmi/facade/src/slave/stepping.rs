@@ -40,7 +40,7 @@ impl Slave {
             }
         }
         self.unit.begin_step(current_time, step_size, partial)?;
-        self.hear();
+        self.collect_notes();
         #[cfg(feature = "test-panic")]
         assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic asked for by the test of panics");
         self.phase = InstancePhase::Updating { stop, reached: self.unit.time(), fresh: false };
@@ -111,7 +111,7 @@ impl Slave {
                 self.unit.end_step_early().map_err(|error| self.fail(last_good, error))?;
             }
             self.phase = InstancePhase::Stepping { stop };
-            self.hear();
+            self.collect_notes();
         }
         Ok(())
     }

@@ -40,7 +40,7 @@ impl Lanes {
     }
 
     /// Three components of a lane.
-    pub fn three(self, values: &[f64], lane: usize) -> [f64; 3] {
+    pub fn vector3(self, values: &[f64], lane: usize) -> [f64; 3] {
         [0, 1, 2].map(|component| values[component * self.width() + lane])
     }
 

@@ -46,7 +46,7 @@ impl<const N: usize> Sums<N> {
     }
 
     /// Three components of a node in a set.
-    pub fn three(&self, set: usize, node: usize, nodes: usize) -> [f64; 3] {
+    pub fn vector3(&self, set: usize, node: usize, nodes: usize) -> [f64; 3] {
         [0, 1, 2].map(|component| self.rows[set][component * nodes + node])
     }
 }
@@ -139,7 +139,7 @@ impl ContactRows {
     }
 
     /// How far each row can be from where it rests, whenever, as long as nothing pushes (m): the amplitudes of all modes together.
-    pub fn reach(&self, state: &SectorState, sums: &mut Sums<1>) {
+    pub fn add_largest_displacements(&self, state: &SectorState, sums: &mut Sums<1>) {
         self.unresolved_amplitudes(f64::INFINITY, state, sums);
     }
 
@@ -196,12 +196,12 @@ mod tests {
             state.position.iter_mut().for_each(|q| *q = random.signed());
             state.velocity.iter_mut().for_each(|v| *v = 3e3 * random.signed());
             let (mut reach, mut now) = (Sums::new(count, 1), Sums::new(count, 1));
-            rows.reach(&state, &mut reach);
-            let (reach, mut advance) = (reach.three(0, 0, 1), Advance::new(count, 1));
+            rows.add_largest_displacements(&state, &mut reach);
+            let (reach, mut advance) = (reach.vector3(0, 0, 1), Advance::new(count, 1));
             let mut most = [0.0_f64; 3];
             for _ in 0..1500 {
                 rows.now(&state, &mut now);
-                let moved = now.three(0, 0, 1);
+                let moved = now.vector3(0, 0, 1);
                 (0..3).for_each(|row| most[row] = most[row].max(moved[row].abs()));
                 advance.freely(&level, &mut state);
             }

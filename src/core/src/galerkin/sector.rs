@@ -149,7 +149,7 @@ pub struct AcceptedStep<'a> {
 /// What is told of a span while it is marched.
 pub trait Witness: Obstacle {
     /// A step of `length` from `from` (shares of the span) is about to be tried, with forces at the points of `level`.
-    fn go(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation);
+    fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation);
 
     /// Whether nodes that stay within `reach` (m, three per node) of where they rest cannot touch over a step of `length` from `from`
     /// (shares of the span).
@@ -161,13 +161,13 @@ pub trait Witness: Obstacle {
     }
 
     /// The same step is about to be taken, with these gaps and displacements at its points.
-    fn passed(&mut self, _level: &StepTables, _trial: &Trial) {}
+    fn record_gaps(&mut self, _level: &StepTables, _trial: &Trial) {}
 
     /// A step has been taken in which nothing was in reach; its damping loss (J).
-    fn flew(&mut self, damping_loss: f64);
+    fn record_flight(&mut self, damping_loss: f64);
 
     /// The step has been taken.
-    fn took(&mut self, step: &AcceptedStep);
+    fn record_step(&mut self, step: &AcceptedStep);
 }
 
 /// Why a span is not marched to its end.
@@ -206,8 +206,8 @@ impl SectorIntegrator {
     }
 
     /// How far the rows of a sector can be from where they rest while nothing pushes (m).
-    pub fn reach(&mut self, tables: &Tables, state: &SectorState) -> &[f64] {
-        self.trial.reach(&tables.rows, state)
+    pub fn largest_displacements(&mut self, tables: &Tables, state: &SectorState) -> &[f64] {
+        self.trial.largest_displacements(&tables.rows, state)
     }
 
     /// See [`Trial::entered`].
@@ -268,20 +268,20 @@ impl<W: Witness> AdaptiveStepper for SingleSector<'_, W> {
             demand: StepGoal { tolerance, .. },
         } = self;
         if state.multipliers.iter().any(|value| *value != 0.0)
-            || !witness.is_clear(step.from, step.length, trial.reach(&tables.rows, state))
+            || !witness.is_clear(step.from, step.length, trial.largest_displacements(&tables.rows, state))
         {
             return false;
         }
         let table = &tables.levels[step.level];
-        if witness.may_come_closer(step.from, step.length, trial.reach(&tables.rows, state)) {
-            witness.go(step.from, step.length, table, ForceInterpolation::Polynomial);
+        if witness.may_come_closer(step.from, step.length, trial.largest_displacements(&tables.rows, state)) {
+            witness.begin_step(step.from, step.length, table, ForceInterpolation::Polynomial);
             trial.glide(table, &tables.rows, state, *witness);
             if trial.find_minima(&table.basis, true, *tolerance) {
                 trial.follow(tables, table, step.level, state, advance);
             }
-            witness.passed(table, trial);
+            witness.record_gaps(table, trial);
         }
-        witness.flew(advance.freely(table, state));
+        witness.record_flight(advance.freely(table, state));
         trial.forget();
         state.looked = false;
         true
@@ -289,7 +289,7 @@ impl<W: Witness> AdaptiveStepper for SingleSector<'_, W> {
 
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult {
         if let Some(table) = self.tables.steady.get(step.level).filter(|_| kind == ForceInterpolation::Polynomial) {
-            self.witness.go(step.from, step.length, table, kind);
+            self.witness.begin_step(step.from, step.length, table, kind);
             let (trial, precision) = (&mut self.marcher.trial, self.demand.precision);
             let verdict = trial.run_steady(table, &self.tables.rows, self.state, self.witness, precision);
             if verdict.solved {
@@ -297,7 +297,7 @@ impl<W: Witness> AdaptiveStepper for SingleSector<'_, W> {
             }
         }
         let table = &self.tables.levels[step.level];
-        self.witness.go(step.from, step.length, table, kind);
+        self.witness.begin_step(step.from, step.length, table, kind);
         self.marcher.trial.run((table, kind), &self.tables.rows, self.state, self.witness, self.demand.precision)
     }
 
@@ -321,7 +321,7 @@ impl<W: Witness> AdaptiveStepper for SingleSector<'_, W> {
             ForceInterpolation::Polynomial => 0.0,
             ForceInterpolation::Constant => dropped + trial.closed(),
         };
-        witness.took(&AcceptedStep { level, kind, trial, damping_loss, dropped });
+        witness.record_step(&AcceptedStep { level, kind, trial, damping_loss, dropped });
         marcher.trial.leave(state);
         left
     }

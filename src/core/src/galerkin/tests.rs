@@ -87,7 +87,7 @@ impl Obstacle for MovingWall {
 }
 
 impl Witness for MovingWall {
-    fn go(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
+    fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
         for (time, point) in self.times.iter_mut().zip(level.basis.points) {
             *time = self.start + self.span * (from + length * point);
         }
@@ -102,11 +102,11 @@ impl Witness for MovingWall {
         reach.iter().step_by(3).all(|reach| *reach < nearest)
     }
 
-    fn flew(&mut self, damping_loss: f64) {
+    fn record_flight(&mut self, damping_loss: f64) {
         self.damping += damping_loss;
     }
 
-    fn took(&mut self, step: &AcceptedStep) {
+    fn record_step(&mut self, step: &AcceptedStep) {
         let (trial, basis) = (step.trial, &step.level.basis);
         self.damping += step.damping_loss;
         self.dropped += step.dropped;

@@ -223,7 +223,7 @@ impl GapLaw {
 
     /// Gap (m), unit normal and place of one node displaced by `moved` (m, own directions) against a surface as it is now; a place
     /// only on surfaces through data points. On open ones it is sought from `guess`, if there is one.
-    pub fn of_one(
+    pub fn gap_of_node(
         &mut self,
         at: At<'_>,
         moved: [f64; 3],
@@ -231,9 +231,9 @@ impl GapLaw {
     ) -> (f64, [f64; 3], ClosestPoint) {
         let (gap, normal) = match self {
             Self::Fixed(law) => (law.gaps[at.node] + dot(law.normals[at.node], moved), law.normals[at.node]),
-            Self::Revolution(law) => law.of_one(at, moved),
-            Self::Spline(law) => return law.of_one(at, moved),
-            Self::Open(law) => return law.of_one(at.node, moved, guess),
+            Self::Revolution(law) => law.gap_of_node(at, moved),
+            Self::Spline(law) => return law.gap_of_node(at, moved),
+            Self::Open(law) => return law.gap_of_node(at.node, moved, guess),
         };
         (gap, normal, ClosestPoint::default())
     }

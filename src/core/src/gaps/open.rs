@@ -111,7 +111,7 @@ impl OpenGap {
         self.surface.follow(moved);
         for &node in &self.nodes {
             let moved = std::array::from_fn(|i| displacement[3 * node + i]);
-            let (value, normal, place) = self.of_one(node, moved, guess.map(|places| places[node]));
+            let (value, normal, place) = self.gap_of_node(node, moved, guess.map(|places| places[node]));
             gap[node] = value;
             geometry.places[node] = place;
             for (component, value) in normal.into_iter().enumerate() {
@@ -122,7 +122,7 @@ impl OpenGap {
 
     /// Gap (m), normal and place of one node displaced by `moved` (m) before the surface as it is now. A gap that is no number is found
     /// out by the caller: the state is not what the model describes any more.
-    pub(super) fn of_one(
+    pub(super) fn gap_of_node(
         &self,
         node: usize,
         moved: [f64; 3],

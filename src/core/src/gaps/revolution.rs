@@ -125,7 +125,7 @@ impl RevolutionGap {
     }
 
     /// Gap (m) and unit normal of one node displaced by `moved` (m).
-    pub fn of_one(&self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3]) {
+    pub fn gap_of_node(&self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3]) {
         let (node, drive, radius) = (at.node, at.drive, self.layout.radii[at.node]);
         let (slope, per_radius) = (self.slopes[node], self.layout.per_radius[node]);
         let angle = self.angle(at, moved);
@@ -420,7 +420,7 @@ mod tests {
         assert_eq!((gaps.clone(), normals.clone()), run(InstructionSet::Baseline));
         for lane in 0..6 {
             let three = |values: &[f64]| [0, 1, 2].map(|component| values[component * width + lane]);
-            let (gap, normal) = law(InstructionSet::Baseline).of_one(at(lane), three(&moved));
+            let (gap, normal) = law(InstructionSet::Baseline).gap_of_node(at(lane), three(&moved));
             assert!((gaps[lane] - gap).abs() < 1e-18, "{lane}: {} {gap}", gaps[lane]);
             assert!(three(&normals).iter().zip(normal).all(|(a, b)| (a - b).abs() < 1e-15), "{lane}");
         }

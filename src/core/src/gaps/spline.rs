@@ -165,7 +165,7 @@ impl SplineGap {
     }
 
     /// Gap (m), unit normal and place of one node displaced by `moved` (m); the surface is rigid.
-    pub(super) fn of_one(&mut self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3], ClosestPoint) {
+    pub(super) fn gap_of_node(&mut self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3], ClosestPoint) {
         self.follow(at.drive.shape_factor, &[]);
         match self.project(at, moved, None) {
             (Projection::Found { place, normal, gap, .. }, frame) => (gap, frame.local(normal), place),

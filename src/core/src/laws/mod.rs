@@ -148,7 +148,7 @@ fn directions<L: ContactLaw>(_: &L) -> usize {
     L::DIRECTIONS
 }
 
-fn looks_again<L: ContactLaw>(_: &L) -> bool {
+fn is_iterative<L: ContactLaw>(_: &L) -> bool {
     L::LOOKS_AGAIN
 }
 
@@ -169,7 +169,7 @@ impl Law {
     }
 
     /// Whether it is what [`Law::new`] would make for the solver; a coating has one law.
-    pub fn is_of(&self, solver: Solver) -> bool {
+    pub fn matches_solver(&self, solver: Solver) -> bool {
         match self {
             Self::Film(_) => solver == Solver::Film,
             Self::Lcp(_) => solver == Solver::Lcp,
@@ -186,8 +186,8 @@ impl Law {
 
     /// [`ContactLaw::LOOKS_AGAIN`].
     #[inline(always)]
-    pub fn looks_again(&self) -> bool {
-        each_law!(self, law => looks_again(law))
+    pub fn is_iterative(&self) -> bool {
+        each_law!(self, law => is_iterative(law))
     }
 
     /// [`ContactLaw::STARTS_FROM_FORCES`].

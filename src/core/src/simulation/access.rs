@@ -93,7 +93,7 @@ impl Simulation {
             let outcome = self.check_limits(&parameters);
             self.values[reference as usize] = before;
             outcome?;
-            self.tell_of_friction(&parameters);
+            self.warn_of_friction(&parameters);
             self.tangent.follow_anew();
             self.apply_friction(&parameters);
         }

@@ -85,7 +85,7 @@ impl Simulation {
     }
 
     /// Friction or impacts have given energy (J): what happened, and what helps.
-    pub(super) fn told_gain(&self, set: usize, loss: Loss, [given, exchanged]: [f64; 2]) -> (String, String) {
+    pub(super) fn gain_texts(&self, set: usize, loss: Loss, [given, exchanged]: [f64; 2]) -> (String, String) {
         let (of, settings) = (self.of_set(set), self.system.settings());
         match loss {
             Loss::Friction => (

@@ -35,7 +35,7 @@ impl Input {
 
     /// Ask for a derivative from `offset` on.
     pub fn ask_slope(&mut self, slope: f64, offset: f64) {
-        (self.value, self.slope, self.since) = (self.asked(offset), slope, offset);
+        (self.value, self.slope, self.since) = (self.requested_value(offset), slope, offset);
     }
 
     /// Ask for what another input asks for.
@@ -44,7 +44,7 @@ impl Input {
     }
 
     /// Value asked for at `offset`.
-    pub fn asked(&self, offset: f64) -> f64 {
+    pub fn requested_value(&self, offset: f64) -> f64 {
         if self.slope == 0.0 { self.value } else { self.value + self.slope * (offset - self.since) }
     }
 
@@ -56,7 +56,7 @@ impl Input {
 
     /// From `offset` on go from the value reached to where the line asked for is at `until`.
     pub fn aim(&mut self, offset: f64, until: f64) {
-        let (reached, end) = (self.at(offset), self.asked(until));
+        let (reached, end) = (self.at(offset), self.requested_value(until));
         (self.reached, self.from) = (reached, offset);
         (self.end, self.until) = (end, until);
         self.rate = (end - reached) / (until - offset);

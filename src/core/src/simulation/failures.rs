@@ -16,7 +16,7 @@ impl Simulation {
                 remedy: "Use a smaller internal step or smaller loads".to_owned(),
             };
         }
-        let (problem, remedy) = self.told_failure(failure);
+        let (problem, remedy) = self.failure_texts(failure);
         Error::Unstable {
             problem: format!("at t = {} s (last good time {} s) {problem}", shown_time(time), shown_time(self.time)),
             remedy,
@@ -24,7 +24,7 @@ impl Simulation {
     }
 
     /// What happened, and what helps.
-    fn told_failure(&self, failure: StepFailure) -> (String, String) {
+    fn failure_texts(&self, failure: StepFailure) -> (String, String) {
         let is_free = |structure: usize| self.compiled.bodies[structure].translations.is_some();
         match failure {
             StepFailure::Implausible { structure, .. } if is_free(structure) => {
@@ -62,7 +62,7 @@ impl Simulation {
                 OUT_OF_REACH_REMEDY.to_owned(),
             ),
             StepFailure::Unexplained { structure, node, sector, jump, explained } => {
-                self.told_jump((structure, node, sector), jump, explained)
+                self.jump_texts((structure, node, sector), jump, explained)
             }
             StepFailure::Unbalanced { set, work, exchanged } => (
                 format!(
@@ -72,7 +72,7 @@ impl Simulation {
                 ),
                 "Use a smaller internal step".to_owned(),
             ),
-            StepFailure::Gives { set, loss, given, exchanged } => self.told_gain(set, loss, [given, exchanged]),
+            StepFailure::Gives { set, loss, given, exchanged } => self.gain_texts(set, loss, [given, exchanged]),
             StepFailure::Pulls { structure, node, share } => {
                 (self.pulls(structure, node, share), self.against_pulling(structure))
             }
@@ -87,7 +87,7 @@ impl Simulation {
                 ),
                 "Use a smaller internal step or a lower velocity".to_owned(),
             ),
-            StepFailure::BehindEdge { structure, node } => self.told_edge(structure, node),
+            StepFailure::BehindEdge { structure, node } => self.edge_texts(structure, node),
             StepFailure::Unsolved { structure, sector } => self.unsolved(
                 structure,
                 &self.sector_name(structure, sector),
@@ -100,7 +100,7 @@ impl Simulation {
         }
     }
 
-    fn told_jump(
+    fn jump_texts(
         &self,
         (structure, node, sector): (usize, usize, usize),
         jump: f64,
@@ -119,7 +119,7 @@ impl Simulation {
         )
     }
 
-    fn told_edge(&self, structure: usize, node: usize) -> (String, String) {
+    fn edge_texts(&self, structure: usize, node: usize) -> (String, String) {
         (
             format!(
                 "the contact node {} comes over the edge of a surface and is behind it already: what is at an edge is not \

@@ -156,7 +156,7 @@ impl Inputs {
     /// How long ramps take that begin with a step of length `length` (s): as long as the step, but what came together
     /// over a step more than twice as long is not put into this one, where it would hit. A step of a nanosecond after
     /// one of ten microseconds goes on at the pace it finds; the delay left shrinks by half of the time that passes.
-    pub fn reach(&self, length: f64) -> f64 {
+    pub fn extrapolation_time(&self, length: f64) -> f64 {
         if self.pace <= QUICKER * length { length } else { self.pace }
     }
 
@@ -168,7 +168,7 @@ impl Inputs {
 
     /// A communication step of length `length` begins.
     pub fn begin(&mut self, length: f64, hold: bool) {
-        let until = self.reach(length);
+        let until = self.extrapolation_time(length);
         self.until = until;
         if !hold {
             self.moving_mut().for_each(|input| input.aim(0.0, until));
@@ -188,7 +188,7 @@ impl Inputs {
 
     /// Nothing will move in a step of length `length`.
     fn rest(&self, length: f64) -> bool {
-        let rests = |input: &Input| input.slope == 0.0 && input.at(0.0).to_bits() == input.asked(length).to_bits();
+        let rests = |input: &Input| input.slope == 0.0 && input.at(0.0).to_bits() == input.requested_value(length).to_bits();
         self.rotors.iter().all(|rotor| rotor.speed.slope == 0.0) && self.moving().all(rests)
     }
 
@@ -260,7 +260,7 @@ impl Simulation {
         [start, until]: [f64; 2],
     ) -> Result<()> {
         let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
-        let (reached, end) = (input.at(start), input.asked(until));
+        let (reached, end) = (input.at(start), input.requested_value(until));
         let beyond = (low - end).max(end - high);
         let what = || format!("variable `{}`", variable.element_name(element));
         if input.slope != 0.0 && !(end.is_finite() && beyond <= SAME_STEP * low.abs().max(high.abs())) {
@@ -278,7 +278,7 @@ impl Simulation {
         let rate = (end - reached) / (until - start);
         let angle =
             matches!(variable.quantity, Quantity::ShapeRotation | Quantity::LoadPhase | Quantity::Excitation(1));
-        let turned = if angle { (input.asked(start) - reached).abs() } else { 0.0 };
+        let turned = if angle { (input.requested_value(start) - reached).abs() } else { 0.0 };
         if at_once || (rate.is_finite() && turned <= std::f64::consts::PI) {
             return Ok(());
         }

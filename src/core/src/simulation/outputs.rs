@@ -42,7 +42,7 @@ pub fn each(read: impl Fn(&OutputView, usize) -> f64 + Send + Sync + 'static) ->
 }
 
 /// Of an array as a whole.
-pub fn whole(read: impl Fn(&OutputView, &mut [f64]) + Send + Sync + 'static) -> OutputReader {
+pub fn array_reader(read: impl Fn(&OutputView, &mut [f64]) + Send + Sync + 'static) -> OutputReader {
     OutputReader(Arc::new(read))
 }
 

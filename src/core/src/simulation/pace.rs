@@ -71,7 +71,7 @@ impl Simulation {
     }
 
     /// In the middle of an internal step no more are allowed: back to where it can be gone on from.
-    pub(super) fn give_up(&mut self) -> Error {
+    pub(super) fn abandon_step(&mut self) -> Error {
         let (length, most) = (self.communication.length, self.communication.most);
         self.withdraw();
         self.exhausted(length, most)

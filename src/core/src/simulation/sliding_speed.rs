@@ -55,7 +55,7 @@ impl Compiled {
         if !lowest.is_finite() {
             return 0.0;
         }
-        let reach = self.plan.pairs_of(body).map(|(pair, _)| self.reach_of(pair)).fold(0.0, f64::max);
+        let reach = self.plan.pairs_of(body).map(|(pair, _)| self.depth_of_shape(pair)).fold(0.0, f64::max);
         let rate = match &parts.disk {
             Some(disk) => (0..disk.diameters.len())
                 .map(|diameter| released(&disk.paired(diameter), friction))
@@ -66,7 +66,7 @@ impl Compiled {
     }
 
     /// Clearance of a pair, or how far the shape of its surface reaches in where that is more (m).
-    fn reach_of(&self, pair: usize) -> f64 {
+    fn depth_of_shape(&self, pair: usize) -> f64 {
         let gap = self.contact(pair).nominal_gap();
         let shape = &self.plan.surface(&self.scene.settings, pair).shape;
         let Ok(shape) = CompiledShape::new(shape, gap) else { return gap };

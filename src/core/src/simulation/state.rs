@@ -195,7 +195,7 @@ impl Simulation {
             return damaged(fault);
         }
         // Those of three kinds of gaps: now, a step earlier, and the lowest.
-        let endless = self.system.endless(&window.all_lowest()).map(|lowest| lowest + endless);
+        let endless = self.system.infinite_gap_count(&window.all_lowest()).map(|lowest| lowest + endless);
         if runs && endless != Some(reader.infinite() - infinite) {
             return damaged("it holds a number that is not finite");
         }
@@ -364,13 +364,13 @@ impl Simulation {
     /// Back to the mark, with the same parameters. Does not allocate.
     pub(super) fn withdraw(&mut self) {
         let mark = std::mem::take(&mut self.mark);
-        self.go_back_to(&mark);
+        self.restore_from(&mark);
         self.mark = mark;
         self.tangent.forget();
     }
 
     /// Back to a state of this simulation, with the same parameters. Does not allocate.
-    pub(super) fn go_back_to(&mut self, mark: &[u8]) {
+    pub(super) fn restore_from(&mut self, mark: &[u8]) {
         let reader = &mut StateReader::new(mark);
         // Magic, version, scene.
         [0_u64; 3].restore(reader);
@@ -405,7 +405,7 @@ fn take(value: &mut impl Persist, reader: &mut StateReader) {
 }
 
 /// The integer that a value is.
-fn whole(value: f64) -> Option<i32> {
+fn as_integer(value: f64) -> Option<i32> {
     #[expect(clippy::cast_possible_truncation, reason = "compared with what it was")]
     let number = value as i32;
     ((f64::from(number) - value).abs() == 0.0).then_some(number)
@@ -418,13 +418,13 @@ fn is_possible(variable: &Variable, value: f64) -> bool {
         // The range of inputs is looked at where they are now.
         DataType::Real if settable && variable.causality != Causality::Input => check_range(variable, value).is_ok(),
         DataType::Real => value.is_finite(),
-        DataType::Boolean => matches!(whole(value), Some(0 | 1)),
+        DataType::Boolean => matches!(as_integer(value), Some(0 | 1)),
         DataType::Enumeration(choices) if settable => {
-            let item = whole(value).and_then(|item| usize::try_from(item).ok());
+            let item = as_integer(value).and_then(|item| usize::try_from(item).ok());
             item.is_some_and(|item| (1..=choices.items.len()).contains(&item))
         }
-        DataType::Integer if settable => whole(value).is_some() && check_range(variable, value).is_ok(),
-        DataType::Integer | DataType::Enumeration(_) => whole(value).is_some(),
+        DataType::Integer if settable => as_integer(value).is_some() && check_range(variable, value).is_ok(),
+        DataType::Integer | DataType::Enumeration(_) => as_integer(value).is_some(),
         DataType::String => true,
     }
 }

@@ -75,7 +75,7 @@ impl Simulation {
             let speed = 0.5 * (rotor.speed.at(0.0) + rotor.speed.at(step_size));
             self.system.set_speed(body, speed, 0.5 * (rotor.temperature_at(0.0) + rotor.temperature_at(step_size)));
         }
-        self.tell(step, step_size);
+        self.warn_of_step_and_speeds(step, step_size);
         self.previous.copy_from_slice(&self.values);
         self.previous_length = self.communication.length;
         let tried = self.system.steps_tried();
@@ -90,7 +90,7 @@ impl Simulation {
         for (index, pair) in self.compiled.plan.pairs.iter().enumerate() {
             let mut rotation = self.inputs.pairs[index].shape_rotation;
             if !self.holds() {
-                rotation.aim(0.0, self.inputs.reach(step_size));
+                rotation.aim(0.0, self.inputs.extrapolation_time(step_size));
             }
             let speed = &self.inputs.rotors[pair.body].speed;
             self.check_turning(index, step, step_size, speed, rotation.rate())?;
@@ -99,7 +99,7 @@ impl Simulation {
         for (body, rotor) in self.inputs.rotors.iter().enumerate() {
             let (first, last) = (rotor.speed.at(0.0), rotor.speed.at(step_size));
             let reached = rotor.temperature_at(0.0);
-            let until = rotor.temperature.first().map_or(0.0, |input| input.asked(step_size));
+            let until = rotor.temperature.first().map_or(0.0, |input| input.requested_value(step_size));
             if self.compiled.softens(body) {
                 self.compiled.check_temperature(body, until).map_err(now)?;
             }
@@ -111,7 +111,7 @@ impl Simulation {
             let phase = rotor.excitation.get(1).map_or(0.0, |phase| {
                 let mut phase = *phase;
                 if !self.holds() {
-                    phase.aim(0.0, self.inputs.reach(step_size));
+                    phase.aim(0.0, self.inputs.extrapolation_time(step_size));
                 }
                 phase.rate()
             });
@@ -255,7 +255,7 @@ impl Simulation {
         }
         match self.system.step(&self.drives) {
             Ok(()) => {}
-            Err(StepFailure::Exhausted) => return Err(self.give_up()),
+            Err(StepFailure::Exhausted) => return Err(self.abandon_step()),
             Err(failure) => return Err(self.fail(failure, time)),
         }
         let places = (&self.compiled.patches[..], &self.compiled.linings[..]);

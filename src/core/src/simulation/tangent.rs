@@ -199,7 +199,7 @@ impl Simulation {
             remedy: "Do without derivatives over this step".to_owned(),
         };
         if self.tangent.follows {
-            twin.go_back_to(&self.tangent.start);
+            twin.restore_from(&self.tangent.start);
         } else {
             twin.restore_state(&self.tangent.start).map_err(lost)?;
             twin.tangent = StepReplay::default();

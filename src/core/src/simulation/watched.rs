@@ -118,7 +118,7 @@ impl WatchedPair {
         let moved = [moved[0] + outwards, moved[1] / longer, moved[2]];
         match &mut self.law {
             GapLaw::Spline(law) => law.gap_of_one(at, moved),
-            law => law.of_one(at, moved, None).0,
+            law => law.gap_of_node(at, moved, None).0,
         }
     }
 }

@@ -180,7 +180,7 @@ impl System {
             if !places.into_iter().all(|places| self.places_exist(structure, places)) {
                 reader.refuse("a contact node is nowhere on its surface");
             }
-            let found = self.endless_of(structure, &saved.gap.now).zip(self.endless_of(structure, &saved.gap.before));
+            let found = self.infinite_gaps_of_structure(structure, &saved.gap.now).zip(self.infinite_gaps_of_structure(structure, &saved.gap.before));
             endless = endless.zip(found).map(|(sum, (now, before))| sum + now + before);
         }
         if started && endless.is_none() {
@@ -200,17 +200,17 @@ impl System {
 
     /// How many of the gaps of all structures, one after the other as [`Structure::gaps`], are infinite: those of padding lanes, of
     /// nodes of no pair, and of nodes that have nothing to touch beyond a free edge; `None` where others are, or one is negative.
-    pub fn endless(&self, gaps: &[f64]) -> Option<usize> {
+    pub fn infinite_gap_count(&self, gaps: &[f64]) -> Option<usize> {
         let (mut rest, mut sum) = (gaps, 0);
         for structure in &self.structures {
             let (own, others) = rest.split_at(structure.gaps().len());
-            sum += self.endless_of(structure, own)?;
+            sum += self.infinite_gaps_of_structure(structure, own)?;
             rest = others;
         }
         Some(sum)
     }
 
-    fn endless_of(&self, structure: &Structure, gaps: &[f64]) -> Option<usize> {
+    fn infinite_gaps_of_structure(&self, structure: &Structure, gaps: &[f64]) -> Option<usize> {
         let (lanes, sectors) = (structure.modes().lanes(), structure.modes().sectors());
         let may_end = |pair: Option<usize>| pair.is_none_or(|pair| matches!(self.pairs[pair].gap(), GapLaw::Open(_)));
         let sound = |(index, gap): (usize, &f64)| {
@@ -249,8 +249,8 @@ impl System {
                     let (Some(pair), index) = (*pair, structure.index(node, sector)) else { continue };
                     let (history, normal) = (&structure.history, structure.history.multiplier[index]);
                     if normal != 0.0 {
-                        let force = structure.three(&history.force.now, node, sector);
-                        let point = structure.three(&history.points, node, sector);
+                        let force = structure.vector3(&history.force.now, node, sector);
+                        let point = structure.vector3(&history.points, node, sector);
                         let of = &self.pairs[pair];
                         let wrench = of.gap().wrench(At { node, index, drive: of.drive(When::Now) }, point, force);
                         let at = ContactMember { structure: number, pair, node, sector, index };
@@ -271,7 +271,7 @@ impl ContactPair {
         let rotor_angle = self.drive(When::Now).rotor_angle;
         for &node in self.nodes() {
             for sector in 0..touching.modes().sectors() {
-                let force = touching.three(&touching.history.passing.lasting, node, sector);
+                let force = touching.vector3(&touching.history.passing.lasting, node, sector);
                 if force.iter().all(|value| *value == 0.0) {
                     continue;
                 }

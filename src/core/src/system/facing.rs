@@ -9,7 +9,7 @@ use crate::galerkin::basis::TimeBasis;
 use crate::galerkin::compliance::Lanes;
 use crate::galerkin::level::StepTables;
 use crate::galerkin::sector::{AcceptedStep, Witness};
-use crate::galerkin::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, one_by_one, three};
+use crate::galerkin::trial::{ForceInterpolation, Obstacle, SlidingState, Trial, node_by_node, vector3_at};
 use crate::gaps::GapLaw;
 use crate::gaps::wrench::{At, MotionIncrement};
 use crate::gaps::{PrescribedMotion, dot};
@@ -58,7 +58,7 @@ impl ObstacleView<'_> {
     }
 
     /// The same, of what is told to it.
-    pub fn tell_ground(&mut self, node: usize, point: usize, tell: impl FnOnce(&mut CarrierIntegrator, Spot)) {
+    pub fn with_carrier_mut(&mut self, node: usize, point: usize, tell: impl FnOnce(&mut CarrierIntegrator, Spot)) {
         let (Some(ground), Some(pair)) = (&mut self.ground, self.pair_of[node]) else { return };
         let Some(casing) = ground.casing_of[pair] else { return };
         let index = node * self.lanes + self.sector;
@@ -104,7 +104,7 @@ impl Obstacle for ObstacleView<'_> {
     fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         let Some(pair) = self.pair_of[node] else { return (f64::INFINITY, [0.0; 3]) };
         let at = self.at(node, &self.record.drives[pair][point].0);
-        let (gap, normal, place) = self.pairs[pair].gap_mut().of_one(at, moved, Some(self.record.places[point][node]));
+        let (gap, normal, place) = self.pairs[pair].gap_mut().gap_of_node(at, moved, Some(self.record.places[point][node]));
         self.record.places[point][node] = place;
         (gap, normal)
     }
@@ -115,7 +115,7 @@ impl Obstacle for ObstacleView<'_> {
         {
             return law.of_lanes(&mut self.record.instants, moved, gaps, normals);
         }
-        one_by_one(self, lanes, moved, gaps, normals);
+        node_by_node(self, lanes, moved, gaps, normals);
     }
 
     fn gap_within(&self, node: usize, theta: f64, moved: [f64; 3]) -> Option<f64> {
@@ -124,7 +124,7 @@ impl Obstacle for ObstacleView<'_> {
         let drive = self.record.courses[pair].at(from + length * theta).0;
         match self.pairs[pair].gap() {
             GapLaw::Fixed(law) => Some(law.gaps[node] + dot(law.normals[node], moved)),
-            GapLaw::Revolution(law) => Some(law.of_one(self.at(node, &drive), moved).0),
+            GapLaw::Revolution(law) => Some(law.gap_of_node(self.at(node, &drive), moved).0),
             GapLaw::Spline(_) | GapLaw::Open(_) => None,
         }
     }
@@ -140,7 +140,7 @@ impl Obstacle for ObstacleView<'_> {
             let known = self.record.slips[point][node].filter(|_| self.record.looks > LOOKS);
             let slip = known.unwrap_or_else(|| {
                 let ground =
-                    self.on_ground((node, point), SurfacePlace::Now, |casing, spot| casing.way_at(spot, point));
+                    self.on_ground((node, point), SurfacePlace::Now, |casing, spot| casing.sliding_distance_at(spot, point));
                 let ground = ground.unwrap_or_default();
                 std::array::from_fn(|c| sliding.way[c] - ground[c])
             });
@@ -161,30 +161,30 @@ impl Obstacle for ObstacleView<'_> {
         self.pairs.iter().any(|pair| pair.gap().slides_anywhere() && pair.friction() != 0.0)
     }
 
-    fn look(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
+    fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
         self.record.looks += 1;
         let Some(CarriersInStep { casings, lanes: of_ground, .. }) = &mut self.ground else { return false };
         *of_ground = lanes;
-        casings.iter_mut().for_each(CarrierIntegrator::look_away);
+        casings.iter_mut().for_each(CarrierIntegrator::clear_lanes);
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
-            let normal = lanes.three(normals, lane);
-            self.tell_ground(node, point, |casing, spot| casing.look(lane, spot, normal));
+            let normal = lanes.vector3(normals, lane);
+            self.with_carrier_mut(node, point, |casing, spot| casing.set_lane(lane, spot, normal));
         }
         true
     }
 
-    fn give(&mut self, lane: usize, direction: [f64; 3], given: &mut [f64]) {
+    fn add_normal_compliance(&mut self, lane: usize, direction: [f64; 3], given: &mut [f64]) {
         given.fill(0.0);
         if let Some((casing, at, lanes)) = self.under(lane) {
-            casing.give(at, lanes, lane, direction, given);
+            casing.add_normal_compliance(at, lanes, lane, direction, given);
         }
     }
 
-    fn give_way(&mut self, lane: usize, force: [f64; 3], given: &mut [f64]) {
+    fn add_compliance(&mut self, lane: usize, force: [f64; 3], given: &mut [f64]) {
         given.fill(0.0);
         if let Some((casing, at, lanes)) = self.under(lane) {
-            casing.give_way(at, lanes, lane, force, given);
+            casing.add_compliance(at, lanes, lane, force, given);
         }
     }
 
@@ -210,7 +210,7 @@ impl Obstacle for ObstacleView<'_> {
 }
 
 impl Witness for ObstacleView<'_> {
-    fn go(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
+    fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
         let count = if kind == ForceInterpolation::Constant { 2 } else { level.basis.count() };
         for (drives, course) in self.record.drives.iter_mut().zip(&self.record.courses) {
             for (point, drive) in drives[..count].iter_mut().enumerate() {
@@ -232,7 +232,7 @@ impl Witness for ObstacleView<'_> {
                 let [start, end] = ends(pair);
                 of.nodes()
                     .iter()
-                    .all(|node| of.gap().is_clear(self.at(*node, &start), end.rotor_angle, three(reach, *node)))
+                    .all(|node| of.gap().is_clear(self.at(*node, &start), end.rotor_angle, vector3_at(reach, *node)))
             }
         })
     }
@@ -242,13 +242,13 @@ impl Witness for ObstacleView<'_> {
         pairs.into_iter().any(|(pair, of)| {
             let [start, end] = [from, from + length].map(|theta| self.record.courses[pair].at(theta).0);
             of.nodes().iter().any(|node| {
-                let (at, reach) = (self.at(*node, &start), three(reach, *node));
+                let (at, reach) = (self.at(*node, &start), vector3_at(reach, *node));
                 of.gap().approach(at, end.rotor_angle, reach) > self.record.tolerance
             })
         })
     }
 
-    fn passed(&mut self, level: &StepTables, trial: &Trial) {
+    fn record_gaps(&mut self, level: &StepTables, trial: &Trial) {
         for (node, pair) in self.pair_of.iter().enumerate() {
             if pair.is_some() {
                 let lowest = self.lowest((trial, &level.basis), node);
@@ -257,11 +257,11 @@ impl Witness for ObstacleView<'_> {
         }
     }
 
-    fn flew(&mut self, damping_loss: f64) {
+    fn record_flight(&mut self, damping_loss: f64) {
         self.record.work.damping += damping_loss;
     }
 
-    fn took(&mut self, step: &AcceptedStep) {
+    fn record_step(&mut self, step: &AcceptedStep) {
         self.record.work.damping += step.damping_loss;
         self.record.work.dropped += step.dropped;
         self.weigh_motions(step);
@@ -407,7 +407,7 @@ impl ObstacleView<'_> {
             for k in (0..=trial.points()).filter(|k| weights[*k] != 0.0) {
                 let displaced = trial.displacement(k, node);
                 there = std::array::from_fn(|c| there[c] + weights[k] * displaced[c]);
-                open += weights[k] * trial.met(k, node);
+                open += weights[k] * trial.finite_gap(k, node);
             }
             let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
             let ground = self

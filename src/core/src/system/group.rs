@@ -117,7 +117,7 @@ impl ContactGroup {
 
     /// Use another solver, if it is another.
     pub fn set_solver(&mut self, solver: Solver, structures: &[Structure]) {
-        if !self.law.is_of(solver) {
+        if !self.law.matches_solver(solver) {
             let touching: Vec<usize> = self.structures().collect();
             let carriers: Vec<usize> = self.reactions.iter().map(|reaction| reaction.structure).collect();
             *self = Self::new((self.reach, &touching, &carriers), structures, (solver, None));
@@ -165,7 +165,7 @@ impl ContactGroup {
             self.list_members(bodies);
             self.find_forces(bodies, found)?;
             self.respond(bodies);
-            if !self.law.looks_again() || !self.add_violated(bodies) {
+            if !self.law.is_iterative() || !self.add_violated(bodies) {
                 break;
             }
         }
@@ -180,7 +180,7 @@ impl ContactGroup {
             for index in 0..self.sides[side].chosen.len() {
                 let gap = history.gap.now[index];
                 // What touched and is beyond an edge now has nothing to touch.
-                let touched = history.gap.before[index] <= 0.0 && gap.is_finite() && self.law.looks_again();
+                let touched = history.gap.before[index] <= 0.0 && gap.is_finite() && self.law.is_iterative();
                 if gap < 0.0 || gap.is_nan() || touched {
                     self.choose(side, index, bodies);
                 }
@@ -407,7 +407,7 @@ impl ContactGroup {
             if normal == 0.0 {
                 continue;
             }
-            let moved = of.three(of.modes().displacement(), node, sector);
+            let moved = of.vector3(of.modes().displacement(), node, sector);
             let (share, force) = (shares.get(contact).copied().unwrap_or(0.0), self.forces[contact]);
             of.history.multiplier[index] = normal;
             of.history.coating_force[index] = share;

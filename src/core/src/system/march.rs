@@ -149,7 +149,7 @@ impl System {
     pub(crate) fn march(&mut self, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
         let span = self.step_size();
         for (pair, drive) in self.pairs.iter_mut().zip(drives) {
-            pair.go_to(drive, span);
+            pair.move_to(drive, span);
         }
         self.events.shift();
         self.events.now.clear();

@@ -149,7 +149,7 @@ impl System {
             ContactGroup::new((reach, &touching, &carriers), &structures, (settings.solver, coating))
         };
         let sets = StructureSets::new(&structures, &pairs);
-        let groups: Vec<ContactGroup> = reaches(&structures, &pairs, &sets).into_iter().map(group).collect();
+        let groups: Vec<ContactGroup> = contact_reaches(&structures, &pairs, &sets).into_iter().map(group).collect();
         let contacts = structures.iter().map(|structure| structure.gaps().len()).sum();
         let room = || Vec::with_capacity(contacts);
         let mut system = Self {
@@ -382,7 +382,7 @@ fn made(part: StructureParts, index: usize, pairs: &[PairParts]) -> Structure {
 }
 
 /// Which structures push each other with their contact nodes, set by set, and how far their contacts reach.
-fn reaches(structures: &[Structure], pairs: &[ContactPair], sets: &StructureSets) -> Vec<(Reach, Vec<usize>)> {
+fn contact_reaches(structures: &[Structure], pairs: &[ContactPair], sets: &StructureSets) -> Vec<(Reach, Vec<usize>)> {
     let touching = |set: usize| -> Vec<usize> {
         let members = sets.members(set).iter().copied();
         members.filter(|member| structures[*member].nodes() > 0).collect()

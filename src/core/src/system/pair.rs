@@ -131,7 +131,7 @@ impl ContactPair {
     }
 
     /// A step (s) to `drive` is under way.
-    pub(crate) fn go_to(&mut self, drive: &PrescribedMotion, step: f64) {
+    pub(crate) fn move_to(&mut self, drive: &PrescribedMotion, step: f64) {
         let Prescribed { drive: drives, motion } = &mut self.prescribed;
         (drives.before, motion.before) = (drives.now, motion.now);
         drives.now = *drive;

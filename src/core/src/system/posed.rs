@@ -58,7 +58,7 @@ impl ContactView<'_> {
     /// Displacement as predicted (m), in its own directions.
     #[inline(always)]
     fn displacement(&self) -> [f64; 3] {
-        self.structure.three(self.structure.modes().displacement(), self.member.node, self.member.sector)
+        self.structure.vector3(self.structure.modes().displacement(), self.member.node, self.member.sector)
     }
 
     /// Displacement relative to its surface over the step, prediction included (m), without rigid motion.
@@ -78,7 +78,7 @@ impl ContactView<'_> {
     #[inline(always)]
     fn slip_between(&self, now: &[f64], before: &[f64]) -> [f64; 3] {
         let ContactMember { node, sector, .. } = self.member;
-        let (now, before) = (self.structure.three(now, node, sector), self.structure.three(before, node, sector));
+        let (now, before) = (self.structure.vector3(now, node, sector), self.structure.vector3(before, node, sector));
         let moved: [f64; 3] = std::array::from_fn(|i| now[i] - before[i]);
         if self.pair.carrier().is_none() { moved } else { self.less_of_carrier(moved) }
     }
@@ -158,7 +158,7 @@ impl ContactPrediction for ContactView<'_> {
         std::array::from_fn(|i| sliding[i] * step + moved[i])
     }
     fn last_force(&self) -> [f64; 3] {
-        self.structure.three(&self.structure.history.force.before, self.member.node, self.member.sector)
+        self.structure.vector3(&self.structure.history.force.before, self.member.node, self.member.sector)
     }
     fn slip_direction(&self) -> [f64; 3] {
         ContactView::slip_direction(self, self.normal())

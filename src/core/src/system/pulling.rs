@@ -49,7 +49,7 @@ impl Pulling {
 impl System {
     /// Enter the forces found in the step just done, where a law leaves some that pull.
     pub(crate) fn count_pulling(&mut self) {
-        if self.groups.iter().all(|group| group.law().looks_again()) {
+        if self.groups.iter().all(|group| group.law().is_iterative()) {
             return;
         }
         let (step, mut last) = (self.step_size(), usize::MAX);

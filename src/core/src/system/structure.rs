@@ -198,8 +198,8 @@ impl Structure {
             let index = self.index(node, sector);
             state.multipliers[node] = self.history.multiplier[index];
             state.gaps[node] = self.history.gap.before[index];
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.three(&self.pace.normals, node, sector));
-            state.forces[3 * node..3 * node + 3].copy_from_slice(&self.three(&self.history.force.now, node, sector));
+            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.pace.normals, node, sector));
+            state.forces[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.history.force.now, node, sector));
         }
         for (row, slope) in state.slopes.iter_mut().enumerate() {
             *slope = self.pace.slopes[row * self.lanes + sector];
@@ -226,7 +226,7 @@ impl Structure {
 
     /// Three components of a node of a sector from an array over rows.
     #[inline(always)]
-    pub(super) fn three(&self, rows: &[f64], node: usize, sector: usize) -> [f64; 3] {
+    pub(super) fn vector3(&self, rows: &[f64], node: usize, sector: usize) -> [f64; 3] {
         let lanes = self.lanes;
         std::array::from_fn(|component| rows[(3 * node + component) * lanes + sector])
     }

@@ -244,8 +244,8 @@ impl System {
     #[inline(always)]
     pub(super) fn relative_motion(&self, event: &ContactEvent, when: When) -> [f64; 3] {
         let structure = &self.structures[event.structure];
-        let now = structure.three(structure.modes().displacement(), event.node, event.sector);
-        let oldest = structure.three(&structure.history.passing.oldest, event.node, event.sector);
+        let now = structure.vector3(structure.modes().displacement(), event.node, event.sector);
+        let oldest = structure.vector3(&structure.history.passing.oldest, event.node, event.sector);
         let moved: [f64; 3] = std::array::from_fn(|i| 0.5 * (now[i] - oldest[i]));
         let pair = &self.pairs[event.pair];
         if pair.carrier().is_none() { moved } else { self.less_of_carrier(event, when, moved) }

@@ -164,7 +164,7 @@ fn assembled(
     for (diameter, one) in nodal_diameters.iter_mut().zip(found) {
         diameter.shapes = one.shapes;
     }
-    let kept = told_kept(options.kind, &choice.counts, contact);
+    let kept = basis_text(options.kind, &choice.counts, contact);
     let origin = format!(
         "{}; one of {} sectors: {} nodes, {clamped} clamped, {} on each face; {kept} per nodal diameter",
         model.origin,
@@ -205,7 +205,7 @@ fn assembled(
 }
 
 /// What a basis consists of, in words.
-fn told_kept(kind: ReductionKind, counts: &[usize], contact: &[ContactPoint]) -> String {
+fn basis_text(kind: ReductionKind, counts: &[usize], contact: &[ContactPoint]) -> String {
     let counts = match (counts.iter().min(), counts.iter().max()) {
         (Some(least), Some(most)) if least < most => format!("{least} to {most}"),
         (Some(least), _) => least.to_string(),

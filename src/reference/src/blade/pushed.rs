@@ -50,7 +50,7 @@ impl PushedBlade {
     ///
     /// # Errors
     /// None that this mesh gives.
-    pub fn told(&self) -> Result<Vec<([f64; 3], [f64; 6])>> {
+    pub fn unit_stresses(&self) -> Result<Vec<([f64; 3], [f64; 6])>> {
         let moved = self.full.moved(&self.forces)?;
         let at = |node: usize| {
             let gauge = Gauge::at(&self.mesh, &self.material, node)?;

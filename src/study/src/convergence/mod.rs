@@ -21,7 +21,7 @@ use std::time::Instant;
 use directions::directions;
 use limit::ConvergedLimit;
 use march::{RunSummary, march};
-use refine::{Again, RefinementDirection, RefinementLevel, RomSource, goes_by_tolerance};
+use refine::{Again, RefinementDirection, RefinementLevel, RomSource, is_adaptive};
 use tiprub_core::{Rom, Scene, rom::RubErrors};
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_shell::{
@@ -208,7 +208,7 @@ fn planned(directions: &[RefinementDirection], scene: &Scene, (own, seconds): (u
 /// Work of a direction, in runs of the scene as it stands.
 fn work(direction: &RefinementDirection, scene: &Scene, own: u32) -> f64 {
     let size = |scene: &Scene| scene.roms.iter().map(|rom| rom.total_order() as f64).sum::<f64>();
-    let steps = |level: &RefinementLevel| match goes_by_tolerance(scene) {
+    let steps = |level: &RefinementLevel| match is_adaptive(scene) {
         // A decade doubles the steps.
         true => (f64::from(level.division) / f64::from(own)).powf(0.3),
         false => f64::from(level.division) / f64::from(own),

@@ -11,7 +11,7 @@ use tiprub_shell::Result;
 use super::{
     ConvergenceResult, Refined,
     march::{QUANTITIES, RunSummary},
-    refine::{OF_CLEARANCE, RefinementDirection, SECONDS, goes_by_tolerance},
+    refine::{OF_CLEARANCE, RefinementDirection, SECONDS, is_adaptive},
 };
 use crate::{Picture, Sheet, Statement, Study, StudyFigure, estimate};
 
@@ -69,7 +69,7 @@ pub fn compared() -> impl Iterator<Item = &'static str> {
 }
 
 /// "displacements 1.2 %, impulse ...".
-fn told(changes: &[Option<f64>; 5]) -> String {
+fn changes_text(changes: &[Option<f64>; 5]) -> String {
     let known =
         compared().zip(changes).filter_map(|(name, change)| Some(format!("{name} {:.2} %", 100.0 * (*change)?)));
     known.collect::<Vec<_>>().join(", ")
@@ -85,7 +85,7 @@ fn error(refined: &Refined) -> Option<Statement> {
     let to_finest = own.changes(finest);
     let unread: [Option<f64>; 5] =
         std::array::from_fn(|index| if errors[index].is_none() { to_finest[index] } else { None });
-    let parts = [("", told(&errors)), ("no limit is read, but to the finest level ", told(&unread))];
+    let parts = [("", changes_text(&errors)), ("no limit is read, but to the finest level ", changes_text(&unread))];
     let found = parts.iter().filter(|(_, told)| !told.is_empty()).map(|(what, told)| format!("{what}{told}"));
     let found = found.collect::<Vec<_>>().join("; ");
     Some(Statement::remark(format!("Error of the scene by {}", title(refined)), found))
@@ -143,7 +143,7 @@ fn small(refined: &Refined) -> Option<Statement> {
     Some(Statement::tested(
         format!("{}: {which} nothing by more than {} %", title(refined), 100.0 * SMALL),
         most <= SMALL,
-        told(&changes),
+        changes_text(&changes),
     ))
 }
 
@@ -192,7 +192,7 @@ fn scope(found: &ConvergenceResult) -> Vec<Statement> {
         .map(|(what, titles)| format!("{what}{titles}"))
         .collect();
     let refined = Statement::remark("What was refined; no error of another direction is in these", parts.join("; "));
-    let told = estimate::told_of_rom(&found.of_rom);
+    let told = estimate::rom_errors_text(&found.of_rom);
     let of_rom = told.map(|told| Statement::remark("What the ROM of the scene says of itself", told));
     std::iter::once(refined).chain(of_rom).collect()
 }
@@ -215,7 +215,7 @@ const HEADINGS: [&str; 13] = [
 
 /// The internal step of a level (s); empty where it goes by a tolerance.
 fn step(level: &super::RefinementLevel) -> String {
-    if goes_by_tolerance(&level.scene) {
+    if is_adaptive(&level.scene) {
         return String::new();
     }
     let length = level.scene.settings.experiment.communication_step;

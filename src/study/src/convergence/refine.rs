@@ -86,7 +86,7 @@ impl RefinementDirection {
         let mut finer = Self { shorter: Some(shorter), ..self.clone() };
         for level in &mut finer.levels {
             level.division = level.division.saturating_mul(shorter);
-            if !goes_by_tolerance(&level.scene) {
+            if !is_adaptive(&level.scene) {
                 level.scene.settings.time.step /= f64::from(shorter);
             } else {
                 level.scene.settings.time.tolerance = Some(1.0 / f64::from(level.division));
@@ -97,14 +97,14 @@ impl RefinementDirection {
 }
 
 /// Whether a tolerance takes the place of the step.
-pub(crate) fn goes_by_tolerance(scene: &Scene) -> bool {
+pub(crate) fn is_adaptive(scene: &Scene) -> bool {
     scene.settings.time.scheme == Scheme::Galerkin
 }
 
 /// The scene with `division` internal steps per communication step, or a tolerance of one over that.
 pub(crate) fn with_division(scene: &Scene, division: u32) -> Scene {
     let mut scene = scene.clone();
-    if goes_by_tolerance(&scene) {
+    if is_adaptive(&scene) {
         scene.settings.time.tolerance = Some(1.0 / f64::from(division));
     } else {
         scene.settings.time.step = scene.settings.experiment.communication_step / f64::from(division);

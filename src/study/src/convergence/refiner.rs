@@ -14,7 +14,7 @@ use super::{
     nodes::{common_start, named_as, starting_with},
     refine::{
         Again, MESH, MESH_NODES, MODES_KEPT, Meshed, NODES, OF_CLEARANCE, RefinementDirection, RefinementLevel,
-        RomSource, SECONDS, STEP, goes_by_tolerance, with_division,
+        RomSource, SECONDS, STEP, is_adaptive, with_division,
     },
     rows::MOST_ROWS,
     truncate::{Truncation, truncated},
@@ -179,7 +179,7 @@ impl<'a> Refiner<'a> {
     pub(super) fn steps(&self) -> RefinementDirection {
         let shares = if self.again.quick { &QUICK_STEPS[..] } else { &STEPS[..] };
         let time = &self.scene.settings.time;
-        let tolerant = goes_by_tolerance(self.scene);
+        let tolerant = is_adaptive(self.scene);
         let step = match tolerant {
             true => time.tolerance.unwrap_or(TOLERANCE),
             false => divided(self.scene.settings.experiment.communication_step, time.step),

@@ -15,7 +15,7 @@ use super::{
     scene::SceneRun,
     window,
 };
-use crate::{arguments::ErrorArguments, convergence::refine::goes_by_tolerance, divisions};
+use crate::{arguments::ErrorArguments, convergence::refine::is_adaptive, divisions};
 
 /// Internal steps tried, as multiples of the number that the scene asks for.
 const SHARES: [f64; 7] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
@@ -106,7 +106,7 @@ impl UserScene {
                     break (touch, samples);
                 }
                 // Growth by friction comes in bands, and what it does while contact is closed is known only then.
-                Err(_) if goes_by_tolerance(&case.scene) && case.base < base << MOST_DOUBLINGS => {
+                Err(_) if is_adaptive(&case.scene) && case.base < base << MOST_DOUBLINGS => {
                     case.base *= 2;
                     case.divisions = divisions_around(case.base, quick);
                 }

@@ -82,20 +82,20 @@ pub fn has_total(case: &dyn ErrorCase) -> bool {
 }
 
 /// The figures that a case has.
-fn told(case: &dyn ErrorCase) -> impl Iterator<Item = &'static NamedFigure> {
+fn figures_of(case: &dyn ErrorCase) -> impl Iterator<Item = &'static NamedFigure> {
     let has_total = has_total(case);
     FIGURES.iter().filter(move |(_, _, total, _)| has_total || !total)
 }
 
 /// Every configuration as comma-separated values; refusals with their reason.
 pub fn csv(case: &dyn ErrorCase, found: &Measured) -> String {
-    let names: Vec<&str> = told(case).map(|figure| figure.0).collect();
+    let names: Vec<&str> = figures_of(case).map(|figure| figure.0).collect();
     let mut text = format!("competitor,{},{STEP},{},remark\n", case.size_name(), names.join(","));
     for row in &found.rows {
         let _ = write!(text, "\"{}\",{},{}", row.competitor.name(), case.sizes()[row.size], shortest(row.step));
         let _ = match &row.outcome {
             Ok(figures) => {
-                for figure in told(case) {
+                for figure in figures_of(case) {
                     let _ = write!(
                         text,
                         ",{}",
@@ -113,7 +113,7 @@ pub fn csv(case: &dyn ErrorCase, found: &Measured) -> String {
 /// Every configuration, for the page.
 pub fn rows(case: &dyn ErrorCase, found: &Measured) -> Table {
     let mut columns = vec!["competitor".to_owned(), case.size_name().to_owned(), "step or tolerance".to_owned()];
-    columns.extend(told(case).map(|figure| figure.0.to_owned()).chain(["remark".to_owned()]));
+    columns.extend(figures_of(case).map(|figure| figure.0.to_owned()).chain(["remark".to_owned()]));
     let mut table = Table { caption: format!("All runs of {}", case.title()), columns, rows: Vec::new() };
     for row in &found.rows {
         table.rows.push(cells(case, row));
@@ -126,12 +126,12 @@ fn cells(case: &dyn ErrorCase, row: &MeasuredRow) -> Vec<String> {
     match &row.outcome {
         Ok(figures) => {
             cells.push(seconds(figures.seconds));
-            let rest = told(case).skip(1).map(|figure| (figure.3)(figures));
+            let rest = figures_of(case).skip(1).map(|figure| (figure.3)(figures));
             cells.extend(rest.map(|value| value.map_or_else(String::new, |value| format!("{value:.1e}"))));
             cells.push(String::new());
         }
         Err(problem) => {
-            cells.extend(told(case).map(|_| String::new()));
+            cells.extend(figures_of(case).map(|_| String::new()));
             cells.push(problem.clone());
         }
     }
@@ -195,7 +195,7 @@ pub fn to_json(case: &dyn ErrorCase, found: &Measured) -> Value {
         });
         match &row.outcome {
             Ok(figures) => {
-                for (_, key, _, value) in told(case) {
+                for (_, key, _, value) in figures_of(case) {
                     object[key] = json!(value(figures));
                 }
             }

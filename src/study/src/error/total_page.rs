@@ -196,7 +196,7 @@ impl Total {
                 found,
             ));
         }
-        if let Some(told) = estimate::told_of_rom(&self.of_rom) {
+        if let Some(told) = estimate::rom_errors_text(&self.of_rom) {
             all.push(Statement::remark(format!("{title}: what its ROM says of itself"), told));
         }
         for target in TARGETS {

@@ -174,7 +174,7 @@ impl Map {
         setup.samples = samples(setup.top, range[0])?;
         setup.revolutions = request.revolutions.unwrap_or(if request.quick { QUICK_REVOLUTIONS } else { REVOLUTIONS });
         let decay = DECAY_TIMES / (start.damping_ratio * std::f64::consts::TAU * first);
-        let patience = whole((start.ramp_time + decay) * range[1] / std::f64::consts::TAU);
+        let patience = as_count((start.ramp_time + decay) * range[1] / std::f64::consts::TAU);
         let most = if request.quick { QUICK_TRANSIENT } else { MOST_TRANSIENT };
         setup.transient = request.transient.unwrap_or(patience.clamp(LEAST_TRANSIENT, most));
         setup.check_size(speeds.len())?;
@@ -377,7 +377,7 @@ fn speeds(prediction: &FrequencyPrediction, request: &MapRequest, fastest: f64) 
 fn samples(top: f64, slowest: f64) -> Result<usize> {
     let least = OVERSAMPLING * top * std::f64::consts::TAU / slowest;
     if least <= MOST_PER_REVOLUTION {
-        return Ok(whole(least).next_power_of_two());
+        return Ok(as_count(least).next_power_of_two());
     }
     // Two digits are shown: rounded down they would be refused again.
     let lowest = 1.05 * OVERSAMPLING * top * std::f64::consts::TAU / MOST_PER_REVOLUTION;
@@ -389,7 +389,7 @@ fn samples(top: f64, slowest: f64) -> Result<usize> {
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped before")]
-fn whole(value: f64) -> usize {
+fn as_count(value: f64) -> usize {
     value.ceil().clamp(1.0, 1e6) as usize
 }
 

@@ -69,7 +69,7 @@ impl StabilityScene<'_> {
     ///
     /// # Errors
     /// A scene that is refused whatever is asked, and start values that are none.
-    pub fn own(&self) -> Result<SceneStart> {
+    pub fn start_values(&self) -> Result<SceneStart> {
         let settings = &self.scene.settings;
         let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
         let mut simulation = Simulation::new(self.scene).map_err(in_scene)?;

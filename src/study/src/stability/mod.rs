@@ -71,7 +71,7 @@ impl StabilityPoint {
     }
 
     /// Refusal or warnings; empty where all is right.
-    pub fn words(&self) -> String {
+    pub fn reason(&self) -> String {
         match &self.answer {
             Ok(warnings) => warnings.join("; "),
             Err(refusal) => refusal.clone(),
@@ -108,7 +108,7 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     one_rotor_and_friction(&scene.settings)?;
     let (scene, frictionless) = with_friction(scene);
     let asked = StabilityScene { scene: &scene, settings: &arguments.set };
-    let mut own = asked.own()?;
+    let mut own = asked.start_values()?;
     if frictionless && !arguments.set.iter().any(|(name, _)| name == "friction_coefficient") {
         own.friction = Some(0.0);
     }

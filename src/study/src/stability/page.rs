@@ -56,7 +56,7 @@ pub fn study(found: &StabilityResult) -> Result<Study> {
             (
                 "answers-in-words.csv".into(),
                 "every answer with its words and growth rates".into(),
-                words(found).into_bytes(),
+                answer_text(found).into_bytes(),
             ),
             (
                 "largest-steps.csv".into(),
@@ -109,7 +109,7 @@ fn facts(found: &StabilityResult) -> Vec<(String, String)> {
 }
 
 /// The point of the scene as it stands.
-fn own(found: &StabilityResult) -> Option<&StabilityPoint> {
+fn own_point(found: &StabilityResult) -> Option<&StabilityPoint> {
     let own = &found.own;
     let is = |point: &&StabilityPoint| {
         point.place.friction == own.friction
@@ -121,8 +121,8 @@ fn own(found: &StabilityResult) -> Option<&StabilityPoint> {
 
 fn statements(found: &StabilityResult) -> Vec<Statement> {
     let mut all = Vec::new();
-    if let Some(point) = own(found) {
-        let words = match (&point.answer, point.words()) {
+    if let Some(point) = own_point(found) {
+        let words = match (&point.answer, point.reason()) {
             (Err(_), words) => words,
             (Ok(_), words) if words.is_empty() => "accepted without a warning".into(),
             (Ok(_), words) => format!("accepted with warnings: {words}"),
@@ -176,7 +176,7 @@ fn answers(found: &StabilityResult) -> StudyFigure {
             "µ {}, h {} µs: {}",
             point.place.friction.map_or("-".into(), short),
             micro(point.step),
-            if point.words().is_empty() { "right".into() } else { point.words() }
+            if point.reason().is_empty() { "right".into() } else { point.reason() }
         ),
     };
     let at = |values: &[Option<f64>], own: Option<f64>| values.iter().position(|value| *value == own);
@@ -250,7 +250,7 @@ fn row(point: &StabilityPoint) -> Vec<String> {
         rate(point.rates.as_ref().map(|rates| rates.physical.rate)),
         rate(growth.map(|growth| growth.stepped)),
         frequency.map_or(String::new(), |hertz| format!("{hertz:.1}")),
-        point.words(),
+        point.reason(),
     ]
 }
 
@@ -280,7 +280,7 @@ fn csv(table: &Table) -> String {
     std::iter::once(&table.columns).chain(&table.rows).map(|cells| line(cells)).collect()
 }
 
-fn words(found: &StabilityResult) -> String {
+fn answer_text(found: &StabilityResult) -> String {
     csv(&points_table(found))
 }
 

@@ -52,7 +52,7 @@ impl Obstacle for RigidObstacle {
 }
 
 impl Witness for RigidObstacle {
-    fn go(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
+    fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation) {
         for (point, time) in self.times.iter_mut().enumerate() {
             let theta = match kind {
                 ForceInterpolation::Constant => f64::from(u8::from(point > 0)),
@@ -66,9 +66,9 @@ impl Witness for RigidObstacle {
         false
     }
 
-    fn flew(&mut self, _: f64) {}
+    fn record_flight(&mut self, _: f64) {}
 
-    fn took(&mut self, step: &AcceptedStep) {
+    fn record_step(&mut self, step: &AcceptedStep) {
         let length = step.level.step;
         for point in 0..=step.trial.points() {
             let force = step.trial.multiplier(point, 0);

@@ -54,7 +54,7 @@ pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<Comm
     if seeds.is_empty() {
         return Ok(CommandOutcome { text: table.to_text(), json: table.to_json(), ..CommandOutcome::default() });
     }
-    console.say(table.to_text());
+    console.print_progress(table.to_text());
     let named: Vec<String> = seeds.iter().take(NAMED).map(u64::to_string).collect();
     let problem = format!("{} of {} scenes are wrong: {}", seeds.len(), arguments.scenes, named.join(", "));
     Err(Failure::new("random scenes", problem, format!("Run one alone with `lab random --only {}`", named[0])))

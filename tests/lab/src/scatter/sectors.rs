@@ -47,15 +47,15 @@ impl Obstacle for ScatterWall {
 }
 
 impl Witness for ScatterWall {
-    fn go(&mut self, _: f64, _: f64, _: &StepTables, _: ForceInterpolation) {}
+    fn begin_step(&mut self, _: f64, _: f64, _: &StepTables, _: ForceInterpolation) {}
 
     fn is_clear(&self, _: f64, _: f64, reach: &[f64]) -> bool {
         reach.iter().step_by(3).all(|reach| *reach < self.place)
     }
 
-    fn flew(&mut self, _: f64) {}
+    fn record_flight(&mut self, _: f64) {}
 
-    fn took(&mut self, step: &AcceptedStep) {
+    fn record_step(&mut self, step: &AcceptedStep) {
         self.dropped += step.dropped;
         let points = 0..=step.trial.points();
         for node in 0..step.trial.nodes() {

@@ -1,6 +1,6 @@
 //! What a trial has found: forces, gaps and displacements of the nodes at the points, and where it leaves the state.
 
-use super::{ForceInterpolation, Trial, three};
+use super::{ForceInterpolation, Trial, vector3_at};
 use crate::galerkin::basis::{MOST, TimeBasis};
 use crate::galerkin::state::SectorState;
 use nalgebra::DMatrix;
@@ -23,7 +23,7 @@ impl Trial {
 
     /// Force on it (N).
     pub fn force(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { three(&self.begun.forces, node) } else { self.lane(&self.forces, point, node) }
+        if point == 0 { vector3_at(&self.begun.forces, node) } else { self.lane(&self.forces, point, node) }
     }
 
     /// Its gap (m).
@@ -32,19 +32,19 @@ impl Trial {
     }
 
     /// The same where forces work on it: none where there is nothing to touch, beyond a free edge.
-    pub fn met(&self, point: usize, node: usize) -> f64 {
+    pub fn finite_gap(&self, point: usize, node: usize) -> f64 {
         let gap = self.gap(point, node);
         if gap == f64::INFINITY { 0.0 } else { gap }
     }
 
     /// Its unit normal.
     pub fn normal(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { three(&self.begun.normals, node) } else { self.lane(&self.normals, point, node) }
+        if point == 0 { vector3_at(&self.begun.normals, node) } else { self.lane(&self.normals, point, node) }
     }
 
     /// The unit normal for which its force was found: force − λ · normal is friction.
     fn solved_normal(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { three(&self.begun.normals, node) } else { self.lane(&self.solved_normals, point, node) }
+        if point == 0 { vector3_at(&self.begun.normals, node) } else { self.lane(&self.solved_normals, point, node) }
     }
 
     /// Friction force on it (N).
@@ -56,11 +56,11 @@ impl Trial {
 
     /// Its displacement (m); at the start only where something pushes.
     pub fn displacement(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { three(&self.start, node) } else { self.lane(&self.moved, point, node) }
+        if point == 0 { vector3_at(&self.start, node) } else { self.lane(&self.moved, point, node) }
     }
 
     fn lane(&self, values: &[f64], point: usize, node: usize) -> [f64; 3] {
-        self.lanes.three(values, self.lanes.at(point, node))
+        self.lanes.vector3(values, self.lanes.at(point, node))
     }
 
     /// A node that had nothing to touch at the start of the step and is inside something now.
@@ -104,7 +104,7 @@ impl Trial {
 
     /// What contacts that close under a constant force lose: λ times the gap there was (J).
     pub fn closed(&self) -> f64 {
-        let lost = |node: usize| self.multiplier(1, node) * (self.met(0, node) - self.met(1, node));
+        let lost = |node: usize| self.multiplier(1, node) * (self.finite_gap(0, node) - self.finite_gap(1, node));
         (0..self.nodes()).filter(|node| self.multiplier(1, *node) > 0.0).map(lost).sum()
     }
 

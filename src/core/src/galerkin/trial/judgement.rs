@@ -86,7 +86,7 @@ impl Trial {
             if !all {
                 verdict.switches = true;
                 let terms = (0..count).flat_map(|i| (0..count).map(move |k| (i, k)));
-                let left = |(i, k): (usize, usize)| self.multiplier(i, node) * basis.work[i][k] * self.met(k, node);
+                let left = |(i, k): (usize, usize)| self.multiplier(i, node) * basis.work[i][k] * self.finite_gap(k, node);
                 verdict.switched += terms.map(left).sum::<f64>();
             }
         }
@@ -149,10 +149,10 @@ impl Trial {
     /// taken to be at rest.
     fn bend_of_gap(&self, step: f64, node: usize, ends: [f64; 2], obstacle: &impl Obstacle) -> (f64, f64) {
         let (from, to, normal) = (self.displacement(0, node), self.displacement(1, node), self.normal(1, node));
-        let velocity = super::three(&self.velocities, node);
+        let velocity = super::vector3_at(&self.velocities, node);
         let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &self.free_motion;
         let (end, amplitude) = if *is_known {
-            (end_velocities.three(0, node, self.nodes()), unresolved_amplitudes.three(0, node, self.nodes()))
+            (end_velocities.vector3(0, node, self.nodes()), unresolved_amplitudes.vector3(0, node, self.nodes()))
         } else {
             (std::array::from_fn(|c| 2.0 * (to[c] - from[c]) / step - velocity[c]), [0.0; 3])
         };

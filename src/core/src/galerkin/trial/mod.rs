@@ -19,7 +19,7 @@ use crate::laws::active_set::ContactSolver;
 pub use judgement::TrialResult;
 use minima::Minima;
 use nalgebra::DMatrix;
-pub use obstacle::{Obstacle, SlidingState, one_by_one};
+pub use obstacle::{Obstacle, SlidingState, node_by_node};
 use steady::Steady;
 use sticking::Sticking;
 
@@ -49,7 +49,7 @@ impl ForceInterpolation {
 }
 
 /// Three values of a node.
-pub fn three(values: &[f64], node: usize) -> [f64; 3] {
+pub fn vector3_at(values: &[f64], node: usize) -> [f64; 3] {
     [values[3 * node], values[3 * node + 1], values[3 * node + 2]]
 }
 
@@ -264,7 +264,7 @@ impl Trial {
         if !state.looked {
             self.find_start(rows, state);
             for node in 0..self.nodes() {
-                (self.begun.gaps[node], _) = obstacle.gap(node, 0, three(&self.start, node));
+                (self.begun.gaps[node], _) = obstacle.gap(node, 0, vector3_at(&self.start, node));
             }
         }
     }
@@ -278,7 +278,7 @@ impl Trial {
         rows.now(state, &mut self.now);
         let nodes = self.lanes.nodes;
         for node in 0..nodes {
-            let [moved, velocity] = [0, 1].map(|set| self.now.three(set, node, nodes));
+            let [moved, velocity] = [0, 1].map(|set| self.now.vector3(set, node, nodes));
             self.start[3 * node..3 * node + 3].copy_from_slice(&moved);
             self.velocities[3 * node..3 * node + 3].copy_from_slice(&velocity);
         }
@@ -288,12 +288,12 @@ impl Trial {
     }
 
     /// How far each row can be from where it rests while nothing pushes (m).
-    pub fn reach(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
+    pub fn largest_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         let (sums, reach) = &mut self.reach;
-        rows.reach(state, sums);
+        rows.add_largest_displacements(state, sums);
         let nodes = self.lanes.nodes;
         for (node, reach) in reach.chunks_exact_mut(3).enumerate() {
-            reach.copy_from_slice(&sums.three(0, node, nodes));
+            reach.copy_from_slice(&sums.vector3(0, node, nodes));
         }
         reach
     }
@@ -322,7 +322,7 @@ impl Trial {
         }
         self.pushed[..stride].fill(0.0);
         for lane in 0..lanes.len() {
-            lanes.set(&mut self.forces, lane, three(&state.forces, lanes.place(lane).1));
+            lanes.set(&mut self.forces, lane, vector3_at(&state.forces, lanes.place(lane).1));
         }
         self.taken.clear();
         self.amounts.clear();
@@ -423,7 +423,7 @@ impl Trial {
         for lane in 0..lanes.len() {
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
-        self.gives = obstacle.look(lanes, &self.chosen, &self.normals[..3 * width]);
+        self.gives = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * width]);
         for lane in 0..lanes.len() {
             if self.chosen[lane] {
                 self.choose(lane, compliance, obstacle);
@@ -485,7 +485,7 @@ impl Trial {
     }
 
     /// What a force on a node at a point works on (m).
-    fn way(&self, point: usize, node: usize) -> [f64; 3] {
+    fn sliding_distance(&self, point: usize, node: usize) -> [f64; 3] {
         let terms = self.ways[point].iter().zip(&self.inert);
         terms.fold([0.0; 3], |way, (weight, inert)| std::array::from_fn(|c| way[c] + weight * inert[3 * node + c]))
     }
@@ -495,10 +495,10 @@ impl Trial {
         let (lanes, width) = (self.lanes, self.lanes.width());
         let (point, node) = lanes.place(lane);
         let sliding = SlidingState {
-            moved: lanes.three(&self.moved, lane),
-            velocity: three(&self.velocities, node),
-            way: self.way(point, node),
-            normal: lanes.three(&self.normals, lane),
+            moved: lanes.vector3(&self.moved, lane),
+            velocity: vector3_at(&self.velocities, node),
+            way: self.sliding_distance(point, node),
+            normal: lanes.vector3(&self.normals, lane),
         };
         let direction = obstacle.direction(node, point, &sliding);
         lanes.set(&mut self.directions, lane, direction);
@@ -511,7 +511,7 @@ impl Trial {
             closing: &mut self.closing[lane * width..][..width],
         });
         if self.gives {
-            obstacle.give(lane, direction, &mut self.given[..width]);
+            obstacle.add_normal_compliance(lane, direction, &mut self.given[..width]);
             let closing = &mut self.closing[lane * width..][..width];
             let now = self.multipliers[lane];
             for ((given, closing), without) in self.given.iter().zip(closing).zip(&mut self.without) {

@@ -9,7 +9,7 @@ pub trait Obstacle {
 
     /// Gaps (m) and normals at all points but the first; arrays of [`Lanes`].
     fn gaps(&mut self, lanes: Lanes, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
-        one_by_one(self, lanes, moved, gaps, normals);
+        node_by_node(self, lanes, moved, gaps, normals);
     }
 
     /// Gap (m) of a node displaced by `moved` (m) at the fraction `theta` of the step. `None` if it is known at the points only.
@@ -27,16 +27,16 @@ pub trait Obstacle {
 
     /// Contacts at the lanes chosen are about to be solved, with these normals: get ready to tell how what is touched gives way there.
     /// False where it does not.
-    fn look(&mut self, _lanes: Lanes, _chosen: &[bool], _normals: &[f64]) -> bool {
+    fn prepare_compliance(&mut self, _lanes: Lanes, _chosen: &[bool], _normals: &[f64]) -> bool {
         false
     }
 
     /// By how much what is touched gives way at all lanes (m, along their normals, away from the node) per λ of one with the force
     /// `direction` per λ; only after [`Obstacle::look`] has said that it does.
-    fn give(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
+    fn add_normal_compliance(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
 
     /// The same in all three directions of each lane, under a `force` on one (N).
-    fn give_way(&mut self, _lane: usize, _force: [f64; 3], _given: &mut [f64]) {}
+    fn add_compliance(&mut self, _lane: usize, _force: [f64; 3], _given: &mut [f64]) {}
 
     /// Coefficient µ of a node that may stick.
     fn friction(&self, _node: usize) -> f64 {
@@ -65,7 +65,7 @@ pub struct SlidingState {
 }
 
 /// [`Obstacle::gaps`] by [`Obstacle::gap`] of every lane.
-pub fn one_by_one(
+pub fn node_by_node(
     obstacle: &mut (impl Obstacle + ?Sized),
     lanes: Lanes,
     moved: &[f64],
@@ -74,7 +74,7 @@ pub fn one_by_one(
 ) {
     for lane in 0..lanes.len() {
         let (point, node) = lanes.place(lane);
-        let (gap, normal) = obstacle.gap(node, point, lanes.three(moved, lane));
+        let (gap, normal) = obstacle.gap(node, point, lanes.vector3(moved, lane));
         gaps[lane] = gap;
         lanes.set(normals, lane, normal);
     }

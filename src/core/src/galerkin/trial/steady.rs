@@ -4,7 +4,7 @@
 //! Whether that holds is found out afterwards: forces press and are within the cone, sliding has not turned round, open nodes stay open.
 //! Where it does not, a step of degree 1 finds what changes.
 
-use super::{Trial, TrialResult, three};
+use super::{Trial, TrialResult, vector3_at};
 use crate::galerkin::basis::{POINTS, TimeBasis};
 use crate::galerkin::compliance::LaneCompliance;
 use crate::galerkin::level::StepTables;
@@ -87,7 +87,7 @@ impl Trial {
         let mut any = false;
         for (node, status) in own.status.iter_mut().enumerate() {
             let (multiplier, normal, force) =
-                (state.multipliers[node], three(&state.normals, node), three(&state.forces, node));
+                (state.multipliers[node], vector3_at(&state.normals, node), vector3_at(&state.forces, node));
             let along: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
             let (size, most) = (dot(along, along).sqrt(), obstacle.friction(node) * multiplier);
             *status = if multiplier == 0.0 {
@@ -189,12 +189,12 @@ impl Trial {
             let (point, node) = lanes.place(*lane);
             let (normal, friction) = (self.normal(point, node), obstacle.friction(node));
             let [first, second] = tangents(normal);
-            let (moved, free) = (lanes.three(&self.moved, *lane), lanes.three(&self.free, *lane));
+            let (moved, free) = (lanes.vector3(&self.moved, *lane), lanes.vector3(&self.free, *lane));
             let relative = self.relative(point, node, obstacle);
             let slides = own.status[node] != ContactStatus::Sticks;
             // Forces as displacements.
             let own_columns = compliance.of_lane(*lane);
-            let scale = (0..3).map(|c| lanes.three(own_columns[c], *lane)[c]).sum::<f64>() / 3.0;
+            let scale = (0..3).map(|c| lanes.vector3(own_columns[c], *lane)[c]).sum::<f64>() / 3.0;
             for (axis, direction) in [normal, first, second].into_iter().enumerate() {
                 let row = 3 * place + axis;
                 if axis > 0 && slides {
@@ -207,7 +207,7 @@ impl Trial {
                 }
                 for (column, other) in self.members.iter().enumerate() {
                     for (c, table) in compliance.of_lane(*other).into_iter().enumerate() {
-                        own.matrix[(3 * column + c) * order + row] = dot(direction, lanes.three(table, *lane));
+                        own.matrix[(3 * column + c) * order + row] = dot(direction, lanes.vector3(table, *lane));
                     }
                 }
                 let away = if axis == 0 { self.gaps[*lane] } else { dot(direction, relative) };
@@ -246,7 +246,7 @@ impl Trial {
         let largest = self.multipliers[..lanes.len()].iter().copied().fold(0.0, f64::max);
         self.members.iter().all(|lane| {
             let (point, node) = lanes.place(*lane);
-            let (force, normal) = (lanes.three(&self.forces, *lane), self.normal(point, node));
+            let (force, normal) = (lanes.vector3(&self.forces, *lane), self.normal(point, node));
             let multiplier = self.multipliers[*lane];
             let along: [f64; 3] = std::array::from_fn(|c| force[c] - multiplier * normal[c]);
             multiplier > 0.0

@@ -3,7 +3,7 @@
 //! Polynomials are of degree 1 then, so that the slip of a node is what it moves along the surface over the step. With b the gap and the
 //! slip without its force and W the flexibility along normal and tangents, they are the problem of [`crate::laws::de_saxce`].
 
-use super::{Trial, TrialResult, three};
+use super::{Trial, TrialResult, vector3_at};
 use crate::galerkin::basis::POINTS;
 use crate::galerkin::compliance::{LaneCompliance, Lanes};
 use crate::galerkin::kernels::{AddProduct, Combine};
@@ -60,7 +60,7 @@ impl Trial {
         self.taken.clear();
         self.amounts.clear();
         for node in 0..self.lanes.nodes {
-            let force = self.lanes.three(&self.forces, node);
+            let force = self.lanes.vector3(&self.forces, node);
             for (component, force) in force.into_iter().enumerate().filter(|(_, force)| *force != 0.0) {
                 self.taken.push(3 * (self.lanes.nodes + node) + component);
                 self.amounts.push(force);
@@ -80,11 +80,11 @@ impl Trial {
         let lanes = self.lanes;
         self.members.clear();
         for lane in 0..lanes.len() {
-            let pushed = dot(lanes.three(&self.normals, lane), lanes.three(&self.pushed, lane));
+            let pushed = dot(lanes.vector3(&self.normals, lane), lanes.vector3(&self.pushed, lane));
             self.without[lane] = self.gaps[lane] - pushed;
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
-        self.gives = obstacle.look(lanes, &self.chosen, &self.normals[..3 * lanes.width()]);
+        self.gives = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * lanes.width()]);
         self.find_under(own, obstacle);
         for lane in 0..lanes.len() {
             if self.chosen[lane] {
@@ -122,7 +122,7 @@ impl Trial {
             return;
         }
         for lane in (0..self.lanes.len()).filter(|lane| self.multipliers[*lane] > 0.0) {
-            obstacle.give_way(lane, self.lanes.three(&self.forces, lane), &mut own.given);
+            obstacle.add_compliance(lane, self.lanes.vector3(&self.forces, lane), &mut own.given);
             own.under.iter_mut().zip(&own.given).for_each(|(sum, given)| *sum += given);
         }
     }
@@ -136,7 +136,7 @@ impl Trial {
         obstacle: &mut impl Obstacle,
     ) {
         let (lanes, stride) = (self.lanes, compliance.stride());
-        let normal = lanes.three(&self.normals, lane);
+        let normal = lanes.vector3(&self.normals, lane);
         let [first, second] = tangents(normal);
         own.axes[lane] = [normal, first, second];
         self.members.push(lane);
@@ -148,7 +148,7 @@ impl Trial {
             let sums = [&mut *target];
             self.instructions.run(Combine { table, stride, columns, coefficients: [&direction[..]], sums });
             if self.gives {
-                obstacle.give_way(lane, direction, &mut own.given[..stride]);
+                obstacle.add_compliance(lane, direction, &mut own.given[..stride]);
                 target.iter_mut().zip(&own.given).for_each(|(moved, given)| *moved += given);
             }
         }
@@ -159,19 +159,19 @@ impl Trial {
         let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
         for (place, lane) in self.members.iter().enumerate() {
             let slip = self.slip(*lane, 1, obstacle);
-            let (pushed, under) = (lanes.three(&self.pushed, *lane), lanes.three(&own.under, *lane));
+            let (pushed, under) = (lanes.vector3(&self.pushed, *lane), lanes.vector3(&own.under, *lane));
             let without: [f64; 3] = std::array::from_fn(|c| slip[c] - pushed[c] - under[c]);
             let [normal, first, second] = own.axes[*lane];
             let free = [self.without[*lane] - dot(normal, under), dot(first, without), dot(second, without)];
             own.solver.free[3 * place..][..3].copy_from_slice(&free);
             own.solver.friction[place] = obstacle.friction(*lane);
             let pushes = self.multipliers[*lane] > 0.0;
-            let force = if pushes { lanes.three(&self.forces, *lane) } else { [0.0; 3] };
+            let force = if pushes { lanes.vector3(&self.forces, *lane) } else { [0.0; 3] };
             for axis in 0..3 {
                 own.solver.reactions[3 * place + axis] = dot(own.axes[*lane][axis], force);
                 let column = &own.columns[(3 * lane + axis) * stride..][..stride];
                 for (row, other) in self.members.iter().enumerate() {
-                    let moved = lanes.three(column, *other);
+                    let moved = lanes.vector3(column, *other);
                     for (along, direction) in own.axes[*other].iter().enumerate() {
                         own.solver.delassus[(3 * row + along, 3 * place + axis)] = dot(*direction, moved);
                     }
@@ -195,12 +195,12 @@ impl Trial {
             if self.chosen[lane] || !self.gaps[lane].is_finite() {
                 continue;
             }
-            let normal = lanes.three(&self.normals, lane);
-            let mut after = self.without[lane] - dot(normal, lanes.three(&own.under, lane));
+            let normal = lanes.vector3(&self.normals, lane);
+            let mut after = self.without[lane] - dot(normal, lanes.vector3(&own.under, lane));
             for (place, member) in self.members[..members].iter().enumerate() {
                 for axis in 0..3 {
                     let column = &own.columns[(3 * member + axis) * stride..][..stride];
-                    after += own.solver.reactions[3 * place + axis] * dot(normal, lanes.three(column, lane));
+                    after += own.solver.reactions[3 * place + axis] * dot(normal, lanes.vector3(column, lane));
                 }
             }
             if after < -super::ROUNDING * scale {
@@ -214,7 +214,7 @@ impl Trial {
 
     /// What a node moves up to a point against what it touches (m).
     pub(super) fn slip(&self, node: usize, point: usize, obstacle: &impl Obstacle) -> [f64; 3] {
-        let (now, before) = (self.displacement(point, node), three(&self.start, node));
+        let (now, before) = (self.displacement(point, node), vector3_at(&self.start, node));
         let under = obstacle.drift(node, point, now);
         std::array::from_fn(|c| now[c] - before[c] + under[c])
     }
@@ -227,7 +227,7 @@ impl Trial {
         for node in (0..self.lanes.nodes).filter(touches) {
             let mut slips = [[0.0; 3]; POINTS];
             (1..=points).for_each(|point| slips[point] = self.slip(node, point, obstacle));
-            let pushed = self.lanes.three(&self.pushed, self.lanes.at(points, node));
+            let pushed = self.lanes.vector3(&self.pushed, self.lanes.at(points, node));
             let (mut own, mut moved) = (0.0, 0.0);
             for point in 0..=points {
                 let terms = self.ways[point].iter().zip(&slips);
@@ -257,7 +257,7 @@ impl Trial {
         let turn = |node: usize| {
             let (normal, slip) = (self.normal(1, node), self.slip(node, 1, obstacle));
             let under = obstacle.drift(node, 1, self.displacement(1, node));
-            let first = three(&self.withdrawn, node);
+            let first = vector3_at(&self.withdrawn, node);
             let along: [f64; 3] = std::array::from_fn(|c| first[c] + under[c] / step);
             let across = dot(along, normal);
             let along: [f64; 3] = std::array::from_fn(|c| along[c] - across * normal[c]);

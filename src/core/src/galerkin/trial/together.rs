@@ -13,10 +13,10 @@ impl Trial {
     }
 
     /// Gaps at the start where nobody has looked; `gap` of a node displaced so (m).
-    pub fn look_at_start(&mut self, state: &SectorState, mut gap: impl FnMut(usize, [f64; 3]) -> f64) {
+    pub fn find_start_gaps(&mut self, state: &SectorState, mut gap: impl FnMut(usize, [f64; 3]) -> f64) {
         if !state.looked {
             for node in 0..self.nodes() {
-                self.begun.gaps[node] = gap(node, super::three(&self.start, node));
+                self.begun.gaps[node] = gap(node, super::vector3_at(&self.start, node));
             }
         }
     }
@@ -25,16 +25,16 @@ impl Trial {
     pub fn carry(&mut self, of: impl Fn(usize, usize) -> [f64; 3]) {
         for lane in 0..self.lanes.len() {
             let (point, node) = self.lanes.place(lane);
-            let (all, own) = (of(point, node), self.lanes.three(&self.pushed, lane));
+            let (all, own) = (of(point, node), self.lanes.vector3(&self.pushed, lane));
             self.lanes.set(&mut self.free, lane, [0, 1, 2].map(|i| all[i] - own[i]));
         }
     }
 
     /// Gaps (m) and normals at point 1 … s, of nodes at their displacements of now (m).
-    pub fn look_at(&mut self, point: usize, mut gap: impl FnMut(usize, [f64; 3]) -> (f64, [f64; 3])) {
+    pub fn find_gaps_at(&mut self, point: usize, mut gap: impl FnMut(usize, [f64; 3]) -> (f64, [f64; 3])) {
         for node in 0..self.nodes() {
             let lane = self.lanes.at(point, node);
-            let (gap, normal) = gap(node, self.lanes.three(&self.moved, lane));
+            let (gap, normal) = gap(node, self.lanes.vector3(&self.moved, lane));
             self.gaps[lane] = gap;
             self.lanes.set(&mut self.normals, lane, normal);
         }
@@ -42,6 +42,6 @@ impl Trial {
 
     /// Impulses that the step leaves out on the rows of a node (N·s), once it is judged.
     pub fn impulse(&self, node: usize) -> [f64; 3] {
-        super::three(&self.impulses, node)
+        super::vector3_at(&self.impulses, node)
     }
 }

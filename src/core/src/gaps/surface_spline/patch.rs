@@ -80,7 +80,7 @@ fn combine(weights: &[f64; 4], points: &[[f64; 4]; 4]) -> [f64; 4] {
 }
 
 #[inline(always)]
-fn three(value: [f64; 4]) -> [f64; 3] {
+fn sum_of_three(value: [f64; 4]) -> [f64; 3] {
     [value[0], value[1], value[2]]
 }
 
@@ -145,11 +145,11 @@ impl SurfaceSpline {
             }
         }
         let second =
-            |along: &[f64; 4], rows: &[[f64; 4]; 4]| if SECOND { three(combine(along, rows)) } else { [0.0; 3] };
+            |along: &[f64; 4], rows: &[[f64; 4]; 4]| if SECOND { sum_of_three(combine(along, rows)) } else { [0.0; 3] };
         Evaluation {
-            point: three(combine(&along[0], &rows[0])),
-            d_s: three(combine(&along[0], &rows[1])),
-            d_t: three(combine(&along[1], &rows[0])),
+            point: sum_of_three(combine(&along[0], &rows[0])),
+            d_s: sum_of_three(combine(&along[0], &rows[1])),
+            d_t: sum_of_three(combine(&along[1], &rows[0])),
             d_ss: second(&along[0], &rows[2]),
             d_st: second(&along[1], &rows[1]),
             d_tt: second(&along[2], &rows[0]),
@@ -160,7 +160,7 @@ impl SurfaceSpline {
         let (width, s, t) = (self.around + 3, place.s, place.t);
         self.assert_exists(place);
         let start = (place.patch[1] + 1) * width + place.patch[0] + 1;
-        let at = |slot: usize| three(self.mesh[start + slot]);
+        let at = |slot: usize| sum_of_three(self.mesh[start + slot]);
         let (a, b, c, d) = (at(0), at(1), at(width), at(width + 1));
         let r = 1.0 - s;
         Evaluation {

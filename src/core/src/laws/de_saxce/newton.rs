@@ -71,7 +71,7 @@ impl Newton {
             let allowed = memory.iter().fold(0.0, |most: f64, value| most.max(*value));
             let reached = self.search(problem, allowed).unwrap_or_else(|| {
                 uphill += 1;
-                self.go(problem, 1.0)
+                self.move_along(problem, 1.0)
             });
             if uphill > UPHILL {
                 break;
@@ -197,7 +197,7 @@ impl Newton {
         self.start_relative[..order].copy_from_slice(&problem.relative[..order]);
         let mut step = 1.0;
         for _ in 0..=HALVINGS {
-            let reached = self.go(problem, step);
+            let reached = self.move_along(problem, step);
             if reached <= (1.0 - DECREASE * step) * allowed {
                 return Some(reached);
             }
@@ -207,7 +207,7 @@ impl Newton {
     }
 
     /// Go a part of the direction from the start of the step; returns the merit there.
-    fn go(&self, problem: &mut ScaledProblem, step: f64) -> f64 {
+    fn move_along(&self, problem: &mut ScaledProblem, step: f64) -> f64 {
         for k in 0..problem.order() {
             problem.reaction[k] = self.start_reaction[k] + step * self.direction[k];
             problem.relative[k] = self.start_relative[k] + step * self.moved[k];

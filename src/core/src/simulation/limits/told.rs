@@ -71,7 +71,7 @@ impl Simulation {
         self.told = WarningState::new(self.rotors.len(), self.compiled.carriers.len());
         for kind in 0..KINDS {
             for of in 0..self.told.steps[kind].len() {
-                self.told.steps[kind][of] = if self.doubt(kind, of, expected).is_some() { expected } else { 0.0 };
+                self.told.steps[kind][of] = if self.warning_of_step(kind, of, expected).is_some() { expected } else { 0.0 };
             }
         }
         let mut doubts: Vec<Warning> = self.compiled.slips().iter().map(Slip::warning).collect();
@@ -95,7 +95,7 @@ impl Simulation {
     }
 
     /// Warnings of another friction coefficient, of each structure unless as many of it were told before.
-    pub(in crate::simulation) fn tell_of_friction(&mut self, parameters: &Parameters) {
+    pub(in crate::simulation) fn warn_of_friction(&mut self, parameters: &Parameters) {
         for (body, sense) in parameters.speeds.iter().enumerate() {
             let warnings = self.warnings_of(body, *sense);
             if warnings.len() > self.told.friction[body] {
@@ -107,11 +107,11 @@ impl Simulation {
 
     /// Tell what holds for an internal step (s) and for the speeds of a communication step of length `length` (s) that were not
     /// told about. Allocates only to tell.
-    pub(in crate::simulation) fn tell(&mut self, step: f64, length: f64) {
+    pub(in crate::simulation) fn warn_of_step_and_speeds(&mut self, step: f64, length: f64) {
         for kind in 0..KINDS {
             for of in 0..self.told.steps[kind].len() {
                 if step > MATERIAL * self.told.steps[kind][of]
-                    && let Some(text) = self.doubt(kind, of, step)
+                    && let Some(text) = self.warning_of_step(kind, of, step)
                 {
                     self.told.steps[kind][of] = step;
                     self.note(text);
@@ -120,7 +120,7 @@ impl Simulation {
         }
         for body in 0..self.rotors.len() {
             for offset in [0.0, length] {
-                self.tell_of_speed(body, self.inputs.rotors[body].speed.at(offset));
+                self.warn_of_speed(body, self.inputs.rotors[body].speed.at(offset));
                 self.warn_of_excitation(body, step * self.excitation_rate(body, offset).abs());
             }
         }
@@ -149,7 +149,7 @@ impl Simulation {
         self.note(self.compiled.warning_of(body, coarse_excitation("the excitation", turn)));
     }
 
-    fn tell_of_speed(&mut self, body: usize, speed: f64) {
+    fn warn_of_speed(&mut self, body: usize, speed: f64) {
         if speed.abs() > self.told.fastest[body]
             && let Some(slip) = self.compiled.slip_of_speed(body, speed)
         {
@@ -167,7 +167,7 @@ impl Simulation {
     }
 
     /// A warning of one kind about a structure at a step (s).
-    fn doubt(&self, kind: usize, of: usize, step: f64) -> Option<Warning> {
+    fn warning_of_step(&self, kind: usize, of: usize, step: f64) -> Option<Warning> {
         let limits = self.limits.as_ref()?;
         let scheme = limits.parameters.scheme;
         let unresolved = |frequency: f64| stability::check_step(frequency, scheme, step).ok().flatten();

@@ -169,7 +169,7 @@ const ENERGIES: [Energy; 19] = [
 
 /// The ledger's rows that exist.
 pub fn energies(table: &mut TableBuilder, parts: &TableFacts) {
-    let mut words = words(parts).into_iter();
+    let mut words = energy_descriptions(parts).into_iter();
     for (name, span, quantity, text, read) in ENERGIES.into_iter().filter(|row| exists(parts, row.0)) {
         let text = if text.is_empty() { words.next().unwrap_or_default() } else { text };
         let text = if name == "stiffening_work" && softens(parts) { SOFTENED } else { text };
@@ -194,7 +194,7 @@ fn softens(parts: &TableFacts) -> bool {
 }
 
 /// Of kinetic energy, strain energy and impacts.
-fn words(parts: &TableFacts) -> [&'static str; 3] {
+fn energy_descriptions(parts: &TableFacts) -> [&'static str; 3] {
     if parts.bodies().iter().any(|body| body.free) {
         return [
             "Kinetic energy of all structures, flight included",

@@ -6,7 +6,7 @@ use super::parts::{AXES, BodyFacts, CarrierFacts, PairFacts, TableFacts, largest
 use crate::laws::coating::Coating;
 use crate::ranges;
 use crate::settings::{CoatingSettings, StructureSettings};
-use crate::simulation::outputs::{each, scalar, whole};
+use crate::simulation::outputs::{each, scalar, array_reader};
 use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
 use crate::variables::{DataType, Quantity, Span, StartValue, Variability};
 
@@ -148,7 +148,7 @@ pub fn outputs(table: &mut TableBuilder, parts: &TableFacts) {
         table.belongs(carrier.index, parts.of_carrier(carrier));
         let text = "Radial displacement of the contact grid of the casing, ring after ring along z, outwards positive";
         let index = carrier.index;
-        let read = whole(move |view, out| view.slave_displacement(index, out));
+        let read = array_reader(move |view, out| view.slave_displacement(index, out));
         let row = table.output("casing_displacement", Span::Point, Some((&LENGTH, 1e-4)), text, read);
         (row.dimension, row.display) = (Some(carrier.rom.contact_nodes.len()), Some(1));
         row.quantity = Quantity::SlaveDisplacement;
@@ -234,7 +234,7 @@ fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating:
             ),
             ("wear_profile_along", false, "Wear depth of each row along z, mean over the circumference"),
         ] {
-            let read = whole(move |view, out| view.wear_profile(index, around, out));
+            let read = array_reader(move |view, out| view.wear_profile(index, around, out));
             let row = table.output(name, Span::Total, depth, text, read);
             let count = if around { coating.cells_around } else { coating.cells_along };
             (row.dimension, row.display) = (Some(count), Some(1));

@@ -4,7 +4,7 @@ use super::builder::TableBuilder;
 use super::parts::{BodyFacts, TableFacts, refuse};
 use crate::Result;
 use crate::rom::{ContactNode, DisplacementFrame, STRESSES};
-use crate::simulation::outputs::{OutputReader, each, scalar, whole};
+use crate::simulation::outputs::{OutputReader, each, scalar, array_reader};
 use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINE_LOAD, PRESSURE, STRESS};
 use crate::variables::{Quantity, Span, VariableUnit};
 
@@ -349,7 +349,7 @@ fn nodal_diameters(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFact
         Span::Point,
         nominal(parts, body),
         "Amplitude of the radial displacement of the middle contact node, of rows of patches their mean, per nodal diameter 0, 1, 2, …",
-        whole(move |view, out| view.nodal_diameters(index, rows, out)),
+        array_reader(move |view, out| view.nodal_diameters(index, rows, out)),
     );
     (amplitude.dimension, amplitude.display) = (Some(largest + 1), Some(1));
     amplitude.quantity = Quantity::NodalDiameterAmplitude;

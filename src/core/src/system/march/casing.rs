@@ -118,7 +118,7 @@ impl CarrierIntegrator {
     }
 
     /// What a force at point i of the step that is tried works on at a place (m), in the directions of the node.
-    pub fn way_at(&self, spot: Spot, i: usize) -> [f64; 3] {
+    pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> [f64; 3] {
         let (weights, moved) = (&self.ways[i], &self.moved);
         let way = |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
         at_place(spot.surface, spot.place, spot.frame, way)
@@ -178,12 +178,12 @@ impl CarrierIntegrator {
     }
 
     /// No lane faces it yet.
-    pub fn look_away(&mut self) {
+    pub fn clear_lanes(&mut self) {
         self.facing.fill(false);
     }
 
     /// A lane of the sector that is solved faces a place, with this normal.
-    pub fn look(&mut self, lane: usize, spot: Spot, normal: [f64; 3]) {
+    pub fn set_lane(&mut self, lane: usize, spot: Spot, normal: [f64; 3]) {
         let padded = self.force.len();
         (self.facing[lane], self.frames[lane]) = (true, spot.frame);
         let around = Around::new(spot);
@@ -204,7 +204,7 @@ impl CarrierIntegrator {
     }
 
     /// By how much it gives way at all lanes (m, along their normals) per λ of one with the force `direction` per λ: added to `given`.
-    pub fn give(
+    pub fn add_normal_compliance(
         &mut self,
         (level, kind): (usize, ForceInterpolation),
         lanes: Lanes,
@@ -223,7 +223,7 @@ impl CarrierIntegrator {
     }
 
     /// The same in the directions of each lane, under a `force` on one at the end of the step (N), where that is all there is.
-    pub fn give_way(
+    pub fn add_compliance(
         &mut self,
         at: (usize, ForceInterpolation),
         lanes: Lanes,

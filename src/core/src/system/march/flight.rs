@@ -22,7 +22,7 @@ impl System {
             }
         }
         for (pair, drive) in pairs.iter_mut().zip(drives) {
-            pair.go_to(drive, length);
+            pair.move_to(drive, length);
         }
         for structure in structures {
             let Some(mut galerkin) = structure.galerkin.take() else { continue };
@@ -53,7 +53,7 @@ impl Structure {
         let Some(bank) = self.bank() else { return false };
         (0..self.modes().sectors()).all(|sector| {
             bank.read_sector(sector, &mut state.position, &mut state.velocity);
-            let reach = marcher.reach(&tables[bank.set_number(sector)], state);
+            let reach = marcher.largest_displacements(&tables[bank.set_number(sector)], state);
             reach.iter().all(|reach| *reach <= demand.tolerance)
                 && (0..self.nodes()).all(|node| {
                     let index = self.index(node, sector);

@@ -309,10 +309,10 @@ impl CoupledStepper<'_> {
         }
         self.each((step, kind), |facing, (trial, state), tables, disk| {
             let level = &tables.levels[step.level];
-            facing.go(step.from, step.length, level, kind);
+            facing.begin_step(step.from, step.length, level, kind);
             facing.record.stay();
             trial.begin((level, kind), disk.is_none().then_some(&tables.rows), state);
-            trial.look_at_start(state, |node, moved| facing.gap(node, 0, moved).0);
+            trial.find_start_gaps(state, |node, moved| facing.gap(node, 0, moved).0);
         });
         if self.together.fresh {
             // What was handed over before is handed over where nodes are found to be at the start of the span.
@@ -330,7 +330,7 @@ impl CoupledStepper<'_> {
                 if trial.multiplier(point, node) != 0.0 {
                     let force = trial.force(point, node);
                     facing.record.act(node, point);
-                    facing.tell_ground(node, point, |casing, spot| casing.react(spot, point, force));
+                    facing.with_carrier_mut(node, point, |casing, spot| casing.react(spot, point, force));
                 }
             }
         });
@@ -380,7 +380,7 @@ impl CoupledStepper<'_> {
             for point in 1..=points {
                 self.bend_surfaces(point);
                 self.each_of(far, (step, kind), |facing, (trial, _), _, _| {
-                    trial.look_at(point, |node, moved| facing.gap(node, point, moved));
+                    trial.find_gaps_at(point, |node, moved| facing.gap(node, point, moved));
                 });
             }
         }
@@ -394,14 +394,14 @@ impl CoupledStepper<'_> {
     }
 
     /// Tell sectors that are far from those that may touch, where the lowest gap is `lowest` (m).
-    fn tell_apart(&mut self, lowest: f64) {
+    fn separate_far_sectors(&mut self, lowest: f64) {
         for one in &mut self.together.sectors {
             one.far = one.trial.rests() && one.trial.extremes().0 > -lowest;
         }
     }
 
     /// Sectors that are far are looked at again. True where one of them touches; it is far no more.
-    fn look_again(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
+    fn recheck_far_sectors(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
         let (lowest, ..) = self.find_gaps(step, kind, points, true);
         // What is no number is found out by the next look at all that are near.
         let found = lowest.is_nan() || lowest < 0.0;
@@ -462,7 +462,7 @@ impl CoupledStepper<'_> {
             for node in 0..trial.nodes() {
                 let impulse = trial.impulse(node);
                 if impulse.iter().any(|component| *component != 0.0) {
-                    facing.tell_ground(node, points, |casing, spot| casing.add_impulse(spot, impulse));
+                    facing.with_carrier_mut(node, points, |casing, spot| casing.add_impulse(spot, impulse));
                 }
             }
         });
@@ -568,13 +568,13 @@ impl AdaptiveStepper for CoupledStepper<'_> {
                 return verdict;
             }
             if ((rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision))
-                && !self.look_again(step, kind, points)
+                && !self.recheck_far_sectors(step, kind, points)
             {
                 verdict.solved = true;
                 break;
             }
             if pass == 0 {
-                self.tell_apart(lowest.min(-precision));
+                self.separate_far_sectors(lowest.min(-precision));
             }
             if pass + 1 == PASSES {
                 self.blame(|one| one.trial.extremes().0 <= lowest || one.trial.extremes().1 >= largest, false);
@@ -596,7 +596,7 @@ impl AdaptiveStepper for CoupledStepper<'_> {
         self.together.casings.iter_mut().for_each(|casing| casing.weigh(points));
         let (mut dropped, mut closed) = (0.0, 0.0);
         let before: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
-        for whole in self.together.wholes() {
+        for whole in self.together.shared_bodies() {
             dropped += if kind == ForceInterpolation::Constant { whole.dropped() } else { 0.0 };
         }
         let (mut of_wholes, tolerance) = (dropped, self.together.demand.tolerance);
@@ -611,7 +611,7 @@ impl AdaptiveStepper for CoupledStepper<'_> {
             dropped += own;
             let level = &tables.levels[step.level];
             trial.find_minima(&level.basis, is_resolved, tolerance);
-            facing.took(&AcceptedStep {
+            facing.record_step(&AcceptedStep {
                 level,
                 kind,
                 trial,
@@ -619,7 +619,7 @@ impl AdaptiveStepper for CoupledStepper<'_> {
                 dropped: own + std::mem::take(&mut of_wholes),
             });
         });
-        self.go_on(step, kind);
+        self.accept_states(step, kind);
         // What gaps within the precision of contacts that stay closed give is paid as well.
         let after: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
         if kind == ForceInterpolation::Constant { dropped + closed } else { after - before }
@@ -644,12 +644,12 @@ impl CoupledStepper<'_> {
         self.each((step, kind), |facing, (trial, _), tables, _| {
             let level = &tables.levels[step.level];
             trial.find_minima(&level.basis, true, tolerance);
-            facing.passed(level, trial);
+            facing.record_gaps(level, trial);
         });
     }
 
     /// All states go to the end of the step.
-    fn go_on(&mut self, step: SpanStep, kind: ForceInterpolation) {
+    fn accept_states(&mut self, step: SpanStep, kind: ForceInterpolation) {
         self.together.fresh = false;
         for one in &mut self.together.sectors {
             if one.disk.is_none() {
@@ -661,7 +661,7 @@ impl CoupledStepper<'_> {
             }
             one.trial.leave(&mut one.state);
         }
-        self.together.wholes_mut().for_each(|whole| whole.take(step.level, kind));
+        self.together.shared_bodies_mut().for_each(|whole| whole.take(step.level, kind));
         self.find_start();
     }
 }
@@ -671,14 +671,14 @@ impl CoupledSet {
     fn energy(&self) -> f64 {
         let own = self.sectors.iter().filter(|one| one.disk.is_none());
         let sectors = own.map(|one| self.tables[one.table[0]][one.table[1]].energy(&one.state));
-        sectors.chain(self.wholes().map(SharedBody::energy)).sum()
+        sectors.chain(self.shared_bodies().map(SharedBody::energy)).sum()
     }
 
-    fn wholes(&self) -> impl Iterator<Item = &SharedBody> {
+    fn shared_bodies(&self) -> impl Iterator<Item = &SharedBody> {
         self.disks.iter().map(|disk| &disk.whole).chain(self.casings.iter().map(|casing| &casing.whole))
     }
 
-    fn wholes_mut(&mut self) -> impl Iterator<Item = &mut SharedBody> {
+    fn shared_bodies_mut(&mut self) -> impl Iterator<Item = &mut SharedBody> {
         let disks = self.disks.iter_mut().map(|disk| &mut disk.whole);
         disks.chain(self.casings.iter_mut().map(|casing| &mut casing.whole))
     }

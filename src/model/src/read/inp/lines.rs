@@ -46,7 +46,7 @@ impl DataLine {
     }
 
     /// Whether the record goes on in the next line.
-    pub(crate) fn goes_on(&self) -> bool {
+    pub(crate) fn is_continued(&self) -> bool {
         self.text.ends_with(',')
     }
 }

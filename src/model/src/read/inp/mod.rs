@@ -186,7 +186,7 @@ impl InpReader {
             for text in line.values() {
                 record.push(label(text, line, "an element or node number")?);
             }
-            let complete = wanted.map_or(!line.goes_on(), |wanted| record.len() >= wanted);
+            let complete = wanted.map_or(!line.is_continued(), |wanted| record.len() >= wanted);
             if !complete && index + 1 < card.data.len() {
                 continue;
             }
