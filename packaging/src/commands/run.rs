@@ -104,7 +104,8 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         let outputs = outputs(&run.recording.names, run.recording.row(rows - 1));
         format!("\n{outputs}\n{}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
     } else {
-        let told = if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::errors_text(&estimates)) };
+        let told =
+            if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::errors_text(&estimates)) };
         let hint =
             if arguments.estimate { "" } else { "\nerrors of this run, estimated from coarser runs: --estimate" };
         format!("{}{told}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))

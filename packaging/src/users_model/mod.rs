@@ -114,7 +114,9 @@ pub fn sector(asked: &SectorArguments, console: &Console) -> Result<ReducedModel
     let source = asked.source();
     let imported = import(&source, console)?;
     let choose = |imported: &Imported| choose::tips(imported, source.model, &asked.tips, Some(asked));
-    reduce_clamped(&source, imported, choose, |model, chosen, clamped| cyclic((&source, asked), model, chosen, clamped, console))
+    reduce_clamped(&source, imported, choose, |model, chosen, clamped| {
+        cyclic((&source, asked), model, chosen, clamped, console)
+    })
 }
 
 /// A casing whose contact nodes form a grid.

@@ -16,7 +16,7 @@ use crate::convergence::{
     refine::{OF_CLEARANCE, RefinementDirection, RefinementLevel, SECONDS, is_adaptive, with_division},
     truncate::{Truncation, truncated},
 };
-use crate::error::own::own_division;
+use crate::error::user_scene::own_division;
 
 /// Least ratio of two changes of the displacements that lets the rest be estimated.
 const SHRINKING: f64 = 1.3;

@@ -15,8 +15,8 @@ pub mod march;
 pub mod response;
 pub mod rows;
 pub mod sector;
+pub mod shared_body;
 pub mod state;
 #[cfg(test)]
 mod tests;
 pub mod trial;
-pub mod whole;

@@ -188,7 +188,8 @@ impl Inputs {
 
     /// Nothing will move in a step of length `length`.
     fn rest(&self, length: f64) -> bool {
-        let rests = |input: &Input| input.slope == 0.0 && input.at(0.0).to_bits() == input.requested_value(length).to_bits();
+        let rests =
+            |input: &Input| input.slope == 0.0 && input.at(0.0).to_bits() == input.requested_value(length).to_bits();
         self.rotors.iter().all(|rotor| rotor.speed.slope == 0.0) && self.moving().all(rests)
     }
 

@@ -4,7 +4,7 @@ mod checking;
 mod closing;
 mod free;
 mod sliding;
-mod told;
+mod warning_state;
 
 use super::table::has_one_friction;
 use super::{Compiled, Simulation};
@@ -18,7 +18,7 @@ use crate::{Error, Result, Warning};
 use checking::Checking;
 use closing::Closing;
 use sliding::Sense;
-pub(super) use told::WarningState;
+pub(super) use warning_state::WarningState;
 
 /// Parameters that decide stability.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! What carries a running state on: another step size, saving and restoring, and ways over an edge.
 
+use super::contact_view::ContactMember;
 use super::pair::When;
-use super::posed::ContactMember;
 use super::{Bodies, ContactEvent, ContactPair, StepFailure, Structure, System, sum_of};
 use crate::gaps::GapLaw;
 use crate::gaps::surface_spline::ClosestPoint;
@@ -180,7 +180,9 @@ impl System {
             if !places.into_iter().all(|places| self.places_exist(structure, places)) {
                 reader.refuse("a contact node is nowhere on its surface");
             }
-            let found = self.infinite_gaps_of_structure(structure, &saved.gap.now).zip(self.infinite_gaps_of_structure(structure, &saved.gap.before));
+            let found = self
+                .infinite_gaps_of_structure(structure, &saved.gap.now)
+                .zip(self.infinite_gaps_of_structure(structure, &saved.gap.before));
             endless = endless.zip(found).map(|(sum, (now, before))| sum + now + before);
         }
         if started && endless.is_none() {

@@ -1,6 +1,6 @@
 //! The Delassus matrix W = C_Nᵀ A⁻¹ C_NT of the contact nodes of one structure, by its flexibility over one step.
 
-use super::posed::ContactMember;
+use super::contact_view::ContactMember;
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::dispatch::Kernel;

@@ -1,6 +1,6 @@
 //! What a contact did in a step.
 
-use super::posed::ContactMember;
+use super::contact_view::ContactMember;
 use crate::gaps::dot;
 use crate::gaps::wrench::Wrench;
 

@@ -1,9 +1,9 @@
 //! Groups of contacts that can push each other: their Delassus matrix, their forces, and what these do to the structures.
 
 use super::carrier::Reaction;
+use super::contact_view::{Bodies, ContactMember, ContactView};
 use super::delassus::{DelassusBlock, fill};
 use super::pair::When;
-use super::posed::{Bodies, ContactMember, ContactView};
 use super::{ContactEvent, StepFailure, Structure};
 use crate::dynamics::sectors::Sectors;
 use crate::gaps::dot;

@@ -1,13 +1,13 @@
 //! One span of time by continuous Galerkin: each sector by itself, in steps of its own.
 
 pub(super) mod casing;
+pub(super) mod coupled_set;
 mod disk;
 mod flight;
-pub(super) mod together;
 
-use super::facing::ObstacleView;
+use super::contact_view::ContactMember;
 use super::growth::ShapeGrowth;
-use super::posed::ContactMember;
+use super::obstacle_view::ObstacleView;
 use super::record::{NodeTally, SpanRecord, Worked};
 use super::{ContactEvent, ContactPair, StepFailure, Structure, System};
 use crate::dynamics::bank::ModalBank;
@@ -21,8 +21,8 @@ use crate::gaps::PrescribedMotion;
 use crate::gaps::wrench::Wrench;
 use crate::ledger::Ledger;
 use crate::settings::{Scheme, Solver};
+use coupled_set::CoupledSet;
 use nalgebra::DMatrix;
-use together::CoupledSet;
 
 /// Contacts count as closed within this share of the tolerance.
 const PRECISION: f64 = 1e-4;

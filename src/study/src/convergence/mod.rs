@@ -36,7 +36,7 @@ use crate::{
     arguments::ConvergenceArguments,
     error::{
         case::ErrorCase,
-        own::{UserScene, refuse_compared},
+        user_scene::{UserScene, refuse_compared},
     },
     estimate::{self, Estimate},
     master, one_rotor,

@@ -19,7 +19,7 @@ use super::{
     rows::MOST_ROWS,
     truncate::{Truncation, truncated},
 };
-use crate::{master, stability::asked::divided};
+use crate::{master, stability::scene::divided};
 
 /// Internal steps, times the scene's own, the coarsest first.
 const STEPS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];

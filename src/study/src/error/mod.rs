@@ -9,7 +9,6 @@ pub mod chart;
 pub mod clock;
 pub mod competitor;
 pub mod measure;
-pub mod own;
 pub mod ranking;
 pub mod run;
 pub mod scene;
@@ -17,6 +16,7 @@ pub mod sheets;
 pub mod summary;
 pub mod total;
 mod total_page;
+pub mod user_scene;
 pub mod window;
 
 use std::iter::zip;
@@ -49,7 +49,7 @@ const MEET: f64 = 2e-3;
 /// # Errors
 /// The scene cannot be read or stepped, a reference fails, or the source does not give the ROM of the scene.
 pub fn study(arguments: &ErrorArguments, source: Option<&dyn RomSource>, console: &Console) -> Result<Study> {
-    let case = own::UserScene::new(arguments, console)?;
+    let case = user_scene::UserScene::new(arguments, console)?;
     let (quick, cache) = (arguments.common.quick, arguments.common.cache.cache());
     let (title, all) = (case.title().to_owned(), measure::count(&case));
     // First: what cannot be reduced again is told before the long work.

@@ -20,9 +20,9 @@ use super::{
     clock,
     competitor::{Competitor, TOLERANT},
     measure::{kind, units},
-    own::UserScene,
     run::TimedRun as _,
     scene::SceneRun,
+    user_scene::UserScene,
 };
 use crate::{
     convergence::{

@@ -2,7 +2,7 @@
 
 use tiprub_shell::{Failure, Result};
 
-use super::asked::{OperatingPoint, SceneStart};
+use super::scene::{OperatingPoint, SceneStart};
 use crate::arguments::{NumberRange, StabilityArguments};
 
 /// Friction coefficients go at least this far where none are asked for.

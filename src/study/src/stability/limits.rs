@@ -8,7 +8,7 @@ use tiprub_core::{
 use tiprub_shell::{Result, forecast::Forecast, sweep};
 
 use super::{
-    asked::{Method, OperatingPoint, SceneStart, ScreeningResult, StabilityScene},
+    scene::{Method, OperatingPoint, SceneStart, ScreeningResult, StabilityScene},
     seek::{Sought, TRIED, seek},
 };
 

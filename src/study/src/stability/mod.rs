@@ -4,15 +4,15 @@
 //! The answers are those of the core, asked as a run asks it ([`asked`]). [`structure`] holds growth rates and limits of one structure
 //! by itself, [`grid`] what is asked, [`limits`] the largest steps, [`page`] pictures and tables.
 
-pub mod asked;
 pub mod grid;
 pub mod limits;
 pub mod page;
+pub mod scene;
 pub mod seek;
 pub mod structure;
 
-use asked::{OperatingPoint, SceneStart, ScreeningResult, StabilityScene};
 use grid::StabilityGrid;
+use scene::{OperatingPoint, SceneStart, ScreeningResult, StabilityScene};
 use structure::{KnownContact, Rates, SingleStructure};
 use tiprub_core::{
     Scene, Simulation,
@@ -27,7 +27,7 @@ use tiprub_shell::{
 };
 
 use super::{Study, master};
-use crate::{arguments::StabilityArguments, error::own::refuse_compared, one_rotor_and_friction};
+use crate::{arguments::StabilityArguments, error::user_scene::refuse_compared, one_rotor_and_friction};
 
 /// What makes friction a parameter of a scene; every answer sets it.
 const SOME_FRICTION: f64 = 0.1;

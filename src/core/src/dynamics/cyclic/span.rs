@@ -4,7 +4,7 @@
 use super::fourier::Synthesis;
 use super::pass::{Complexes, Gather, Recover, modal_force};
 use super::{CyclicBank, LANES};
-use crate::galerkin::whole::Coordinates;
+use crate::galerkin::shared_body::Coordinates;
 use crate::settings::Scheme;
 use nalgebra::DMatrix;
 

@@ -86,7 +86,8 @@ impl Trial {
             if !all {
                 verdict.switches = true;
                 let terms = (0..count).flat_map(|i| (0..count).map(move |k| (i, k)));
-                let left = |(i, k): (usize, usize)| self.multiplier(i, node) * basis.work[i][k] * self.finite_gap(k, node);
+                let left =
+                    |(i, k): (usize, usize)| self.multiplier(i, node) * basis.work[i][k] * self.finite_gap(k, node);
                 verdict.switched += terms.map(left).sum::<f64>();
             }
         }

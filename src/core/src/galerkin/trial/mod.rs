@@ -1,12 +1,12 @@
 //! One step of one sector, tried: contact forces at the points, gaps there, and how good they are.
 
-mod found;
+mod coupled;
 mod judgement;
 mod minima;
 mod obstacle;
+mod outcome;
 mod steady;
 mod sticking;
-mod together;
 
 use super::basis::{MOST, POINTS, TimeBasis};
 use super::compliance::{LaneCompliance, Lanes};

@@ -6,7 +6,7 @@ use super::parts::{AXES, BodyFacts, CarrierFacts, PairFacts, TableFacts, largest
 use crate::laws::coating::Coating;
 use crate::ranges;
 use crate::settings::{CoatingSettings, StructureSettings};
-use crate::simulation::outputs::{each, scalar, array_reader};
+use crate::simulation::outputs::{array_reader, each, scalar};
 use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
 use crate::variables::{DataType, Quantity, Span, StartValue, Variability};
 

@@ -3,7 +3,7 @@
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::sectors::Sectors;
 use crate::galerkin::basis::POINTS;
-use crate::galerkin::whole::SharedBody;
+use crate::galerkin::shared_body::SharedBody;
 use crate::system::Structure;
 
 /// A disk of coupled sectors.

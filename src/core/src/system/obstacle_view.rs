@@ -104,7 +104,8 @@ impl Obstacle for ObstacleView<'_> {
     fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]) {
         let Some(pair) = self.pair_of[node] else { return (f64::INFINITY, [0.0; 3]) };
         let at = self.at(node, &self.record.drives[pair][point].0);
-        let (gap, normal, place) = self.pairs[pair].gap_mut().gap_of_node(at, moved, Some(self.record.places[point][node]));
+        let (gap, normal, place) =
+            self.pairs[pair].gap_mut().gap_of_node(at, moved, Some(self.record.places[point][node]));
         self.record.places[point][node] = place;
         (gap, normal)
     }
@@ -139,8 +140,9 @@ impl Obstacle for ObstacleView<'_> {
         let slip = if gap.slides_anywhere() {
             let known = self.record.slips[point][node].filter(|_| self.record.looks > LOOKS);
             let slip = known.unwrap_or_else(|| {
-                let ground =
-                    self.on_ground((node, point), SurfacePlace::Now, |casing, spot| casing.sliding_distance_at(spot, point));
+                let ground = self.on_ground((node, point), SurfacePlace::Now, |casing, spot| {
+                    casing.sliding_distance_at(spot, point)
+                });
                 let ground = ground.unwrap_or_default();
                 std::array::from_fn(|c| sliding.way[c] - ground[c])
             });

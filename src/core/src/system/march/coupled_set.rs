@@ -11,11 +11,11 @@ use crate::galerkin::compliance::Lanes;
 use crate::galerkin::level::ContactModes;
 use crate::galerkin::march::{AdaptiveStepper, SpanStep};
 use crate::galerkin::sector::{AcceptedStep, StepGoal, Stopped, Tables, Witness};
+use crate::galerkin::shared_body::SharedBody;
 use crate::galerkin::state::SectorState;
 use crate::galerkin::trial::{ForceInterpolation, Obstacle, Trial, TrialResult};
-use crate::galerkin::whole::SharedBody;
 use crate::settings::Scheme;
-use crate::system::facing::{CarriersInStep, ObstacleView};
+use crate::system::obstacle_view::{CarriersInStep, ObstacleView};
 use crate::system::record::SpanRecord;
 use crate::system::{ContactPair, StepFailure, Structure};
 

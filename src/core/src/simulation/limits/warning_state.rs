@@ -71,7 +71,8 @@ impl Simulation {
         self.told = WarningState::new(self.rotors.len(), self.compiled.carriers.len());
         for kind in 0..KINDS {
             for of in 0..self.told.steps[kind].len() {
-                self.told.steps[kind][of] = if self.warning_of_step(kind, of, expected).is_some() { expected } else { 0.0 };
+                self.told.steps[kind][of] =
+                    if self.warning_of_step(kind, of, expected).is_some() { expected } else { 0.0 };
             }
         }
         let mut doubts: Vec<Warning> = self.compiled.slips().iter().map(Slip::warning).collect();
