@@ -10,7 +10,7 @@ const TABLES: [(&str, &str); 4] = [
     ("summary-steps", "error-study.md"),
     ("summary-total", "error-study.md"),
     ("summary-limits", "error-study.md"),
-    ("communication-steps", "coupling.md"),
+    ("communication-steps", "co-simulation.md"),
 ];
 /// The page that says on which machine and when, as the block of this name.
 const MACHINE: (&str, &str) = ("machine", "error-study.md");
