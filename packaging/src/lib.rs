@@ -2,7 +2,7 @@
 //!
 //! It wires the lower floors together. [`commands`] holds one module per command; the rest are the parts they share.
 //!
-//! - [`cli`], [`reduce_arguments`], [`casing_arguments`], [`thermal_arguments`], [`own_arguments`], [`shared_arguments`]: what can be asked for; [`spelling`]: what was;
+//! - [`cli`], [`reduce_arguments`], [`casing_arguments`], [`thermal_arguments`], [`own_arguments`], [`shared_arguments`]: what can be requested; [`command_names`]: errors of the command line;
 //! - [`command_files`]: what each command reads and writes, looked at before any work;
 //! - [`left_out`]: what a scene leaves out, in one table;
 //! - [`answer`]: the five lines that a run is about;
@@ -15,6 +15,7 @@ pub mod answer;
 pub mod casing_arguments;
 pub mod cli;
 pub mod command_files;
+pub mod command_names;
 pub mod commands;
 pub mod cube_models;
 pub mod fmu;
@@ -27,7 +28,6 @@ pub mod report;
 pub mod rom_facts;
 pub mod scene_features;
 pub mod shared_arguments;
-pub mod spelling;
 pub mod thermal_arguments;
 pub mod thermal_fmu;
 pub mod users_model;

@@ -2,17 +2,17 @@
 
 use std::{ffi::OsString, process::ExitCode};
 
-use tiprub_packaging::{cli::Cli, commands, spelling};
+use tiprub_packaging::{cli::Cli, command_names, commands};
 use tiprub_shell::{Failure, console::Console};
 
 fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
-    let asked = Console::new(true, spelling::asks_for_json(&arguments));
-    if let Some(failure) = spelling::of_before(&arguments) {
+    let asked = Console::new(true, command_names::asks_for_json(&arguments));
+    if let Some(failure) = command_names::check_names(&arguments) {
         asked.fail(&failure);
         return ExitCode::from(failure.exit_code());
     }
-    let cli: Cli = spelling::parsed(&asked);
+    let cli: Cli = command_names::parsed(&asked);
     let console = Console::new(cli.quiet, cli.json);
     if stdout_at_start::was_closed() {
         return console.finish(Err(Failure::new(

@@ -134,7 +134,7 @@ def test_a_rom_has_every_entry_and_order_of_memory(tmp_path):
     path = module.rom(tmp_path / "a.safetensors", MASS, numpy.asfortranarray(STIFFNESS + numpy.diag([0, 1, 2.0])), MAP, POSITIONS, **BLADE, **more)
     arrays, entries = read_rom(path)
     assert (arrays["stiffness"] == STIFFNESS + numpy.diag([0, 1, 2.0])).all() and arrays["contact_areas"] == [1e-6]
-    assert entries["format_version"] == "2" and entries["contact_names"] == "mid_chord" and entries["damping_ratio"] == "0.002"
+    assert entries["format_version"] == "1" and entries["contact_names"] == "mid_chord" and entries["damping_ratio"] == "0.002"
     with pytest.raises(module.Error, match="symmetric"):
         module.rom(tmp_path / "b.safetensors", MASS, numpy.triu(STIFFNESS), MAP, POSITIONS, **BLADE)
     with pytest.raises(module.Error, match="contact_area"):

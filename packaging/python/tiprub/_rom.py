@@ -17,10 +17,6 @@ from ._program import Error, call, called, place, text
 #: Entries of the file that are text; all else is an array.
 ENTRIES = {"origin", "contact_names", "largest_speed", "contact_grid", "watched_names", "stress_names", "basis", "contact_rows",
            "rub_errors", "rub_errors_found_on", "units"}
-#: Needs format 2.
-SECOND = {"contact_areas", "contact_lengths", "flexibility_deviation", "response_frequencies", "response_deviation", "watched_map",
-          "watched_positions", "watched_names", "stress_map", "stress_positions", "stress_names", "stress_thermal", "stress_centrifugal", "support_stiffness", "support_mass",
-          "support_thermal", "basis", "contact_rows", "rub_errors", "rub_errors_found_on"}
 
 
 def rom(
@@ -81,7 +77,7 @@ def rom(
     arrays = {"mass": mass, "stiffness": stiffness, "contact_map": contact_map, "contact_positions": contact_positions}
     arrays.update((key, item) for key, item in more.items() if key not in ENTRIES)
     path = place("path", path)
-    entries = {"format": "tiprub-rom", "format_version": "2" if SECOND & more.keys() else "1", "name": name, "sectors": sectors,
+    entries = {"format": "tiprub-rom", "format_version": "1", "name": name, "sectors": sectors,
                "frame": frame, "damping_ratio": damping_ratio}
     entries.update((key, item) for key, item in more.items() if key in ENTRIES)
     header: dict[str, Any] = {"__metadata__": {key: entry(f"{path}: `{key}`", item) for key, item in entries.items()}}

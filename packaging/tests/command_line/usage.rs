@@ -37,7 +37,7 @@ fn failures_exit_with_one_and_are_json_too() {
     assert!(truncated.contains("small.rom.safetensors"), "{truncated}");
 }
 
-/// Of every command, whoever refuses: the parser, the program for a spelling of before, or the work.
+/// Of every command, whoever refuses: the parser, the check of names, or the work.
 #[test]
 fn every_error_is_one_json_object_too() {
     let project = Project::new();

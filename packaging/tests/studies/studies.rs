@@ -527,11 +527,6 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
     assert!(told.contains("file: cannot create the directory"), "{told}");
     let told = refuse(&["study", "map", "builtin:cube-between-rings"], 2);
     assert!(told.contains("`cube`, flies freely") && told.contains("rotating master"), "{told}");
-    for name in ["stage", "modes", "cube", "conjugacy", "inputs"] {
-        let told = refuse(&["study", name, "--quick"], 2);
-        assert!(told.contains("the laboratory") && told.contains(&format!("-p tiprub-lab -- {name}")), "{told}");
-    }
-    assert!(refuse(&["stability", "--case", "friction/"], 2).contains("-p tiprub-lab -- stability"));
     assert!(refuse(&["study", "tip"], 2).contains("Choose `map`, `error`"));
     let told = refuse(&["study", "error", "builtin:rotor37", "--set", "scheme=film"], 2);
     assert!(told.contains("--set scheme: the study compares all of them"), "{told}");

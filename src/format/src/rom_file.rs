@@ -12,7 +12,7 @@ mod extras;
 mod harmonics;
 mod rub_errors;
 
-use crate::rom_layout::{ARRAYS, METADATA, NUMBER, ROM_FORMAT, ROM_FORMAT_VERSIONS, SECOND_RELEASE, units_text};
+use crate::rom_layout::{ARRAYS, METADATA, NUMBER, ROM_FORMAT, ROM_FORMAT_VERSION, units_text};
 use crate::{Error, Result, suggestion};
 
 const WRITE_AGAIN: &str = "Write the ROM again; the ROM file chapter of the user guide lists arrays and metadata";
@@ -132,10 +132,10 @@ impl RomReader<'_> {
             ));
         }
         let version = metadata.get("format_version").map(String::as_str);
-        if !version.is_some_and(|version| ROM_FORMAT_VERSIONS.contains(&version)) {
+        if version != Some(ROM_FORMAT_VERSION) {
             return Err(self.error(
                 "metadata `format_version`",
-                format!("{} found, one of {ROM_FORMAT_VERSIONS:?} expected", quoted(version)),
+                format!("{} found, \"{ROM_FORMAT_VERSION}\" expected", quoted(version)),
                 "Use the tiprub release that wrote the file, or write the ROM again with this one",
             ));
         }
@@ -353,11 +353,9 @@ fn rom_metadata(rom: &Rom, arrays: &Arrays) -> Metadata {
     let names = names(&rom.contact_nodes);
     let mut extras = extras::metadata(&rom.extras);
     extras.extend(rom.checks.rub_errors.iter().flat_map(rub_errors::metadata));
-    let second = arrays.keys().map(String::as_str).chain(extras.iter().map(|(key, _)| *key));
-    let version = ROM_FORMAT_VERSIONS[usize::from(second.into_iter().any(|name| SECOND_RELEASE.contains(&name)))];
     [
         ("format", ROM_FORMAT.to_owned()),
-        ("format_version", version.to_owned()),
+        ("format_version", ROM_FORMAT_VERSION.to_owned()),
         ("name", rom.name.clone()),
         ("origin", rom.origin.clone()),
         ("sectors", rom.sectors.to_string()),

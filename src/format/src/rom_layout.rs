@@ -2,32 +2,8 @@
 
 /// Value of the metadata entry `format`.
 pub(crate) const ROM_FORMAT: &str = "tiprub-rom";
-/// Values of the metadata entry `format_version`: files of the first release, and with what only [`SECOND_RELEASE`] has. A file is
-/// written in the first form that holds it, for older readers.
-pub(crate) const ROM_FORMAT_VERSIONS: [&str; 2] = ["1", "2"];
-/// Arrays and metadata of format 2.
-pub(crate) const SECOND_RELEASE: [&str; 20] = [
-    "support_stiffness",
-    "support_mass",
-    "support_thermal",
-    "contact_areas",
-    "contact_lengths",
-    "flexibility_deviation",
-    "response_frequencies",
-    "response_deviation",
-    "watched_map",
-    "watched_positions",
-    "watched_names",
-    "stress_map",
-    "stress_positions",
-    "stress_names",
-    "stress_thermal",
-    "stress_centrifugal",
-    "basis",
-    "contact_rows",
-    "rub_errors",
-    "rub_errors_found_on",
-];
+/// Value of the metadata entry `format_version`.
+pub(crate) const ROM_FORMAT_VERSION: &str = "1";
 
 /// One named array of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -292,7 +268,7 @@ const fn entry(name: &'static str, default: Option<&'static str>, description: &
 /// Every metadata entry.
 pub const METADATA: [MetadataLayout; 18] = [
     entry("format", None, "Always `tiprub-rom`."),
-    entry("format_version", None, "`1`, or `2` with anything that format 2 added, below."),
+    entry("format_version", None, "Always `1`."),
     entry("name", None, "Name of the structure."),
     entry("origin", Some(""), "Where the model came from: mesh, material, reduction; free text."),
     entry(
@@ -317,27 +293,26 @@ pub const METADATA: [MetadataLayout; 18] = [
          `around,along,open`: they form a grid with four free edges, frame `cartesian`; node along·around + i is the i-th \
          of its row.",
     ),
-    entry("watched_names", Some(""), "Names of the watched points, separated by commas; format 2."),
-    entry("stress_names", Some(""), "Names of the places with stress, separated by commas; format 2."),
+    entry("watched_names", Some(""), "Names of the watched points, separated by commas."),
+    entry("stress_names", Some(""), "Names of the places with stress, separated by commas."),
     entry(
         "basis",
         Some("craig-bampton"),
-        "`craig-bampton`, modes with the contact nodes held, or `free-interface`, modes of the structure as it is supported; \
-         format 2.",
+        "`craig-bampton`, modes with the contact nodes held, or `free-interface`, modes of the structure as it is supported.",
     ),
     entry(
         "contact_rows",
         Some("1"),
         "Rows of contact patches across the thickness of the tip: patch row·(nodes/rows) + i is the i-th along the chord of its row, rows from \
-         side to side; format 2.",
+         side to side.",
     ),
     entry(
         "rub_errors",
         Some(""),
         "What the reduction leaves of a rub, as far as it is known: `modes=0.01,patches=0.02,rows=0.1,mesh=0.03`, relative errors of the \
-         displacements of the tip; format 2.",
+         displacements of the tip.",
     ),
-    entry("rub_errors_found_on", Some(""), "The scene that these were found on, in words; format 2."),
+    entry("rub_errors_found_on", Some(""), "The scene that these were found on, in words."),
     entry("units", Some(""), "Text for the reader of the file: one line per array."),
     entry("checksum", Some(""), "SHA-256 of the content, checked where present; leave it out when writing by hand."),
 ];

@@ -256,7 +256,7 @@ fn values_that_are_no_structure_are_refused() {
 fn wrong_metadata_is_refused_by_key() {
     ByHand::example().with("format", "pt").refused_with(&["metadata `format`: \"pt\" found", "not a tiprub ROM file"]);
     ByHand::example().without("format").refused_with(&["metadata `format`: nothing found"]);
-    ByHand::example().with("format_version", "3").refused_with(&["metadata `format_version`: \"3\" found", "release"]);
+    ByHand::example().with("format_version", "2").refused_with(&["metadata `format_version`: \"2\" found", "release"]);
     ByHand::example().without("sectors").refused_with(&["metadata `sectors`: missing", "at least 1"]);
     ByHand::example().with("sectors", "-3").refused_with(&["metadata `sectors`: \"-3\" is not such a number"]);
     ByHand::example().with("sectors", "0").refused_with(&["`sectors`", "zero sectors"]);

@@ -32,7 +32,7 @@ pub trait Obstacle {
     }
 
     /// By how much what is touched gives way at all lanes (m, along their normals, away from the node) per λ of one with the force
-    /// `direction` per λ; only after [`Obstacle::look`] has said that it does.
+    /// `direction` per λ; only after [`Obstacle::prepare_compliance`] has said that it does.
     fn add_normal_compliance(&mut self, _lane: usize, _direction: [f64; 3], _given: &mut [f64]) {}
 
     /// The same in all three directions of each lane, under a `force` on one (N).

@@ -1,4 +1,4 @@
-//! Command lines of before, answered with what they are now, and command lines that are not understood, for programs.
+//! Command lines that the parser would reject without a useful remedy, and errors of the parser for programs.
 
 use std::{ffi::OsString, fmt::Write as _};
 
@@ -15,39 +15,24 @@ pub fn asks_for_json(arguments: &[OsString]) -> bool {
     arguments.iter().take_while(|argument| *argument != "--").any(|argument| argument == "--json")
 }
 
-/// The answer to a command line of before; `None` where it is none. The arguments are without the name of the program.
-pub fn of_before(arguments: &[OsString]) -> Option<Failure> {
+/// The error of a command line in which the kind of model or the name of a study is missing or wrong; `None` if they are right. The arguments
+/// are without the name of the program.
+pub fn check_names(arguments: &[OsString]) -> Option<Failure> {
     let words: Vec<String> = arguments.iter().map(|word| word.to_string_lossy().into_owned()).collect();
     let global = |word: &&String| ["--json", "--quiet", "-q"].contains(&word.as_str());
     let start = words.iter().position(|word| !global(&word))?;
     let rest = &words[start + 1..];
     match words[start].as_str() {
-        "stability" => Some(stability()),
         "reduce" => reduce(rest),
         "study" => study(rest.iter().find(|word| !global(word))?),
         _ => None,
     }
 }
 
-/// What was `tiprub stability`.
-fn stability() -> Failure {
-    let problem = "of a scene it is a study; stiff and extreme cases have moved to the laboratory in the sources";
-    let remedy = "Run `tiprub study stability SCENE`, or `cargo run --release -p tiprub-lab -- stability` there";
-    Failure::usage("stability", problem, remedy)
-}
-
-/// Studies of the models that ship, which are evidence for the program and none of its commands.
-const LABORATORY: [&str; 5] = ["stage", "modes", "cube", "conjugacy", "inputs"];
-
 fn study(name: &str) -> Option<Failure> {
     let known = subcommands("study");
     if name.starts_with('-') || name == "help" || known.iter().any(|known| known == name) {
         return None;
-    }
-    if LABORATORY.contains(&name) {
-        let problem = "is a study of the models that ship, which has moved to the laboratory in the sources";
-        let remedy = format!("Run `cargo run --release -p tiprub-lab -- {name}` there");
-        return Some(Failure::usage(name, problem, remedy));
     }
     let remedy = format!("Choose {}, see `tiprub study --help`", listed(&known));
     Some(Failure::usage(format!("study {name}"), "no such study", remedy))
@@ -76,7 +61,7 @@ fn listed(names: &[String]) -> String {
     text
 }
 
-/// Options that stand before the model belong behind it now, and a file needs the word for what it is.
+/// The kind of model comes before options and files.
 fn reduce(words: &[String]) -> Option<Failure> {
     let (own, global): (Vec<&String>, Vec<&String>) =
         words.iter().partition(|word| !["--json", "--quiet", "-q"].contains(&word.as_str()));
@@ -107,8 +92,8 @@ fn reduce(words: &[String]) -> Option<Failure> {
         return Some(no_model(first, &models));
     }
     let line: Vec<String> = now.into_iter().chain(global.into_iter().map(String::as_str)).map(quoted).collect();
-    let remedy = format!("Say `tiprub reduce {}`", line.join(" "));
-    Some(Failure::usage(format!("reduce {first}"), "the kind of model comes first now", remedy))
+    let remedy = format!("Run `tiprub reduce {}`", line.join(" "));
+    Some(Failure::usage(format!("reduce {first}"), "the kind of model comes first", remedy))
 }
 
 fn is_mesh(word: &str) -> bool {
@@ -187,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn old_spellings_of_reduce_are_answered_with_one_that_is_understood() {
+    fn proposes_the_kind_of_model_where_it_is_missing() {
         for (line, now) in [
             (
                 "reduce blade.inp --contact-set TIP --clamp-set ROOT --sectors 36",
@@ -206,8 +191,8 @@ mod tests {
             ("reduce --modes 30 rotor37", "rotor37 --modes 30"),
             ("reduce -o x.rom --contact-set TIP bar.inp", "blade -o x.rom --contact-set TIP bar.inp"),
         ] {
-            let failure = of_before(&words(line)).unwrap_or_else(|| panic!("{line}"));
-            assert_eq!(failure.remedy, format!("Say `tiprub reduce {now}`"), "{line}");
+            let failure = check_names(&words(line)).unwrap_or_else(|| panic!("{line}"));
+            assert_eq!(failure.remedy, format!("Run `tiprub reduce {now}`"), "{line}");
             assert_eq!(failure.exit_code(), 2);
             let parsed = Cli::try_parse_from(words(&format!("tiprub reduce {now}")));
             assert!(parsed.is_ok(), "{now}: {}", parsed.unwrap_err());
@@ -221,19 +206,17 @@ mod tests {
             "reduce --modes 3",
             "",
         ] {
-            assert_eq!(of_before(&words(line)), None, "{line}");
+            assert_eq!(check_names(&words(line)), None, "{line}");
         }
     }
 
     #[test]
-    fn names_that_are_none_are_answered_with_those_that_are() {
-        let failure = of_before(&words("reduce rotor38")).unwrap();
+    fn proposes_known_names_for_unknown_ones() {
+        let failure = check_names(&words("reduce rotor38")).unwrap();
         assert!(failure.remedy.starts_with("Did you mean `rotor37`? Choose `blade`, "), "{failure}");
-        assert!(of_before(&words("study tip")).unwrap().remedy.starts_with("Choose `map`, "));
-        assert!(of_before(&words("study --json stage --quick")).unwrap().remedy.contains("-p tiprub-lab -- stage"));
-        assert!(of_before(&words("stability --case a")).unwrap().remedy.contains("tiprub study stability SCENE"));
+        assert!(check_names(&words("study tip")).unwrap().remedy.starts_with("Choose `map`, "));
         for line in ["study map", "study error --help", "study --help", "study"] {
-            assert_eq!(of_before(&words(line)), None, "{line}");
+            assert_eq!(check_names(&words(line)), None, "{line}");
         }
     }
 
