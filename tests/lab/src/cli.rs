@@ -140,7 +140,8 @@ pub struct LabErrorArguments {
     /// Only this scene; may be given several times.
     #[arg(long = "scene", value_name = "SCENE", value_enum)]
     pub scenes: Vec<ErrorScene>,
-    /// Write tables and pictures into this directory of the guide too: the folder docs of the sources.
+    /// Write tables and pictures into this directory of the guide too: the folder docs of the sources. With `--scene`, only the rows of these
+    /// scenes.
     #[arg(long, value_name = "DIR")]
     pub guide: Option<PathBuf>,
     /// What all studies take.

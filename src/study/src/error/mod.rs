@@ -2,7 +2,7 @@
 //!
 //! A [`case::ErrorCase`] is a scene in one or several sizes; [`competitor::Competitor`] is who steps it; [`measure`] holds every
 //! configuration against two references, and [`ranking`] says who is cheapest. Refusals and failures are rows like all others.
-//! [`own::UserScene`] makes a case of any scene.
+//! [`user_scene::UserScene`] makes a case of any scene.
 
 pub mod case;
 pub mod chart;

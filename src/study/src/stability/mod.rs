@@ -1,7 +1,7 @@
 //! What a scene allows: right, warned or refused over friction, speed and internal step, growth of sliding contact, and the largest
 //! accepted step of every scheme and solver.
 //!
-//! The answers are those of the core, asked as a run asks it ([`asked`]). [`structure`] holds growth rates and limits of one structure
+//! The answers are those of the core, asked as a run asks it ([`scene`]). [`structure`] holds growth rates and limits of one structure
 //! by itself, [`grid`] what is asked, [`limits`] the largest steps, [`page`] pictures and tables.
 
 pub mod grid;

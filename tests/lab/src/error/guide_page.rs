@@ -17,26 +17,27 @@ const MACHINE: (&str, &str) = ("machine", "error-study.md");
 /// Where pictures are, beside the pages.
 const PICTURES: &str = "error";
 
-/// Replaces pictures and every block of the guide in `directory`. Nothing is written unless every block is there.
+/// Replaces pictures and blocks of the guide in `directory`: every block by a study of all scenes, else only the rows of the scenes that were
+/// run. Nothing is written unless every block is there.
 ///
 /// # Errors
 /// A page or a block is missing, or a file cannot be written.
-pub(super) fn write(study: &Study, directory: &Path) -> Result<()> {
+pub(super) fn write(study: &Study, directory: &Path, is_whole: bool) -> Result<()> {
     let fact = |name: &str| study.facts.iter().find(|(known, _)| known == name).map_or("", |(_, value)| value.as_str());
     let seconds = fact("processor time of the study");
-    let mut blocks = vec![(
-        MACHINE.0,
-        MACHINE.1,
-        format!(
-            "{}, processors used: {}, {}. The study took {seconds} of processor time.",
-            fact("processor"),
-            fact("processors available"),
-            fact("date")
-        ),
-    )];
+    let machine = format!(
+        "{}, processors used: {}, {}. The study took {seconds} of processor time.",
+        fact("processor"),
+        fact("processors available"),
+        fact("date")
+    );
+    let mut blocks: Vec<_> = is_whole.then_some((MACHINE.0, MACHINE.1, machine)).into_iter().collect();
     for (name, page) in TABLES {
         let file = format!("{name}.md");
         let found = study.files.iter().find(|(known, ..)| *known == file);
+        if found.is_none() && !is_whole {
+            continue;
+        }
         let (.., bytes) = found.ok_or_else(|| failed(directory, format!("the study has no table `{name}`")))?;
         // The caption is the page's own heading.
         let text = String::from_utf8_lossy(bytes);
@@ -55,6 +56,7 @@ pub(super) fn write(study: &Study, directory: &Path) -> Result<()> {
                 pages.len() - 1
             }
         };
+        let content = if is_whole { content } else { with_rows(&pages[index].1, name, &content) };
         let text = replaced(&pages[index].1, name, &content, fact("date"))
             .map_err(|problem| failed(&directory.join(page), problem))?;
         pages[index].1 = text;
@@ -67,6 +69,18 @@ pub(super) fn write(study: &Study, directory: &Path) -> Result<()> {
 
 fn failed(path: &Path, problem: String) -> Failure {
     Failure::new(path.display().to_string(), problem, "Give the directory `docs` of the sources with `--guide`")
+}
+
+/// The table of a block of the page with the rows of the scenes in `table` replaced or added; the first cell of a row is its scene.
+fn with_rows(page: &str, name: &str, table: &str) -> String {
+    let scene = |row: &str| row.split('|').nth(1).unwrap_or_default().to_owned();
+    let begin = format!("<!-- written: lab error {name};");
+    let block = page.split_once(&begin).and_then(|(_, rest)| rest.split_once("<!-- end -->"));
+    let known = block.map_or("", |(block, _)| block);
+    let added: Vec<&str> = table.lines().skip(2).collect();
+    let scenes: Vec<String> = added.iter().map(|row| scene(row)).collect();
+    let kept = known.lines().filter(|row| row.starts_with('|') && !scenes.contains(&scene(row)));
+    kept.chain(added.iter().copied()).collect::<Vec<_>>().join("\n")
 }
 
 /// The page with the content of one block replaced, and its date.
@@ -94,6 +108,20 @@ mod tests {
             .replace("| old |", "| new |");
         assert_eq!(found, expected);
         assert!(replaced(PAGE, "third", "", "").unwrap_err().contains("lab error third"));
+    }
+
+    #[test]
+    fn rows_of_a_scene_are_replaced_or_added() {
+        let page = "<!-- written: lab error first; today -->\n| scene | error |\n|---|---|\n| a | 1 |\n| b | 2 |\n<!-- end -->\n| b | 3 |\n";
+        let head = "| scene | error |\n|---|---|\n";
+        assert_eq!(
+            with_rows(page, "first", &format!("{head}| b | 5 |\n| b | 6 |")),
+            format!("{head}| a | 1 |\n| b | 5 |\n| b | 6 |")
+        );
+        assert_eq!(
+            with_rows(page, "first", &format!("{head}| c | 7 |")),
+            format!("{head}| a | 1 |\n| b | 2 |\n| c | 7 |")
+        );
     }
 
     #[test]

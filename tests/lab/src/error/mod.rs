@@ -39,12 +39,8 @@ const COMMUNICATION: &str = "communication-steps.md";
 /// A reference fails, which does not happen with built-in scenes, or the guide cannot be written.
 pub(crate) fn study(arguments: &LabErrorArguments, console: &Console) -> Result<Study> {
     let guide = arguments.guide.as_deref();
-    if guide.is_some() && (arguments.common.quick || !arguments.scenes.is_empty()) {
-        return Err(Failure::new(
-            "--guide",
-            "the tables of the guide are those of all scenes and of the whole study",
-            "Leave out `--quick` and `--scene`",
-        ));
+    if guide.is_some() && arguments.common.quick {
+        return Err(Failure::new("--guide", "the guide shows the whole study", "Leave out `--quick`"));
     }
     let scenes = if arguments.scenes.is_empty() { ErrorScene::ALL.to_vec() } else { arguments.scenes.clone() };
     let quick = arguments.common.quick;
@@ -69,7 +65,7 @@ pub(crate) fn study(arguments: &LabErrorArguments, console: &Console) -> Result<
     let time = format!("{:.0} min", clock::now().as_secs_f64() / 60.0);
     study.facts.push(("processor time of the study".into(), time));
     if let Some(directory) = guide {
-        guide_page::write(&study, directory)?;
+        guide_page::write(&study, directory, arguments.scenes.is_empty())?;
     }
     Ok(study)
 }
