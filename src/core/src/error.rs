@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// What can go wrong when a scene is compiled or stepped.
+/// Error of compiling or stepping a scene.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Error {
     /// A value in the scene or the ROM is outside what the method allows.
@@ -10,9 +10,9 @@ pub enum Error {
     Invalid {
         /// The field, array or variable, as the user wrote it.
         what: String,
-        /// What is wrong with it, with its value.
+        /// The problem, with the value.
         problem: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
     /// A value reference that the table does not hold.
@@ -38,21 +38,21 @@ pub enum Error {
         last_good_time: f64,
         /// Internal time at which it was found (s).
         time: f64,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
     /// A communication step takes more internal steps than are allowed; nothing is lost.
     #[error("{problem}. {remedy}")]
     Exhausted {
-        /// How many, from when on.
+        /// The number of internal steps, and from when on.
         problem: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
     /// A saved state does not belong to this scene, or is damaged.
     #[error("the saved state cannot be restored: {problem}")]
     State {
-        /// What does not fit.
+        /// The part of the state that does not fit.
         problem: String,
     },
 }
@@ -77,7 +77,7 @@ impl Error {
         }
     }
 
-    /// What is wrong in a `table` of the scene file, as that of the one `at` which it is: `contact` as `contact[2]`.
+    /// Places the error in a `table` of the scene file: replaces the name of the table by that of the entry `at`, such as `contact` by `contact[2]`.
     pub(crate) fn placed(self, table: &str, at: &str) -> Self {
         let rest = |what: &str| Some(format!("{at}.{}", what.strip_prefix(table)?.strip_prefix('.')?));
         match self {

@@ -6,9 +6,9 @@ use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 /// A value of the step just done, and of the step before. Only the former is part of a saved state.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Two<T> {
-    /// Of the last step.
+    /// Value of the last step.
     pub now: T,
-    /// Of the step before.
+    /// Value of the step before.
     pub before: T,
 }
 
@@ -18,7 +18,7 @@ impl<T: Clone> Two<T> {
         Self { before: value.clone(), now: value }
     }
 
-    /// What is now becomes what was before; what is now is then to be written.
+    /// Makes the current value the one of the step before; the current value must be written next.
     pub fn shift(&mut self) {
         std::mem::swap(&mut self.now, &mut self.before);
     }
@@ -93,11 +93,11 @@ pub struct ContactHistory {
     pub points: Vec<f64>,
     /// Displacement of the contact rows as predicted (m), of schemes whose contact forces act one step later.
     pub predicted: Two<Vec<f64>>,
-    /// What is no part of a state.
+    /// Data that is not part of a state.
     pub passing: Passing,
 }
 
-/// What a step needs of the past that the next one does not.
+/// Data of the past that a step needs and the next one does not.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Passing {
     /// Displacements of all rows of the structure, two steps before the step under way ends (m).

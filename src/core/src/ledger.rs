@@ -62,8 +62,8 @@ pub struct Ledger {
     pub shift_work: Sum,
     /// Work of prescribed motion of the casing, along the normals of the contacts.
     pub casing_work: Sum,
-    /// What lies between the work of contact forces in the scheme and all that has a name: normals turn and surfaces curve
-    /// within a step. It vanishes with the step.
+    /// Difference between the work of contact forces in the scheme and all other rows: normals turn and surfaces curve within a step. It vanishes
+    /// with the step.
     pub curvature_work: Sum,
     /// Energy added (or removed) by carrying the state to another step size.
     pub step_change: Sum,
@@ -160,7 +160,7 @@ impl Ledger {
         left - self.wear_work.value() - self.cutting_work.value()
     }
 
-    /// What the residual is compared with (J): initial energy plus all work exchanged.
+    /// Returns the energy that the residual is compared with (J): initial energy plus all work exchanged.
     pub fn scale(&self) -> f64 {
         self.initial.abs() + self.turnover.value()
     }

@@ -53,7 +53,7 @@ impl<'a> StateReader<'a> {
         self.fault.get_or_insert(fault);
     }
 
-    /// What is wrong with the bytes looked at so far.
+    /// Returns the fault of the bytes read so far.
     pub fn fault(&self) -> Option<&'static str> {
         self.fault
     }

@@ -5,7 +5,7 @@ use crate::rom::DisplacementFrame;
 use crate::warning::{Topic, Warning};
 use crate::{Error, Rom, shown};
 
-/// What to do about a slip that is none.
+/// Remedy for a rejected value that is meant.
 pub const IF_MEANT: &str = "If you mean it, set `accept_implausible = true` in the scene (--accept-implausible)";
 
 /// A value that is rarely meant.
@@ -13,9 +13,9 @@ pub const IF_MEANT: &str = "If you mean it, set `accept_implausible = true` in t
 pub struct Slip {
     /// Where it stands: a variable, a field or a ROM.
     pub what: String,
-    /// What is wrong with it, with its value.
+    /// The problem, with the value.
     pub problem: String,
-    /// What was probably meant.
+    /// The value that was probably meant.
     pub question: String,
 }
 

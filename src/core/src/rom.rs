@@ -46,7 +46,7 @@ pub struct ContactNode {
     pub length: f64,
 }
 
-/// What the coordinates of a ROM stand for beside static responses to contact.
+/// Meaning of the coordinates of a ROM besides static responses to contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ReductionBasis {
     /// Modes with the contact nodes held (Craig-Bampton), or not known.
@@ -56,7 +56,7 @@ pub enum ReductionBasis {
     FreeInterface,
 }
 
-/// What a reduction leaves of a rub: errors of the displacements of the tip (relative L2) against the limit of refinements.
+/// Errors that a reduction causes in a rub: errors of the displacements of the tip (relative L2) against the limit of refinements.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RubErrors {
     /// The scene that they were found on, in words.
@@ -78,7 +78,7 @@ impl RubErrors {
     }
 }
 
-/// How well the reduced model stands for the full one. Empty vectors where a ROM came from elsewhere.
+/// Agreement of the reduced model with the full one. Vectors are empty if the ROM is from another program.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RomChecks {
     /// Natural frequencies of the full finite-element model (Hz), ascending.
@@ -99,11 +99,11 @@ pub struct RomChecks {
     /// Deviation of the forced response at the contact nodes from that of the full model at each of them (%), all contact nodes and
     /// directions together.
     pub response_deviation: Vec<f64>,
-    /// What is left of a rub, where somebody has found it.
+    /// Errors in a rub, if they are known.
     pub rub_errors: Option<RubErrors>,
 }
 
-/// What a steady speed Ω about the z axis does to one structure, in its reduced coordinates.
+/// Effects of a steady speed Ω about the z axis on one structure, in its reduced coordinates.
 ///
 /// M q̈ + (D + 2ΩG) q̇ + (K + Ω²K₁ + Ω⁴K₂) q = f + Ω²c + Ω⁴c₂ in the rotating frame; K₁ holds spin softening and centrifugal
 /// stiffening together.
@@ -158,7 +158,7 @@ pub struct ContactGrid {
     pub closed: bool,
 }
 
-/// What only some structures have and only some scenes need.
+/// Optional data of a ROM, which only some scenes need.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RomExtras {
     /// Effects of spin.
@@ -179,9 +179,9 @@ pub struct RomExtras {
     pub stress_thermal: Option<DMatrix<f64>>,
     /// The same per Ω² of the centrifugal load on the structure at rest, 6·places × 1 (Pa s²).
     pub stress_centrifugal: Option<DMatrix<f64>>,
-    /// What its held nodes feel.
+    /// Forces on the held nodes.
     pub support: Option<SupportRows>,
-    /// What the coordinates stand for.
+    /// Meaning of the coordinates.
     pub basis: ReductionBasis,
     /// The contact patches are in so many rows across the thickness of the tip, one row after the other, each as the others along the chord;
     /// `None` for one row, or nodes.

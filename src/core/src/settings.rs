@@ -86,7 +86,7 @@ pub const TOLERANCE: f64 = 1e-3;
 /// Longest step (s) of `galerkin` if the scene file gives none. The communication step bounds steps too.
 pub const ADAPTIVE_STEP: f64 = 8e-5;
 
-/// How a structure moves as a whole.
+/// Rigid motion of a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyMotion {
@@ -188,7 +188,7 @@ pub struct StructureSettings {
     pub initial: Vec<InitialSettings>,
 }
 
-/// What happens to a surface spline where it closes around the circumference.
+/// Continuation of a surface spline around the circumference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Closure {
@@ -199,7 +199,7 @@ pub enum Closure {
     FreeEnds,
 }
 
-/// How a surface runs between its data points.
+/// Interpolation between the data points of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Interpolation {
@@ -365,7 +365,7 @@ impl ContactSettings {
     }
 }
 
-/// How inputs that move or load something run between communication points.
+/// Interpolation of inputs that move or load something between communication points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InputInterpolation {
@@ -401,7 +401,7 @@ pub struct TimeSettings {
     pub input_interpolation: InputInterpolation,
 }
 
-/// What the FMU exposes beside the totals.
+/// Outputs of the FMU besides the totals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct OutputSettings {
@@ -515,7 +515,7 @@ pub struct SceneSettings {
     /// Internal time stepping.
     #[serde(default)]
     pub time: TimeSettings,
-    /// What to expose.
+    /// Optional outputs.
     #[serde(default)]
     pub outputs: OutputSettings,
     /// Default experiment.

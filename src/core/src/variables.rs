@@ -8,8 +8,8 @@ use std::collections::{BTreeMap, HashSet};
 
 use crate::{Error, Result, ranges};
 
-/// What a clearance output says where no node has anything to touch (m): finite, as FMI wants it, and no distance in any
-/// engine. Its time derivative is 0 then.
+/// Value of a clearance output if no node has anything to touch (m): finite, as FMI requires, and larger than any distance in an engine. Its time
+/// derivative is 0 then.
 pub const NO_CLEARANCE: f64 = 1e9;
 
 /// Role of a variable, as in the FMI standards.
@@ -62,7 +62,7 @@ pub enum DataType {
 pub struct Enumeration {
     /// Type name.
     pub name: &'static str,
-    /// What it selects.
+    /// Meaning of the item.
     pub description: &'static str,
     /// (item name, description); the value of an item is its index + 1.
     pub items: &'static [(&'static str, &'static str)],
@@ -73,7 +73,7 @@ pub struct Enumeration {
 pub struct VariableUnit {
     /// Unit name.
     pub name: &'static str,
-    /// What it measures, in the words of Modelica's SI units.
+    /// The quantity, by its name among Modelica's SI units.
     pub quantity: &'static str,
     /// Exponents of kg, m, s, rad, K.
     pub exponents: [i32; 5],
@@ -81,7 +81,7 @@ pub struct VariableUnit {
     pub display: &'static [(&'static str, f64)],
 }
 
-/// How a value relates to the communication step just finished.
+/// Relation of a value to the communication step just finished.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Span {
     /// Value at the communication point.
@@ -138,14 +138,14 @@ pub struct Variable {
     pub start: Option<StartValue>,
     /// One sentence.
     pub description: String,
-    /// What the value stands for inside the simulation.
+    /// Quantity inside the simulation that the value is.
     pub quantity: Quantity,
     /// Which structure that touches, contact pair or structure that carries surfaces it belongs to, each counted from 0 in the
     /// order of the scene; 0 for what belongs to none.
     pub of: usize,
 }
 
-/// What a variable stands for, where code other than the reader of an output asks for it.
+/// Quantity of a variable, for code other than the reader of an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
     /// Simulated time.
@@ -170,7 +170,7 @@ pub enum Quantity {
     LoadOrder,
     /// Amplitude and phase (component 0, 1) of the excitation of blades, input.
     Excitation(usize),
-    /// Its engine order, parameter.
+    /// Engine order, parameter.
     ExcitationOrder,
     /// Temperature of a rotor above the reference, input.
     RotorTemperature,
@@ -204,7 +204,7 @@ pub enum Quantity {
     StepsAtMost,
     /// Solver, parameter.
     SolverChoice,
-    /// How inputs run between communication points, parameter.
+    /// Interpolation of inputs between communication points, parameter.
     InputInterpolation,
     /// Whether derivatives over the last step can be asked for, parameter.
     StepDerivatives,
@@ -251,7 +251,7 @@ pub enum Quantity {
     ImpactLoss,
     /// Work of all inputs but loads.
     ExternalWork,
-    /// What turning normals and curving surfaces add within steps.
+    /// Energy added by turning normals and curving surfaces within steps.
     CurvatureWork,
     /// Closure residual relative to initial energy and all work exchanged.
     EnergyResidualRelative,

@@ -5,7 +5,7 @@ use std::ops::Deref;
 
 use crate::{Error, Result};
 
-/// How much a warning matters.
+/// Severity of a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// Results are as good as without it; it explains the physics of the scene.
@@ -26,7 +26,7 @@ impl Severity {
 
 macro_rules! topics {
     ($($variant:ident $id:literal $meaning:literal $remedy:literal;)*) => {
-        /// What a warning is about. Every topic has an identifier, and a row in the guide (`docs/warnings.md`).
+        /// Topic of a warning. Every topic has an identifier, and a row in the guide (`docs/warnings.md`).
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum Topic {
             $(#[doc = $meaning] $variant,)*
@@ -41,12 +41,12 @@ macro_rules! topics {
                 match self { $(Self::$variant => $id,)* }
             }
 
-            /// What it means, a sentence for the guide.
+            /// Meaning of the topic, a sentence for the guide.
             pub fn meaning(self) -> &'static str {
                 match self { $(Self::$variant => $meaning,)* }
             }
 
-            /// What to do about it, a sentence for the guide.
+            /// Remedy, a sentence for the guide.
             pub fn remedy(self) -> &'static str {
                 match self { $(Self::$variant => $remedy,)* }
             }
@@ -195,12 +195,12 @@ impl Warning {
         Self { lines: [format!("{name}: {problem}"), remedy], text: format!("{name}: {}", self.text), ..self }
     }
 
-    /// What it is about.
+    /// Returns the topic.
     pub fn topic(&self) -> Topic {
         self.topic
     }
 
-    /// How much it matters.
+    /// Returns the severity.
     pub fn level(&self) -> Severity {
         self.level
     }

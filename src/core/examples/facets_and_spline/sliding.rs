@@ -18,7 +18,7 @@ pub const MASS: f64 = 5e-3;
 pub const STIFFNESS: f64 = 1e6;
 /// Damping ratio.
 pub const DAMPING: f64 = 0.03;
-/// How far the node at rest would stand outside the data points (m).
+/// Interference of the node at rest with the data points (m).
 pub const INTERFERENCE: f64 = 5e-4;
 /// Speed of the rotor (rad/s): low enough for the node to stay on the facets.
 pub const SPEED: f64 = 300.0;

@@ -6,7 +6,7 @@
 /// Instruction sets the hot loops are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InstructionSet {
-    /// What every target of the build supports (SSE2 on x86-64).
+    /// Instructions that every target of the build supports (SSE2 on x86-64).
     Baseline,
     /// 256-bit vectors.
     #[cfg(target_arch = "x86_64")]

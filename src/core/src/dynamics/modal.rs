@@ -33,7 +33,7 @@ pub struct ModalSpin {
     pub reference_speed: f64,
     /// Temperature whose stiffness they are those of (K).
     pub reference_temperature: f64,
-    /// What a kelvin adds to the stiffness, −s φᵀKφ, modes²; `None` without softening.
+    /// Change of the stiffness per kelvin, −s φᵀKφ, modes²; `None` without softening.
     pub softening: Option<DMatrix<f64>>,
     /// φᵀK₁φ, modes².
     pub stiffness_speed2: DMatrix<f64>,
@@ -63,7 +63,7 @@ impl ModalSpin {
         }
     }
 
-    /// Of modes that no spin couples.
+    /// Makes the matrices of modes that no spin couples: zeros.
     pub fn without_spin(model: &ModalModel) -> Self {
         let none = || DMatrix::zeros(model.len(), model.len());
         let (reference_speed, reference_temperature, softening) = (0.0, 0.0, None);

@@ -9,9 +9,9 @@ use crate::settings::Scheme;
 /// Modes of the sectors.
 #[derive(Debug, Clone, Copy)]
 pub enum SectorModel<'a> {
-    /// Those of one uncoupled sector, and the number of sectors.
+    /// Modes of one uncoupled sector, and the number of sectors.
     Uncoupled(&'a ModalModel, usize),
-    /// Those of the whole disk.
+    /// Modes of the whole disk.
     Coupled(&'a CyclicModel),
 }
 

@@ -9,7 +9,7 @@ pub const POINTS: usize = MOST + 1;
 /// Places between the points at which a gap is looked at.
 pub const PLACES: usize = 9;
 
-/// What depends on the degree alone. Entries beyond `degree` are 0.
+/// Points, weights and polynomials of one degree. Entries beyond `degree` are 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeBasis {
     /// s.
@@ -31,7 +31,7 @@ pub struct TimeBasis {
 }
 
 impl TimeBasis {
-    /// Of degree s.
+    /// Makes the basis of degree s.
     ///
     /// # Panics
     /// For another degree than 1, 2, 3.

@@ -14,7 +14,7 @@ pub struct Lanes {
 }
 
 impl Lanes {
-    /// Those in use.
+    /// Number of lanes in use.
     pub fn len(self) -> usize {
         self.points * self.nodes
     }

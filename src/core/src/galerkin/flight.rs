@@ -52,7 +52,7 @@ pub struct FreeFlight {
 }
 
 impl FreeFlight {
-    /// Of these modes; [`FreeFlight::set_length`] comes before the first.
+    /// Makes tables of these modes; call [`FreeFlight::set_length`] before the first flight.
     pub fn new(modes: &ContactModes) -> Self {
         let ratios = modes.frequencies.iter().zip(&modes.damping_ratios);
         let modes: Vec<[f64; 2]> = ratios.map(|(frequency, ratio)| [*frequency, *ratio]).collect();

@@ -88,7 +88,7 @@ impl ContactModes {
     }
 }
 
-/// What the modes do over a step, mode by mode in each array.
+/// Motion of the modes over a step, one entry per mode in each array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModeSteps {
     /// `[i][0, 1]`: coefficients of q and q̇ in the displacement at point i + 1.
@@ -109,7 +109,7 @@ impl ModeSteps {
         }
     }
 
-    /// What one mode does another does as well.
+    /// Copies the entries of one mode to another with the same frequency and damping.
     fn copy(&mut self, from: usize, to: usize) {
         let rows = self.points.as_flattened_mut().iter_mut();
         let rows = rows.chain(self.end.as_flattened_mut()).chain(self.loss.as_flattened_mut());
@@ -129,7 +129,7 @@ impl ModeSteps {
     }
 }
 
-/// What forces at the points of a step do to a mode at these points.
+/// Motion of a mode at the points of a step under forces at these points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Influence {
     /// `[i - 1][k]`: displacement at point i per modal force at point k.
@@ -147,7 +147,7 @@ pub struct StepTables {
     pub share: f64,
     /// Points of the step.
     pub basis: TimeBasis,
-    /// Of all modes.
+    /// Motion of all modes over the step.
     pub modes: ModeSteps,
     /// Displacements at the points per force at the points, residual flexibility included.
     pub compliance: LaneCompliance,
@@ -177,7 +177,7 @@ impl StepTables {
         }
     }
 
-    /// What forces of a kind do.
+    /// Returns the displacements of all lanes under forces of a kind.
     pub fn compliance_of(&self, kind: ForceInterpolation) -> &LaneCompliance {
         match kind {
             ForceInterpolation::Polynomial => &self.compliance,

@@ -15,7 +15,7 @@ const SHORTEST_LOOK: f64 = 2.5e-6;
 /// A step within a span: its level, and where it begins and how long it is as shares of the span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpanStep {
-    /// How often the span is halved.
+    /// Number of times that the span is halved.
     pub level: usize,
     /// Start.
     pub from: f64,
@@ -23,7 +23,7 @@ pub struct SpanStep {
     pub length: f64,
 }
 
-/// What is marched.
+/// A system that is integrated with adaptive steps.
 pub trait AdaptiveStepper {
     /// Energy left by contacts that opened and closed (J), and level of the next step; both go on from step to step.
     fn pace(&mut self) -> (&mut f64, &mut usize);
@@ -34,7 +34,7 @@ pub trait AdaptiveStepper {
     /// Length of steps of a level (s).
     fn length(&self, level: usize) -> f64;
 
-    /// How many sectors this is.
+    /// Returns the number of sectors.
     fn count(&self) -> u64;
 
     /// Take the step without a trial, if nothing can touch on the way.

@@ -104,7 +104,7 @@ fn exponential<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N
     (0..squarings).fold(series, |power, _| power * power)
 }
 
-/// Those of the forces at the points in place of the coefficients of θᵃ.
+/// Converts coefficients of θᵃ to coefficients of the forces at the points.
 pub fn by_points(terms: &[f64; TERMS], basis: &TimeBasis) -> [f64; POINTS] {
     std::array::from_fn(|k| (0..basis.degree).map(|a| terms[2 + a] * basis.projection[a][k]).sum())
 }

@@ -6,7 +6,7 @@ use super::state::SectorState;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 use nalgebra::DMatrix;
 
-/// What all lengths of the step share.
+/// Data that all lengths of the step share.
 #[derive(Debug, Clone)]
 pub struct ContactRows {
     /// Mode by mode: all nodes of the first component, of the second, of the third, filled up with zeros.
@@ -32,7 +32,7 @@ const RESOLVED: f64 = 2.0;
 #[derive(Debug, Clone)]
 pub struct Sums<const N: usize> {
     coefficients: [Vec<f64>; N],
-    /// Of each set: all nodes of the first component, of the second, of the third.
+    /// Rows of each set: all nodes of the first component, of the second, of the third.
     pub rows: [Vec<f64>; N],
 }
 
@@ -69,7 +69,7 @@ impl Kernel for Weigh<'_> {
 }
 
 impl ContactRows {
-    /// Of the modes of a sector.
+    /// Makes the rows of the modes of a sector.
     pub fn new(modes: &ContactModes) -> Self {
         let (nodes, count) = (modes.rows() / 3, modes.len());
         let stride = modes.rows().next_multiple_of(PADDED);
@@ -138,7 +138,7 @@ impl ContactRows {
         self.add_up(&self.by_mode, [&state.position, &state.velocity], [one, two]);
     }
 
-    /// How far each row can be from where it rests, whenever, as long as nothing pushes (m): the amplitudes of all modes together.
+    /// Adds the largest displacement of each row from rest (m) at any time without contact: the amplitudes of all modes together.
     pub fn add_largest_displacements(&self, state: &SectorState, sums: &mut Sums<1>) {
         self.unresolved_amplitudes(f64::INFINITY, state, sums);
     }

@@ -15,7 +15,7 @@ pub const HALVINGS: usize = 10;
 /// Tables of one kind of sector: spans of one length halved again and again. All have one degree.
 #[derive(Debug, Clone)]
 pub struct Tables {
-    /// What all levels share.
+    /// Data that all levels share.
     pub rows: ContactRows,
     /// Span, half of it, a quarter, …
     pub levels: Vec<StepTables>,
@@ -92,12 +92,12 @@ fn halved(span: f64, halvings: usize) -> f64 {
     libm::ldexp(span, -i32::try_from(halvings).unwrap_or(i32::MAX))
 }
 
-/// What has been done to keep the tolerance.
+/// Work done to keep the tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effort {
     /// Steps taken.
     pub steps: u64,
-    /// Those of them in which nothing was in reach, without a trial.
+    /// Steps in which nothing was in reach, without a trial.
     pub flights: u64,
     /// Trials, those taken included.
     pub trials: u64,
@@ -120,7 +120,7 @@ impl Effort {
     }
 }
 
-/// How exactly a sector is marched.
+/// Tolerances and limits of the steps of a sector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepGoal {
     /// Error of a step in displacements (m).
@@ -146,7 +146,7 @@ pub struct AcceptedStep<'a> {
     pub dropped: f64,
 }
 
-/// What is told of a span while it is marched.
+/// Records the steps of a span while it is integrated.
 pub trait Witness: Obstacle {
     /// A step of `length` from `from` (shares of the span) is about to be tried, with forces at the points of `level`.
     fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation);
@@ -205,7 +205,7 @@ impl SectorIntegrator {
         self.trial.find_start(&tables.rows, state)
     }
 
-    /// How far the rows of a sector can be from where they rest while nothing pushes (m).
+    /// Returns the largest displacement of each row of a sector from rest (m) without contact.
     pub fn largest_displacements(&mut self, tables: &Tables, state: &SectorState) -> &[f64] {
         self.trial.largest_displacements(&tables.rows, state)
     }

@@ -24,7 +24,7 @@ pub struct Coordinates {
 }
 
 impl Coordinates {
-    /// Of modes whose first `dynamic` have inertia.
+    /// Makes a body of modes, the first `dynamic` of which have inertia.
     pub fn new(frequencies: &[f64], damping_ratios: &[f64], dynamic: usize) -> Self {
         let of = |with: fn(f64) -> f64, without: fn(f64) -> f64| -> Vec<f64> {
             let value = |(mode, w): (usize, &f64)| if mode < dynamic { with(*w) } else { without(*w) };
@@ -132,7 +132,7 @@ impl SharedBody {
         self.len() == 0
     }
 
-    /// Its coordinates.
+    /// Coordinates of the body.
     pub fn coordinates(&self) -> &Coordinates {
         &self.coordinates
     }

@@ -45,7 +45,7 @@ pub struct PrescribedMotion {
     pub radius_change: f64,
     /// Displacement of the shaft's centre along fixed x, y and z (m): whirl and axial shift.
     pub shaft: [f64; 3],
-    /// Its velocity (m/s).
+    /// Velocity of the shaft's centre (m/s).
     pub shaft_velocity: [f64; 3],
 }
 
@@ -72,7 +72,7 @@ pub struct Geometry {
 persist_fields!(Geometry { normal, places });
 
 impl Geometry {
-    /// Of all contact nodes and lanes of a structure, `len` in all, with places where one of its pairs has them.
+    /// Makes room for all contact nodes and lanes of a structure, `len` in all, with closest points if one of its pairs has them.
     pub fn new(len: usize, has_places: bool) -> Self {
         let places = if has_places { len } else { 0 };
         Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]], places: vec![ClosestPoint::default(); places] }
@@ -186,7 +186,7 @@ impl GapLaw {
         all.iter().copied().filter(|clearance| *clearance > 0.0).fold(f64::INFINITY, f64::min)
     }
 
-    /// What rounding leaves of a gap (m), where it is a distance of points that are far from the origin.
+    /// Returns the rounding error of a gap (m) that is a distance between points far from the origin.
     pub fn rounding(&self) -> f64 {
         let largest = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, f64::max);
         let far = match self {
@@ -285,8 +285,8 @@ impl GapLaw {
         }
     }
 
-    /// What turning by `angle` (rad) can do to a gap (m): under the shape at `factor`, and under a surface laid through
-    /// points that are displaced by up to `moved` (m).
+    /// Returns the largest change of a gap (m) when the rotor turns by `angle` (rad): under the shape at `factor`, and under a surface through points
+    /// that are displaced by up to `moved` (m).
     pub fn turned_under(&self, angle: f64, factor: f64, moved: f64) -> f64 {
         // From one end of the range of a change to the other at most.
         let part = |scale: f64| 2.0 * (angle / scale).min(1.0);

@@ -11,8 +11,8 @@ use crate::ranges::SMALL;
 /// [`OpenGap::clearance`] as a share of the largest displacement that counts as small.
 const CLEARANCE: f64 = 1e-2;
 
-/// How far behind a surface, continued beyond its edge, a node may have been: share of its way in the step, since the surface
-/// may bend, and of the largest displacement that counts as small.
+/// Largest distance of a node behind a surface that is continued beyond its edge: as a fraction of the node's path in the step, since the surface may
+/// be curved, and of the largest small displacement.
 const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
 
 /// A surface through the contact grid of a structure, in fixed directions.
@@ -56,7 +56,7 @@ impl OpenSurface {
 pub struct OpenGap {
     /// Undeformed positions of the contact nodes of the structure (m).
     positions: Vec<[f64; 3]>,
-    /// Those that meet the surface.
+    /// Contact nodes that meet the surface.
     nodes: Vec<usize>,
     /// The surface.
     pub surface: OpenSurface,
@@ -142,7 +142,7 @@ impl OpenGap {
         }
     }
 
-    /// What stands in place of a clearance, which nothing that flies has: a thousandth of the smallest extent (m).
+    /// Returns the length that takes the place of a clearance, which free bodies do not have: a thousandth of the smallest extent (m).
     pub(super) fn clearance(&self) -> f64 {
         CLEARANCE * self.largest
     }

@@ -27,7 +27,7 @@ pub struct RevolutionGap {
     instruction_set: InstructionSet,
     /// Where the contact nodes of the structure are.
     pub layout: Layout,
-    /// Those that meet the surface.
+    /// Contact nodes that meet the surface.
     pub(super) nodes: Vec<usize>,
     /// Meridional slope per contact node of the structure.
     slopes: Vec<f64>,
@@ -107,8 +107,8 @@ impl RevolutionGap {
 }
 
 impl RevolutionGap {
-    /// How far prescribed motion of the surface has taken it along the normal at a node displaced by `moved` (m), whose
-    /// normal has the radial part `facing`: the share n_r/(n_r N) of what it has moved outwards.
+    /// Returns the displacement of the surface along the normal by its prescribed motion (m), at a node displaced by `moved` (m) whose normal has the
+    /// radial part `facing`: n_r/(n_r N) times the outward displacement.
     pub fn surface_motion(&self, at: At<'_>, moved: [f64; 3], facing: f64, motion: &MotionIncrement) -> f64 {
         if motion.casing_rests() {
             return 0.0;

@@ -15,7 +15,7 @@ pub const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
 pub struct SplineGap {
     /// Where the contact nodes of the structure are.
     pub layout: Layout,
-    /// Those that meet the surface.
+    /// Contact nodes that meet the surface.
     pub nodes: Vec<usize>,
     /// The first data point among the nodes of the contact grid that carries the surface.
     pub first_node: usize,
@@ -25,7 +25,7 @@ pub struct SplineGap {
     pub surface: SurfaceSpline,
     /// Control points of the round surface (m).
     pub round: Vec<[f64; 3]>,
-    /// What the shape adds to them at factor 1 (m); empty for a round surface.
+    /// Displacement of the data points by the shape at factor 1 (m); empty for a round surface.
     pub shape: Vec<[f64; 3]>,
     /// Angle over which the shape changes noticeably (rad).
     pub angular_scale: f64,
@@ -209,8 +209,8 @@ impl SplineGap {
         std::array::from_fn(|i| point[i] - shaft[i])
     }
 
-    /// How far prescribed motion of the surface has taken it along `normal` at a contact point, `arm` from the shaft's
-    /// centre (m, directions of the node).
+    /// Returns the displacement of the surface along `normal` by its prescribed motion (m), at a contact point `arm` from the shaft's centre (m,
+    /// directions of the node).
     pub fn surface_motion(
         &self,
         at: At<'_>,

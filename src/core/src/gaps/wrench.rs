@@ -24,7 +24,7 @@ pub struct Wrench {
     pub moment: [f64; 3],
 }
 
-/// How prescribed inputs have moved over a step.
+/// Change of the prescribed inputs over a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MotionIncrement {
     /// Length of the step (s).
@@ -85,7 +85,7 @@ impl MotionIncrement {
         }
     }
 
-    /// What this motion is beyond another.
+    /// Returns the difference of this motion and another.
     pub fn less(&self, other: &Self) -> Self {
         self.since(&other.over(-1.0))
     }
@@ -120,8 +120,8 @@ pub struct At<'a> {
 }
 
 impl GapLaw {
-    /// What tells the contact point of a node displaced by `moved` (m, own directions) whose closest point is `place`: the
-    /// displacement itself on surfaces of revolution, else the point from the shaft's centre or the origin (m).
+    /// Returns the data from which the contact point of a node displaced by `moved` (m, own directions) with the closest point `place` follows: the
+    /// displacement itself on surfaces of revolution, else the point relative to the shaft's centre or the origin (m).
     #[inline(always)]
     pub fn contact_point(&self, at: At<'_>, moved: [f64; 3], place: ClosestPoint) -> [f64; 3] {
         match self {
@@ -179,7 +179,7 @@ impl GapLaw {
         }
     }
 
-    /// How far the prescribed motion of the surface has taken it along `normal` (own directions) at a contact point (m).
+    /// Returns the displacement of the surface along `normal` (own directions) by its prescribed motion at a contact point (m).
     #[inline(always)]
     pub fn surface_motion(
         &self,

@@ -39,7 +39,7 @@ const FULL_PATIENCE: usize = 256;
 /// Systems from this order on are worked on column by column, as they are stored.
 const LARGE: usize = 32;
 
-/// What one solve did, and whether it succeeded.
+/// Effort of one solution, and whether it succeeded.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SolverOutcome {
     /// The complementarity conditions hold.
@@ -80,7 +80,7 @@ pub struct ContactSolver {
     factor: DMatrix<f64>,
     /// Diagonal of W_AA in the order of `members`, without sign.
     diagonal: Vec<f64>,
-    /// What elimination has left of it.
+    /// Matrix that remains after elimination.
     remaining: Vec<f64>,
     right: Vec<f64>,
     members: Vec<usize>,

@@ -62,7 +62,7 @@ pub(crate) static SOLVERS: Enumeration = Enumeration {
     ],
 };
 
-/// What is known of a contact before its force is.
+/// Gaps and compliances of contacts before their forces are known.
 pub trait ContactPrediction {
     /// Predicted gap (m).
     fn gap(&self) -> f64;
@@ -82,7 +82,7 @@ pub trait ContactPrediction {
     fn angle(&self) -> f64;
 }
 
-/// What every law can do. Slices are along the columns of the Delassus matrix or one entry per contact.
+/// Interface of every contact law. Slices are along the columns of the Delassus matrix or have one entry per contact.
 pub trait ContactLaw {
     /// Directions per contact in the Delassus matrix: 1 (normal, with sliding friction in the columns) or 3 (normal and tangents).
     const DIRECTIONS: usize;
@@ -237,7 +237,7 @@ impl Law {
         each_law!(self, law => law.coating_shares())
     }
 
-    /// Its coating.
+    /// Returns the coating of the law.
     pub fn coating(&self) -> Option<&Coating> {
         match self {
             Self::Coated(law) => Some(law.coating()),

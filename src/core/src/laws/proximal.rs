@@ -33,7 +33,7 @@ const PINCHED: f64 = 1e-6;
 /// Golden ratio: multiples of it, without their whole part, are spread evenly.
 const GOLDEN: f64 = 1.618_033_988_749_895;
 
-/// How contacts yield; allocates only when made.
+/// Regularisation of contacts; allocates only when made.
 #[derive(Debug, Clone)]
 pub struct Yielding {
     /// Predicted gaps (m).

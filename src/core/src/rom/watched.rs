@@ -8,8 +8,8 @@ use crate::{Error, Result, ranges};
 /// Points that are looked at, and that touch nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WatchedPoints {
-    /// What is there per unit of each coordinate, rows (point, component) × n, directions as for contact nodes: three displacements, or
-    /// six stresses σ₁₁, σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁ (Pa).
+    /// Values per unit of each coordinate, rows (point, component) × n, directions as for contact nodes: three displacements, or six stresses σ₁₁,
+    /// σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁ (Pa).
     pub map: DMatrix<f64>,
     /// Names and places.
     pub points: Vec<ContactNode>,

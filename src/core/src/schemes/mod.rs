@@ -51,7 +51,7 @@ impl Scheme {
     /// All of them, in the order of the FMU's enumeration.
     pub const ALL: [Self; 4] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary, Self::Galerkin];
 
-    /// Those whose modes follow recurrences, all with one step.
+    /// Schemes whose modes follow recurrences, all with one step.
     pub const RECURRENCES: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
 
     /// Whether the highest modes, three per contact node, are quasi-static.
@@ -245,7 +245,7 @@ impl Velocity {
         Self { increment: per_sine * libm::exp(-rate * step), position, force: -position / frequency / frequency }
     }
 
-    /// Of a state (q, hq̇).
+    /// Makes the coefficients of states (q, hq̇).
     pub fn of_state(step: f64) -> Self {
         Self { increment: 1.0 / step, position: 0.0, force: 0.0 }
     }

@@ -3,7 +3,7 @@
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// How a coating is cut: the tips shear it off along their way, at the cost of the shaft.
+/// Cutting of a coating: the tips shear it off along their path, and the shaft does the work.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CuttingSettings {

@@ -26,7 +26,7 @@ fn places<'a>(names: impl Iterator<Item = &'a String>) -> HashMap<&'a str, usize
 }
 
 impl Relations {
-    /// Of a scene whose names need not be defined.
+    /// Finds the relations of a scene whose names may be undefined.
     pub(crate) fn of(settings: &SceneSettings) -> Self {
         let structures = places(settings.structures.iter().map(|structure| &structure.name));
         let named = places(settings.surfaces.iter().map(|surface| &surface.name));

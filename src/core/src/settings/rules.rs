@@ -13,7 +13,7 @@ use crate::{Error, Result, Rom};
 use facts::*;
 use place::{ScenePlace, path};
 
-/// What a feature may need or exclude, at the same place.
+/// A feature that another feature needs or excludes, at the same place.
 type RelatedFeature = (&'static str, fn(&ScenePlace) -> bool);
 
 /// One row.
@@ -47,7 +47,7 @@ const FREE: RelatedFeature = ("a free master", |at| at.is_free());
 const ALL_FREE: RelatedFeature = ("a scene of free masters only", |at| at.contacts().all(|at| at.is_free()));
 const COUPLED: RelatedFeature = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
 
-/// Of structures, surfaces and contacts.
+/// Rules of structures, surfaces and contacts.
 static PARTS: &[FeatureRule] = &[
     needs(
         &[SPEED, FACTORS, STIFFENING, GROWTH, CORIOLIS, WHIRL, AXIAL_SHIFT, SOFTENING, EXCITATION, INITIAL],
@@ -159,7 +159,7 @@ static PARTS: &[FeatureRule] = &[
     ),
 ];
 
-/// Of outputs and inputs.
+/// Rules of outputs and inputs.
 static VARIABLES: &[FeatureRule] = &[
     needs(
         &[WEAR, WEAR_PROFILE],
@@ -204,7 +204,7 @@ static VARIABLES: &[FeatureRule] = &[
     excludes(&[INTERPOLATION], ALL_FREE, "such a scene has no inputs", "Remove the line"),
 ];
 
-/// Of schemes and solvers: those of the scene, and those chosen by parameters.
+/// Rules of schemes and solvers: those of the scene, and those chosen by parameters.
 static METHODS: &[FeatureRule] = &[
     needs(
         &[COULOMB],
@@ -299,7 +299,7 @@ static METHODS: &[FeatureRule] = &[
     ),
 ];
 
-/// Of a preset: what the scene file says beside it. Parameters may be set to anything.
+/// Rules of presets: settings that the scene file may have beside it. Parameters may be set to anything.
 static PRESETS: &[FeatureRule] = &[excludes(
     &[OTHER_SCHEME, OTHER_SOLVER],
     ("`preset = \"paper\"`", |at| at.settings.preset == Preset::Paper),
@@ -307,7 +307,7 @@ static PRESETS: &[FeatureRule] = &[excludes(
     "Remove the line, or the preset",
 )];
 
-/// Of ROMs.
+/// Rules of ROMs.
 static ROMS: &[FeatureRule] = &[
     needs(
         &[ROM_AROUND],
@@ -449,7 +449,7 @@ impl FeatureRule {
 }
 
 impl SceneSettings {
-    /// What structures, surfaces and contacts need and exclude, whose names are checked.
+    /// Checks the needs and exclusions of structures, surfaces and contacts, whose names are checked.
     pub(super) fn check_parts(&self) -> Result<()> {
         check(PARTS, self.place(&Relations::of(self)), path)
     }
@@ -475,7 +475,7 @@ impl SceneSettings {
 }
 
 impl Scene {
-    /// What a validated scene needs of its ROMs, and what they exclude.
+    /// Checks what a validated scene needs of its ROMs, and what they exclude.
     pub(crate) fn check_roms(&self) -> Result<()> {
         let relations = Relations::of(&self.settings);
         check(ROMS, ScenePlace { roms: &self.roms, ..self.settings.place(&relations) }, path)

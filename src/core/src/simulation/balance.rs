@@ -119,7 +119,7 @@ impl Simulation {
         }
     }
 
-    /// What helps where tips do not only slide: the law that knows sticking, if this scene may have it.
+    /// Returns the remedy for tips that do not only slide: the law with sticking, if this scene may have it.
     fn against_sliding(&self, scheme: Scheme) -> String {
         let scene = &self.compiled.scene;
         let coulomb = match scene.check_methods(scheme, Solver::Coulomb) {

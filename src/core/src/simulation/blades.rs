@@ -157,7 +157,7 @@ impl Compiled {
         Err(Error::invalid(field, problem, "Use a lower mode, or a ROM with more of them"))
     }
 
-    /// What cannot be looked at without the ROM: lists of modes, sectors and nodal diameters.
+    /// Checks lists of modes, sectors and nodal diameters, which need the ROM.
     ///
     /// # Errors
     /// Naming the field.
@@ -216,7 +216,7 @@ impl Compiled {
         ))
     }
 
-    /// What the modes of a structure that touches need beside contact.
+    /// Returns the needs of the modes of a touching structure besides contact.
     pub fn bank_options(&self, body: usize, excitation: Option<Excitation>) -> BankOptions {
         let ((structure, rom), parts) = (self.body(body), &self.bodies[body]);
         let coupled = structure.spin.stiffening || structure.spin.coriolis;
@@ -314,7 +314,7 @@ impl Simulation {
         Some([amplitude.at(offset), angle - phase.at(offset)])
     }
 
-    /// How fast the excitation turns at an offset, by the speed and by its phase together (rad/s).
+    /// Returns the angular frequency of the excitation at an offset, from the speed and from its phase (rad/s).
     pub(super) fn excitation_rate(&self, body: usize, offset: f64) -> f64 {
         let rotor = &self.inputs.rotors[body];
         let order = self.compiled.references.engine_orders[body].map_or(0.0, |reference| self.values[reference]);

@@ -8,7 +8,7 @@ use crate::variables::Causality;
 use crate::warning::{Topic, Warning};
 use crate::{Error, Result, shown_time};
 
-/// How far a surface around an axis goes on ([`crate::gaps::surface_spline::REACH`]), and what to do about a node further out.
+/// Extension of a surface around an axis ([`crate::gaps::surface_spline::REACH`]), and the remedy for a node further out.
 pub const OUT_OF_REACH: &str = "a quarter of its axial extent, as far as it goes on along its tangents";
 pub const OUT_OF_REACH_REMEDY: &str = "Give a casing whose contact grid covers the blade tips wherever they go, or check axial \
                                        shift, loads and speed";

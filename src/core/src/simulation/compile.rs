@@ -33,9 +33,9 @@ pub const MOST_COUPLED: usize = 2000;
 pub struct ValuePlaces {
     pub step_max: usize,
     pub input_interpolation: Option<usize>,
-    /// Of each pair whose shape grows in.
+    /// Ramp time of each pair whose shape grows from zero.
     pub ramp_times: Vec<Option<usize>>,
-    /// Of each structure that is excited.
+    /// Engine order of each structure that is excited.
     pub engine_orders: Vec<Option<usize>>,
 }
 
@@ -77,12 +77,12 @@ pub struct CompiledBody {
 pub struct CarrierParts {
     /// Place in the scene.
     pub structure: usize,
-    /// Its modes, seen at its contact grid.
+    /// Modes, seen at the contact grid.
     pub model: ModalModel,
     /// Nodal diameters of the load on it.
     pub load_order: u32,
     pub loads: CarrierLoads,
-    /// What its support feels per unit of each mode, where that is asked for.
+    /// Force on the support per unit of each mode, if requested.
     pub support: Option<SupportRows>,
 }
 
@@ -216,7 +216,7 @@ impl Compiled {
         Lining::new(carrier, (self.carrier(carrier).1, self.share(carrier)), master, self.contact(pair)).map(Some)
     }
 
-    /// How much of the contact grid of a carrier a surface takes.
+    /// Returns the part of the contact grid of a carrier that a surface uses.
     fn share(&self, carrier: usize) -> Share {
         if self.uses(carrier) > 1 { Share::Near } else { Share::Whole }
     }
@@ -243,7 +243,7 @@ impl Compiled {
         format!("{prefix}{}", self.body(body).1.contact_nodes[node].name)
     }
 
-    /// What turns, for messages: the rotor, or its name where several structures touch.
+    /// Returns the name of what turns, for messages: "the rotor", or its name if several structures touch.
     pub fn rotor_name(&self, body: usize) -> String {
         if self.bodies.len() > 1 { self.body(body).0.name.clone() } else { "the rotor".to_owned() }
     }
@@ -274,7 +274,7 @@ impl Compiled {
         }
     }
 
-    /// How many pairs have their surface on a carrier.
+    /// Returns the number of pairs with their surface on a carrier.
     fn uses(&self, carrier: usize) -> usize {
         self.plan.pairs.iter().filter(|pair| pair.carrier == Some(carrier)).count()
     }

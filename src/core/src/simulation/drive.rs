@@ -17,7 +17,7 @@ pub struct Input {
     pub since: f64,
     /// Value that acts at the time `from`.
     reached: f64,
-    /// Its first time derivative from there on.
+    /// First time derivative after the start.
     rate: f64,
     from: f64,
     /// Value that acts at the time `until`, to the last bit.

@@ -23,7 +23,7 @@ impl Simulation {
         }
     }
 
-    /// What happened, and what helps.
+    /// Returns the problem and the remedy.
     fn failure_texts(&self, failure: StepFailure) -> (String, String) {
         let is_free = |structure: usize| self.compiled.bodies[structure].translations.is_some();
         match failure {
@@ -219,7 +219,7 @@ impl Simulation {
 const BESIDE_FLIGHT: &str =
     "Check positions and velocity; small displacements beside rigid flight cannot describe this";
 
-/// What means something else for a structure that flies freely.
+/// Returns the problem and the remedy of a failure that means something else for a free body.
 fn free_failure(name: &str) -> (String, String) {
     let problem = format!(
         "contact nodes of {name} have moved against each other, or into a surface, by more than a tenth of the extent of the \

@@ -6,10 +6,10 @@ use crate::persist::persist_fields;
 use crate::variables::{Causality, Quantity, Variable};
 use crate::{Error, Result, shown};
 
-/// How many times as fast as before ramps may go because a step is shorter.
+/// Largest factor by which ramps may become faster because a step is shorter.
 const QUICKER: f64 = 2.0;
 
-/// What is prescribed of a structure that turns.
+/// Prescribed inputs of a rotor.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RotorInputs {
     /// Speed of the rotor: what is set acts at once, so that its integral is the angle that the importer expects.
@@ -24,7 +24,7 @@ pub struct RotorInputs {
     pub temperature: Vec<Input>,
 }
 
-/// What is prescribed of a surface.
+/// Prescribed inputs of a surface.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PairInputs {
     pub gap_offset: Input,
@@ -33,7 +33,7 @@ pub struct PairInputs {
     pub radius_change: Input,
 }
 
-/// What loads a structure that carries surfaces.
+/// Loads of a structure that carries surfaces.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CarrierInputs {
     pub load_amplitude: Input,
@@ -153,9 +153,9 @@ impl Inputs {
         shafts.chain(pairs).chain(self.carriers.iter_mut().flat_map(CarrierInputs::moving_mut))
     }
 
-    /// How long ramps take that begin with a step of length `length` (s): as long as the step, but what came together
-    /// over a step more than twice as long is not put into this one, where it would hit. A step of a nanosecond after
-    /// one of ten microseconds goes on at the pace it finds; the delay left shrinks by half of the time that passes.
+    /// Returns the duration of ramps that begin with a step of length `length` (s): that of the step. A change that accumulated over a step more than
+    /// twice as long is not applied within this one, where it would act as an impact. A step of a nanosecond after one of ten microseconds continues
+    /// with the rate of change it finds; the remaining delay shrinks by half of the time that passes.
     pub fn extrapolation_time(&self, length: f64) -> f64 {
         if self.pace <= QUICKER * length { length } else { self.pace }
     }
@@ -213,7 +213,7 @@ pub struct InputCourses {
 }
 
 impl Simulation {
-    /// What the inputs do, derivatives included.
+    /// Returns the inputs over time, derivatives included.
     pub fn courses(&self) -> InputCourses {
         InputCourses { inputs: self.inputs.clone(), rotors: self.rotors.clone() }
     }

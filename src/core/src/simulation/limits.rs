@@ -23,9 +23,9 @@ pub(super) use warning_state::WarningState;
 /// Parameters that decide stability.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
-    /// Of each contact pair.
+    /// Friction coefficient of each contact pair.
     pub friction: Vec<f64>,
-    /// Of the structures that touch, then of those that carry surfaces.
+    /// Damping ratios of the structures that touch, then of those that carry surfaces.
     pub damping_ratios: Vec<f64>,
     /// The same of their first modes, where they have their own.
     pub mode_damping: Vec<Vec<f64>>,
@@ -48,23 +48,23 @@ impl Parameters {
     }
 }
 
-/// What is known about the limits with some parameters.
+/// Limits with given parameters.
 #[derive(Debug, Clone)]
 pub struct Limits {
     /// Whatever the speeds.
     parameters: Parameters,
-    /// Of each structure that touches.
+    /// Limits of each structure that touches.
     bodies: Vec<BodyLimits>,
 }
 
-/// Of one structure and what it touches.
+/// Limits of one structure and the surfaces it touches.
 #[derive(Debug, Clone)]
 struct BodyLimits {
     /// Warnings for the step expected, or why these parameters are refused, whatever the sense of slip.
     outcome: Result<Vec<Warning>>,
     /// Slip in +θ and in −θ; of a disk, for which it takes long, only what was asked for.
     senses: [Option<Sense>; 2],
-    /// How long contact stays closed.
+    /// Duration of closed contact.
     closing: Closing,
     /// Steps of massless-boundary; infinite for other schemes.
     massless: MasslessLimit,
@@ -72,7 +72,7 @@ struct BodyLimits {
     casing: Vec<(f64, Option<Warning>)>,
     /// Smallest step of modal-exact that passes over what contact acts on; infinite for other schemes.
     unresolved: f64,
-    /// What grows while blades cut.
+    /// Growth while blades cut.
     cutting: Option<Warning>,
 }
 
@@ -81,7 +81,7 @@ fn senses_of(sense: f64) -> impl Iterator<Item = usize> {
     [sense >= 0.0, sense <= 0.0].into_iter().enumerate().filter(|(_, slips)| *slips).map(|(index, _)| index)
 }
 
-/// What a range found says about a step: that of the smallest entry not below it.
+/// Returns the result for a step from a list of ranges: that of the smallest entry not below it.
 fn in_range<T>(ranges: &[(f64, Option<T>)], step: f64) -> Option<&T> {
     let range = ranges.iter().rev().find(|(largest, _)| step <= largest * (1.0 + super::SAME_STEP));
     range.and_then(|(_, found)| found.as_ref())
@@ -339,7 +339,7 @@ impl Limits {
         Ok(warnings)
     }
 
-    /// What of a structure that turns at a speed of this sign grows by itself.
+    /// Returns the warning of self-excited growth of a structure that turns at a speed of this sign.
     pub fn grows(&self, body: usize, speed: f64) -> Option<Warning> {
         let BodyLimits { cutting, senses, .. } = &self.bodies[body];
         // Whatever is held to have stayed closed.

@@ -56,7 +56,7 @@ fn same_step(time: f64, length: f64) -> f64 {
 /// Most internal steps of one communication step.
 const MOST_STEPS: f64 = 1e9;
 
-/// What one call of [`Simulation::advance`] did.
+/// Result of one call of [`Simulation::advance`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepProgress {
     /// Internal time reached (s).
@@ -117,7 +117,7 @@ impl Communication {
 #[derive(Debug, Clone)]
 pub struct Simulation {
     table: VariableTable,
-    /// What fills the outputs, in the order of the table.
+    /// Functions that fill the outputs, in the order of the table.
     readers: Vec<outputs::OutputReader>,
     compiled: Compiled,
     system: System,
@@ -126,7 +126,7 @@ pub struct Simulation {
     /// Real outputs at the previous communication point, for derivatives.
     previous: Vec<f64>,
     inputs: Inputs,
-    /// Of the structures that touch.
+    /// Angles of the structures that touch.
     rotors: Vec<RotorAngle>,
     /// Prescribed motion at the end of the internal step under way, per contact pair.
     drives: Vec<PrescribedMotion>,
@@ -145,7 +145,7 @@ pub struct Simulation {
     warnings: Vec<Warning>,
     /// Warnings since the last [`Simulation::take_notes`].
     notes: Vec<Warning>,
-    /// What was told since the start.
+    /// Warnings given since the start.
     told: limits::WarningState,
     /// Parameters that the system was prepared for.
     prepared: Option<limits::Parameters>,
@@ -155,7 +155,7 @@ pub struct Simulation {
     state_size: usize,
     /// State to go back to where a communication step takes too many internal steps; empty where nothing bounds them.
     mark: Vec<u8>,
-    /// What derivatives of the last communication step take.
+    /// Data for derivatives of the last communication step.
     tangent: StepReplay,
     /// Whether the communication step under way may end early.
     partial: bool,
@@ -172,7 +172,7 @@ pub struct Simulation {
 struct SetEnergy {
     /// Kinetic plus strain energy of the instant.
     now: f64,
-    /// What the scheme conserves.
+    /// Energy that the scheme conserves.
     conserved: f64,
 }
 
@@ -368,7 +368,7 @@ impl Simulation {
         self.follow_engine_orders();
     }
 
-    /// What flies freely starts with its initial velocity as a whole; again for another length of the first step.
+    /// Gives free bodies their initial velocity; called again for another length of the first step.
     fn launch(&mut self) {
         for (body, parts) in self.compiled.bodies.iter().enumerate() {
             let Some(translations) = &parts.translations else { continue };
@@ -463,7 +463,7 @@ impl Simulation {
         ShapeGrowth::share(time - self.initial_time, self.values[reference])
     }
 
-    /// How the shape of a pair grows between two offsets and times (s).
+    /// Returns the growth of the shape of a pair between two offsets and times (s).
     fn growth(&self, pair: usize, offsets: [f64; 2], times: [f64; 2]) -> ShapeGrowth {
         ShapeGrowth {
             factors: offsets.map(|offset| self.inputs.pairs[pair].shape_factor.at(offset)),

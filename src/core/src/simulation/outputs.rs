@@ -19,7 +19,7 @@ use crate::variables::{Causality, NO_CLEARANCE, Quantity, Span, Variable};
 
 type Fill = dyn Fn(&OutputView, &mut [f64]) + Send + Sync;
 
-/// What fills the elements of an output.
+/// Function that fills the elements of an output.
 #[derive(Clone)]
 pub struct OutputReader(Arc<Fill>);
 
@@ -29,24 +29,24 @@ impl fmt::Debug for OutputReader {
     }
 }
 
-/// Of a scalar.
+/// Makes the reader of a scalar.
 pub fn scalar(read: impl Fn(&OutputView) -> f64 + Send + Sync + 'static) -> OutputReader {
     OutputReader(Arc::new(move |view, out| out[0] = read(view)))
 }
 
-/// Of an array, element by element.
+/// Makes the reader of an array, element by element.
 pub fn each(read: impl Fn(&OutputView, usize) -> f64 + Send + Sync + 'static) -> OutputReader {
     OutputReader(Arc::new(move |view, out| {
         out.iter_mut().enumerate().for_each(|(index, value)| *value = read(view, index));
     }))
 }
 
-/// Of an array as a whole.
+/// Makes the reader of an array as a whole.
 pub fn array_reader(read: impl Fn(&OutputView, &mut [f64]) + Send + Sync + 'static) -> OutputReader {
     OutputReader(Arc::new(read))
 }
 
-/// What outputs are read from, and what all of them share at one instant.
+/// Data that outputs are read from, shared by all of them at one instant.
 pub struct OutputView<'a> {
     simulation: &'a Simulation,
     pub system: &'a System,
@@ -109,7 +109,7 @@ impl Simulation {
     }
 }
 
-/// Of clearances, as an output tells it: finite.
+/// Returns the smallest clearance as a finite number.
 fn smallest<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
     values.fold(f64::INFINITY, |low: f64, value| low.min(*value)).min(NO_CLEARANCE)
 }
@@ -128,7 +128,7 @@ impl OutputView<'_> {
         &self.ledger
     }
 
-    /// Of the set of structures that can feel each other where it is largest.
+    /// Returns the largest relative residual of any set of structures that can feel each other.
     pub fn relative_residual(&self) -> f64 {
         let ledgers = self.system.ledgers().iter().zip(&self.simulation.energies);
         let relative = ledgers.map(|(ledger, energy)| match ledger.scale() {
@@ -165,7 +165,7 @@ impl OutputView<'_> {
         self.simulation.most_tried as f64
     }
 
-    /// What the coating of a pair tells; nothing without one.
+    /// Reads a value of the coating of a pair; empty without a coating.
     pub fn coating(&self, pair: usize, read: impl Fn(&Coating) -> f64) -> f64 {
         self.system.coating(pair).map_or(0.0, read)
     }
@@ -224,7 +224,7 @@ impl OutputView<'_> {
         self.window.bodies[body].normal_impulse[self.index(body, node, sector)]
     }
 
-    /// Of all nodes of all structures.
+    /// Returns the normal impulse of all nodes of all structures.
     pub fn whole_normal_impulse(&self) -> f64 {
         self.window.bodies.iter().flat_map(|body| &body.normal_impulse).sum()
     }

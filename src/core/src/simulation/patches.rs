@@ -15,12 +15,12 @@ pub enum HeatPatches {
         /// From and to (m).
         extent: [f64; 2],
     },
-    /// Those of the structure that carries the surface.
+    /// Patches of the structure that carries the surface.
     Listed(Vec<ThermalPatch>),
 }
 
 impl HeatPatches {
-    /// What the scene asks of a pair: patches of its surface, else those of a thermal structure under it.
+    /// Makes the heat patches of a pair: patches of its surface, or those of a thermal structure that carries it.
     pub fn new(scene: &Scene, plan: &SteppingOrder, pair: &PairPlan) -> Option<Self> {
         if let Some(parts) = scene.settings.surfaces[pair.surface].patches {
             let nodes = &plan.structure(scene, pair.body).1.contact_nodes;
@@ -34,7 +34,7 @@ impl HeatPatches {
         thermal.map(|thermal| Self::Listed(thermal.patches.clone()))
     }
 
-    /// How many there are.
+    /// Returns the number of patches.
     pub fn len(&self) -> usize {
         match self {
             Self::Equal { parts, .. } => parts.around * parts.along,

@@ -38,7 +38,7 @@ pub fn prefix(count: usize, name: &str) -> String {
 }
 
 impl SteppingOrder {
-    /// Of a validated scene.
+    /// Orders the structures of a validated scene.
     ///
     /// # Errors
     /// ROMs that do not fit what is asked of them; pairs without nodes, nodes of two pairs.
@@ -91,12 +91,12 @@ impl SteppingOrder {
         (&scene.settings.structures[self.bodies[body]], &scene.roms[self.bodies[body]])
     }
 
-    /// What belongs to the structure of a body starts with this, in names.
+    /// Returns the prefix of names that belong to the structure of a body.
     pub fn body_prefix(&self, scene: &Scene, body: usize) -> String {
         prefix(self.bodies.len(), &self.structure(scene, body).0.name)
     }
 
-    /// What belongs to a pair starts with this: the name of its surface.
+    /// Returns the prefix of names that belong to a pair: the name of its surface.
     pub fn pair_prefix(&self, settings: &SceneSettings, pair: usize) -> String {
         prefix(self.pairs.len(), &self.surface(settings, pair).name)
     }

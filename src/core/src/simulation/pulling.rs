@@ -72,7 +72,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// What film does to a node.
+    /// Describes a node at which `film` pulls.
     pub(super) fn pulls(&self, structure: usize, node: usize, share: f64) -> String {
         format!(
             "film has pulled at contact node {} with {:.0} % of the impulse of the most loaded node: it checks penetration only once, and \
@@ -82,7 +82,7 @@ impl Simulation {
         )
     }
 
-    /// What film has not looked at.
+    /// Describes a node that `film` left inside a surface.
     pub(super) fn left_inside(&self, structure: usize, node: usize, share: f64) -> String {
         let (surface, length) = if self.is_free(structure) {
             ("surface", "a thousandth of the extent of what touches")
@@ -103,7 +103,7 @@ impl Simulation {
         self.compiled.bodies[structure].translations.is_some()
     }
 
-    /// What helps.
+    /// Returns the remedy.
     pub(super) fn against_pulling(&self, structure: usize) -> String {
         let settings = self.system.settings();
         let highest = self.compiled.bodies[structure].largest_frequency() * self.compiled.stiffest(structure);

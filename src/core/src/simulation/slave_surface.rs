@@ -31,9 +31,9 @@ struct DataGrid {
 /// A structure that carries a surface.
 #[derive(Debug, Clone, Copy)]
 pub struct CarrierModes<'a> {
-    /// Its ROM.
+    /// ROM of the structure.
     pub rom: &'a Rom,
-    /// Its modes, seen at its contact grid.
+    /// Modes, seen at the contact grid.
     pub model: &'a ModalModel,
 }
 
@@ -74,8 +74,8 @@ pub fn spline_gap(
 }
 
 impl CarrierModes<'_> {
-    /// Its modes, seen at the control points of a surface along x, y, z; data points of the surface are nodes of the contact grid
-    /// from `first` on.
+    /// Returns the modes, seen at the control points of a surface along x, y, z; data points of the surface are nodes of the contact grid from
+    /// `first` on.
     pub fn at_control_points(&self, surface: &SurfaceSpline, first: usize) -> ModalModel {
         let nodes = surface.control_points().len();
         let mut model = self.model.clone();
@@ -110,7 +110,7 @@ fn along_axes(rom: &Rom, node: usize, own: [f64; 3]) -> [f64; 3] {
     [radial * cosine - tangential * sine, radial * sine + tangential * cosine, axial]
 }
 
-/// How much of a contact grid a surface takes.
+/// Part of a contact grid that a surface uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Share {
     /// All of it.
@@ -174,7 +174,7 @@ fn data(grid: &DataGrid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
 /// passes forces on as a rigid body, so that the support feels them with the lever of the surface.
 #[derive(Debug, Clone)]
 pub struct Lining {
-    /// Of the structure that carries it, among such structures.
+    /// Index of the structure that carries the surface, among such structures.
     pub carrier: usize,
     /// Axial position, and radius of the surface less that of the mesh, ascending along z (m).
     rings: Vec<[f64; 2]>,

@@ -45,7 +45,7 @@ impl Persist for SimulationPhase {
 /// Nothing in a structure or in its ledger is as large, in any unit; squares and products stay far from overflow.
 const LARGEST: f64 = 1e50;
 
-/// What the rest of a state follows from: read and checked before anything is changed.
+/// First part of a state, from which the rest follows: read and checked before anything is changed.
 struct Lead {
     phase: SimulationPhase,
     time: f64,
@@ -55,7 +55,7 @@ struct Lead {
     inputs: Inputs,
     rotors: Vec<RotorAngle>,
     values: Vec<f64>,
-    /// Of each structure that touches (rad/s), and their temperatures (K).
+    /// Reference speed of each structure that touches (rad/s), and their temperatures (K).
     reference_speeds: Vec<f64>,
     reference_temperatures: Vec<f64>,
     /// Internal step (s).
@@ -307,7 +307,7 @@ impl Simulation {
         })
     }
 
-    /// What inputs make of the motion, also those that this scene does not list.
+    /// Checks the motion that the inputs cause, also inputs that this scene does not list.
     fn is_moved_within_reason(&self, length: f64, time: f64) -> bool {
         let moments = (0..self.drives.len()).flat_map(|pair| [(pair, 0.0), (pair, length)]);
         moments.into_iter().all(|(pair, offset)| {

@@ -8,8 +8,8 @@ use crate::variables::Quantity;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, shown, shown_time};
 
-/// What shortest steps leave, as a share of the clearance per length (1/s): where errors stop to follow the tolerance. A blade with 18
-/// modes that rubs (`core/tests/galerkin/main.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
+/// Error of the shortest steps as a fraction of the clearance per length (1/s), where errors stop following the tolerance. A rubbing blade with 18
+/// modes (`core/tests/galerkin/main.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
 const LEFT: f64 = 4.0;
 
 impl Simulation {

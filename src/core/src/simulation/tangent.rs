@@ -14,7 +14,7 @@ use crate::{Error, Result, shown, shown_time};
 /// By how much inputs are moved, as a share of what moves gaps by a clearance: 2⁻²⁰, so that sums with usual values are exact. Rounding in
 /// gaps is some 1e-7 of it, more on splines.
 const SMALL: f64 = 1.0 / 1_048_576.0;
-/// How much less, in turn, where the step does not stay on its piece.
+/// Factor of reductions where the step does not stay on its smooth piece.
 const LESS: f64 = 0.125;
 /// Marches at most with galerkin, and pairs of marches with other schemes.
 const TRIES: usize = 6;
@@ -28,14 +28,14 @@ const TURN: f64 = 0.1;
 /// Change of a temperature (K) that moves a casing by a clearance, by order of magnitude.
 const HEATING: f64 = 100.0;
 
-/// What marching the last communication step again takes.
+/// Data for repeating the last communication step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct StepReplay {
     /// State at its start; empty where nobody asks for derivatives.
     start: Vec<u8>,
     /// Whether `start` and the inputs in it are all that the step came from.
     stands: bool,
-    /// What marches it again, made when first needed.
+    /// Copy of the simulation that repeats the step, made when first needed.
     twin: Option<Box<Simulation>>,
     /// Whether parameters of the twin are those of now.
     follows: bool,
@@ -230,7 +230,7 @@ impl Simulation {
         }
     }
 
-    /// How far an input is moved: a small share of what closes the clearance.
+    /// Returns the change of an input for a difference: a small fraction of the change that closes the clearance.
     fn nudge(&self, reference: u32) -> f64 {
         let Ok((variable, _)) = self.table.locate(reference) else { return f64::INFINITY };
         let value = self.values[reference as usize].abs();
@@ -290,7 +290,7 @@ impl Simulation {
     }
 }
 
-/// How far impulses and gaps at three places in a row are from a line, as a share of their change; the larger of both.
+/// Returns the deviation of impulses and gaps at three places in a row from a line, as a fraction of their change; the larger of both.
 fn bend(behind: &[Vec<f64>; 2], now: &[Vec<f64>; 2], ahead: &[Vec<f64>; 2]) -> f64 {
     let one = |which: usize| {
         let (mut off, mut change) = (0.0, 0.0);

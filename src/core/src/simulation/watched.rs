@@ -15,7 +15,7 @@ use crate::{Result, Rom};
 use super::Simulation;
 use super::compile::Compiled;
 
-/// How far a point stands outside of where its gap function has it (m), and by how much larger arcs are there.
+/// Distance of a point from the place where its gap function has it (m, outwards), and the factor of arcs there.
 type Raised = (f64, f64);
 
 /// Watched points of a structure that face one surface.
@@ -27,7 +27,7 @@ struct WatchedPair {
     points: Vec<usize>,
     /// The gap function, of all watched points of the structure.
     law: GapLaw,
-    /// Of each watched point.
+    /// Offsets of the watched points.
     raised: Vec<Raised>,
 }
 
@@ -37,7 +37,7 @@ pub struct WatchedGaps {
     facing: Vec<WatchedPair>,
     /// Sectors that are watched (0-based).
     sectors: Vec<usize>,
-    /// Of each structure (m), `[point · watched sectors + watched sector]`.
+    /// Clearances of each structure (m), `[point · watched sectors + watched sector]`.
     clearances: Vec<Vec<f64>>,
 }
 
@@ -75,13 +75,13 @@ impl WatchedGaps {
         Ok(gaps)
     }
 
-    /// Of a watched sector (0-based) of a structure (m).
+    /// Returns the clearance of a watched sector (0-based) of a structure (m).
     pub fn clearance(&self, body: usize, point: usize, sector: usize) -> f64 {
         let place = self.sectors.iter().position(|watched| *watched == sector);
         place.map_or(NO_CLEARANCE, |place| self.clearances[body][point * self.sectors.len() + place])
     }
 
-    /// Of the instant that a simulation has reached.
+    /// Finds the clearances at the current instant of a simulation.
     fn find(&mut self, simulation: &Simulation) {
         for facing in &mut self.facing {
             let of_rom = simulation.system.structures()[facing.body].modes().sectors();

@@ -8,7 +8,7 @@ use crate::persist::persist_fields;
 use crate::settings::OutputSettings;
 use crate::system::{Structure, System};
 
-/// Of a structure that touches: sums and extremes since the communication step began, `[node · lanes + lane]`.
+/// Sums and extremes of a touching structure since the communication step began, `[node · lanes + lane]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodyWindow {
     /// Smallest gap of every node (m).
@@ -23,7 +23,7 @@ pub struct BodyWindow {
     pub moment_impulse: [f64; 3],
 }
 
-/// Of a contact pair.
+/// Sums and extremes of a contact pair.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairWindow {
     /// ∫F dt on what touches, along x, y, z (N·s).
@@ -38,7 +38,7 @@ pub struct PairWindow {
     pub casing_moment: Vec<f64>,
 }
 
-/// Of a structure that carries surfaces, per mode.
+/// Sums of a structure that carries surfaces, per mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SupportWindow {
     /// ∫q dt.
@@ -52,11 +52,11 @@ pub struct SupportWindow {
 /// Sums and extremes since the communication step began.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepWindow {
-    /// Of the structures that touch.
+    /// Windows of the structures that touch.
     pub bodies: Vec<BodyWindow>,
-    /// Of the pairs.
+    /// Windows of the pairs.
     pub pairs: Vec<PairWindow>,
-    /// Of the structures under surfaces; empty unless asked for.
+    /// Windows of the structures that carry surfaces; empty unless requested.
     pub supports: Vec<SupportWindow>,
     /// Friction heat (J).
     pub friction_heat: f64,

@@ -25,11 +25,11 @@ pub struct Fastest {
 /// Growth rates of closed sliding contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GrowthRates {
-    /// Of the constrained differential equations (1/s); positive means flutter.
+    /// Rate of the constrained differential equations (1/s); positive means flutter.
     pub continuous: f64,
     /// Angular frequency of that motion (rad/s); 0: it grows without swinging.
     pub frequency: f64,
-    /// Of the constrained step map (1/s).
+    /// Rate of the constrained step map (1/s).
     pub stepped: f64,
     /// Angular frequency of that motion (rad/s), as its samples have it: at most π/h.
     pub swing: f64,
@@ -118,7 +118,7 @@ pub fn stepped(
     })
 }
 
-/// Of motions e^st.
+/// Finds the fastest growth of motions e^st.
 pub(super) fn fastest(eigenvalues: &[Complex<f64>]) -> Fastest {
     let none = Fastest { rate: f64::NEG_INFINITY, frequency: 0.0 };
     eigenvalues.iter().fold(
@@ -129,7 +129,7 @@ pub(super) fn fastest(eigenvalues: &[Complex<f64>]) -> Fastest {
     )
 }
 
-/// Of motions (1 + s)^t.
+/// Finds the fastest growth of motions (1 + s)^t.
 fn fastest_stepped(eigenvalues: &[Complex<f64>]) -> Fastest {
     // |1 + s|² − 1.
     let (mut gain, mut frequency) = (-1.0, 0.0);
@@ -154,8 +154,8 @@ pub fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
         .take(24)
 }
 
-/// Of few contacts by [`secular`], else and where that proves nothing from the dense matrix. Of complex pairs at least one; `None` where
-/// the contacts are redundant.
+/// Returns the eigenvalues: for few contacts by [`secular`], else, and where that proves nothing, from the dense matrix. At least one of each complex
+/// pair; `None` if the contacts are redundant.
 fn eigenvalues(held: &HeldContacts) -> Option<Vec<Complex<f64>>> {
     secular::eigenvalues(held).or_else(|| held.dense_eigenvalues())
 }
@@ -330,7 +330,7 @@ mod tests {
         }
     }
 
-    /// What is left without the mass of the node leans: with µ > 0.5 it gives way to no force, and there is no such limit.
+    /// Without the mass of the node, the rest leans: with µ > 0.5 it yields to no force, and there is no such limit.
     #[test]
     fn without_its_mass_a_node_that_digs_in_has_no_motion() {
         let leaning = ModalModel { quasi_static: 1, ..model(&[1e3, 1e5], &[[1.0, 0.2, 0.0], [0.5, -1.0, 0.0]], 0.01) };

@@ -85,7 +85,7 @@ impl HeldContacts {
         self.normals.nrows()
     }
 
-    /// Of the matrix of the first-order form; without inertialess modes on the null space of the contact normals, so that the
+    /// Returns the eigenvalues of the matrix of the first-order form; without inertialess modes on the null space of the contact normals, so that the
     /// constraint adds no zero eigenvalues.
     pub fn dense_eigenvalues(&self) -> Option<Vec<Complex<f64>>> {
         let [stiffness, damping] = match &self.residual {

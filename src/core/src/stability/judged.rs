@@ -22,7 +22,7 @@ const BELOW: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Growth of one set of closed contacts at one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SetGrowth {
-    /// Its rates.
+    /// Growth rates of the set.
     pub growth: GrowthRates,
     /// Share of the static flexibility that modes of the stepped motion's frequency and above have.
     pub share: f64,
@@ -48,7 +48,7 @@ impl SetGrowth {
         Self { growth, share }
     }
 
-    /// What the step makes of the motion at most, as a share of what contact displaces, while contact stays closed for a time (s).
+    /// Returns the largest error of the motion by the step, as a fraction of what contact displaces, while contact stays closed for a time (s).
     pub fn error(&self, closed: f64) -> f64 {
         -self.share * libm::expm1(-self.growth.added() * closed.min(self.grown()))
     }

@@ -52,7 +52,7 @@ impl MasslessLimit {
     pub const NONE: Self = Self { closed: f64::INFINITY, usable: f64::INFINITY };
 }
 
-/// What the limit depends on.
+/// Data that the limit depends on.
 #[derive(Debug, Clone)]
 pub struct MasslessCheck<'a> {
     /// Modes of the master.

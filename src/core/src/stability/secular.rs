@@ -220,7 +220,7 @@ impl<const K: usize> Secular<K> {
         }
     }
 
-    /// What is to be subtracted from a member of a pair; something small where it lies on a pole or on another zero.
+    /// Returns the correction of a member of a pair; a small number if it lies on a pole or on another zero.
     fn correction(&self, zeros: &[ZeroPair], index: usize, member: usize) -> Number {
         let [zero, partner] = [zeros[index][member], zeros[index][1 - member]];
         let mut others = inverse(zero - partner);

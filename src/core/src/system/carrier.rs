@@ -128,7 +128,7 @@ impl Reaction {
         }
     }
 
-    /// What the forces of a solution would do to the rows of the structure.
+    /// Adds the displacements of the structure's rows under the forces of a solution.
     pub fn respond(&mut self, of: &mut Structure, multipliers: &[f64], per: usize) {
         self.gather(multipliers, per);
         if self.members.is_empty() {

@@ -21,7 +21,7 @@ pub struct ContactMember {
     pub index: usize,
 }
 
-/// What groups work on.
+/// Structures and pairs that groups work on.
 pub struct Bodies<'a> {
     /// All structures.
     pub structures: &'a mut [Structure],

@@ -200,8 +200,8 @@ impl System {
         places.iter().enumerate().all(|(index, place)| surface(index).is_none_or(|surface| surface.has_place(*place)))
     }
 
-    /// How many of the gaps of all structures, one after the other as [`Structure::gaps`], are infinite: those of padding lanes, of
-    /// nodes of no pair, and of nodes that have nothing to touch beyond a free edge; `None` where others are, or one is negative.
+    /// Returns the number of infinite gaps among the gaps of all structures, one after the other as [`Structure::gaps`]: those of padding lanes, of
+    /// nodes without a pair, and of nodes beyond a free edge; `None` if another gap is infinite, or one is negative.
     pub fn infinite_gap_count(&self, gaps: &[f64]) -> Option<usize> {
         let (mut rest, mut sum) = (gaps, 0);
         for structure in &self.structures {

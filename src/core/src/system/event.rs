@@ -24,7 +24,7 @@ pub struct ContactEvent {
     pub tangential: f64,
     /// Force on the structure (N) in the coordinates of its displacements.
     pub force: [f64; 3],
-    /// What tells the contact point, see [`GapLaw::contact_point`](crate::gaps::GapLaw::contact_point).
+    /// Data of the contact point, see [`GapLaw::contact_point`](crate::gaps::GapLaw::contact_point).
     pub point: [f64; 3],
     /// The force in fixed directions, its moment, and where it acts.
     pub wrench: Wrench,

@@ -37,7 +37,7 @@ pub enum StepFailure {
     Unbalanced {
         /// Set of structures that can feel each other.
         set: usize,
-        /// What it has added (J).
+        /// Energy that was added (J).
         work: f64,
         /// All energy exchanged (J).
         exchanged: f64,
@@ -48,9 +48,9 @@ pub enum StepFailure {
         set: usize,
         /// Which of the two.
         loss: Loss,
-        /// What it has given since it had taken most (J).
+        /// Energy that was given back since the largest loss (J).
         given: f64,
-        /// What that is held against (J).
+        /// Energy that it is compared with (J).
         exchanged: f64,
     },
     /// A node moves so far around the axis that what linear kinematics misses is as large as its clearance.
@@ -74,7 +74,7 @@ pub enum StepFailure {
         sector: usize,
         /// Change of the gap over two steps (m).
         jump: f64,
-        /// What motion can explain of it (m).
+        /// Part that motion explains (m).
         explained: f64,
     },
     /// A law that looks once for penetration holds nodes closed that the others push away.
@@ -83,7 +83,7 @@ pub enum StepFailure {
         structure: usize,
         /// Contact node most pulled at.
         node: usize,
-        /// Its impulse as a share of that of the node most pushed.
+        /// Impulse as a fraction of that of the node with the largest.
         share: f64,
     },
     /// A law that looks once for penetration leaves a node deep inside the surface.
@@ -92,7 +92,7 @@ pub enum StepFailure {
         structure: usize,
         /// Contact node that was deepest inside.
         node: usize,
-        /// How deep, as a share of its clearance.
+        /// Depth as a fraction of the clearance.
         share: f64,
     },
     /// More steps would have to be tried than are allowed.

@@ -15,7 +15,7 @@ use crate::settings::Solver;
 /// Nodes outside a group count as penetrating beyond this fraction of the largest gap of the group.
 const VIOLATED_FRACTION: f64 = 1e-13;
 
-/// What a group has found in a step.
+/// Forces that a group has found in a step.
 pub struct GroupSolution<'a> {
     /// Active contacts, appended.
     pub events: &'a mut Vec<ContactEvent>,
@@ -33,11 +33,11 @@ struct GroupSide {
     chosen: Vec<bool>,
     /// Change of all of its gaps by the solution (m), same layout.
     response: Vec<f64>,
-    /// Its members among those of the group.
+    /// Range of the members among those of the group.
     span: std::ops::Range<usize>,
 }
 
-/// How contacts of a group hang together.
+/// Coupling of the contacts of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
     /// Each sector by itself: uncoupled sectors of one structure against what does not move.

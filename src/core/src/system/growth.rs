@@ -1,6 +1,6 @@
 //! The growth of a shape over time.
 
-/// How the shape of a surface grows over a span: a factor that is linear in time, times ½(1 − cos(πt/T)) until T.
+/// Growth of the shape of a surface over a span: a factor that is linear in time, times ½(1 − cos(πt/T)) until T.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ShapeGrowth {
     /// Factor at the start and the end.

@@ -11,7 +11,7 @@ use crate::ledger::Ledger;
 use crate::persist::persist_fields;
 use crate::settings::{Scheme, Solver};
 
-/// What takes energy from a vibration in contact.
+/// Loss of energy of a vibration in contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Loss {
     /// Friction along the way.
@@ -38,15 +38,15 @@ const STOPPED: f64 = 0.01;
 pub struct LargestLosses {
     friction: f64,
     impact: f64,
-    /// What forces of cutting have given to tips that go back, which is not booked as cutting.
+    /// Energy that cutting forces have given to tips that move backwards, which does not count as cutting (J).
     pub(super) uncut: f64,
 }
 
 persist_fields!(LargestLosses { friction, impact, uncut });
 
 impl LargestLosses {
-    /// What is given back of the most that friction, and impacts, had taken (J). Steps by a tolerance pay impacts from those before: these
-    /// are held against nothing taken at all.
+    /// Returns the energy that friction and impacts have given back of their largest losses (J). Adaptive steps pay impacts from earlier losses:
+    /// there the comparison is with zero.
     fn given(&mut self, ledger: &Ledger, pays: bool) -> [f64; 2] {
         let (friction, impact) = (ledger.friction_loss.value(), ledger.impact_loss.value());
         self.friction = self.friction.max(friction);

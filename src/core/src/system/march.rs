@@ -31,7 +31,7 @@ const PRECISION: f64 = 1e-4;
 #[derive(Debug, Clone)]
 pub struct Galerkin {
     tables: Vec<Tables>,
-    /// Of each table.
+    /// Free flight of each table.
     flights: Vec<FreeFlight>,
     marcher: SectorIntegrator,
     state: SectorState,
@@ -40,7 +40,8 @@ pub struct Galerkin {
 }
 
 impl Galerkin {
-    /// Of a structure whose modes are `bank`, for spans up to `longest` (s) and errors of `tolerance` (m), with gaps rounded by `rounding` (m).
+    /// Makes the tables of a structure whose modes are `bank`, for spans up to `longest` (s) and errors of `tolerance` (m), with gaps rounded by
+    /// `rounding` (m).
     fn new(
         bank: &ModalBank,
         (nodes, pairs): (usize, usize),
@@ -231,7 +232,7 @@ fn failure(stopped: Stopped, (structure, sector): (usize, usize), entered: Optio
     }
 }
 
-/// What contacts of a sector did over a span goes to the ledger.
+/// Adds the work of the contacts of a sector over a span to the ledger.
 fn enter_work(ledger: &mut Ledger, work: &Worked) {
     let moved = work.shaft + work.whirl + work.shift + work.casing;
     for (sum, term) in [
@@ -249,7 +250,7 @@ fn enter_work(ledger: &mut Ledger, work: &Worked) {
     }
 }
 
-/// Its contacts become events.
+/// Turns the contacts of a sector into events.
 fn enter_events(
     structure: &Structure,
     (index, sector): (usize, usize),

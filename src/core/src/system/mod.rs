@@ -49,13 +49,13 @@ pub use structure::Structure;
 /// A structure about to be put into a system.
 #[derive(Debug, Clone)]
 pub enum StructureParts<'a> {
-    /// Its contact nodes touch surfaces.
+    /// A structure with contact nodes that touch surfaces.
     Touching(SectorModel<'a>, Box<BankOptions>),
     /// It carries surfaces, whose control points have three contact rows each; whether it is loaded beside contact.
     Carrying(&'a ModalModel, bool),
 }
 
-/// How the system is stepped.
+/// Scheme, solver and options of a system.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SystemSettings {
     /// Time-stepping scheme.
@@ -70,12 +70,12 @@ pub struct SystemSettings {
 pub(crate) struct RunTotals {
     /// Internal steps done.
     pub steps: u64,
-    /// What marching sectors one by one has taken.
+    /// Work of adaptive steps.
     pub effort: Effort,
     pub factorisations: u64,
     /// Steps done when the gap two steps back was first one of steps of this size.
     pub witnessed: u64,
-    /// Of each set.
+    /// Energy balance of each set.
     pub ledgers: Vec<Ledger>,
     /// Most that contact of each set has taken so far.
     taken: Vec<LargestLosses>,
@@ -95,7 +95,7 @@ impl RunTotals {
 pub struct System {
     pub(crate) structures: Vec<Structure>,
     pub(crate) pairs: Vec<ContactPair>,
-    /// Those of the first sets, in their order.
+    /// Contact groups of the first sets, in their order.
     pub(crate) groups: Vec<ContactGroup>,
     sets: StructureSets,
     /// Sets whose sectors are marched together.
@@ -246,7 +246,7 @@ impl System {
         self.counted.steps
     }
 
-    /// What marching sectors one by one has taken, all together.
+    /// Returns the work of adaptive steps of all sectors together.
     pub fn effort(&self) -> &Effort {
         &self.counted.effort
     }

@@ -30,7 +30,7 @@ pub struct CarriersInStep<'a> {
 
 /// A sector of a structure facing its surfaces.
 pub struct ObstacleView<'a> {
-    /// What carries them, if anything does.
+    /// Structures that carry the surfaces, if any.
     pub ground: Option<CarriersInStep<'a>>,
     pub pairs: &'a mut [ContactPair],
     /// Pair of each node.
@@ -42,7 +42,7 @@ pub struct ObstacleView<'a> {
 }
 
 impl ObstacleView<'_> {
-    /// What a structure tells of the place where a node is on the surface that it carries, at a point of the step.
+    /// Reads a value from the structure that carries a surface, at the place of a node and at a point of the step.
     fn on_ground<T>(
         &self,
         (node, point): (usize, usize),
@@ -67,7 +67,7 @@ impl ObstacleView<'_> {
         }
     }
 
-    /// What a lane faces, and the step that is solved.
+    /// Returns the carrier that a lane faces, and the step that is solved.
     fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, (usize, ForceInterpolation), Lanes)> {
         let CarriersInStep { casings, casing_of, level, kind, lanes } = self.ground.as_mut()?;
         let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair])?;
@@ -288,7 +288,7 @@ impl Witness for ObstacleView<'_> {
 
 /// Times that the smallest gap between points is sought by a parabola through three gaps.
 const PARABOLAS: usize = 4;
-/// How much closer these are each time.
+/// Factor by which the points move closer each time.
 const CLOSER: f64 = 0.25;
 
 impl ObstacleView<'_> {

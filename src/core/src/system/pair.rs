@@ -14,11 +14,11 @@ use crate::persist::persist_fields;
 pub struct SurfaceCarrier {
     /// The structure.
     pub structure: usize,
-    /// Its first row that moves a control point of this surface.
+    /// First row of the carrier that moves a control point of this surface.
     pub first_row: usize,
 }
 
-/// What a pair is made of.
+/// Parts of a pair.
 #[derive(Debug, Clone)]
 pub struct PairParts {
     /// Structure whose contact nodes touch.
@@ -33,7 +33,7 @@ pub struct PairParts {
     pub cutting: f64,
 }
 
-/// How prescribed motion has gone on.
+/// Prescribed motion over the last steps.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Prescribed {
     /// At the last step, and before.
@@ -47,7 +47,7 @@ persist_fields!(Prescribed { drive, motion });
 /// A pair with the prescribed motion of what touches.
 #[derive(Debug, Clone)]
 pub struct ContactPair {
-    /// What it is made of.
+    /// Parts of the pair.
     pub(super) parts: PairParts,
     /// Contact nodes that belong to it.
     nodes: Vec<usize>,
@@ -191,7 +191,7 @@ impl ContactPair {
 /// Which of two instants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum When {
-    /// Of the last step.
+    /// The last step.
     Now,
     /// One step earlier.
     Before,

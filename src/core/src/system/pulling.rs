@@ -9,17 +9,17 @@ use crate::persist::persist_fields;
 pub struct Pulling {
     /// Internal steps in which a node touched.
     touched: u64,
-    /// Of forces that push, and of those that pull, for each node (N s).
+    /// Impulses of pushing forces, and of pulling forces, of each node (N s).
     pushed: Vec<f64>,
     pulled: Vec<f64>,
-    /// How deep each node has been inside at the end of a step, as a share of its clearance.
+    /// Largest depth of each node inside a surface at the end of a step, as a fraction of its clearance.
     inside: Vec<f64>,
 }
 
 persist_fields!(Pulling { touched, pushed, pulled, inside });
 
 impl Pulling {
-    /// Of so many nodes.
+    /// Makes room for `nodes` nodes.
     pub(super) fn new(nodes: usize) -> Self {
         Self { touched: 0, pushed: vec![0.0; nodes], pulled: vec![0.0; nodes], inside: vec![0.0; nodes] }
     }
@@ -71,7 +71,7 @@ impl System {
         }
     }
 
-    /// Of a structure that touches: the node that was deepest inside at the end of a step, and how deep, as a share of its clearance
+    /// Returns the node of a touching structure that was deepest inside at the end of a step, and the depth as a fraction of its clearance
     /// ([`GapLaw::clearance`](crate::gaps::GapLaw::clearance)).
     pub fn left_inside(&self, structure: usize) -> Option<(usize, f64)> {
         self.structures[structure].pulling.inside.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
@@ -83,8 +83,8 @@ impl System {
         pair.map_or(0.0, |pair| self.pairs[pair].gap().clearance())
     }
 
-    /// Of a structure that touches: the node most pulled at and the share of its impulse in that of the node most pushed, once contact
-    /// lasted for so many internal steps.
+    /// Returns the node of a touching structure with the largest pulling impulse, as a fraction of the largest pushing impulse of a node, once
+    /// contact has lasted for `steps` internal steps.
     pub fn pulling(&self, structure: usize, steps: u64) -> Option<(usize, f64)> {
         self.structures[structure].pulling.most(steps)
     }

@@ -11,8 +11,8 @@ use crate::gaps::revolution::Instants;
 use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::{MotionIncrement, Wrench};
 
-/// How prescribed motion of a pair goes on over a span: from where it was, quadratic in time through the middle and the end. Inputs
-/// are linear in time and the angle of the rotor quadratic, so that this is exact; what grows in otherwise is the shape.
+/// Prescribed motion of a pair over a span: from its start, quadratic in time through the middle and the end. Inputs are linear in time and the angle
+/// of the rotor is quadratic, so that this is exact; the shape may grow in another way.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MotionCourse {
     before: PrescribedMotion,
@@ -68,7 +68,7 @@ impl MotionCourse {
     }
 }
 
-/// What a node did over a span.
+/// Contact of a node over a span.
 #[derive(Debug, Clone, Copy)]
 pub struct NodeTally {
     /// ∫λ dt (N·s).
@@ -102,24 +102,24 @@ impl NodeTally {
 /// Work of all contacts of a sector over a span (J).
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Worked {
-    /// Of the shaft.
+    /// Work of the shaft (J).
     pub shaft: f64,
-    /// Of whirl and of axial shift.
+    /// Work of whirl (J).
     pub whirl: f64,
-    /// Of axial shift.
+    /// Work of axial shift (J).
     pub shift: f64,
-    /// Of the casing.
+    /// Work of the casing (J).
     pub casing: f64,
     /// Friction heat.
     pub heat: f64,
-    /// Of gaps that close.
+    /// Energy lost by gaps that close (J).
     pub closing: f64,
     /// On the structure, and its magnitudes.
     pub exact: f64,
     pub moved: f64,
     /// Damping loss.
     pub damping: f64,
-    /// What constant forces lose against those before.
+    /// Energy lost by constant forces compared with those before (J).
     pub dropped: f64,
 }
 
@@ -134,12 +134,12 @@ pub enum SurfacePlace {
     Acted,
 }
 
-/// What is kept from span to span, and scratch: allocates only when made.
+/// Data that is kept from span to span, and scratch; allocates only when made.
 #[derive(Debug, Clone)]
 pub struct SpanRecord {
-    /// Of each node.
+    /// Contact of each node.
     pub tallies: Vec<NodeTally>,
-    /// Of all nodes.
+    /// Work of all nodes.
     pub work: Worked,
     /// Motion of each pair over the span.
     pub courses: Vec<MotionCourse>,
@@ -154,7 +154,7 @@ pub struct SpanRecord {
     pub places: [Vec<ClosestPoint>; POINTS],
     /// Where forces have been handed to structures that carry surfaces: places of the pass before that in which gaps hold.
     pub acted: [Vec<ClosestPoint>; POINTS],
-    /// How nodes slide along open surfaces at the points (m), of those that were asked for in this trial; and how often that was.
+    /// Sliding of nodes along open surfaces at the points (m), where it was requested in this trial; and the number of requests.
     pub slips: [Vec<Option<[f64; 3]>>; POINTS],
     pub looks: usize,
     pub instants: Instants,
@@ -210,7 +210,7 @@ impl SpanRecord {
         self.acted[point][node] = self.places[point][node];
     }
 
-    /// What a span of this structure and sector ends with.
+    /// Returns the failure that ends a span of this structure and sector, if any.
     pub fn check(&self, (structure, sector): (usize, usize)) -> Result<(), StepFailure> {
         if self.implausible {
             return Err(StepFailure::Implausible { structure, sector });

@@ -14,7 +14,7 @@ pub struct StructureSets {
 }
 
 impl StructureSets {
-    /// Those whose contact nodes touch come first.
+    /// Finds the sets; sets with contact nodes come first.
     pub(super) fn new(structures: &[Structure], pairs: &[ContactPair]) -> Self {
         let links = pairs.iter().filter_map(|pair| Some((pair.structure(), pair.carrier()?.structure)));
         let number = joined(structures.len(), links);
@@ -28,7 +28,7 @@ impl StructureSets {
         Self { of: all.filter_map(place).collect(), members }
     }
 
-    /// How many.
+    /// Returns the number of sets.
     pub fn count(&self) -> usize {
         self.members.len()
     }

@@ -6,7 +6,7 @@ use crate::gaps::GapLaw;
 /// Clearances below this share of the radius are those of a press fit, in which errors as small do not matter.
 pub const LEAST_CLEARANCE: f64 = 1e-4;
 
-/// What linear kinematics misses at a node that moves far around the axis.
+/// Error of linear kinematics at a node that moves far around the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curved {
     /// Structure (0-based).
@@ -17,7 +17,7 @@ pub struct Curved {
     pub node: usize,
     /// Displacement around the axis u_θ (m).
     pub moved: f64,
-    /// What it puts the node further out by, u_θ²/2r (m).
+    /// Outward displacement that linear kinematics misses, u_θ²/2r (m).
     pub error: f64,
     /// Clearance that the sector was given, or 1e-4 of the radius if that is more (m).
     pub clearance: f64,

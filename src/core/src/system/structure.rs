@@ -32,7 +32,7 @@ pub struct Structure {
     pub(super) lowest: Vec<f64>,
     /// Modal contact force on its surfaces found in the last step (N·√kg⁻¹); empty where it carries none.
     pub(super) delayed: Vec<f64>,
-    /// Of each sector, where sectors are marched one by one.
+    /// Step control of each sector, for adaptive steps of single sectors.
     pub(super) pace: StepControl,
     /// Tables and scratch of that scheme.
     pub(super) galerkin: Option<Box<Galerkin>>,
@@ -40,14 +40,14 @@ pub struct Structure {
     pub(super) lowest_in_span: Vec<f64>,
 }
 
-/// How sectors are marched by continuous Galerkin.
+/// State of adaptive steps of all sectors.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepControl {
     /// Energy left by contacts that opened and closed (J).
     pub bank: Vec<f64>,
     /// Largest energy that this has been compared with (J).
     pub largest: Vec<f64>,
-    /// How often the span is halved.
+    /// Number of times that the span is halved, for each sector.
     pub level: Vec<u64>,
     /// Slopes of contact forces over the last step (N/s), `[row · lanes + lane]`.
     pub slopes: Vec<f64>,
@@ -68,7 +68,7 @@ impl StepControl {
         }
     }
 
-    /// How often the span of a sector is halved.
+    /// Returns how often the span of a sector is halved.
     pub fn level_of(&self, sector: usize) -> usize {
         usize::try_from(self.level[sector]).unwrap_or(HALVINGS).min(HALVINGS)
     }
@@ -138,7 +138,7 @@ impl Structure {
         !self.delayed.is_empty()
     }
 
-    /// Its single bank of modes, where sectors are not coupled.
+    /// Returns the bank of modes, if sectors are not coupled.
     pub(super) fn bank(&self) -> Option<&ModalBank> {
         self.modes.uncoupled()
     }

@@ -39,7 +39,7 @@ impl System {
         Ok(())
     }
 
-    /// What prescribed motion over two steps explains of the gaps of a pair (m): inputs that move, and turning under the shape of
+    /// Returns the change of the gaps of a pair over two steps that prescribed motion explains (m): inputs that move, and turning under the shape of
     /// the casing.
     pub(super) fn explained_by_drive(&self, pair: usize) -> f64 {
         let pair = &self.pairs[pair];

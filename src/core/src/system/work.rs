@@ -6,7 +6,7 @@ use crate::gaps::wrench::{At, MotionIncrement};
 use crate::gaps::{Geometry, dot};
 use crate::settings::Solver;
 
-/// What one contact did over a step (J).
+/// Work of one contact over a step (J).
 #[derive(Debug, Clone, Copy, Default)]
 struct ContactWork {
     shaft: f64,
@@ -21,7 +21,7 @@ struct ContactWork {
     cut: f64,
     /// Part of `turned` that is cutting (≤ 0): a tip that goes back cuts nothing.
     uncut: f64,
-    /// Of the node that stops at the surface.
+    /// Energy lost by the node that stops at the surface (J).
     closing: f64,
     /// The part of it that a coating takes.
     worn: f64,
@@ -52,7 +52,7 @@ impl ContactWork {
         self.moved += other.moved;
     }
 
-    /// What has no other name.
+    /// Returns the rest of the work, which is curvature work.
     fn curvature(&self) -> f64 {
         self.exact + self.heat + self.cut + self.closing - (self.shaft + self.whirl + self.shift + self.casing)
     }

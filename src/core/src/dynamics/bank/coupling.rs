@@ -12,7 +12,7 @@
 use crate::dynamics::modal::ModalSpin;
 use crate::schemes::ModeCoefficients;
 
-/// What of the spin couples the modes.
+/// Terms of spin that couple the modes.
 #[derive(Debug, Clone)]
 pub struct Coupling {
     spin: ModalSpin,

@@ -36,7 +36,7 @@ pub fn lanes(sectors: usize) -> usize {
     if sectors == 1 { 1 } else { sectors.div_ceil(LANES) * LANES }
 }
 
-/// What only some structures need; what is off takes neither time nor memory.
+/// Optional features of a bank; a feature that is off takes neither time nor memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BankOptions {
     /// Factor on the frequencies of every sector (mistuning); empty = all tuned.
@@ -83,11 +83,11 @@ struct BankState {
     modal_load_before: Vec<f64>,
     /// Speed of the coupling (rad/s).
     speed: f64,
-    /// Its temperature (K).
+    /// Temperature of the structure (K).
     temperature: f64,
     /// Loads of heat of the step before, of a sector without a factor; empty where all are equal.
     heat_before: Vec<f64>,
-    /// What quasi-static modes have gained since the last step as shares of their stiffness; empty without softening.
+    /// Change of the stiffness of quasi-static modes since the last step, relative to their stiffness; empty without softening.
     stiffened: Vec<f64>,
 }
 
@@ -104,7 +104,7 @@ persist_fields!(BankState {
     stiffened
 });
 
-/// What the special pass needs per mode and lane.
+/// Coefficients of the special pass per mode and lane.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct BankCoefficients {
     beta: f64,

@@ -74,7 +74,7 @@ impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predi
 /// A single structure with more contact rows than this recovers them mode by mode.
 const WIDE: usize = 18;
 
-/// What the passes over one chunk share.
+/// Data that the passes over one chunk share.
 struct ChunkModes<'a> {
     coefficients: &'a [ModeCoefficients],
     /// `[mode · WIDTH + lane]` where the pass is special.

@@ -71,7 +71,7 @@ impl ModalBank {
         }
     }
 
-    /// Those at its start and at its end; nothing where there are none.
+    /// Reads the loads at the start and at the end of the span; reads nothing if there are no loads.
     pub fn read_loads(&self, [start, end]: &mut [Vec<f64>; 2]) {
         if self.options.loads {
             start.copy_from_slice(&self.state.modal_load_before);

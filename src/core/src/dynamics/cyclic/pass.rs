@@ -34,7 +34,7 @@ impl CyclicCoefficients {
     };
 }
 
-/// What one pass works on. Arrays of modes are `[block][mode]`, spectra `[block][row]`.
+/// Data of one pass. Arrays of modes are `[block][mode]`, spectra `[block][row]`.
 ///
 /// `APPLY`: the contact forces of the step before act with their compliance first. `DELAYED`: they also act on the
 /// step predicted (massless-boundary). `LOSS`: add the damping loss of the step before. `ADVANCE`: predict and recover.

@@ -25,7 +25,7 @@ impl CyclicBank {
         (2 * index + part) * LANES + lane
     }
 
-    /// What they are where the highest modes are quasi-static, and how they move the contact rows of sector 0 (rows × coordinates).
+    /// Returns the coordinates with quasi-static highest modes, and the motion of the contact rows of sector 0 per coordinate (rows × coordinates).
     pub fn coordinates_of(&self) -> (Coordinates, DMatrix<f64>) {
         let count = self.coordinates();
         let nothing = || vec![0.0; count];
@@ -113,7 +113,7 @@ impl CyclicBank {
         sizes.collect()
     }
 
-    /// How far each contact row of any sector is moved by coordinates of these amplitudes at most (m), with [`CyclicBank::sizes`].
+    /// Adds the largest displacement of each contact row of any sector (m) under coordinates of these amplitudes, with [`CyclicBank::sizes`].
     pub fn reach(&self, amplitudes: &[f64], sizes: &[f64], reach: &mut [f64]) {
         reach.fill(0.0);
         for (pair, sizes) in sizes.chunks_exact(self.rows).enumerate() {

@@ -19,7 +19,7 @@ const BEND: f64 = 0.5;
 const OPENING: f64 = 30.0;
 /// Gap of a node between points may be so many times what the polynomial leaves out, or the step is shortened.
 pub(super) const NEAR: f64 = 4.0;
-/// How a trial came out.
+/// Result of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TrialResult {
     /// The contact problem has been solved.

@@ -24,12 +24,12 @@ const SHARE: f64 = 0.1;
 /// Displacement of a node at the ends of parts of a step (m), and its change per part there.
 type Path = [[[f64; 3]; 2]; PARTS + 1];
 
-/// What is known of gaps between the points.
+/// Smallest gaps between the points.
 #[derive(Debug, Clone)]
 pub(super) struct Minima {
     /// Where the polynomial through the gaps of a node is smallest, as a share of the step; NaN where it need not be looked at.
     at: Vec<f64>,
-    /// How those move, and in how many parts that is known; 0: nobody has followed them.
+    /// Paths of the nodes, and the number of parts in which they are known; 0 if they were not followed.
     paths: Vec<Path>,
     parts: usize,
     /// State on the way.
@@ -126,7 +126,7 @@ impl Trial {
         self.minima = minima;
     }
 
-    /// What the residual flexibility adds to the displacement of a node within the step (m), and its slope by the share of the step.
+    /// Returns the displacement of a node within the step by the residual flexibility (m), and its slope with respect to the fraction of the step.
     fn bent(&self, basis: &TimeBasis, rows: &ContactRows, node: usize, theta: f64) -> [[f64; 3]; 2] {
         let mut sums = [[0.0; 3]; 2];
         for other in 0..self.nodes() {

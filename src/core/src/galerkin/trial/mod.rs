@@ -28,7 +28,7 @@ const PASSES: usize = 6;
 /// Gaps this far below zero, as a share of the largest, are rounding.
 const ROUNDING: f64 = 1e-13;
 
-/// What is used to step: all points, or a constant force and the end alone.
+/// Forces over a step: a polynomial through all points, or a constant force and the end alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ForceInterpolation {
     /// The force is a polynomial of degree s.
@@ -82,7 +82,7 @@ pub struct Trial {
     /// Displacements and gaps of all lanes per λ of each.
     columns: Vec<f64>,
     closing: Vec<f64>,
-    /// Of what is touched, where it gives way.
+    /// Compliance of the obstacle, if it is elastic.
     given: Vec<f64>,
     gives: bool,
     solver: ContactSolver,
@@ -109,7 +109,7 @@ pub struct Trial {
     /// Where contacts may stick; and 1/h of the step (1/s), 0 where its force does not follow on that before.
     sticking: Option<Box<Sticking>>,
     per_step: f64,
-    /// Of steps of a higher degree; and slopes of the polynomials through the points at the end of the step (1/s).
+    /// Data of steps of a higher degree; and slopes of the polynomials through the points at the end of the step (1/s).
     steady: Option<Box<Steady>>,
     end_slopes: [f64; POINTS],
 }
@@ -132,7 +132,7 @@ struct Contacts {
     multipliers: Vec<f64>,
     gaps: Vec<f64>,
     normals: Vec<f64>,
-    /// Of forces over the last step (N/s), where contacts may stick.
+    /// Slopes of the forces over the last step (N/s), if contacts may stick.
     slopes: Vec<f64>,
 }
 
@@ -287,7 +287,7 @@ impl Trial {
         &self.start
     }
 
-    /// How far each row can be from where it rests while nothing pushes (m).
+    /// Returns the largest displacement of each row from rest (m) without contact.
     pub fn largest_displacements(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         let (sums, reach) = &mut self.reach;
         rows.add_largest_displacements(state, sums);
@@ -361,7 +361,7 @@ impl Trial {
         }
     }
 
-    /// What `taken` columns of a table, as much as told, push.
+    /// Sums the `taken` columns of a table, multiplied by `amounts`.
     fn combine(&mut self, table: &[f64], stride: usize) {
         let Self { taken, amounts, pushed, instructions, .. } = self;
         let sums = [&mut pushed[..stride]];
@@ -468,7 +468,7 @@ impl Trial {
         self.solved_normals[..stride].copy_from_slice(&self.normals[..stride]);
     }
 
-    /// What modes with inertia move by at the points.
+    /// Finds the displacements at the points by modes with inertia.
     ///
     /// Not what nodes move by: without mass they go to and fro with the force, much faster than they slide.
     fn find_inert(&mut self, residual: &DMatrix<f64>) {
@@ -484,7 +484,7 @@ impl Trial {
         }
     }
 
-    /// What a force on a node at a point works on (m).
+    /// Returns the sliding distance that a force on a node at a point works on (m).
     fn sliding_distance(&self, point: usize, node: usize) -> [f64; 3] {
         let terms = self.ways[point].iter().zip(&self.inert);
         terms.fold([0.0; 3], |way, (weight, inert)| std::array::from_fn(|c| way[c] + weight * inert[3 * node + c]))

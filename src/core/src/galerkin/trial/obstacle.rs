@@ -2,7 +2,7 @@
 
 use crate::galerkin::compliance::Lanes;
 
-/// What the nodes of a sector may touch, at the points of the step that is tried.
+/// Surfaces that the nodes of a sector may touch, at the points of the tried step.
 pub trait Obstacle {
     /// Gap (m; infinite where there is nothing to touch) and unit normal to the node displaced by `moved` (m), at a point of the step.
     fn gap(&mut self, node: usize, point: usize, moved: [f64; 3]) -> (f64, [f64; 3]);
@@ -43,22 +43,21 @@ pub trait Obstacle {
         0.0
     }
 
-    /// What prescribed motion, and that of what it touches, add to its own up to a point of the step where it slides (m); it is displaced by
-    /// `moved` there (m).
+    /// Returns the sliding (m) of a node up to a point of the step that prescribed motion and the motion of the surface cause; the node is displaced
+    /// by `moved` (m).
     fn drift(&self, _node: usize, _point: usize, _moved: [f64; 3]) -> [f64; 3] {
         [0.0; 3]
     }
 }
 
-/// How a node slides at a point of the step.
+/// Sliding motion of a node at a point of the step.
 #[derive(Debug, Clone, Copy)]
 pub struct SlidingState {
-    /// Its displacement (m).
+    /// Displacement of the node (m).
     pub moved: [f64; 3],
     /// Velocity of its vibration at the start of the step (m/s).
     pub velocity: [f64; 3],
-    /// What a force at this point works on, Σ_k S_ik ũ_k (m), as far as modes with inertia go there; 0 where nobody asks
-    /// ([`Obstacle::turns`]).
+    /// Sliding distance that a force at this point works on, Σ_k S_ik ũ_k (m), by modes with inertia; 0 unless [`Obstacle::turns`].
     pub way: [f64; 3],
     /// Unit normal at the point.
     pub normal: [f64; 3],

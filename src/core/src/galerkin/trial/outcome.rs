@@ -26,7 +26,7 @@ impl Trial {
         if point == 0 { vector3_at(&self.begun.forces, node) } else { self.lane(&self.forces, point, node) }
     }
 
-    /// Its gap (m).
+    /// Returns the gap of a node (m).
     pub fn gap(&self, point: usize, node: usize) -> f64 {
         if point == 0 { self.begun.gaps[node] } else { self.gaps[self.lanes.at(point, node)] }
     }
@@ -37,7 +37,7 @@ impl Trial {
         if gap == f64::INFINITY { 0.0 } else { gap }
     }
 
-    /// Its unit normal.
+    /// Returns the unit normal of a node.
     pub fn normal(&self, point: usize, node: usize) -> [f64; 3] {
         if point == 0 { vector3_at(&self.begun.normals, node) } else { self.lane(&self.normals, point, node) }
     }
@@ -54,7 +54,7 @@ impl Trial {
         std::array::from_fn(|c| force[c] - multiplier * normal[c])
     }
 
-    /// Its displacement (m); at the start only where something pushes.
+    /// Returns the displacement of a node (m); at the start only if a contact is closed.
     pub fn displacement(&self, point: usize, node: usize) -> [f64; 3] {
         if point == 0 { vector3_at(&self.start, node) } else { self.lane(&self.moved, point, node) }
     }
@@ -102,7 +102,7 @@ impl Trial {
             .sum::<f64>()
     }
 
-    /// What contacts that close under a constant force lose: λ times the gap there was (J).
+    /// Returns the energy that contacts lose when they close under a constant force: λ times the gap before (J).
     pub fn closed(&self) -> f64 {
         let lost = |node: usize| self.multiplier(1, node) * (self.finite_gap(0, node) - self.finite_gap(1, node));
         (0..self.nodes()).filter(|node| self.multiplier(1, *node) > 0.0).map(lost).sum()

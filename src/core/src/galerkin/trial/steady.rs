@@ -21,10 +21,10 @@ const PASSES: usize = 8;
 const ON_THE_CONE: f64 = 1e-7;
 /// Directions of sliding are known to this.
 const TURNED: f64 = 1e-9;
-/// What rounding leaves of forces, as a share of the largest.
+/// Rounding error of forces, as a fraction of the largest.
 const ROUNDING: f64 = 1e-10;
 
-/// What a closed contact does over the step.
+/// Status of a contact over the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ContactStatus {
     Open,
@@ -82,7 +82,7 @@ impl Trial {
         verdict
     }
 
-    /// What contacts do at the start; false where nothing pushes.
+    /// Finds the status of all contacts at the start; returns false if none is closed.
     fn find_status(&self, own: &mut Steady, state: &SectorState, obstacle: &impl Obstacle) -> bool {
         let mut any = false;
         for (node, status) in own.status.iter_mut().enumerate() {

@@ -115,7 +115,7 @@ impl Trial {
         true
     }
 
-    /// How what is touched gives way under the forces of now.
+    /// Finds the displacements of the obstacle under the current forces.
     fn find_under(&mut self, own: &mut Sticking, obstacle: &mut impl Obstacle) {
         own.under.fill(0.0);
         if !self.gives {
@@ -212,7 +212,7 @@ impl Trial {
         found
     }
 
-    /// What a node moves up to a point against what it touches (m).
+    /// Returns the slip of a node up to a point, relative to the surface (m).
     pub(super) fn slip(&self, node: usize, point: usize, obstacle: &impl Obstacle) -> [f64; 3] {
         let (now, before) = (self.displacement(point, node), vector3_at(&self.start, node));
         let under = obstacle.drift(node, point, now);
@@ -247,8 +247,8 @@ impl Trial {
         self.sticking.is_some()
     }
 
-    /// How far nodes may have gone on and come back within a step (m): where sliding turns round they stick before. Four times that, as
-    /// where they stick lasts.
+    /// Returns the largest distance (m) that nodes may have slid forth and back within a step. Where sliding turns round, nodes stick for a while;
+    /// the result is four times the distance because of the duration of sticking.
     pub fn find_turn(&mut self, residual: &DMatrix<f64>, step: f64, obstacle: &impl Obstacle) -> f64 {
         self.withdrawn.copy_from_slice(&self.velocities);
         let (matrix, x, y) = (residual, &self.begun.slopes, &mut self.withdrawn);

@@ -39,8 +39,8 @@ pub const FEWEST_AROUND: usize = 4;
 /// Fewest rings of data points along the axis, and of data points in either direction of an open surface.
 pub const FEWEST_ALONG: usize = 2;
 
-/// How far a surface around the axis goes on beyond its first and last ring, as a share of its axial extent (counted in
-/// rings: exact where they are equally spaced). It does not depend on how fine the grid is.
+/// Extension of a surface around the axis beyond its first and last ring, as a fraction of its axial extent (counted in rings: exact for equal
+/// distances). It does not depend on the fineness of the grid.
 pub const REACH: f64 = 0.25;
 /// A node this far (in patches) beyond an edge of an open surface is still on it, so that rounding does not decide for nodes
 /// that stand exactly on it.
@@ -80,7 +80,7 @@ pub struct SurfaceSpline {
     around: usize,
     along: usize,
     ends: Ends,
-    /// How far it goes on beyond the first and last ring (patches).
+    /// Extension beyond the first and last ring (patches).
     reach: f64,
     interpolation: Interpolation,
     /// Interpolation problems around and along.

@@ -27,7 +27,7 @@ pub struct Weights {
     pub indices: [u32; 16],
     /// Their weights; the sum is 1.
     pub values: [f64; 16],
-    /// How many: 16 inside, 12 or fewer next to a free end, 4 on a facet.
+    /// Number of control points: 16 inside, 12 or fewer next to a free end, 4 on a facet.
     pub len: usize,
 }
 

@@ -10,7 +10,7 @@ use super::{Branch, CellContact, CellRow, CoatedProblem, Coating, RodMaterial, p
 use crate::persist::{Persist, StateReader, StateWriter};
 use crate::settings::CuttingSettings;
 
-/// What one row of a blade is cutting.
+/// Edge of one row of a blade that cuts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Edge {
     /// Number of the cell, from 1; 0: it cuts nothing.
@@ -23,7 +23,7 @@ struct Edge {
 
 crate::persist::persist_fields!(Edge { cell, ahead, sense });
 
-/// What is being removed from a cell in a step.
+/// Material that is removed from a cell in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Chip {
     cell: usize,
@@ -33,7 +33,7 @@ struct Chip {
     force: f64,
 }
 
-/// How a blade moves along the coating.
+/// Motion of a blade along the coating.
 #[derive(Debug, Clone, Copy)]
 pub struct BladePassage<'a> {
     /// Which blade.
@@ -55,7 +55,7 @@ pub(super) struct CoatingCut {
     edges: Vec<Edge>,
     /// The same after the step under way: a row that is not pressed in any more starts anew.
     next: Vec<Edge>,
-    /// Of the step under way; none between steps.
+    /// Chips of the current step; none between steps.
     chips: Vec<Chip>,
     /// Way against the force of each contact node (m), `[blade · nodes + node]`; of the step under way.
     ways: Vec<f64>,
@@ -93,7 +93,7 @@ impl CoatingCut {
         self.forget();
     }
 
-    /// What a step under way has found.
+    /// Discards the results of the current step.
     fn forget(&mut self) {
         self.next.fill(Edge::default());
         self.chips.clear();

@@ -7,7 +7,7 @@ use crate::settings::{BodyMotion, Closure, InputInterpolation, Meridian, Scheme,
 pub struct Fact {
     /// Key of the scene file, whose first word says which places there are.
     pub(super) key: &'static str,
-    /// What it is there, where the key alone does not say it.
+    /// Description of the value, if the key alone does not give it.
     pub(super) words: &'static str,
     pub(super) holds: fn(&ScenePlace) -> bool,
 }

@@ -46,7 +46,7 @@ impl<'a> ScenePlace<'a> {
         &self.settings.structures[self.index]
     }
 
-    /// Of a structure; ROMs are known.
+    /// Returns the ROM of a structure; ROMs are known.
     pub(super) fn rom(&self) -> &'a Rom {
         &self.roms[self.index]
     }
@@ -55,7 +55,7 @@ impl<'a> ScenePlace<'a> {
         &self.settings.contacts[self.index]
     }
 
-    /// Of a contact, whose names are checked.
+    /// Returns the surface of a contact, whose names are checked.
     pub(super) fn surface(&self) -> &'a SurfaceSettings {
         let own = self.relations.surfaces[self.index];
         &self.settings.surfaces[own.unwrap_or_else(|| unreachable!("validated"))]
@@ -118,7 +118,7 @@ impl<'a> ScenePlace<'a> {
         self.relations.shares_carrier(self.settings, self.index)
     }
 
-    /// Of the master of a contact.
+    /// Returns the ROM of the master of a contact.
     pub(super) fn master_rom(&self) -> Option<&'a Rom> {
         self.relations.masters[self.index].map(|index| &self.roms[index])
     }

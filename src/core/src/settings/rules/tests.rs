@@ -104,7 +104,7 @@ fn second(settings: &mut SceneSettings) {
     }
 }
 
-/// What `galerkin` takes: a rigid surface at a distance.
+/// Makes a scene valid for `galerkin`: a rigid surface at a distance.
 fn galerkin(settings: &mut SceneSettings) {
     settings.surfaces[0].structure = None;
     settings.contacts[0].gap = 1e-4;
@@ -123,7 +123,7 @@ fn excitation() -> ExcitationSettings {
 
 type Change = fn(&mut Scene);
 
-/// What breaks a row in a scene with a rotor, and how the refusal begins.
+/// Changes that break a rule in a scene with a rotor, and the beginning of the message.
 const OF_ROTORS: &[(&str, Change)] = &[
     ("structure[2].whirl: needs `motion = \"rotating\"`", |scene| scene.settings.structures[1].whirl = true),
     ("structure[1].load: needs `motion = \"still\"`", |scene| {

@@ -103,8 +103,8 @@ pub(super) struct Checking<'a> {
     pub(super) body: usize,
     /// Contact nodes that meet a surface.
     pub(super) nodes: Vec<usize>,
-    /// What the contact problem with all sectors closed decouples into: one uncoupled sector, or the nodal diameters as
-    /// real structures; seen at these nodes.
+    /// Structures into which the contact problem with all sectors closed decouples: one uncoupled sector, or the nodal diameters as real structures;
+    /// seen at these nodes.
     pub(super) models: Vec<ModalModel>,
     pub(super) parameters: &'a Parameters,
     /// Largest friction coefficient.

@@ -24,13 +24,13 @@ pub struct Closing {
 }
 
 impl Closing {
-    /// Of what flies freely.
+    /// Returns the duration for free bodies.
     pub fn of_run(compiled: &Compiled) -> Self {
         let experiment = &compiled.scene.settings.experiment;
         Self { arc: f64::INFINITY, after: 0.0, run: (experiment.stop - experiment.start).max(A_WHILE) }
     }
 
-    /// Of a structure that turns.
+    /// Returns the duration for a rotor.
     pub fn new(compiled: &Compiled, body: usize) -> Self {
         let (structure, _) = compiled.body(body);
         let pairs = compiled.plan.pairs_of(body);

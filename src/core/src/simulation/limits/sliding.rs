@@ -25,7 +25,7 @@ const ALIKE: f64 = 1.25;
 /// Contact that slides in one sense.
 #[derive(Debug, Clone, Default)]
 pub struct Sense {
-    /// What the equations make of it, where it grows.
+    /// Warnings of growth by the differential equations.
     grows: Vec<Warning>,
     /// Rate of flutter (1/s), 0 without.
     rate: f64,
@@ -41,7 +41,7 @@ type Looked<'a> = (f64, Option<(&'a [usize], SetGrowth)>);
 /// Growth that steps of one range, or shorter ones, add.
 #[derive(Debug, Clone)]
 struct Added {
-    /// How long contact may stay closed (s): without a refusal, and without a warning.
+    /// Durations of closed contact (s) up to which the scene is accepted, and accepted without a warning.
     allowed: f64,
     quiet: f64,
     refusal: Error,
@@ -70,7 +70,8 @@ impl Sense {
         Ok(self.grows(closed).chain(added.map(|added| added.warning.clone())).collect())
     }
 
-    /// What grows by the equations; flutter is a note where contact that closes for a time (s) opens before it matters.
+    /// Returns the warnings of growth by the differential equations; flutter is a note if contact closes for a time (s) that is too short for it to
+    /// matter.
     pub fn grows(&self, closed: f64) -> impl Iterator<Item = Warning> {
         let opens_before = self.rate * closed < MATTERS.ln();
         self.grows.iter().map(move |warning| match warning.topic() {
@@ -114,7 +115,7 @@ struct Flutter {
     share: f64,
 }
 
-/// What grows by the equations.
+/// Growth by the differential equations.
 #[derive(Default)]
 struct Physics {
     flutter: Option<Flutter>,
@@ -161,7 +162,7 @@ impl Checking<'_> {
         Sense { ranges: self.added(&looked, sign), ..self.growth(&physics, sign, expected) }
     }
 
-    /// What the equations make of contact that slides in one sense, whatever the step.
+    /// Returns the growth of contact that slides in one sense by the differential equations, independent of the step.
     pub(super) fn physics(&self, sense: usize, expected: f64) -> Sense {
         if self.friction == 0.0 {
             return Sense::default();
@@ -280,7 +281,7 @@ impl Checking<'_> {
         format!("closed at {names}{where_closed}, sliding in {sense} with µ = {}", frictions.join(" and "))
     }
 
-    /// What grows by the equations, in words.
+    /// Returns warnings of growth by the differential equations.
     fn growth(&self, physics: &Physics, sign: f64, expected: f64) -> Sense {
         let lock_up = physics.digging.as_ref().map(|(least, nodes)| {
             let rate = match physics.divergence {

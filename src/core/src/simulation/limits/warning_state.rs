@@ -14,11 +14,11 @@ const MATERIAL: f64 = 1.5;
 /// Turn of the excitation per internal step (rad) from which central differences make a resonance more than 1 % too large: √0.06.
 const RESOLVED_TURN: f64 = 0.245;
 
-/// What depends on the step: modes of the master and of carriers that are not resolved, contact of massless-boundary that gains
-/// energy, flexibility that is passed over, casings that spoil solvability.
+/// Number of kinds of warnings that depend on the step: unresolved modes of the master and of carriers, contact of massless-boundary that gains
+/// energy, neglected flexibility, casings that spoil solvability.
 const KINDS: usize = 5;
 
-/// What was told since the start.
+/// Warnings given since the start.
 #[derive(Debug, Clone)]
 pub struct WarningState {
     /// Longest step told about (s), per kind and structure: kinds of those that touch, and one of those that carry surfaces.
@@ -37,7 +37,7 @@ pub struct WarningState {
     turned: Vec<f64>,
     /// The same of the loads on structures that carry surfaces.
     load_turned: Vec<f64>,
-    /// How deep contact nodes were left inside when that was last told, of each structure that touches, as a share of the clearance.
+    /// Depth of contact nodes inside a surface at the last warning, of each structure that touches, as a fraction of the clearance.
     pub(in crate::simulation) inside: Vec<f64>,
     /// Whether curvature work was large beside the net work of inputs.
     pub(in crate::simulation) curvature: bool,
@@ -90,7 +90,7 @@ impl Simulation {
         self.warnings.extend(doubts);
     }
 
-    /// What limits warn of for a structure whose contact slides in the sense of this sign.
+    /// Returns the warnings for a structure whose contact slides in the sense of this sign.
     fn warnings_of(&self, body: usize, sense: f64) -> Vec<Warning> {
         self.limits.as_ref().and_then(|limits| limits.bodies[body].warnings(sense).ok()).unwrap_or_default()
     }
@@ -198,8 +198,8 @@ impl Simulation {
         }
     }
 
-    /// What sliding contact would do should the rotor turn the other way, which the warnings of the start leave out. Empty
-    /// before [`Simulation::initialise`], and for coupled sectors, where looking takes as long again.
+    /// Returns the warnings of sliding contact in the opposite sense of rotation, which the warnings of the start leave out. Empty before
+    /// [`Simulation::initialise`], and for coupled sectors, where the search takes as long again.
     pub fn if_reversed(&self) -> Vec<Warning> {
         let Some(limits) = &self.limits else { return Vec::new() };
         let mut found = Vec::new();
@@ -213,7 +213,7 @@ impl Simulation {
     }
 }
 
-/// What central differences make of a resonance where `what` turns so far (rad) in one internal step.
+/// Returns the warning of central differences that distort a resonance because `what` turns by this angle (rad) in one internal step.
 fn coarse_excitation(what: &str, turn: f64) -> Warning {
     let error = turn / libm::sin(turn) - 1.0;
     let problem = format!(
@@ -228,7 +228,7 @@ fn coarse_excitation(what: &str, turn: f64) -> Warning {
 }
 
 impl BodyLimits {
-    /// What contact of a `rotor` that slides in a sense does at the step expected and at a speed (rad/s).
+    /// Returns the warnings for contact of a `rotor` that slides in a sense at the expected step and at a speed (rad/s).
     fn of_sense(&self, sense: usize, speed: f64, rotor: &str) -> Vec<Warning> {
         let closed = self.closing.time(speed);
         match self.senses[sense].as_ref().map(|sense| sense.warnings(closed)) {

@@ -11,7 +11,7 @@ use crate::variables::{
 };
 use crate::{Result, ranges};
 
-/// How inputs run that would hit or shake something if they jumped.
+/// Description of inputs that would cause an impact if they jumped.
 pub const RAMPED: &str = "; reached at the end of the step (input_interpolation)";
 /// The same of angles.
 const RAMPED_ANGLE: &str = "; reached at the end of the step (input_interpolation), so never to be wrapped to one turn";
@@ -20,10 +20,10 @@ const RAMPED_ANGLE: &str = "; reached at the end of the step (input_interpolatio
 #[derive(Default)]
 pub struct TableBuilder {
     variables: Vec<Variable>,
-    /// Of the outputs, in their order.
+    /// Readers of the outputs, in their order.
     readers: Vec<OutputReader>,
     next: u32,
-    /// What rows from here on belong to, and what their names start with.
+    /// Index of the structure or pair of the next rows, and the prefix of their names.
     of: usize,
     prefix: String,
 }
@@ -198,7 +198,7 @@ impl TableBuilder {
             Some(StartValue::Integer(i32::try_from(settings.time.steps_at_most.unwrap_or(0)).unwrap_or(i32::MAX)));
     }
 
-    /// How inputs run between communication points.
+    /// Adds the interpolation of inputs between communication points.
     pub fn input_interpolation(&mut self, settings: &SceneSettings) {
         let start = settings.time.input_interpolation as i32 + 1;
         let text =

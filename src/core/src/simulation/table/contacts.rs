@@ -193,7 +193,7 @@ fn softens(parts: &TableFacts) -> bool {
     parts.bodies().iter().any(|body| body.structure.softening != 0.0)
 }
 
-/// Of kinetic energy, strain energy and impacts.
+/// Returns the descriptions of kinetic energy, strain energy and impact losses.
 fn energy_descriptions(parts: &TableFacts) -> [&'static str; 3] {
     if parts.bodies().iter().any(|body| body.free) {
         return [
@@ -232,7 +232,7 @@ fn exists(parts: &TableFacts, name: &str) -> bool {
 /// Name, text, and the count.
 type Count = (&'static str, &'static str, fn(&OutputView) -> f64);
 
-/// What a tolerance has taken since the start.
+/// Counts of the effort for a tolerance since the start.
 const EFFORTS: [Count; 3] = [
     ("internal_trials", "Internal steps tried since the start, those taken included, of all blades together", |view| {
         view.trials()

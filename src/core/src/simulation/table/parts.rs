@@ -7,7 +7,7 @@ use crate::{Error, Result, Rom, ranges};
 
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// What of a scene the variables depend on.
+/// Properties of a scene that the variables depend on.
 pub struct TableFacts<'a> {
     pub scene: &'a Scene,
     pub settings: &'a SceneSettings,
@@ -40,7 +40,7 @@ pub struct CarrierFacts<'a> {
     pub index: usize,
     pub structure: &'a StructureSettings,
     pub rom: &'a Rom,
-    /// Of open surfaces.
+    /// Whether the surfaces are open.
     pub open: bool,
 }
 

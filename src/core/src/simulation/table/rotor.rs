@@ -39,7 +39,7 @@ pub fn clearances(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts
     (each_node.dimension, each_node.display) = (Some(body.rom.contact_nodes.len()), Some(1));
 }
 
-/// What clearances are where there is nothing to touch.
+/// Describes clearances where there is nothing to touch.
 fn untouched(parts: &TableFacts, body: &BodyFacts) -> &'static str {
     let paired: usize = parts.plan.pairs_of(body.index).map(|(_, pair)| pair.nodes.len()).sum();
     if paired < body.rom.contact_nodes.len() { "; 1e9 m at nodes of no contact" } else { "" }

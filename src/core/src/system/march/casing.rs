@@ -17,7 +17,7 @@ use crate::system::pair::at_place;
 pub struct CarrierIntegrator {
     /// Which structure.
     pub structure: usize,
-    /// Its modes.
+    /// Modes of the structure.
     pub whole: SharedBody,
     /// `[row][mode]` of the rows that move control points, modes filled up to whole registers.
     shapes: Vec<f64>,
@@ -29,7 +29,7 @@ pub struct CarrierIntegrator {
     /// Displacements of these rows at the points of the step (m), and velocities at its start (m/s).
     moved: [Vec<f64>; POINTS],
     velocity: Vec<f64>,
-    /// Of each point of the step taken: what forces there work on, Σ_k S_ik of the displacements (m).
+    /// Displacements that forces at each point of the accepted step work on, Σ_k S_ik u_k (m).
     worked: [Vec<f64>; POINTS],
     /// Weights of the work of forces at each point of the step that is tried.
     pub ways: [[f64; POINTS]; POINTS],
@@ -117,7 +117,7 @@ impl CarrierIntegrator {
         at_place(spot.surface, spot.place, spot.frame, |row| self.velocity[row])
     }
 
-    /// What a force at point i of the step that is tried works on at a place (m), in the directions of the node.
+    /// Returns the displacement that a force at point i of the tried step works on at a place (m), in the directions of the node.
     pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> [f64; 3] {
         let (weights, moved) = (&self.ways[i], &self.moved);
         let way = |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
@@ -129,7 +129,7 @@ impl CarrierIntegrator {
         at_place(spot.surface, spot.place, spot.frame, |row| self.moved[point][row])
     }
 
-    /// What a force at point i of the step works on there (m), in the directions of the node.
+    /// Returns the displacement that a force at point i of the accepted step works on at a place (m), in the directions of the node.
     pub fn worked_at(&self, spot: Spot, i: usize) -> [f64; 3] {
         at_place(spot.surface, spot.place, spot.frame, |row| self.worked[i][row])
     }
@@ -239,7 +239,7 @@ impl CarrierIntegrator {
         }
     }
 
-    /// How modes move at point i under a force on a lane, in its directions.
+    /// Returns the motion of the modes at point i under a force on a lane, in its directions.
     fn move_modes(
         &mut self,
         (level, kind): (usize, ForceInterpolation),

@@ -34,7 +34,7 @@ pub struct CoupledSet {
     casings: Vec<CarrierIntegrator>,
     /// Which of these carries the surface of each pair.
     casing_of: Vec<Option<usize>>,
-    /// Of each touching structure.
+    /// Tables of each touching structure.
     tables: Vec<Vec<Tables>>,
     pub demand: StepGoal,
     bank: f64,
@@ -56,7 +56,7 @@ pub struct CoupledSector {
     pub sector: usize,
     /// Tables of its structure, and which of them are its own.
     table: [usize; 2],
-    /// Its disk, if its modes are those of one.
+    /// Disk of the sector, if its modes are those of a disk.
     disk: Option<usize>,
     trial: Trial,
     state: SectorState,
@@ -72,14 +72,14 @@ struct SceneMut<'a> {
     pairs: &'a mut [ContactPair],
 }
 
-/// What is marched.
+/// The set and the scene, as one system with adaptive steps.
 pub struct CoupledStepper<'a> {
     together: &'a mut CoupledSet,
     world: SceneMut<'a>,
 }
 
 impl CoupledSet {
-    /// Of the structures of a set, for spans up to `longest` (s) and errors of `tolerance` (m).
+    /// Makes the tables of the structures of a set, for spans up to `longest` (s) and errors of `tolerance` (m).
     pub fn new(
         set: usize,
         members: &[usize],

@@ -11,21 +11,21 @@ use crate::system::Structure;
 pub struct CoupledDisk {
     /// Which structure.
     pub structure: usize,
-    /// Its modes.
+    /// Modes of the disk.
     pub whole: SharedBody,
     /// Displacements of all contact rows at the points of the step (m), and velocities at its start (m/s), `[row][lane of sector]`.
     pub moved: [Vec<f64>; POINTS],
     pub velocity: Vec<f64>,
-    /// How all rows of any sector see the size of a coordinate; how far they can be from where they rest.
+    /// Largest displacement of all rows of any sector per unit of a coordinate; largest displacements of the rows from rest.
     sizes: Vec<f64>,
     amplitudes: Vec<f64>,
     pub reach: Vec<f64>,
-    /// Of the step that is judged (m).
+    /// Error of the judged step (m).
     pub error: f64,
 }
 
 impl CoupledDisk {
-    /// Of a structure, with polynomials of degree `degree`.
+    /// Makes the tables of a structure, with polynomials of degree `degree`.
     pub fn new(structure: usize, bank: &CyclicBank, degree: usize) -> Self {
         let (coordinates, shapes) = bank.coordinates_of();
         let rows = bank.rows() * bank.lanes();
@@ -56,7 +56,7 @@ impl CoupledDisk {
         bank.modal_forces(pushing, self.whole.forces_mut(0));
     }
 
-    /// How far the rows of any sector can be from where they rest while nothing pushes (m).
+    /// Finds the largest displacements of the rows of any sector from rest without contact (m).
     pub fn find_reach(&mut self, bank: &CyclicBank) {
         self.whole.amplitudes(&mut self.amplitudes);
         bank.reach(&self.amplitudes, &self.sizes, &mut self.reach);
