@@ -9,11 +9,11 @@ use tiprub_shell::{
 /// One line of the answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnswerLine {
-    /// What it is about: a word.
+    /// Name of the result.
     pub name: &'static str,
-    /// Its value and unit; `None` where the scene does not have it.
+    /// Value and unit; `None` if the scene does not have it.
     pub value: Option<(f64, &'static str)>,
-    /// What the value stands for, or why there is none.
+    /// Meaning of the value, or why there is none.
     pub meaning: String,
 }
 

@@ -11,7 +11,7 @@ use tiprub_model::{
 /// Share of a casing's length before the first and behind the last contact ring, where no positions are given.
 const MARGIN: f64 = 0.1;
 
-/// What a casing looks like; absent options are those of casing37.
+/// Shape of a casing; absent options are those of casing37.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct RingArguments {
     /// Inner contour as points z:r in m, by growing z (the tip of rotor 37 and the design gap when absent).
@@ -47,10 +47,10 @@ pub struct RingArguments {
     pub mesh: Option<MeshSize>,
 }
 
-/// What describes a casing; absent options are those of casing37.
+/// Options of a casing; absent options are those of casing37.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct CasingArguments {
-    /// What it looks like.
+    /// Shape of the casing.
     #[command(flatten)]
     pub ring: RingArguments,
     /// End faces that are held [default: low].
@@ -65,7 +65,7 @@ pub struct CasingArguments {
     /// Fixed-interface modes to reduce with [default: 156].
     #[arg(long, value_name = "N")]
     pub fixed_interface_modes: Option<usize>,
-    /// What is written; a casing other than casing37 is called casing.
+    /// Output options; a casing other than casing37 is called casing.
     #[command(flatten)]
     pub written: OutputArguments,
 }

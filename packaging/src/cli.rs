@@ -39,12 +39,12 @@ pub struct Cli {
     /// No progress on stderr; results, warnings and errors are still printed.
     #[arg(long, short, global = true, display_order = 901)]
     pub quiet: bool,
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What to do.
+/// All commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// All steps on a real blade: reduce rotor 37, package both FMUs, import and run them, write a report.
@@ -138,7 +138,7 @@ pub struct PackageArguments {
     /// Libraries that go into the FMU.
     #[command(flatten)]
     pub libraries: LibraryArguments,
-    /// What is added to the scene.
+    /// Changes to the scene.
     #[command(flatten)]
     pub options: SceneOptions,
     /// Where built-in models are kept.
@@ -175,7 +175,7 @@ pub struct RunArguments {
     /// runs. The error of the mesh is printed if the ROM contains it (`tiprub study convergence --into`).
     #[arg(long)]
     pub estimate: bool,
-    /// What is added to the scene.
+    /// Changes to the scene.
     #[command(flatten)]
     pub options: SceneOptions,
     /// Where built-in models are kept.
@@ -192,7 +192,7 @@ pub struct InspectArguments {
     /// Also measure the computing time of each effect that a scene leaves out, over its first 100 communication steps.
     #[arg(long)]
     pub measure: bool,
-    /// What is added to the scene.
+    /// Changes to the scene.
     #[command(flatten)]
     pub options: SceneOptions,
     /// Where built-in models are kept.
@@ -203,7 +203,7 @@ pub struct InspectArguments {
 /// Arguments of `tiprub study`.
 #[derive(Debug, Args)]
 pub struct StudyArguments {
-    /// What to study.
+    /// The study.
     #[command(subcommand)]
     pub study: StudyCommand,
 }
@@ -273,7 +273,7 @@ mod tests {
         Cli::command().debug_assert();
     }
 
-    /// Of a command and all of its subcommands.
+    /// Checks the help of a command and all of its subcommands.
     fn explained(command: &clap::Command, name: &str) {
         for command in command.get_subcommands().filter(|command| command.get_name() != "help") {
             let name = format!("{name} {}", command.get_name());

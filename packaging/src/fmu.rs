@@ -34,18 +34,18 @@ pub const MOST_SCALARS: usize = 300;
 /// Most variables of an FMU without arrays: each takes half a kilobyte of its description, and importers hold all of it in memory.
 pub const MOST_VARIABLES: usize = 100_000;
 
-/// What FMI-LS-REF says of a file of an FMU: path, MIME type, role, description.
+/// Entry of FMI-LS-REF for a file of an FMU: path, MIME type, role, description.
 pub type Related<'a> = (&'a str, &'a str, &'a str, &'a str);
 
 /// The scene inside the FMU.
 const SCENE: Related = ("resources/scene.toml", "application/toml", "model", "The scene this FMU was made from");
 
-/// What stands above all variables on the page inside the FMU.
+/// Text above all variables on the page inside the FMU.
 const ABOUT: &str = "This unit marches reduced-order models of flexible structures in time, together with their unilateral \
     contact against a surface around them, rigid or flexible. The importer sets inputs, calls the unit step by step, and reads clearances, \
     forces, torques and energies. Inside each communication step the unit takes as many smaller steps of its own \
     as its time step asks for, and lands exactly on the communication point.";
-/// What is to be known of its steps.
+/// Text about the steps of the FMU.
 const STEPS: &str = "A communication step is usually much longer than an impact. Forces and torques are therefore given as \
     averages over the step just finished, and extremes within it stand beside them.";
 

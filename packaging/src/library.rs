@@ -42,7 +42,7 @@ const LARGEST: u64 = 1 << 30;
 /// Extensions of libraries; a directory may hold other files too.
 const EXTENSIONS: [&str; 3] = ["so", "dll", "dylib"];
 
-/// What a library makes of the resources of an FMU.
+/// Kind of FMU that a library makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LibraryUnit {
     /// Contact of a scene.
@@ -60,7 +60,7 @@ impl LibraryUnit {
         }
     }
 
-    /// What names of installed libraries begin with.
+    /// Returns the beginning of the names of installed libraries.
     fn prefix(self) -> &'static str {
         match self {
             Self::Scene => "",
@@ -92,7 +92,7 @@ fn release(bytes: &[u8]) -> Option<String> {
 /// The FMU's code for one platform.
 #[derive(Debug, Clone)]
 pub struct Library {
-    /// What it runs on.
+    /// Platform of the library.
     pub platform: Platform,
     /// The file.
     pub bytes: Vec<u8>,

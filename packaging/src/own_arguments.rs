@@ -23,18 +23,18 @@ pub struct BladeArguments {
     /// Contact nodes.
     #[command(flatten)]
     pub tips: TipOptions,
-    /// What is read.
+    /// Input options.
     #[command(flatten)]
     pub blade: BladeOptions,
-    /// What it becomes.
+    /// Reduction options.
     #[command(flatten)]
     pub kept: KeptOptions,
-    /// What is written.
+    /// Output options.
     #[command(flatten)]
     pub written: OutputArguments,
 }
 
-/// What blades are read from.
+/// Input of blades.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct BladeOptions {
     /// Number of uncoupled blades around the axis [default: 1].
@@ -53,7 +53,7 @@ pub struct BladeOptions {
     /// Nodes where stress is recovered: a set, or numbers of nodes in the file, such as 12,57,103.
     #[arg(long, value_name = "SET", conflicts_with = "stiffness")]
     pub stress_set: Option<String>,
-    /// What is read.
+    /// Input options.
     #[command(flatten)]
     pub model: ModelOptions,
     /// Matrices.
@@ -94,7 +94,7 @@ pub struct FromMesh {
     /// repeated; two or more let the error of the mesh be read.
     #[arg(long = "other-mesh", value_name = "FILE", help_heading = MESH, requires = "file", conflicts_with = "stiffness")]
     pub others: Vec<PathBuf>,
-    /// Its options.
+    /// Options of the blade.
     #[command(flatten, next_help_heading = MESH)]
     pub blade: BladeOptions,
 }
@@ -147,16 +147,16 @@ pub struct SectorArguments {
     /// Contact nodes.
     #[command(flatten)]
     pub tips: TipOptions,
-    /// What is read.
+    /// Input options.
     #[command(flatten)]
     pub model: ModelOptions,
     /// Matrices.
     #[command(flatten)]
     pub matrices: MatrixOptions,
-    /// What it becomes.
+    /// Reduction options.
     #[command(flatten)]
     pub kept: KeptOptions,
-    /// What is written.
+    /// Output options.
     #[command(flatten)]
     pub written: OutputArguments,
 }
@@ -182,13 +182,13 @@ pub struct CasingMeshArguments {
     /// Fixed-interface modes to reduce with; `--modes` is the number of modes kept in the ROM [default: 156].
     #[arg(long, value_name = "N")]
     pub fixed_interface_modes: Option<usize>,
-    /// What is read.
+    /// Input options.
     #[command(flatten)]
     pub model: ModelOptions,
-    /// What it becomes.
+    /// Reduction options.
     #[command(flatten)]
     pub kept: KeptOptions,
-    /// What is written.
+    /// Output options.
     #[command(flatten)]
     pub written: OutputArguments,
 }
@@ -213,7 +213,7 @@ pub struct TipOptions {
     pub contact_names: Vec<String>,
 }
 
-/// What every model of one's own takes.
+/// Options of every user mesh.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct ModelOptions {
     /// Set of nodes that can touch. With more than 12 nodes it is a tip, and contact is on patches; with fewer all of them are contact nodes,
@@ -247,7 +247,7 @@ pub struct ModelOptions {
     pub temperature: Option<f64>,
 }
 
-/// What a model of one's own becomes.
+/// Reduction options of a user mesh.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct KeptOptions {
     /// Modes kept [default: 25, of blades with patches up to 80, of a disk per nodal diameter; 60 of a casing].
@@ -278,7 +278,7 @@ pub struct MatrixOptions {
     pub dofs: Option<PathBuf>,
 }
 
-/// What is read of a model of one's own, whatever it becomes.
+/// Input of a user mesh, of any kind.
 #[derive(Debug, Clone)]
 pub struct MeshSource<'a> {
     /// Mesh file.
@@ -287,26 +287,26 @@ pub struct MeshSource<'a> {
     pub model: &'a ModelOptions,
     /// Matrices, where they can be given.
     pub matrices: Option<&'a MatrixOptions>,
-    /// What it becomes.
+    /// Reduction options.
     pub kept: KeptOptions,
 }
 
 impl BladeArguments {
-    /// What is read.
+    /// Returns the input.
     pub fn source(&self) -> MeshSource<'_> {
         self.blade.source(self.file.as_deref(), self.kept.clone())
     }
 }
 
 impl BladeOptions {
-    /// What is read, with this mesh file.
+    /// Returns the input, with this mesh file.
     pub fn source<'a>(&'a self, file: Option<&'a Path>, kept: KeptOptions) -> MeshSource<'a> {
         MeshSource { file, model: &self.model, matrices: Some(&self.matrices), kept }
     }
 }
 
 impl SectorArguments {
-    /// What is read.
+    /// Returns the input.
     pub fn source(&self) -> MeshSource<'_> {
         let file = self.file.as_deref();
         MeshSource { file, model: &self.model, matrices: Some(&self.matrices), kept: self.kept.clone() }
@@ -314,7 +314,7 @@ impl SectorArguments {
 }
 
 impl CasingMeshArguments {
-    /// What is read.
+    /// Returns the input.
     pub fn source(&self) -> MeshSource<'_> {
         MeshSource { file: Some(&self.file), model: &self.model, matrices: None, kept: self.kept.clone() }
     }

@@ -21,12 +21,12 @@ use crate::{
 /// Arguments of `tiprub reduce`.
 #[derive(Debug, Args)]
 pub struct ReduceArguments {
-    /// What to reduce.
+    /// The model.
     #[command(subcommand)]
     pub model: ModelToReduce,
 }
 
-/// What can be reduced.
+/// Models that can be reduced.
 #[derive(Debug, Subcommand)]
 pub enum ModelToReduce {
     /// Blades of your own on a rigid hub: a mesh (CalculiX/Abaqus .inp, Gmsh 4.1 .msh), or matrices of any code.
@@ -98,7 +98,7 @@ pub struct Rotor37Arguments {
     /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s).
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
     pub spin: Option<f64>,
-    /// What is written.
+    /// Output options.
     #[command(flatten)]
     pub written: OutputArguments,
 }
@@ -175,7 +175,7 @@ pub struct StageArguments {
     /// Which modes are kept [default: free-interface; craig-bampton with contact nodes].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
-    /// What is written.
+    /// Output options.
     #[command(flatten)]
     pub written: OutputArguments,
 }
@@ -201,7 +201,7 @@ pub struct StageCasingArguments {
     /// Material [default: titanium].
     #[arg(long, value_enum)]
     pub material: Option<MaterialChoice>,
-    /// What is written.
+    /// Output options.
     #[command(flatten)]
     pub written: OutputArguments,
 }
@@ -221,7 +221,7 @@ pub struct CubeArguments {
     /// Mass matrix of the finite elements [default: lumped].
     #[arg(long, value_enum)]
     pub mass_matrix: Option<MassChoice>,
-    /// What is written.
+    /// Output options.
     #[command(flatten)]
     pub written: OutputArguments,
 }
@@ -238,7 +238,7 @@ pub struct CubeRingArguments {
     /// Mass matrix of the finite elements [default: lumped].
     #[arg(long, value_enum)]
     pub mass_matrix: Option<MassChoice>,
-    /// What is written.
+    /// Output options.
     #[command(flatten)]
     pub written: OutputArguments,
 }
@@ -262,7 +262,7 @@ impl From<MassChoice> for MassMatrix {
 }
 
 impl ModelToReduce {
-    /// What it writes.
+    /// Returns the output options.
     pub fn written(&self) -> &OutputArguments {
         match self {
             Self::Blade(own) => &own.written,

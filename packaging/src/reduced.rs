@@ -31,7 +31,7 @@ pub struct ReducedModel {
     pub free_dofs: usize,
     /// Largest relative residual of the full modes, where it is known.
     pub largest_residual: Option<f64>,
-    /// How well the spin arrays hold; empty where none were asked for.
+    /// Quality of the spin arrays; empty if they were not requested.
     pub spin_checks: Vec<SpinCheck>,
     /// Wall time (s).
     pub seconds: f64,
@@ -41,7 +41,7 @@ pub struct ReducedModel {
     pub faces: Option<[String; 2]>,
     /// Mode shapes for pictures.
     pub fields: Vec<NodalField>,
-    /// What was read, where it was a file: for people, and for programs.
+    /// Description of the file that was read: for people, and for programs.
     pub read: (String, Value),
     /// Warnings.
     pub warnings: Vec<String>,

@@ -110,7 +110,7 @@ impl RomFacts {
         })
     }
 
-    /// What its checks say against a ROM: one line per mode beyond the limits, first modes only.
+    /// Returns the warnings of the checks of a ROM: one line per mode beyond the limits, first modes only.
     pub fn warnings(&self) -> Vec<Warning> {
         let checks = self.checks();
         // A deviation of rigid-body modes compares one rounding with another.
@@ -129,12 +129,12 @@ impl RomFacts {
         poor.collect()
     }
 
-    /// What in the ROM is rarely meant.
+    /// Returns values of the ROM that are rarely meant.
     pub fn slips(&self) -> Vec<Slip> {
         plausibility::of_rom(&self.rom, self.frequencies.iter().map(|hertz| hertz * std::f64::consts::TAU))
     }
 
-    /// How many of the checked modes are to be good.
+    /// Returns the number of checked modes that should be accurate.
     fn first_modes(&self) -> usize {
         let (sectors, numbers) = (self.rom.sectors, &self.rom.checks.nodal_diameters);
         if numbers.is_empty() {
@@ -222,7 +222,7 @@ impl RomFacts {
         text
     }
 
-    /// What the reduction leaves of the response at the contact nodes.
+    /// Writes the deviations of the response at the contact nodes.
     fn write_responses(&self, text: &mut String) {
         let checks = &self.rom.checks;
         let worst = |values: &[f64]| values.iter().fold(0.0, |worst: f64, value| worst.max(*value));
@@ -277,7 +277,7 @@ impl RomFacts {
         if senses.is_empty() { "none".to_owned() } else { senses.join("; ") }
     }
 
-    /// What the limits hold for.
+    /// Describes the conditions of the limits.
     pub(crate) fn steps_hold_for(&self) -> String {
         match self.sliding {
             Some(KnownContact { friction, speed }) if friction > 0.0 && !self.rom.is_cyclic() => {
@@ -407,7 +407,7 @@ impl RomFacts {
     }
 }
 
-/// What the rows of a long table of checks that are not shown amount to.
+/// Summary of the rows of a long table of checks that are not shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct OmittedRows {
     pub count: usize,

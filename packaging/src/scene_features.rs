@@ -206,7 +206,7 @@ fn limits_of_flight(settings: &SceneSettings) -> [&'static str; 5] {
     ]
 }
 
-/// What holds the blades together, and what speed does to them. Coupled blades are refused with stiffening.
+/// Describes the connection of the blades, and the effects of speed. Coupled blades are rejected with stiffening.
 fn blades(coupled: bool, stiffens: bool) -> &'static str {
     match (coupled, stiffens) {
         (true, _) => {

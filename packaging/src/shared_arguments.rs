@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use tiprub_model::{Material, reduce::ReductionKind};
 
-/// What every reduction writes.
+/// Output options of every reduction.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Args)]
 pub struct OutputArguments {
     /// ROM file to write [default: NAME.rom.safetensors with the name of the model].

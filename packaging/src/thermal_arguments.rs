@@ -77,7 +77,7 @@ impl ThermalArguments {
         })
     }
 
-    /// How FILE is read.
+    /// Returns the input options of FILE.
     pub fn model(&self) -> ModelOptions {
         ModelOptions {
             contact_set: self.contact_set.clone(),

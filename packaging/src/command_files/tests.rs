@@ -98,7 +98,7 @@ fn every_argument_that_names_a_file_is_known_as_read_or_written() {
     assert_eq!(found, known);
 }
 
-/// What `check` answers to a command line.
+/// Returns the result of `check` for a command line.
 fn answer(line: &str) -> Result<(), tiprub_shell::Failure> {
     let words = std::iter::once("tiprub").chain(line.split_whitespace());
     check(&Cli::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}")).command)

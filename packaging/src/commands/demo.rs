@@ -50,7 +50,7 @@ const LARGEST_SCENE: u64 = 1 << 20;
 const STUDY: &str = "error against run time of every method: see the picture in the report; to measure it here (minutes), run\n  \
                      tiprub study error builtin:rotor37 --quick\n";
 
-/// What to do about a scene in the directory that somebody changed.
+/// Remedy for a scene in the directory that somebody changed.
 const KEEP: &str = "Give the demo another directory with --out, or copy your file elsewhere and delete it here";
 
 /// Wall times of the parts of the demo.

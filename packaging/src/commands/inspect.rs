@@ -154,7 +154,7 @@ fn inspect_resources(fmu: &UnpackedFmu, measure: bool, console: &Console) -> Res
     describe_scene(&resources.scene, measure, console).map(Some)
 }
 
-/// What there is to know of a scene.
+/// Description of a scene.
 struct Described {
     text: String,
     warnings: Vec<Warning>,

@@ -22,7 +22,7 @@ use tiprub_study::estimate::{self, Estimate};
 
 use crate::{answer, cli::RunArguments, scene_features};
 
-/// What adaptive steps may leave a closed contact open or inside by (m); 0 with fixed steps.
+/// Largest gap or depth of a closed contact with adaptive steps (m); 0 with fixed steps.
 fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
     if settings.time.scheme != Scheme::Galerkin {
         return 0.0;
@@ -117,7 +117,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
     Ok(CommandOutcome { text, warnings: run.warnings, rest, json })
 }
 
-/// What stands behind the answer and the warnings.
+/// Returns the last lines, which say where the rest of the results is.
 fn where_the_rest_is(json: &Value, warned: bool) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
     let mut text = format!(
@@ -138,7 +138,7 @@ fn where_the_rest_is(json: &Value, warned: bool) -> String {
     text
 }
 
-/// What the run leaves, where asked for; else what the ROM of the master says of itself.
+/// Returns the errors of the run if requested, else those that the ROM of the master carries.
 fn estimated(scene: &Scene, arguments: &RunArguments, schedule: &Schedule, console: &Console) -> Result<Vec<Estimate>> {
     if !arguments.estimate {
         return Ok(estimate::of_rom(&scene.roms[tiprub_study::master(scene)]));
@@ -159,7 +159,7 @@ fn lines(estimates: &[Estimate]) -> String {
 /// Longer arrays are told by their range.
 const MOST_LISTED: usize = 12;
 
-/// What a user looks for, last, where the eye is: extremes, warnings, files.
+/// Returns the most useful results, which come last, near the prompt: extremes, warnings, files.
 fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
     let number = |name: &str| json[name].as_f64().unwrap_or(f64::NAN);
     let per_step = |name: &str| json["milliseconds_per_communication_step"][name].as_f64().unwrap_or(f64::NAN);

@@ -16,7 +16,7 @@ pub use table::{EFFECTS, Effect, RowGroup};
 /// Communication steps whose time is measured.
 const MEASURED_STEPS: usize = 100;
 
-/// What an effect adds to a scene.
+/// Cost that an effect adds to a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
     /// Variables, as scalars.
@@ -33,7 +33,7 @@ pub struct Cost {
 pub struct LeftOut {
     /// Which one.
     pub effect: &'static Effect,
-    /// What it would add, or why this scene cannot have it as it stands; `None` where keys alone do not do it.
+    /// Cost, or why this scene cannot have the effect as it stands; `None` if keys alone are not enough.
     pub cost: Option<Result<Cost, FeatureRefusal>>,
 }
 
@@ -203,7 +203,7 @@ mod tests {
         }
     }
 
-    /// What a key switches on is there afterwards; what the scene has is not listed.
+    /// An effect that a key switches on is present afterwards; effects that the scene has are not listed.
     #[test]
     fn effects_that_keys_add_are_found_in_the_scene_that_has_them() {
         let scene = rub(4);

@@ -8,7 +8,7 @@ use tiprub_core::{
     },
 };
 
-/// What a row is about.
+/// Topic of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowGroup {
     /// A physical effect.
@@ -19,11 +19,11 @@ pub enum RowGroup {
 
 /// Something that a scene has or leaves out.
 pub struct Effect {
-    /// Its name.
+    /// Name of the effect.
     pub name: &'static str,
-    /// What it is about.
+    /// Topic of the effect.
     pub group: RowGroup,
-    /// What it would take.
+    /// Keys or models that the effect needs.
     pub takes: &'static str,
     /// Whether it means anything for a scene.
     pub concerns: fn(&Scene) -> bool,

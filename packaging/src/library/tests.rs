@@ -1,6 +1,6 @@
 use super::*;
 
-/// What a library of an FMU has somewhere.
+/// Text that every library of an FMU contains.
 const FUNCTIONS: &[u8] = b"fmi2DoStep\0fmi3DoStep\0";
 
 /// Both functions and this release.

@@ -7,7 +7,7 @@ use tiprub_study::estimate::Estimate;
 
 use crate::rom_facts::RomFacts;
 
-/// What an imported run has to say in the report.
+/// Results of an imported run for the report.
 #[derive(Debug, Clone)]
 pub struct ImportedSummary {
     /// For example `FMI 2.0`.
@@ -23,7 +23,7 @@ pub struct ImportedSummary {
 pub struct ReportFile {
     /// File name, relative to the report.
     pub name: String,
-    /// What it is.
+    /// Meaning of the value.
     pub meaning: String,
     /// Size in bytes.
     pub bytes: u64,
@@ -33,7 +33,7 @@ pub struct ReportFile {
 pub struct ReportInput<'a> {
     /// The scene.
     pub scene: &'a Scene,
-    /// Its variables.
+    /// Variables of the run.
     pub table: &'a VariableTable,
     /// Full model and modes, where they are at hand.
     pub reduction: Option<&'a Reduction>,
@@ -45,7 +45,7 @@ pub struct ReportInput<'a> {
     pub native: &'a NativeRun,
     /// The runs through the C ABIs.
     pub imported: &'a [ImportedSummary],
-    /// What steps, modes, patches and mesh are estimated to leave; empty where nobody asked.
+    /// Estimated errors of steps, modes, patches and mesh; empty if not requested.
     pub estimates: &'a [Estimate],
     /// The same run with the paper's model and method, and its variables.
     pub paper: Option<(&'a VariableTable, &'a NativeRun)>,

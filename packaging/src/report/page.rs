@@ -200,7 +200,7 @@ fn run_section(input: &ReportInput<'_>) -> String {
     html
 }
 
-/// What an internal step of a scene moves.
+/// Describes the motion in an internal step of a scene.
 fn step_of(settings: &SceneSettings) -> &'static str {
     if settings.time.scheme == Scheme::Galerkin { "one blade, native" } else { "whole disk, native" }
 }

@@ -68,7 +68,7 @@ impl<'a> Results<'a> {
         self.recording.times.iter().zip(column).map(|(time, value)| (1e3 * time, factor * value)).collect()
     }
 
-    /// What the contact nodes do over time: a line for each of a few, a map of more. Empty where the scene has no such output.
+    /// Draws the contact nodes over time: a line for each of a few, a map of more. Empty if the scene has no such output.
     fn per_node(&self, quantity: Quantity, nodes: &[String], (label, factor, shows): LabelledUnit) -> Result<String> {
         let columns = self.columns(quantity);
         if columns.is_empty() {
@@ -129,7 +129,7 @@ pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, Stri
     ])
 }
 
-/// What the laboratory measured, with the command that measures it on this machine.
+/// Shows the error study of the laboratory, with the command that measures it on this machine.
 fn error_study() -> NumberedFigure {
     // The picture has its own paper and its own legend.
     let body = format!("<div class=\"scroll adapts\">{ERROR_PICTURE}</div>");
@@ -203,7 +203,7 @@ fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Numb
     Ok(figures)
 }
 
-/// What the time between contacts shows, for the casing shapes of which it can be said.
+/// Describes the time between contacts, for casing shapes for which it is known.
 fn passing(input: &ReportInput<'_>) -> &'static str {
     match input.scene.settings.surfaces.first().map(|surface| &surface.shape) {
         Some(Shape::TwoLobe { .. }) => {

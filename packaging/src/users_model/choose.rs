@@ -17,7 +17,7 @@ use crate::own_arguments::{BladeOptions, CasingMeshArguments, ModelOptions, Sect
 /// Share of the largest radius by which nodes of the two faces of a sector may miss each other.
 const FACE_TOLERANCE: f64 = 1e-5;
 
-/// What is reduced, chosen from what was read.
+/// Nodes and options of the reduction, chosen from the input.
 pub struct Chosen {
     /// Places whose stress the ROM recovers.
     pub stress: StressPlaces,
@@ -97,7 +97,7 @@ pub fn tips(
 /// Nodes that may touch, whether they were given by number, and the tip with whether they are its.
 type Candidates = (Vec<usize>, bool, Option<(FoundTip, bool)>);
 
-/// Those of the contact set, or of the tip where there is no set.
+/// Returns the nodes of the contact set, or of the tip if there is no set.
 fn candidates(imported: &Imported, asked: &ModelOptions, fixed: &[usize]) -> Result<Candidates> {
     let mesh = imported.model.mesh.as_ref().map(|(mesh, _)| mesh);
     let found = mesh.map(|mesh| find_tip(mesh, fixed).map_err(failure)).transpose();

@@ -13,7 +13,7 @@ use tiprub_model::{
 use super::choose::Chosen;
 use crate::own_arguments::ModelOptions;
 
-/// What was read and chosen, for people and for programs.
+/// Describes the input and the choices, for people and for programs.
 pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (String, Value) {
     let model = &imported.model;
     let [low, high] = bounding_box(&model.nodes);

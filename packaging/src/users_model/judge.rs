@@ -13,7 +13,7 @@ use crate::own_arguments::{ModelOptions, UnitChoice};
 /// First natural frequencies (Hz) of things that are built lie in here.
 const USUAL_FREQUENCIES: [f64; 2] = [1.0, 1e6];
 
-/// What cannot be meant is refused, unless the units are said to be SI; what is unusual is asked about.
+/// Rejects values that cannot be meant, unless the units are said to be SI; asks about unusual values.
 pub fn judge(imported: &Imported, asked: &ModelOptions) -> Result<Vec<String>> {
     let found = plausibility(&imported.model, &imported.materials);
     let question = |list: &[String]| format!("{}: is that meant?", list.join("; "));

@@ -150,7 +150,7 @@ pub fn conducting(file: &Path, asked: &ModelOptions, console: &Console) -> Resul
     Ok(ConductingMesh { mesh, material, set: set.map(|(nodes, _)| nodes), warnings })
 }
 
-/// What [`conducting`] reads.
+/// Input of [`conducting`].
 pub struct ConductingMesh {
     /// Mesh.
     pub mesh: Mesh,
@@ -158,7 +158,7 @@ pub struct ConductingMesh {
     pub material: Material,
     /// Nodes of the inner surface, where a set is named.
     pub set: Option<Vec<usize>>,
-    /// What is unusual.
+    /// Unusual properties.
     pub warnings: Vec<String>,
 }
 

@@ -12,7 +12,7 @@ use crate::progress::{Listener, ReductionStage, report};
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, Result};
 
-/// How many elements are computed in parallel before their matrices are added to the global ones.
+/// Number of elements that are computed in parallel before their matrices are added to the global ones.
 const CHUNK: usize = 256;
 
 /// Stiffness (N/m) and consistent mass (kg) of the whole mesh; dof 3·node + component, no boundary applied.

@@ -45,7 +45,7 @@ pub fn craig_bampton(
     craig_bampton_with(stiffness, mass, interface, &inner, listener)
 }
 
-/// What describes the motion of the interior with the interface held.
+/// Motion of the interior with the interface held.
 #[derive(Debug, Clone, Copy)]
 pub struct InnerBasis<'a> {
     /// Number of fixed-interface modes.

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::element::ElementKind;
 
-/// What can go wrong on the way from a mesh to a reduced model.
+/// Error on the way from a mesh to a reduced model.
 #[derive(Debug, Error)]
 pub enum Error {
     /// A value, set or count is outside what the method allows.
@@ -14,9 +14,9 @@ pub enum Error {
     Invalid {
         /// The field, set or array.
         what: String,
-        /// What is wrong with it, with its value.
+        /// The problem, with the value.
         problem: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
     /// An element is turned inside out or degenerate.
@@ -28,7 +28,7 @@ pub enum Error {
     NegativeJacobian {
         /// Number of the element, counted from 1 as in an exported file.
         element: usize,
-        /// Its kind.
+        /// Kind of the element.
         kind: ElementKind,
         /// Integration point, counted from 1.
         point: usize,
@@ -40,7 +40,7 @@ pub enum Error {
     NotPositiveDefinite {
         /// Which matrix.
         matrix: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
     /// The eigenvalue iteration ended before all wanted pairs were found.
@@ -66,9 +66,9 @@ pub enum Error {
     Read {
         /// File and line (from 1), or byte of a binary file, or record.
         place: String,
-        /// What is wrong there.
+        /// The problem.
         problem: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
     /// A file could not be read or written.
@@ -76,7 +76,7 @@ pub enum Error {
     File {
         /// Which file.
         path: PathBuf,
-        /// What the system said.
+        /// The message of the operating system.
         source: std::io::Error,
     },
 }

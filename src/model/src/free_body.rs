@@ -21,14 +21,14 @@ use crate::reduce::{
 /// Rigid-body motions.
 const RIGID: usize = 6;
 
-/// What to reduce a body to, and what to call it.
+/// Options of the reduction of a free body.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FreeBodyOptions {
     /// Name of the structure.
     pub name: String,
     /// Which modes are kept.
     pub kind: ReductionKind,
-    /// How many: with the contact held, or beside the rigid-body motions. All where absent, and the reduction is then exact.
+    /// Number of modes: with the contact held, or besides the rigid-body motions. All if absent, and the reduction is then exact.
     pub modes: Option<usize>,
     /// Number of modes compared with the full model, the six rigid-body motions among them.
     pub checked_modes: usize,

@@ -50,7 +50,7 @@ pub struct SurfacePoint {
     pub position: [f64; 3],
 }
 
-/// How much of a face lies in a patch.
+/// Part of a face that lies in a patch.
 enum CoveredFace {
     Nothing,
     Whole,
@@ -275,7 +275,7 @@ pub struct InnerSurface<'a> {
 struct Border {
     /// Times that it goes around the axis, with its sense.
     turns: f64,
-    /// Its nodes, ascending.
+    /// Nodes, ascending.
     nodes: Vec<usize>,
     /// Means of x and y along it (m).
     middle: [f64; 2],

@@ -17,7 +17,7 @@ use faer::sparse::linalg::amd;
 use crate::pattern::Pattern;
 use graph::Graph;
 
-/// How the elimination order is found.
+/// Method that finds the elimination order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Ordering {
     /// Nested dissection where it pays, which is from a few thousand degrees of freedom on.

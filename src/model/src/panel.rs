@@ -59,7 +59,7 @@ impl PanelGrid {
     }
 }
 
-/// What to reduce to, and what to call it.
+/// Options of the reduction of a panel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PanelOptions {
     /// Name of the structure.

@@ -17,7 +17,7 @@ pub(crate) struct Places {
     across: Vec<f64>,
     /// Whether the set lies in one plane across the axis.
     flat: bool,
-    /// Of the chord on the developed surface, z and rθ.
+    /// Direction of the chord on the developed surface, z and rθ.
     chord: [f64; 2],
     /// Cosine and sine of the angle that rθ is counted from.
     middle: [f64; 2],
@@ -70,7 +70,7 @@ impl Places {
         high - low
     }
 
-    /// How far along the chord of the set a point stands, 0 to 1 between its ends.
+    /// Returns the position of a point along the chord of the set, 0 to 1 between its ends.
     pub(crate) fn share_along(&self, point: [f64; 3]) -> f64 {
         let [low, high] = extent(&self.along);
         let [cz, cs] = self.chord;

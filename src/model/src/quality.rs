@@ -3,7 +3,7 @@
 use crate::element::ElementKind;
 use crate::mesh::Mesh;
 
-/// How well an element, or the worst of a mesh, is shaped.
+/// Shape quality of an element, or the worst of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElementQuality {
     /// Scaled Jacobian: over the corners, the least triple product of the unit tangents of the three edges that meet there,

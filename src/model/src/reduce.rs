@@ -33,7 +33,7 @@ use outcome::build_rom;
 pub(crate) use outcome::{contact_node, description, direction, element_names, interface, responses};
 use response::{ContactResponse, with_responses};
 
-/// How the motion of a structure is described beside its static responses to contact forces.
+/// Coordinates of a structure besides its static responses to contact forces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ReductionKind {
     /// Modes of the structure with its contact nodes held (Craig and Bampton): the paper's.
@@ -53,14 +53,14 @@ impl ReductionKind {
     }
 }
 
-/// What to reduce to, and what to call it.
+/// Options of a reduction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReductionOptions {
     /// Name of the structure.
     pub name: String,
     /// Which modes are kept.
     pub kind: ReductionKind,
-    /// How many.
+    /// Number of modes.
     pub modes: usize,
     /// Number of modes of the full model that are computed and compared with the reduced ones.
     pub checked_modes: usize,
@@ -106,7 +106,7 @@ pub struct Reduction {
     pub reduced_angular_frequencies: Vec<f64>,
     /// Natural frequencies with the contact nodes held (Hz).
     pub fixed_interface_frequencies: Vec<f64>,
-    /// How well the spin arrays hold, at half the largest speed and at the largest; empty where none were asked for.
+    /// Quality of the spin arrays, at half the largest speed and at the largest; empty if they were not requested.
     pub spin_checks: Vec<SpinCheck>,
 }
 
@@ -244,7 +244,7 @@ pub struct FullModes {
     pub modes: EigenModes,
     /// K - σM.
     shifted: SparseMatrix,
-    /// Its factor.
+    /// Factor of the matrix.
     factor: Factor,
     /// σ.
     shift: f64,

@@ -217,7 +217,7 @@ impl RecoveredStress {
         WatchedPoints { map, points: self.points.clone() }
     }
 
-    /// Of displacements (free dofs × 1), 6·places × 1.
+    /// Returns the stresses of displacements (free dofs × 1), 6·places × 1.
     pub(crate) fn elastic(&self, moved: &Mat<f64>) -> DMatrix<f64> {
         let stress = tall_product(self.rows.as_ref(), moved.as_ref());
         DMatrix::from_fn(stress.nrows(), 1, |row, _| stress[(row, 0)])

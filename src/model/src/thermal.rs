@@ -83,7 +83,7 @@ pub fn patch_of_elements(mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Vec<Op
     Ok(found)
 }
 
-/// What patches have of an element.
+/// Part of an element that belongs to patches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ElementShare {
     /// No patch holds any of it.
@@ -94,7 +94,7 @@ pub(crate) enum ElementShare {
     Divided,
 }
 
-/// What patches have of each element.
+/// Returns the part of each element that belongs to patches.
 ///
 /// # Errors
 /// Those of [`patch_of_elements`].

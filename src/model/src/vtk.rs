@@ -19,7 +19,7 @@ use crate::{Error, Result};
 pub struct NodalField {
     /// Name under which ParaView shows it.
     pub name: String,
-    /// Its values.
+    /// Values at the nodes.
     pub values: Values,
 }
 

@@ -7,7 +7,7 @@ use tiprub_core::{Scene, warning::Topic};
 use tiprub_gallery::{rom_cache::RomCache, scene_source};
 use tiprub_shell::console::Console;
 
-/// What all studies take.
+/// Options of all studies.
 #[derive(Debug, Args)]
 pub struct StudyCommon {
     /// Directory for everything the study writes; created if missing [default: study-STUDY].
@@ -16,7 +16,7 @@ pub struct StudyCommon {
     /// Few and short runs: seconds instead of minutes, for a first look.
     #[arg(long)]
     pub quick: bool,
-    /// What is added to the scene.
+    /// Changes to the scene.
     #[command(flatten)]
     pub options: SceneOptions,
     /// Where built-in models are kept.
@@ -47,7 +47,7 @@ pub struct MapArguments {
     /// Start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -65,7 +65,7 @@ pub struct ErrorArguments {
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -91,7 +91,7 @@ pub struct StabilityArguments {
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -118,7 +118,7 @@ pub struct ConvergenceArguments {
     /// Start value of an input or parameter; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -130,7 +130,7 @@ pub struct NumberRange {
     pub from: f64,
     /// Last.
     pub to: f64,
-    /// How many, ends included.
+    /// Number of values, ends included.
     pub count: usize,
 }
 
@@ -184,7 +184,7 @@ fn steps(text: &str) -> Result<NumberRange, String> {
 /// A range of angular velocities (rad/s).
 pub type Speeds = NumberRange;
 
-/// What a command line adds to a scene.
+/// Changes of the command line to a scene.
 #[derive(Debug, Clone, Default, Args)]
 pub struct SceneOptions {
     /// Suppress warnings with this identifier, such as `flutter`; may be repeated. In an FMU they are not logged.

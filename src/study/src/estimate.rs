@@ -29,17 +29,16 @@ const LATER: [(&str, [f64; 2]); 4] = [
     ("patches", [3.0, f64::INFINITY]),
     ("rows", [3.0, f64::INFINITY]),
 ];
-/// What directions are called in words, where their names do not do.
+/// Descriptions of directions whose names are not clear.
 const WORDS: [(&str, &str); 2] =
     [("patches", "patches along the chord"), ("rows", "rows of patches across the thickness")];
 
-/// What one direction leaves.
+/// Estimated error of one direction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// `steps`, `modes`, `patches`, `rows` or `mesh`.
     pub direction: &'static str,
-    /// Of the displacements (relative L2), or why it is not known. Of impulse and work the truth is too often passed by chance for
-    /// estimates to hold.
+    /// Error of the displacements (relative L2), or why it is unknown. Impulse and work pass the truth by chance too often for estimates.
     pub left: std::result::Result<f64, String>,
     /// The scene it was found on, where the ROM tells it.
     pub found_on: Option<String>,
@@ -66,7 +65,7 @@ impl Estimate {
         }
     }
 
-    /// Of a direction that was run, its own level the first or the last.
+    /// Estimates the error of a direction that was run, with the scene's own level first or last.
     fn of(direction: &'static str, refined: &Refined) -> Self {
         if let Some(why) = refined.runs.iter().find_map(|run| run.as_ref().err()) {
             return Self::unknown(direction, format!("another run is refused: {why}"));
@@ -116,7 +115,7 @@ fn ratio(before: f64, last: f64, [least, most]: [f64; 2]) -> Option<f64> {
     (before >= SHRINKING * last).then(|| (before / last).clamp(least, most))
 }
 
-/// What a ROM says of its modes, patches and mesh, in one line; `None` where it says nothing.
+/// Returns one line with the errors of modes, patches and mesh that a ROM carries; `None` if it has none.
 pub fn rom_errors_text(estimates: &[Estimate]) -> Option<String> {
     let of_model: Vec<Estimate> = estimates.iter().filter(|one| one.direction != "steps").cloned().collect();
     (!of_model.is_empty()).then(|| errors_text(&of_model))
@@ -142,7 +141,7 @@ pub fn errors_text(estimates: &[Estimate]) -> String {
     format!("estimated error of the displacements: {}", parts.join("; "))
 }
 
-/// What a ROM says of itself; empty where it says nothing.
+/// Returns the errors that a ROM carries; empty if it has none.
 pub fn of_rom(rom: &Rom) -> Vec<Estimate> {
     if rom.checks.rub_errors.as_ref().is_none_or(RubErrors::is_empty) {
         return Vec::new();
@@ -170,8 +169,8 @@ fn steps(scene: &Scene, own: u32, divisions: [u32; 3]) -> RefinementDirection {
     direction(title, unit, divisions.map(level).into())
 }
 
-/// Of the steps: from longer ones, or from shorter ones where there are no longer ones, or they are refused. Of a tolerance: from smaller
-/// ones, a decade apart, since errors follow it in steps.
+/// Estimates the error of the steps: from longer steps, or from shorter ones if longer ones are impossible or rejected. With a tolerance: from
+/// smaller tolerances, a decade apart, since errors follow it in steps.
 fn of_steps(scene: &Scene, own: u32, runner: &Runner) -> Result<Estimate> {
     if is_adaptive(scene) {
         let decades = [1, 10, 100].map(|times| own.saturating_mul(times));

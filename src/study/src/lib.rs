@@ -71,11 +71,11 @@ pub struct Study {
     pub name: &'static str,
     /// Title of the page.
     pub title: String,
-    /// What was done, in one or a few sentences.
+    /// Summary of the study, in one or a few sentences.
     pub summary: String,
-    /// What was studied: names and values with units.
+    /// Facts of the study: names and values with units.
     pub facts: Vec<(String, String)>,
-    /// What the figures should show and whether they do.
+    /// Expectations, and whether the figures fulfil them.
     pub statements: Vec<Statement>,
     /// The figures.
     pub figures: Vec<StudyFigure>,
@@ -88,9 +88,9 @@ pub struct Study {
 /// Something that a study should show.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Statement {
-    /// What should be seen.
+    /// The expectation.
     pub expected: String,
-    /// What was found, with numbers.
+    /// The result, with numbers.
     pub found: String,
     /// Whether it is so; `None` where it cannot be decided here.
     pub holds: Option<bool>,

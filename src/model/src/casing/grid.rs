@@ -192,7 +192,7 @@ impl GridNodes {
         self.nodes.len() / self.around
     }
 
-    /// Its shape, as the ROM has it.
+    /// Returns the shape of the grid, as the ROM has it.
     pub(crate) fn shape(&self) -> ContactGrid {
         ContactGrid { around: self.around, along: self.along(), closed: true }
     }

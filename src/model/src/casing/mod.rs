@@ -41,7 +41,7 @@ pub enum RingSupport {
     Free,
 }
 
-/// What to build.
+/// Options of a casing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CasingOptions {
     /// Name of the structure.

@@ -28,7 +28,7 @@ use crate::{Error, Result};
 /// Rigid-body motions of a free structure.
 const RIGID: usize = 6;
 
-/// What to reduce a casing to, and what to call it.
+/// Options of the reduction of a casing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CasingReductionOptions {
     /// Name of the structure.

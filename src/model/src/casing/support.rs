@@ -18,7 +18,7 @@ pub(super) struct HeldRows {
 }
 
 impl HeldRows {
-    /// Of the `held` nodes of a model; `loads` of all dofs.
+    /// Makes the rows of the `held` nodes of a model; `loads` of all dofs.
     pub(super) fn new(full: &Assembled, nodes: &[[f64; 3]], held: &[usize], free: &[usize], loads: &Mat<f64>) -> Self {
         let motions = motions(nodes, held);
         // K_fs r: K and M are symmetric.

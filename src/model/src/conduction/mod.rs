@@ -28,7 +28,7 @@ use crate::sparse::{Pattern, SparseMatrix};
 use crate::thermal::{ElementShare, patches_of_points, shares_of_elements};
 use crate::{Error, Result};
 
-/// How a material conducts and stores heat.
+/// Thermal properties of a material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conductor {
     /// Conductivity k (W/(m K)).
@@ -54,7 +54,7 @@ impl Conductor {
     }
 }
 
-/// What to reduce, and to what.
+/// Options of the reduction of a conduction model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConductionOptions {
     /// Name of the model.

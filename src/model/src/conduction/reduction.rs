@@ -26,7 +26,7 @@ use crate::{Error, Result};
 const ITERATIONS: usize = 10;
 /// Share of the slowest rate from which rates are looked at.
 const BELOW: f64 = 0.98;
-/// What is left of a vector, as a share of it, that depends on those before.
+/// Fraction of a vector that must remain after orthogonalisation; less means that it depends on the vectors before.
 const DEPENDENT: f64 = 1e-9;
 /// Rates of growth, as multiples of the slowest rate of decay, whose responses are in the basis.
 const GROWTHS: [f64; 3] = [10.0, 100.0, 1000.0];
@@ -44,7 +44,7 @@ pub struct SteadyCheck {
     pub surfaces: f64,
 }
 
-/// What a reduction gives.
+/// Result of a reduction.
 #[derive(Debug, Clone)]
 pub struct ConductionReduction {
     /// The model.

@@ -20,7 +20,7 @@ pub enum MassMatrix {
     Consistent,
 }
 
-/// What to reduce the cube to.
+/// Options of the reduction of the cube.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CubeOptions {
     /// Name of the structure.
@@ -33,7 +33,7 @@ pub struct CubeOptions {
     pub patches: Option<[usize; 2]>,
     /// Which modes are kept.
     pub kind: ReductionKind,
-    /// How many: with the contact held, or beside the rigid-body motions. All where absent, and the reduction is then exact.
+    /// Number of modes: with the contact held, or besides the rigid-body motions. All if absent, and the reduction is then exact.
     pub modes: Option<usize>,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,
@@ -54,7 +54,7 @@ impl Default for CubeOptions {
     }
 }
 
-/// What to reduce a ring to.
+/// Options of the reduction of a ring.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RingOptions {
     /// Name of the structure.

@@ -7,7 +7,7 @@ use tiprub_core::rom::MAX_SECTORS;
 use super::CyclicBoundary;
 use crate::{Error, Result};
 
-/// How well the two faces fit.
+/// Fit of the two faces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairingReport {
     /// Largest distance of a high node from its turned low node (m).

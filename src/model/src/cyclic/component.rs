@@ -39,7 +39,7 @@ pub(super) struct Component {
     kind: ReductionKind,
 }
 
-/// What is kept of a nodal diameter.
+/// Modes of one nodal diameter that a reduction keeps.
 pub(super) struct ComponentModes {
     /// M̂.
     pub mass: Mat<c64>,

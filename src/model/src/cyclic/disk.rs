@@ -7,7 +7,7 @@ use crate::mesh::{Element, Mesh};
 /// A whole disk.
 #[derive(Debug, Clone)]
 pub struct WholeDisk {
-    /// Its mesh; sets hold the nodes of all sectors.
+    /// Mesh of the disk; sets hold the nodes of all sectors.
     pub mesh: Mesh,
     /// Node of the disk for every sector and node of the sector.
     pub nodes: Vec<Vec<usize>>,

@@ -25,7 +25,7 @@ pub(super) struct Choice {
     pub note: Option<String>,
 }
 
-/// What has to be computed for a selection, of `available` modes.
+/// Returns the modes that must be computed for a selection, of `available` modes.
 pub(super) fn wanted(selection: ModeSelection, available: usize) -> DiameterModes {
     match selection {
         ModeSelection::Families(modes) => DiameterModes::Count((modes + (modes / 4).max(4)).min(available)),

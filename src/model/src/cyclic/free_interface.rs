@@ -16,7 +16,7 @@ use crate::{Error, Result};
 /// An ω² below this share of the shift σ is that of a rigid-body motion.
 const RIGID: f64 = 1e-5;
 
-/// What describes the motion with the contact held.
+/// Motion with the contact held.
 pub(super) struct Inner {
     /// ω² of the modes it was made of.
     pub squares: Vec<f64>,
@@ -26,7 +26,7 @@ pub(super) struct Inner {
     pub stiffness: Mat<c64>,
 }
 
-/// What moves no contact of the modes `found` of `full`.
+/// Returns the part of the modes `found` of `full` that moves no contact.
 ///
 /// # Errors
 /// [`Error::Invalid`] for so many modes that no residual flexibility is left.

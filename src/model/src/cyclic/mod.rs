@@ -43,18 +43,18 @@ pub enum ModeSelection {
     Families(usize),
     /// Exactly this many at every nodal diameter.
     Count(usize),
-    /// Those up to a frequency (Hz).
+    /// Modes up to a frequency (Hz).
     UpTo(f64),
 }
 
-/// What to reduce to, and what to call it.
+/// Options of the reduction of coupled sectors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CyclicOptions {
     /// Name of the structure.
     pub name: String,
     /// Which modes are kept.
     pub kind: ReductionKind,
-    /// How many.
+    /// Selection of modes.
     pub modes: ModeSelection,
     /// Modes of the full model per nodal diameter that are computed and compared with the reduced ones.
     pub checked_modes: usize,
@@ -65,7 +65,7 @@ pub struct CyclicOptions {
 /// One nodal diameter, full and reduced.
 #[derive(Debug, Clone)]
 pub struct NodalDiameter {
-    /// Its number n.
+    /// Nodal diameter n.
     pub number: usize,
     /// Frequencies of the full model (Hz), ascending. With 0 < 2n < sectors each stands for two modes of the disk.
     pub full_frequencies: Vec<f64>,
@@ -86,7 +86,7 @@ pub struct NodalDiameter {
 pub struct ConvergenceRow {
     /// Modes per nodal diameter η.
     pub modes: usize,
-    /// Of the whole disk.
+    /// Number of modes of the whole disk.
     pub total_modes: usize,
     /// Frequency deviation (%) of each of the lowest modes of the disk, double ones twice, ascending in frequency.
     pub frequency_deviation: Vec<f64>,
@@ -107,6 +107,6 @@ pub struct CyclicReduction {
     pub free_dofs: usize,
     /// Largest natural angular frequency of the reduced model (rad/s).
     pub largest_angular_frequency: f64,
-    /// What is worth telling about the choice of modes.
+    /// Notes about the choice of modes.
     pub notes: Vec<String>,
 }

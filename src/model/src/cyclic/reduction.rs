@@ -15,7 +15,7 @@ use crate::progress::{Listener, ReductionStage, report};
 use crate::reduce::{ContactPoint, ReductionKind, check_nodes, interface, responses};
 use crate::{Error, FeModel, Result};
 
-/// What is found of one nodal diameter in parallel.
+/// Result of one nodal diameter, computed in parallel.
 struct DiameterReduction {
     component: Component,
     full_squares: Vec<f64>,
@@ -204,7 +204,7 @@ fn assembled(
     })
 }
 
-/// What a basis consists of, in words.
+/// Describes the basis in words.
 fn basis_text(kind: ReductionKind, counts: &[usize], contact: &[ContactPoint]) -> String {
     let counts = match (counts.iter().min(), counts.iter().max()) {
         (Some(least), Some(most)) if least < most => format!("{least} to {most}"),

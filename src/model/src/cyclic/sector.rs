@@ -24,7 +24,7 @@ use crate::{Error, FeModel, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct DofCounts {
     pub interior: usize,
-    /// Of one face.
+    /// Number of dofs of one face.
     pub face: usize,
     pub contact: usize,
 }
@@ -50,7 +50,7 @@ pub(super) struct Sector {
     pub nodes: Vec<usize>,
     /// Directions of the node at each place: columns are its three unit vectors.
     pub directions: Vec<Matrix3<f64>>,
-    /// What the variables of the nodes that stand for patches are, where there are patches.
+    /// Meaning of the variables of the nodes that stand for patches, if there are patches.
     pub patches: Option<PatchCoordinates>,
 }
 

@@ -18,7 +18,7 @@ const NODES: usize = 8;
 /// Incompatible modes, which follow the nodes.
 const MODES: usize = 3;
 
-/// How the stiffness of hex8 is formed; other elements have one formulation only.
+/// Formulation of the stiffness of hex8; other elements have one formulation only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Formulation {
     /// Displacements as they are interpolated, full integration (C3D8).

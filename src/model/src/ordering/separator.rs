@@ -157,7 +157,7 @@ impl<'a> Partition<'a> {
         Self { graph, sides, weights, heaviest }
     }
 
-    /// What is to be small: overweight, then the separator, dearer the more the parts differ.
+    /// Returns the cost to minimise: overweight, then the separator, which costs more the more the parts differ.
     fn cost(&self) -> (usize, u128) {
         let [first, second, middle] = self.weights;
         let overweight = first.max(second).saturating_sub(self.heaviest);

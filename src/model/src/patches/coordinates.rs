@@ -42,7 +42,8 @@ pub(crate) struct PatchCoordinates {
 }
 
 impl PatchCoordinates {
-    /// Of contact in which there are patches, none without; for matrices of the degrees of freedom `free` (3·node + component, ascending).
+    /// Makes the coordinates of contact with patches, `None` without patches; for matrices of the degrees of freedom `free` (3·node + component,
+    /// ascending).
     ///
     /// # Errors
     /// [`Error::Invalid`] for patches that depend on each other, have a node that is not free, or have too many nodes.
@@ -299,7 +300,7 @@ fn directions([x, y, _]: [f64; 3], frame: DisplacementFrame) -> Matrix3<f64> {
     }
 }
 
-/// Of every patch a node of its own, by elimination with complete pivoting: W_PP is as well conditioned as the weights let it be.
+/// Chooses a node for every patch by elimination with complete pivoting, so that W_PP is as well conditioned as the weights permit.
 fn pivots(weights: &DMatrix<f64>, contact: &[ContactPoint]) -> Result<Vec<usize>> {
     let mut left = weights.clone();
     left.row_iter_mut().for_each(|mut row| row /= row.amax());

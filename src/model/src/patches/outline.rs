@@ -46,7 +46,7 @@ impl Outline {
         Self(edges.into_iter().flat_map(chords).collect())
     }
 
-    /// How far across a point stands, 0 to 1 between the sides there.
+    /// Returns the position of a point across the tip, 0 to 1 between its sides.
     pub(super) fn share_across(&self, [along, across]: [f64; 2]) -> f64 {
         let [low, high] = self.sides(along);
         if high > low { ((across - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 }

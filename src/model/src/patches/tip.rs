@@ -17,10 +17,10 @@ const AS_FAR_OUT: f64 = 1e-3;
 /// Share of the chord at which elements across it are counted: near its middle, on no line of a regular mesh.
 const MIDDLE: f64 = 0.4931;
 
-/// What was found.
+/// A tip found in a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundTip {
-    /// Its nodes, mid-side ones too, ascending.
+    /// Nodes of the tip, with mid-side nodes, ascending.
     pub nodes: Vec<usize>,
     /// Number of its faces.
     pub faces: usize,

@@ -6,13 +6,13 @@ use crate::{Error, Result};
 
 /// A set of at most this many nodes is taken whole.
 pub(crate) const TAKEN_WHOLE: usize = 12;
-/// Of a larger set, this many: both edges and the middle.
+/// Number of nodes chosen of a larger set: both edges and the middle.
 pub(crate) const CHOSEN: usize = 3;
 
-/// What is wanted of the contact nodes.
+/// Choice of the contact nodes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ContactChoice {
-    /// How many; all of a set of at most `TAKEN_WHOLE`, `CHOSEN` of a larger one where absent.
+    /// Number of nodes; if absent, all of a set of at most `TAKEN_WHOLE` nodes, and `CHOSEN` of a larger one.
     pub count: Option<usize>,
     /// Their names by growing z; `tip_1`, `tip_2`, ... where empty.
     pub names: Vec<String>,

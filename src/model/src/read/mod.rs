@@ -98,7 +98,7 @@ impl EngineAxis {
     }
 }
 
-/// How a mesh file is to be understood.
+/// Interpretation of a mesh file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MeshOptions {
     /// Units of coordinates and material in the file.
@@ -122,11 +122,11 @@ pub struct Imported {
     pub materials: Vec<Material>,
     /// Nodes that the matrices leave out: they are clamped. Ascending indices.
     pub absent: Vec<usize>,
-    /// What the file itself holds fixed (`*BOUNDARY`), as written: a hint, not applied.
+    /// Nodes that the file itself holds fixed (`*BOUNDARY`), as written: a hint, not applied.
     pub held: Vec<String>,
     /// Harmless: what was skipped, left out or taken for granted.
     pub notes: Vec<String>,
-    /// What makes results differ from those of the file's own code.
+    /// Differences that make results differ from those of the file's own program.
     pub warnings: Vec<String>,
 }
 

@@ -3,7 +3,7 @@
 use crate::fe_model::FeModel;
 use crate::material::Material;
 
-/// What speaks against the units of a model.
+/// Signs that the units of a model are wrong.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Plausibility {
     /// Cannot be meant.
@@ -69,7 +69,7 @@ pub fn bounding_box(nodes: &[[f64; 3]]) -> [[f64; 3]; 2] {
     })
 }
 
-/// What speaks against the units of a model and its materials.
+/// Looks for signs that the units of a model and its materials are wrong.
 pub fn plausibility(model: &FeModel, materials: &[Material]) -> Plausibility {
     let mut found = Plausibility::default();
     let [low, high] = bounding_box(&model.nodes);

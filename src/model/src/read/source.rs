@@ -22,13 +22,13 @@ impl fmt::Display for SourceLine {
 }
 
 impl SourceLine {
-    /// What is wrong here, and what to do about it.
+    /// Returns an error at this line.
     pub(super) fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         Error::Read { place: self.to_string(), problem: problem.into(), remedy: remedy.into() }
     }
 }
 
-/// How files are opened; tests keep theirs in memory.
+/// Function that opens files; tests keep files in memory.
 pub(super) type Open<'a> = &'a dyn Fn(&Path) -> Result<Vec<u8>>;
 
 /// Largest file that is read (bytes): far beyond any mesh, far below what exhausts the machine.

@@ -26,7 +26,7 @@ pub(crate) struct HeldContact<'a> {
 }
 
 impl<'a> HeldContact<'a> {
-    /// Of the free dofs (3·node + component, ascending) of a model.
+    /// Finds the contact degrees of freedom among the free dofs (3·node + component, ascending) of a model.
     ///
     /// # Errors
     /// Contact that is clamped; patches that depend on each other.

@@ -56,14 +56,14 @@ pub(crate) fn contact_node(nodes: &[[f64; 3]], point: &ContactPoint, frame: Disp
     ContactNode { name: point.name.clone(), position, meridional_slope, area, length }
 }
 
-/// What is held where fixed-interface modes are found, for the ROM's origin.
+/// Names the interface that is held for fixed-interface modes, for the ROM's origin.
 pub(crate) fn interface(contact: &[ContactPoint]) -> String {
     let patches = contact.iter().filter(|point| !point.patch.is_empty()).count();
     let of = if patches > 0 { format!(" of {patches} patches{}", in_rows(contact)) } else { String::new() };
     format!("{} interface degrees of freedom{of}", 3 * contact.len())
 }
 
-/// What stands beside free-interface modes, for the ROM's origin.
+/// Names the static responses besides free-interface modes, for the ROM's origin.
 pub(crate) fn responses(contact: &[ContactPoint]) -> String {
     match contact.iter().filter(|point| !point.patch.is_empty()).count() {
         0 => format!("static responses to forces on {} contact nodes", contact.len()),
@@ -75,7 +75,7 @@ fn in_rows(contact: &[ContactPoint]) -> String {
     ContactPoint::rows(contact).map_or(String::new(), |rows| format!(" in {rows} rows"))
 }
 
-/// What the full model is made of, and how many of its nodes are clamped.
+/// Describes the full model and the number of its clamped nodes.
 pub(crate) fn description(model: &FeModel, clamped: usize) -> String {
     let before = if model.origin.is_empty() { String::new() } else { format!("{}: ", model.origin) };
     let nodes = model.nodes.len();
@@ -91,7 +91,7 @@ pub(crate) fn description(model: &FeModel, clamped: usize) -> String {
 }
 
 impl Reduction {
-    /// What comes of a reduced model once it is valid; `full` are the modes of the full model over its `free` dofs, `squares` all ω² of the reduced one.
+    /// Makes the result of a valid reduced model; `full` are the modes of the full model over its `free` dofs, `squares` all ω² of the reduced one.
     ///
     /// # Errors
     /// The ROM's own validation refuses.

@@ -21,7 +21,7 @@ const REACH: f64 = 0.5;
 pub(super) struct ContactResponse<'a> {
     /// ω² of all of its modes.
     pub squares: &'a [f64],
-    /// Its modes at the contact coordinates, 3·nodes × modes.
+    /// Modes at the contact coordinates, 3·nodes × modes.
     pub shapes: DMatrix<f64>,
 }
 
@@ -80,9 +80,9 @@ fn response(shapes: &DMatrix<f64>, squares: &[f64], square: f64) -> DMatrix<f64>
 /// The full model at the contact coordinates.
 struct Moments<'a> {
     squares: &'a [f64],
-    /// Its lowest modes there.
+    /// Lowest modes at the contact coordinates.
     shapes: DMatrix<f64>,
-    /// Of ω²ʲ.
+    /// Moments of ω²ʲ.
     moments: Vec<DMatrix<f64>>,
 }
 

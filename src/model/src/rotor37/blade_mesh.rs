@@ -124,7 +124,7 @@ pub(crate) fn spread_contact(line: &[usize], slopes: &[f64], count: usize) -> Re
     Ok((0..count).map(point).collect())
 }
 
-/// Of the contact node or patch `index` of `count` from leading to trailing edge.
+/// Returns the name of the contact node or patch `index` of `count` from leading to trailing edge.
 pub(crate) fn place_name(index: usize, count: usize) -> String {
     match index {
         0 => "leading_edge".to_owned(),

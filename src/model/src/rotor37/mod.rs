@@ -52,7 +52,7 @@ const WATCHED: usize = 3;
 /// Modes of a blade with patches whose places of largest stress are recovered.
 const STRESSED: usize = 6;
 
-/// What of the tip touches.
+/// Contact nodes or patches of the tip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TipContact {
     /// So many nodes along the mid-thickness line, ends included (at least 2).
@@ -81,16 +81,16 @@ impl TipContact {
     }
 }
 
-/// What to build.
+/// Options of the blade.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rotor37Options {
     /// Number of elements along chord, thickness and span.
     pub mesh: MeshCounts,
-    /// What touches.
+    /// Contact of the tip.
     pub tip: TipContact,
     /// Which modes are kept.
     pub kind: ReductionKind,
-    /// How many.
+    /// Number of modes.
     pub modes: usize,
     /// Number of modes compared with the full model.
     pub checked_modes: usize,

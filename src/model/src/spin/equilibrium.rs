@@ -12,7 +12,7 @@ use crate::mesh::Mesh;
 use crate::sparse::{Pattern, SparseMatrix};
 use crate::{Error, Result};
 
-/// How many elements are computed in parallel before they are added to the global matrix.
+/// Number of elements that are computed in parallel before they are added to the global matrix.
 const CHUNK: usize = 256;
 /// Newton's iteration ends when its last correction was below this share of the displacement. It converges quadratically,
 /// so the error that is left is of the order of the square of it.

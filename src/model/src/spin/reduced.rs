@@ -22,7 +22,7 @@ pub(crate) const SPARE_MODES: usize = 10;
 /// Least share that every resting fixed-interface mode must have in the spinning ones.
 const OVERLAP: f64 = 0.5;
 
-/// How well the reduced model holds at one speed.
+/// Quality of the reduced model at one speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpinCheck {
     /// Speed Ω (rad/s).
@@ -106,7 +106,7 @@ pub(crate) struct Resting<'a> {
     pub contact: MatRef<'a, f64>,
 }
 
-/// What one speed says of the arrays, in the coordinates and with the mass matrix of the resting model.
+/// Arrays at one speed, in the coordinates and with the mass matrix of the resting model.
 ///
 /// T = \[Ψ Φ\] of the spinning state becomes TR, R = \[I 0; BA B\]: contact displacements stay what they are; BᵀB = I
 /// picks and turns the fixed-interface modes to come closest to the resting ones (polar factor of ΦᵀMΦ₀), and

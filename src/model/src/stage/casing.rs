@@ -20,7 +20,7 @@ use crate::{Error, Result};
 
 /// Axial ends of the casing (m).
 const AXIAL: [f64; 2] = [-0.060, 0.060];
-/// How far the outer contact rings lie beyond the blade tip (m).
+/// Distance of the outer contact rings from the blade tip (m).
 const BEYOND: f64 = 4e-3;
 /// Thickness of the wall (m).
 const WALL: f64 = 5e-3;
@@ -42,7 +42,7 @@ const HOOKS: [usize; 2] = [22, 49];
 #[cfg(test)]
 const SECTION_NODES: usize = 307;
 
-/// What to build.
+/// Options of the casing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageCasingOptions {
     /// Name of the structure.

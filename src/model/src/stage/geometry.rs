@@ -103,7 +103,7 @@ pub(super) struct BladeSection {
     slopes: [f64; 2],
     thickness: f64,
     edge_thickness: f64,
-    /// What the fillet adds to each side (m).
+    /// Thickness that the fillet adds to each side (m).
     fillet: f64,
 }
 

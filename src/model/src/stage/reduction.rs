@@ -9,18 +9,18 @@ use crate::reduce::{ContactPoint, ReductionKind};
 use crate::rotor37::TipContact;
 use crate::{FeModel, Result};
 
-/// What to build.
+/// Options of the stage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageOptions {
     /// Shape and mesh of a sector.
     pub sector: SectorOptions,
     /// Material.
     pub material: Material,
-    /// What touches.
+    /// Contact of the tip.
     pub tip: TipContact,
     /// Which modes are kept.
     pub kind: ReductionKind,
-    /// How many.
+    /// Selection of modes.
     pub modes: ModeSelection,
     /// Modes per nodal diameter that are compared with the full model.
     pub checked_modes: usize,
@@ -48,7 +48,7 @@ impl StageOptions {
         Self { sector: SectorOptions::coarse(), modes: ModeSelection::Families(8), checked_modes: 5, ..Self::default() }
     }
 
-    /// What its sector is reduced to.
+    /// Returns the options of the reduction of its sector.
     pub fn cyclic(&self, name: impl Into<String>) -> CyclicOptions {
         CyclicOptions {
             name: name.into(),
@@ -71,7 +71,7 @@ pub struct StageModel {
     pub contact: Vec<ContactPoint>,
     /// Pairs of nodes of the faces.
     pub boundary: CyclicBoundary,
-    /// How well they fit.
+    /// Fit of the two faces.
     pub pairing: PairingReport,
 }
 

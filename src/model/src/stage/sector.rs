@@ -36,7 +36,7 @@ impl Default for SectorCounts {
     }
 }
 
-/// What to build. Lengths and numbers of elements are independent of each other.
+/// Options of the sector. Lengths and numbers of elements are independent of each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SectorOptions {
     /// Shape.

@@ -18,12 +18,12 @@ const SPREAD: [f64; 3] = [1.9, 1.35, 1.0];
 /// Changes below this share of a value are rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// What three levels tell.
+/// Extrapolation from three levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConvergedLimit {
     /// Order that was read, from [`LEAST`] to [`MOST`].
     pub order: f64,
-    /// What further refinement would still add to the value of the finest level.
+    /// Remaining change of the value by further refinement, as seen from the finest level.
     pub rest: f64,
 }
 
@@ -50,7 +50,7 @@ pub fn of_values(sizes: [f64; 3], values: [f64; 3]) -> Option<ConvergedLimit> {
     of_changes(sizes, [change(values[0], values[1]), change(values[1], values[2])], LEAST)
 }
 
-/// What two meshes alone tell, the first of them coarser than the second.
+/// Extrapolates from two meshes, the first of them coarser than the second.
 pub fn of_two_meshes([coarse, fine]: [f64; 2], change: f64) -> ConvergedLimit {
     let [coarse, fine] = [coarse, fine].map(|size| size.powf(OF_TWO_MESHES));
     ConvergedLimit { order: OF_TWO_MESHES, rest: change * fine / (coarse - fine) }

@@ -12,7 +12,7 @@ use crate::error::{
     scene::SceneRun,
 };
 
-/// What a run leaves behind.
+/// Results of a run that are compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
     /// Displacements of all watched points, of all sectors, sample by sample: point by point, axis by axis, sector by sector (m). Where
@@ -57,8 +57,7 @@ impl RunSummary {
         found
     }
 
-    /// How far the displacements of the points that both have are from those of another run, relative to these (L2); `None` where there are
-    /// none.
+    /// Returns the distance of the displacements of common points from those of another run, relative to these (L2); `None` if there are none.
     pub fn displacement_change(&self, next: &Self) -> Option<f64> {
         let pairs = self.pairs(next);
         if pairs.is_empty() {
@@ -90,7 +89,7 @@ impl RunSummary {
     }
 }
 
-/// What is compared of a run.
+/// Displacements of a run that are compared.
 pub(crate) enum Observed {
     /// Watched points.
     Watched,
@@ -101,7 +100,7 @@ pub(crate) enum Observed {
 }
 
 impl Observed {
-    /// Of a ROM, and which points these are.
+    /// Finds the points of a ROM that are compared.
     pub(crate) fn of(rom: &Rom) -> (Self, Vec<ContactNode>) {
         if let Some(watched) = &rom.extras.watched {
             return (Self::Watched, watched.points.clone());

@@ -46,7 +46,7 @@ use crate::{
 /// One direction with the runs of its levels.
 #[derive(Debug)]
 pub struct Refined {
-    /// What is refined.
+    /// Direction of refinement.
     pub direction: RefinementDirection,
     /// A run per level, or why it is refused.
     pub runs: Vec<std::result::Result<RunSummary, String>>,
@@ -65,7 +65,7 @@ pub struct ConvergenceResult {
     pub method: String,
     /// All directions.
     pub refined: Vec<Refined>,
-    /// What the ROM of the master said of itself before; empty where it said nothing.
+    /// Errors that the ROM of the master carried before; empty if it had none.
     pub of_rom: Vec<Estimate>,
 }
 
@@ -129,7 +129,7 @@ pub fn study(
     Ok((page::study(&found)?, found.with_errors(&scene)))
 }
 
-/// What is asked of a scene.
+/// Request of a convergence study.
 pub struct ConvergenceRequest<'a> {
     /// Start values that replace its own (name, value as text).
     pub settings: &'a [(String, String)],
@@ -220,7 +220,7 @@ fn work(direction: &RefinementDirection, scene: &Scene, own: u32) -> f64 {
 /// Shares of the step at which a direction is run once more where one of its levels is refused.
 const SHORTER: [u32; 3] = [2, 4, 8];
 
-/// How levels are run.
+/// Runs the levels.
 pub(crate) struct Runner<'a> {
     settings: &'a [(String, String)],
     samples: usize,
@@ -271,7 +271,7 @@ impl<'a> Runner<'a> {
         Ok(Refined { digging: self.digging(&direction)?, direction, runs })
     }
 
-    /// What friction the master's tip digs in with, level by level; it is of the model, not of the steps.
+    /// Returns the lock-up friction of the master's tip, level by level; it depends on the model, not on the steps.
     fn digging(&self, direction: &RefinementDirection) -> Result<Vec<Option<f64>>> {
         let of = |level: &RefinementLevel| {
             let (index, scene) = (master(&level.scene), &level.scene);
@@ -321,7 +321,8 @@ impl Refined {
         limit::chosen(&sizes).into_iter().map(|index| (sizes[index], ran[index].1)).collect()
     }
 
-    /// What further refinement would still do to the displacements of the finest level (relative L2). Of two meshes the order is assumed.
+    /// Returns the remaining change of the displacements of the finest level by further refinement (relative L2). With two meshes the order is
+    /// assumed.
     pub fn rest(&self) -> Option<ConvergedLimit> {
         match &self.read()[..] {
             [a, b, c] => {
@@ -363,8 +364,7 @@ impl Refined {
         Some(self.errors(own))
     }
 
-    /// What the next refinement changes of the scene as it stands, and whether that is the step from it; where it is the finest, the
-    /// step to it.
+    /// Returns the changes of the scene by the next refinement, and whether the step is from the scene; if it is the finest, the step to it.
     pub fn at_own(&self) -> Option<([Option<f64>; 5], bool)> {
         let (ran, changes) = (self.ran(), self.changes());
         let own = ran.iter().position(|(level, _)| level.own)?;

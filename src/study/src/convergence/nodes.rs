@@ -16,8 +16,8 @@ fn claims(contact: &ContactSettings, node: &ContactNode) -> bool {
     contact.nodes.as_ref().is_none_or(|start| node.name.starts_with(start))
 }
 
-/// What the names of all contact nodes of the structure at `index` start with, where one pair claims them all; whether a new node
-/// touches, and what, is then no question.
+/// Returns the common beginning of the names of all contact nodes of the structure at `index`, if one pair claims all of them; then it is clear that
+/// a new node touches, and what.
 ///
 /// # Errors
 /// Why it is one: a new node lies between two that do not belong to the same pair.

@@ -63,7 +63,7 @@ fn value(refined: &Refined, value: f64) -> String {
     }
 }
 
-/// What is compared: displacements and the quantities.
+/// Returns the names of the compared quantities: displacements and others.
 pub fn compared() -> impl Iterator<Item = &'static str> {
     std::iter::once("displacements").chain(QUANTITIES.iter().map(|(name, _)| *name))
 }
@@ -91,7 +91,7 @@ fn error(refined: &Refined) -> Option<Statement> {
     Some(Statement::remark(format!("Error of the scene by {}", title(refined)), found))
 }
 
-/// What was found, in words.
+/// Returns the results in words.
 pub fn statements(found: &ConvergenceResult) -> Vec<Statement> {
     let mut all: Vec<Statement> = found.refined.iter().filter_map(error).collect();
     all.extend(found.refined.iter().filter_map(small));
@@ -147,7 +147,7 @@ fn small(refined: &Refined) -> Option<Statement> {
     ))
 }
 
-/// What to refine first.
+/// Returns the direction to refine first.
 fn worst(found: &ConvergenceResult) -> Option<Statement> {
     let most = |refined: &Refined| {
         let (changes, _) = refined.at_own()?;
@@ -182,7 +182,7 @@ fn directions(found: &ConvergenceResult) -> [Vec<&str>; 3] {
     })
 }
 
-/// What was refined and what not: the errors above are of nothing else. Beside it what the ROM says of itself.
+/// Returns what was refined and what was not, and the errors that the ROM carries.
 fn scope(found: &ConvergenceResult) -> Vec<Statement> {
     let [finer, coarser, not] = directions(found).map(|titles| titles.join(", "));
     let parts = [("finer than the scene: ", finer), ("coarser ones only: ", coarser), ("not at all: ", not)];

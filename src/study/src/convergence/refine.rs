@@ -23,7 +23,7 @@ pub trait RomSource {
     /// Whatever the reduction refuses.
     fn reduce(&self, other: Option<usize>, modes: usize, tip: TipContact, console: &Console) -> Result<Meshed>;
 
-    /// How many other meshes of the same structure there are.
+    /// Returns the number of other meshes of the same structure.
     fn others(&self) -> usize;
 }
 
@@ -40,18 +40,18 @@ pub struct RefinementLevel {
     pub division: u32,
 }
 
-/// What is refined while all else stays.
+/// A setting that is refined while all others stay.
 #[derive(Debug, Clone)]
 pub struct RefinementDirection {
     /// For file names.
     pub name: &'static str,
     /// `modes of rotor`.
     pub title: String,
-    /// Of the values.
+    /// Unit of the values.
     pub unit: &'static str,
     /// The coarsest first; empty where there is nothing to refine.
     pub levels: Vec<RefinementLevel>,
-    /// What cannot be refined, and why; empty where all can.
+    /// Parts that cannot be refined, and why; empty if all can.
     pub missing: String,
     /// All levels take a step shorter by this factor than the scene's, at which one of them is refused.
     pub shorter: Option<u32>,
@@ -62,7 +62,7 @@ impl RefinementDirection {
         Self { name, title, unit, levels: Vec::new(), missing: String::new(), shorter: None }
     }
 
-    /// What the error of a level goes with a power of: the step, one over the number of modes, the length of a patch, the edge of an
+    /// Returns the size that the error of a level follows with a power: the step, one over the number of modes, the length of a patch, the edge of an
     /// element.
     pub fn size(&self, value: f64) -> f64 {
         match self.unit {
@@ -138,7 +138,7 @@ pub fn modes_of(structure: usize) -> Option<&'static str> {
     MODES.get(structure).copied()
 }
 
-/// How models are reduced again.
+/// Data for reducing models again.
 pub struct Again<'a> {
     /// Where the ROM of the master comes from, if that is a file and known.
     pub source: Option<&'a dyn RomSource>,

@@ -40,7 +40,7 @@ pub(crate) struct Refiner<'a> {
     /// Internal steps per communication step, or one over the tolerance.
     own: u32,
     pub(super) again: &'a Again<'a>,
-    /// Of the mesh of the master, where it can be reduced again.
+    /// Number of nodes of the master's mesh, if it can be reduced again.
     mesh_nodes: Option<usize>,
 }
 

@@ -127,7 +127,8 @@ pub(crate) mod tests {
         assert!(levels == [(1, false), (2, true)] && missing.contains("more rows of patches are fixed"), "{missing}");
     }
 
-    /// Of finer models the first has a row more, the next as many as tell how straight the tip stays, as far as its mesh has places for them.
+    /// The first finer model has one row more, the next has as many rows as needed to see whether the tip stays straight, as far as its mesh has
+    /// places for them.
     #[test]
     fn finer_models_have_more_rows() {
         let (console, cache) = (Console::new(true, false), RomCache::off());
@@ -152,7 +153,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// What three rows tell, fewer do not.
+    /// Three rows are needed for an estimate.
     #[test]
     fn an_estimate_of_rows_needs_three() {
         let levels = crate::estimate::rows(&scene(3), 1).unwrap().levels;

@@ -7,7 +7,7 @@ use tiprub_core::{
     rom::{Harmonic, ReductionBasis, RomChecks, Spin, Thermal},
 };
 
-/// How a ROM is truncated.
+/// Form of truncation of a ROM.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Truncation {
     /// Modes with the contact nodes held, beside the displacements of these.
@@ -19,7 +19,7 @@ pub enum Truncation {
 }
 
 impl Truncation {
-    /// Of a ROM.
+    /// Returns the form for a ROM.
     pub fn of(rom: &Rom) -> Self {
         match rom.extras.basis {
             _ if rom.contact_map.nrows() >= rom.order() => Self::Natural,

@@ -16,10 +16,10 @@ pub trait ErrorCase {
     /// For headings.
     fn title(&self) -> &str;
 
-    /// What the scene is, in a sentence or two, with what bounds the reading of its figures.
+    /// Returns a description of the scene in a sentence or two, with the limits of its figures.
     fn description(&self) -> String;
 
-    /// What a size counts: `elements per bar`.
+    /// Returns the meaning of a size: `elements per bar`.
     fn size_name(&self) -> &'static str;
 
     /// The sizes, ascending.
@@ -65,7 +65,7 @@ pub trait ErrorCase {
         Competitor::Moreau
     }
 
-    /// What the second reference has to do with the first.
+    /// Returns the relation of the second reference to the first.
     fn relation(&self) -> &'static str {
         "which shares no code with it"
     }
@@ -75,7 +75,7 @@ pub trait ErrorCase {
         None
     }
 
-    /// How far apart two references are that share no code with the product, and what they are, where there are two.
+    /// Returns the distance of two references that share no code with the product, and their names, if there are two.
     fn meeting(&self) -> Option<(f64, String)> {
         None
     }
@@ -115,18 +115,18 @@ pub trait ErrorCase {
         Vec::new()
     }
 
-    /// What errors of the energy are relative to (J); the largest energy there is, where the scene does not say.
+    /// Returns the scale of errors of the energy (J); the largest energy there is, if the scene does not give one.
     fn energy_scale(&self) -> Option<f64> {
         None
     }
 
-    /// How two runs from almost the same start part ([`super::window::parting`]), beyond the window; empty where the exact
-    /// solution is known.
+    /// Returns the divergence of two runs from almost the same start ([`super::window::parting`]), beyond the window; empty if the exact solution is
+    /// known.
     fn parting(&self) -> &[f64] {
         &[]
     }
 
-    /// What is changed by almost nothing for that.
+    /// Returns the name of the quantity that is perturbed for that.
     fn perturbed(&self) -> &'static str {
         "a gap"
     }
@@ -145,7 +145,7 @@ pub trait ErrorCase {
     fn families(&self, size: usize) -> Vec<EquationFamily>;
 }
 
-/// Of the divisions at the standard size, those of another size: without the finest.
+/// Returns the divisions of another size: those at the standard size without the finest.
 pub fn without_finest(divisions: &[u32], standard: bool) -> Vec<u32> {
     divisions[..divisions.len() - usize::from(!standard)].to_vec()
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// What the clock measures, in words.
+/// Meaning of the measured time, in words.
 pub const MEANING: &str =
     if cfg!(unix) { "processor time of the thread that steps" } else { "wall time, as there is no other clock here" };
 

@@ -13,7 +13,7 @@ use super::{
     run::{self, Trace},
 };
 
-/// What a run is judged by. Relative errors unless units are given.
+/// Figures of a run. Relative errors unless units are given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Figures {
     /// Median processor time of stepping (s).
@@ -49,7 +49,7 @@ pub struct MeasuredRow {
     pub competitor: Competitor,
     /// Internal step (s); the tolerance of those that go by one.
     pub step: f64,
-    /// How it went, or why it was refused or failed.
+    /// Figures, or the reason of a rejection or failure.
     pub outcome: Result<Figures, String>,
 }
 
@@ -74,7 +74,7 @@ impl CaseReferences {
         of(family).or_else(|| of(EquationFamily { sticking: false, ..family })).unwrap_or(&self.first)
     }
 
-    /// How far the limit of a family is from the first reference; `None` where it was not computed.
+    /// Returns the distance of the limit of a family from the first reference; `None` if it was not computed.
     pub fn away(&self, family: EquationFamily) -> Option<f64> {
         let own = self.limits.iter().find(|limit| limit.0 == family)?;
         Some(apart(&own.1, &self.first))
@@ -94,7 +94,7 @@ pub struct Measured {
 /// A run whose displacements are further away than so many times their size has failed.
 const DIVERGED: f64 = 10.0;
 
-/// What moves less than this share of the largest motion is judged by that: its own norm would be that of rounding.
+/// Smallest motion that is judged by its own norm, as a fraction of the largest motion; the norm of less would be that of rounding.
 pub(super) const STILL: f64 = 1e-6;
 
 /// |a − b| / |b| over all samples, of the structure of which it is largest: one that moves far would hide the errors of another.

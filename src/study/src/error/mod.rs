@@ -41,7 +41,7 @@ use crate::{
     convergence::refine::{Again, FINEST_TIP, RomSource},
 };
 
-/// How far apart the two references of a scene may be.
+/// Largest distance of the two references of a scene.
 const MEET: f64 = 2e-3;
 
 /// The study of a scene of one's own; `source` is where the ROM of its master comes from, if that is a file and known.
@@ -113,7 +113,7 @@ fn repetitions(quick: bool) -> usize {
     if quick { 1 } else { run::REPETITIONS }
 }
 
-/// What the study of several cases plans; nothing is known of its rate.
+/// Returns the planned work of a study of several cases; its rate is unknown.
 pub fn planned(cases: &[Box<dyn ErrorCase>], smooth: &[&dyn ErrorCase], quick: bool) -> WorkPlan {
     let mut ledger = WorkPlan::new(0.0);
     for (number, case) in cases.iter().enumerate() {
@@ -297,7 +297,7 @@ fn caption(case: &dyn ErrorCase, found: &Measured, kind: ErrorKind, chart: &Erro
     )
 }
 
-/// What every scene should show.
+/// Returns the expectations of every scene.
 fn statements(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let title = case.title();
     let lcp = Scheme::RECURRENCES.map(|scheme| Competitor::Core(scheme, Solver::Lcp));
@@ -351,7 +351,7 @@ fn meeting(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     ]
 }
 
-/// What has no mass of the contact nodes tends to a limit of its own, which two schemes share.
+/// Returns the statement that schemes without mass of the contact nodes tend to a common limit.
 fn massless(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let (own, title) = (&found.references[case.standard()], case.title());
     let Some(away) = own.away(case.tolerant().family()).filter(|_| ErrorKind::of_steps(case) == ErrorKind::OfOwn)
@@ -372,7 +372,7 @@ fn massless(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     std::iter::once(between).chain(witness).collect()
 }
 
-/// What became of one step of central differences.
+/// Result of one step of central differences.
 struct Tried {
     size: usize,
     /// s
@@ -427,7 +427,7 @@ fn bounds(case: &dyn ErrorCase, tried: &[Tried]) -> String {
     case.sizes().into_iter().enumerate().map(|(at, size)| of(at, size)).collect::<Vec<_>>().join("; ")
 }
 
-/// What central differences refuse, and how long the steps of modal-exact may be.
+/// Returns the steps that central differences reject, and the longest steps of modal-exact.
 fn limits(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let own = |scheme: Scheme| {
         let competitor = Competitor::Core(scheme, Solver::Lcp);

@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1e-12;
 /// Which error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// Of the steps alone, at the standard size.
+    /// Error of the steps alone, at the standard size.
     OfTime,
     /// The same, against the limit of the equations that a competitor solves: those without mass of the contact nodes, or with sticking,
     /// have another, and that is no error of the steps.
@@ -155,7 +155,7 @@ pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Ta
     table
 }
 
-/// What every competitor needs for every target.
+/// Returns the cost of every competitor for every target.
 pub fn costs(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Table {
     let rows = kind.rows(case, measured);
     let of = if kind == ErrorKind::Total { "all, modes included" } else { "the steps alone" };
@@ -190,7 +190,7 @@ pub fn costs(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Tabl
     table
 }
 
-/// How far film stays behind lcp; only where several nodes are coupled.
+/// Returns the distance by which film stays behind lcp; only if several nodes are coupled.
 pub fn floor(case: &dyn ErrorCase, found: &Measured) -> Option<Statement> {
     let errors = |solver: Solver| -> Vec<f64> {
         let competitor = Competitor::Core(Scheme::ModalExact, solver);
@@ -209,7 +209,7 @@ pub fn floor(case: &dyn ErrorCase, found: &Measured) -> Option<Statement> {
     })
 }
 
-/// What an order is.
+/// Order of convergence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Order {
     /// The error goes with this power of h.

@@ -26,7 +26,7 @@ pub trait TimedRun {
     /// The displacements that are compared (m).
     fn displacements(&self) -> Vec<f64>;
 
-    /// How many of these belong to each structure that touches, in their order.
+    /// Returns the number of displacements of each structure that touches, in their order.
     fn parts(&self) -> Vec<usize> {
         vec![self.displacements().len()]
     }
@@ -43,7 +43,7 @@ pub trait TimedRun {
     }
 }
 
-/// What is gathered over internal steps.
+/// Extremes and sums over internal steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepExtremes {
     /// ∫ of all normal forces since the last sample (N·s).
@@ -86,7 +86,7 @@ impl StepExtremes {
     }
 }
 
-/// What a run leaves behind.
+/// Recorded results of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
     /// Displacements, sample by sample (m).

@@ -19,11 +19,11 @@ pub struct SceneRun {
     interval: f64,
     division: u32,
     samples: u32,
-    /// Of every structure that touches.
+    /// Motion without contact of every structure that touches.
     unmoved: Vec<Unmoved>,
 }
 
-/// How a structure would move if nothing touched it: at rest where it starts, or in straight flight.
+/// Motion of a structure without contact: at rest where it starts, or in straight flight.
 struct Unmoved {
     /// Displacements at the start (m).
     start: Vec<f64>,
@@ -47,8 +47,7 @@ impl Unmoved {
         Self { start: rows(structure), rates, touched: false }
     }
 
-    /// What contact has done to the displacements up to a time since the start (s): nothing to what flies untouched, whatever
-    /// rounding says.
+    /// Returns the displacements caused by contact up to a time since the start (s): exactly zero for free bodies that were not touched.
     fn moved(&self, mut displacements: Vec<f64>, time: f64) -> Vec<f64> {
         displacements.iter_mut().zip(&self.start).for_each(|(value, start)| *value -= start);
         for (value, rate) in displacements.iter_mut().zip(&self.rates) {
@@ -198,7 +197,7 @@ impl TimedRun for SceneRun {
         }
     }
 
-    /// Of what contact did: without the start and without flight, which would hide it.
+    /// Returns the displacements caused by contact: without the start and without flight, which would hide it.
     fn displacements(&self) -> Vec<f64> {
         let time = f64::from(self.samples) * self.interval;
         let each = self.touching().zip(&self.unmoved);

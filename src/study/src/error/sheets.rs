@@ -138,7 +138,7 @@ fn cells(case: &dyn ErrorCase, row: &MeasuredRow) -> Vec<String> {
     cells
 }
 
-/// How far the references are apart, size by size.
+/// Tabulates the distance of the references, size by size.
 pub fn references(case: &dyn ErrorCase, found: &Measured) -> Table {
     let caption = format!(
         "{}: references, {} and {}, and what the number of {} leaves out",

@@ -91,7 +91,7 @@ pub fn in_total(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
 /// Total error of a run from its figures.
 type TotalError = Box<dyn Fn(&Figures) -> f64>;
 
-/// How the total error of a run follows from its figures; `None` where a case has no finer model and no known errors.
+/// Returns the function that gives the total error of a run from its figures; `None` if a case has no finer model and no known errors.
 fn total_error(case: &dyn ErrorCase) -> Option<TotalError> {
     if let Some(left) = case.model_error() {
         return Some(Box::new(move |figures| figures.of_own + left));

@@ -100,18 +100,18 @@ pub struct Total {
     pub models: Vec<SceneModel>,
     /// All settings.
     pub rows: Vec<TotalRow>,
-    /// What the truth is, in words.
+    /// Description of the reference.
     pub truth: String,
-    /// What the last refinement on the way to the truth changed: errors below are not to be read. `None` where the truth is the scene's own model.
+    /// Change by the last refinement on the way to the reference: errors below cannot be read. `None` if the reference is the scene's own model.
     pub readable: Option<f64>,
     /// `patches` or `nodes`.
     pub touching: &'static str,
     /// Whether the truth has more modes than the scene, more contact points along the chord, and more rows of them; nodes have no rows, and count
     /// as refined.
     pub finer: [bool; 3],
-    /// What the ROM says of itself; empty where it says nothing.
+    /// Errors that the ROM carries; empty if it has none.
     pub of_rom: Vec<Estimate>,
-    /// What the mesh leaves, or why that is not known.
+    /// Error of the mesh, or why it is unknown.
     pub mesh: std::result::Result<f64, String>,
 }
 

@@ -17,7 +17,7 @@ use crate::{Picture, Sheet, Statement, StudyFigure, estimate};
 pub const TARGETS: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 impl Total {
-    /// What errors against the truth are called: total ones are those that modes, contact points and their rows have a part in.
+    /// Returns the name of errors against the reference: they are total if modes, contact points and their rows take part.
     pub fn name(&self) -> String {
         let points = if self.touching == "nodes" { "contact nodes" } else { self.touching };
         let rows = self.finer[2] && self.touching != "nodes";
@@ -41,7 +41,7 @@ impl Total {
         if self.is_total() { "total" } else { "own_model" }
     }
 
-    /// What the truth has finer than the scene, and what not; nodes have no rows.
+    /// Returns the directions in which the reference is finer than the scene, and the others; nodes have no rows.
     pub fn directions(&self) -> [Vec<&'static str>; 2] {
         let [modes, points, rows] = self.finer;
         let all =
@@ -186,7 +186,7 @@ impl Total {
         }
     }
 
-    /// What was found, in words.
+    /// Returns the results in words.
     pub fn statements(&self, title: &str) -> Vec<Statement> {
         let mut all = Vec::new();
         if let Some((row, time, error)) = self.ran().find(|(row, ..)| row.own) {

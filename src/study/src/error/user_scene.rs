@@ -30,7 +30,7 @@ const MOST_DOUBLINGS: u32 = 3;
 const SAMPLES: usize = 400;
 const QUICK_SAMPLES: usize = 100;
 
-/// What no start value may replace.
+/// Parameters that start values must not replace.
 const COMPARED: [&str; 4] = ["scheme", "solver", "internal_step_max", "tolerance"];
 
 /// Start values that a study varies itself.
@@ -181,7 +181,7 @@ impl UserScene {
         all
     }
 
-    /// Its scheme and solver.
+    /// Returns scheme and solver of the scene.
     pub fn method(&self) -> Competitor {
         Competitor::Core(self.scene.settings.time.scheme, self.scene.settings.contacts[0].solver)
     }

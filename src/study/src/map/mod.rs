@@ -54,7 +54,7 @@ const MOST_PER_REVOLUTION: f64 = 1e6;
 /// Order of the casing's base order at whose resonance the range of speeds lies.
 const HARMONIC: usize = 2;
 
-/// What was asked, and everything found.
+/// Request and results of a map.
 struct Map {
     setup: MapSetup,
     prediction: FrequencyPrediction,
@@ -62,7 +62,7 @@ struct Map {
     runs: Vec<SpeedRun>,
     peaks: Vec<MapPeak>,
     coincidences: Vec<Coincidence>,
-    /// How far the casing reaches beyond the tips at rest (m).
+    /// Distance by which the casing reaches beyond the tips at rest (m).
     intrusion: f64,
     /// Difference between the casing's largest and smallest radius (m).
     depth: f64,
@@ -104,7 +104,7 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     Ok(study)
 }
 
-/// What is asked of a scene; `None` is the default of the study.
+/// Request of a map; `None` is the default of the study.
 #[derive(Debug, Clone, Default)]
 pub struct MapRequest {
     /// Few short runs.
@@ -199,7 +199,7 @@ impl Map {
         Ok((map, speeds))
     }
 
-    /// How many internal steps the runs at these speeds (rad/s) will make.
+    /// Returns the number of internal steps of the runs at these speeds (rad/s).
     fn internal_steps(&self, speeds: &[f64]) -> f64 {
         let MapSetup { samples, transient, revolutions, .. } = self.setup;
         let count = (transient as f64 + revolutions as f64) * samples as f64;
@@ -279,7 +279,7 @@ impl Map {
         Ok(facts)
     }
 
-    /// What was studied.
+    /// Returns the facts of the scene.
     fn facts_of_scene(&self) -> Result<Vec<(String, String)>> {
         let (setup, settings) = (&self.setup, &self.setup.scene.settings);
         let rom = &setup.scene.roms[start::master(&setup.scene.settings)?];
@@ -304,7 +304,7 @@ impl Map {
         ])
     }
 
-    /// How it was run.
+    /// Returns the facts of the runs.
     fn facts_of_runs(&self) -> Vec<(String, String)> {
         let setup = &self.setup;
         let [first, last] = [self.runs[0].speed, self.runs[self.runs.len() - 1].speed];

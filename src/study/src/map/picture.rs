@@ -45,11 +45,11 @@ pub struct MapLine {
     pub points: Vec<(f64, f64)>,
     /// Text at the right end.
     pub label: String,
-    /// How it is drawn.
+    /// Style of the line.
     pub kind: LineKind,
 }
 
-/// What a line stands for.
+/// Meaning of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineKind {
     /// An engine order that the casing excites.

@@ -57,7 +57,7 @@ pub struct Crossing {
 }
 
 impl FrequencyPrediction {
-    /// Of the first master of a scene with its start values, at speeds up to `fastest` (rad/s).
+    /// Predicts frequencies of the first master of a scene with its start values, at speeds up to `fastest` (rad/s).
     ///
     /// # Errors
     /// A ROM whose eigenproblem cannot be solved, a shape that cannot be evaluated.

@@ -19,10 +19,10 @@ const MOST_BYTES: usize = 2 << 30;
 const BYTES_PER_BIN: usize = 256;
 /// At most one bin for so many samples is kept: the sampling rate is [`super::OVERSAMPLING`] times the highest frequency.
 const BIN_SHARE: usize = 8;
-/// What happens between samples is filtered by [`Decimator`] only where there is something between them.
+/// Smallest number of steps per sample from which [`Decimator`] filters the motion between samples.
 const LEAST_FACTOR: f64 = 4.0;
 
-/// What all runs share.
+/// Data that all runs share.
 #[derive(Debug, Clone)]
 pub struct MapSetup {
     /// The scene, but for the size of its speed.
@@ -39,7 +39,7 @@ pub struct MapSetup {
     pub top: f64,
 }
 
-/// What came of one speed.
+/// Result of one speed.
 #[derive(Debug, Clone)]
 pub struct SpeedRun {
     /// Angular velocity (rad/s).
@@ -78,7 +78,7 @@ pub struct SpeedResponse {
     pub internal_steps: u64,
     /// Time spent stepping.
     pub stepping: Duration,
-    /// What the simulation warned of.
+    /// Warnings of the simulation.
     pub warnings: Vec<String>,
 }
 
@@ -128,7 +128,7 @@ impl MapSetup {
         if master.is_ok_and(|master| self.scene.settings.structures[master].speed < 0.0) { -1.0 } else { 1.0 }
     }
 
-    /// What would not fit into memory is refused: samples of one blade in one run, and the spectra of all `runs`.
+    /// Rejects requests that would not fit into memory: samples of one blade in one run, and the spectra of all `runs`.
     ///
     /// # Errors
     /// Naming the most revolutions that would fit.
@@ -222,7 +222,7 @@ struct March<'a> {
     index: usize,
 }
 
-/// What the window leaves.
+/// Recorded results of the window.
 struct WindowRecording {
     decimator: Decimator,
     /// Contact rows recorded per blade: two nodes, three components each.

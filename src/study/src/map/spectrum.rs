@@ -61,7 +61,7 @@ impl Decimator {
         self.samples.iter().skip(channel).step_by(self.channels).copied()
     }
 
-    /// What the filter leaves of an oscillation with so many periods per sample.
+    /// Returns the gain of the filter for an oscillation with `periods` periods per sample.
     pub fn gain(&self, periods: f64) -> f64 {
         gain(periods, self.factor)
     }
@@ -193,7 +193,7 @@ mod tests {
         }
     }
 
-    /// What lies near the sampling rate would fold down; plain sampling at the same rate shows how much.
+    /// Frequencies near the sampling rate would fold down; plain sampling at the same rate shows how much.
     #[test]
     fn frequencies_near_the_sampling_rate_do_not_fold_down() {
         let high = COUNT as f64 - 100.0;

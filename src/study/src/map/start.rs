@@ -16,7 +16,7 @@ pub struct MapStart {
     pub shape_factor: f64,
     /// Orders around the circumference of what acts beside the shape.
     pub orders: Vec<usize>,
-    /// What moves tips or casing beside contact, which clearances at rest do not know.
+    /// Causes of motion of tips or casing besides contact, which clearances at rest do not include.
     pub acting: Vec<&'static str>,
     /// ξ of the rotor.
     pub damping_ratio: f64,
@@ -44,7 +44,7 @@ impl Default for MapStart {
 }
 
 impl MapStart {
-    /// Of a simulation that has its start values.
+    /// Reads the start of a simulation that has its start values.
     ///
     /// # Errors
     /// A scene whose master cannot turn.

@@ -16,7 +16,7 @@ const NEARLY_ALL: f64 = 0.99;
 /// Largest residual of a ledger that closes, relative to the energy exchanged.
 const LEDGER: f64 = 1e-9;
 
-/// What the map should show and whether it does.
+/// Returns the expectations of the map, and whether it fulfils them.
 pub fn statements(map: &Map) -> Vec<Statement> {
     let mut all = vec![runs_end(map)];
     all.extend(contact(map));

@@ -6,7 +6,7 @@ use super::*;
 /// First mode of the test blade (Hz), and where engine order 4 meets it (rad/s).
 const FIRST: f64 = 100.0;
 const CROSSING: f64 = FIRST * std::f64::consts::TAU / 4.0;
-/// How far the bumps of the scene reach beyond the tips (m).
+/// Distance by which the bumps of the scene reach beyond the tips (m).
 const BUMP: f64 = 0.2 * 3.56e-4;
 
 /// Damped enough for the free vibration to die out soon, without friction, and only `intrusion` (m) of the bumps.

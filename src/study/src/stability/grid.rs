@@ -16,7 +16,7 @@ const QUICK_STEPS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 /// The same for coupled sectors, of which every answer takes long.
 const COUPLED_STEPS: [f64; 3] = [0.5, 1.0, 2.0];
 
-/// What is asked; values that the scene has no variable for are `None`, and alone.
+/// Requested values; values that the scene has no variable for are `None`, and alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StabilityGrid {
     /// Ascending.
@@ -28,8 +28,8 @@ pub struct StabilityGrid {
 }
 
 impl StabilityGrid {
-    /// What the command line asks for, and the scene's own values always; where the largest `usable` step (s) lies below, steps go
-    /// down to half of it.
+    /// Makes the grid of the command line, which always includes the scene's own values; if the largest `usable` step (s) lies below, steps go down
+    /// to half of it.
     ///
     /// # Errors
     /// A range of what the scene has no variable for.

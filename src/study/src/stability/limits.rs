@@ -15,7 +15,7 @@ use super::{
 /// Answers that are asked for, about: doublings from end to end of the range and halvings, of every scheme, and two of each further solver.
 pub const ANSWERS: usize = 72;
 
-/// How far a scheme goes with a solver.
+/// Largest steps of a scheme with a solver.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Usable {
     /// Scheme and solver.

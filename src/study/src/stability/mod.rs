@@ -29,7 +29,7 @@ use tiprub_shell::{
 use super::{Study, master};
 use crate::{arguments::StabilityArguments, error::user_scene::refuse_compared, one_rotor_and_friction};
 
-/// What makes friction a parameter of a scene; every answer sets it.
+/// Friction that makes the coefficient a parameter of a scene; every answer sets it.
 const SOME_FRICTION: f64 = 0.1;
 
 /// The answer at one place and step.
@@ -39,9 +39,9 @@ pub struct StabilityPoint {
     pub place: OperatingPoint,
     /// Internal step (s).
     pub step: f64,
-    /// What the core says.
+    /// Answer of the core.
     pub answer: ScreeningResult,
-    /// How sliding contact grows there, where that can be told.
+    /// Growth of sliding contact, if it can be computed.
     pub rates: Option<Rates>,
 }
 
@@ -84,11 +84,11 @@ impl StabilityPoint {
 pub struct StabilityResult {
     /// The scene.
     pub scene: Scene,
-    /// How it was named on the command line.
+    /// Name on the command line.
     pub name: String,
     /// With what it starts.
     pub own: SceneStart,
-    /// What was asked.
+    /// Requested values.
     pub grid: StabilityGrid,
     /// All answers: step by step, in each speed by speed, in each by friction.
     pub points: Vec<StabilityPoint>,

@@ -5,12 +5,12 @@ pub const TRIED: [f64; 2] = [0.1, 1e3];
 /// Halvings of the interval between a step that is accepted and one that is not.
 const HALVINGS: u32 = 7;
 
-/// What was found.
+/// Result of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Sought<E> {
     /// All are accepted, the largest tried.
     All(f64),
-    /// Those below are, and why a longer one is not.
+    /// Shorter steps are accepted, and why a longer one is not.
     Below(f64, E),
     /// None is: why.
     None(E),

@@ -19,7 +19,7 @@ const ALL_COMBINATIONS_UP_TO: usize = 3;
 const FRICTION_STEPS: u32 = 40;
 const FRICTION_STEPS_PER_UNIT: f64 = 20.0;
 
-/// What is known of the contact from a scene.
+/// Properties of the contact that are known from a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownContact {
     /// Friction coefficient µ.
@@ -36,7 +36,7 @@ impl KnownContact {
     }
 }
 
-/// How far a scheme goes.
+/// Limit of a scheme.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SchemeLimit {
     /// Steps below this (s) are accepted.
@@ -52,7 +52,7 @@ pub enum SchemeLimit {
 pub struct StepLimit {
     /// Name as in a scene.
     pub scheme: &'static str,
-    /// How far it goes.
+    /// Largest step.
     pub limit: SchemeLimit,
 }
 
@@ -75,12 +75,12 @@ impl StepLimit {
     }
 }
 
-/// How closed sliding contact grows, of all sets of closed nodes the one that grows most.
+/// Growth of closed sliding contact: that of the set of closed nodes that grows most.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rates {
     /// Growth of the model and of the scheme's steps.
     pub growth: GrowthRates,
-    /// What grows fastest in the equations, without the mass of the contact nodes where the model allows.
+    /// Fastest growth of the differential equations, without the mass of the contact nodes if the model permits it.
     pub physical: Fastest,
     /// Names of the closed nodes, of coupled sectors with the nodal diameter.
     pub closed: String,
@@ -113,7 +113,7 @@ pub struct Digging {
 #[derive(Debug)]
 pub struct SingleStructure<'a> {
     rom: &'a Rom,
-    /// Its sector, or all nodal diameters of coupled sectors.
+    /// The sector, or all nodal diameters of coupled sectors.
     pub models: Vec<ModalModel>,
     /// Natural angular frequencies (rad/s) of every nodal diameter of coupled sectors, from 0; else of the sector.
     pub frequencies: Vec<Vec<f64>>,
@@ -142,7 +142,7 @@ impl<'a> SingleStructure<'a> {
         Ok(Self { rom, frequencies: vec![model.frequencies.clone()], models: vec![model], closed })
     }
 
-    /// Of mistuned blades, the one with the highest frequencies: all times `factor`.
+    /// Returns the blade with the highest frequencies of mistuned blades: all times `factor`.
     pub fn stiffened(mut self, factor: f64) -> Self {
         let models = self.models.iter_mut().flat_map(|model| &mut model.frequencies);
         models.chain(self.frequencies.iter_mut().flatten()).for_each(|frequency| *frequency *= factor);
@@ -382,7 +382,7 @@ mod tests {
 
     use super::*;
 
-    /// What the structure says by itself is what the start of a run warns of, and of less friction it does not.
+    /// The limits of the structure alone are those of which the start of a run warns; with less friction there is no warning.
     #[test]
     fn a_tip_digs_in_with_the_friction_that_a_run_warns_of() {
         let options = StageOptions {

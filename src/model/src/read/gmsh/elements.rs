@@ -2,7 +2,7 @@
 
 use crate::element::ElementKind;
 
-/// What an element type is.
+/// Meaning of an element type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum GmshElement {
     /// A solid; node i of the kind is node `order[i]` of Gmsh.

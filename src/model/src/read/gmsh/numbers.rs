@@ -15,7 +15,7 @@ pub(super) enum Numbers<'a> {
 }
 
 impl<'a> Numbers<'a> {
-    /// What is wrong with the number just read or to be read.
+    /// Returns an error at the current number.
     pub(super) fn error(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         match self {
             Self::Text { file, line, .. } => SourceLine { file: Arc::clone(file), line: *line }.error(problem, remedy),

@@ -22,14 +22,14 @@ use super::source::{Open, SourceLine, number};
 use crate::Result;
 use crate::material::Material;
 
-/// What an input file holds.
+/// Content of an input file.
 #[derive(Debug, Default)]
 pub(super) struct Deck {
     /// Nodes, elements, sets.
     pub draft: MeshDraft,
     /// Materials in the order of the file, in its units.
     pub materials: Vec<Material>,
-    /// What `*BOUNDARY` holds, for a hint: set names or node numbers, as written.
+    /// Content of `*BOUNDARY`, for a hint: set names or node numbers, as written.
     pub held: Vec<String>,
 }
 

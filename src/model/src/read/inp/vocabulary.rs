@@ -2,7 +2,7 @@
 
 use crate::element::ElementKind;
 
-/// What an element type means here.
+/// Meaning of an element type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ElementType {
     /// Computed as the file's own code does.
@@ -52,7 +52,7 @@ pub(super) fn element_type(name: &str) -> ElementType {
     }
 }
 
-/// What is done with a keyword that is not read.
+/// Treatment of a keyword that is not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum UnreadKeyword {
     /// It changes neither stiffness nor mass nor sets.
@@ -168,7 +168,7 @@ const CHANGING: &[&str] = &[
     "IMPORT",
 ];
 
-/// What is done with a keyword that the reader does not act on.
+/// Returns the treatment of a keyword that the reader does not act on.
 pub(super) fn unread(keyword: &str) -> UnreadKeyword {
     if HARMLESS.contains(&keyword) {
         UnreadKeyword::Harmless

@@ -8,7 +8,7 @@ use super::super::entries::Entries;
 use super::super::source::{SourceLine, about, number, text_of};
 use crate::Result;
 
-/// What the rows of a matrix are.
+/// Labels of the rows of a matrix.
 #[derive(Debug)]
 pub(super) enum Labels {
     /// Counted from the first, so many of them.

@@ -102,7 +102,7 @@ fn dof_file(files: &MatrixFiles) -> Result<Option<Vec<(u64, u64)>>> {
     formats::read_dofs(&path, &open_file(&path)?).map(Some)
 }
 
-/// What row a dof has.
+/// Rows of the dofs.
 struct DofRows<'a> {
     table: &'a NodeTable,
     index: HashMap<u64, usize>,
