@@ -146,7 +146,7 @@ pub fn missing<'a>(block: &'a str, found: &[String]) -> Vec<&'a str> {
     lines.filter(|(_, shown)| !found.iter().any(|line| holds(line, shown))).map(|(line, _)| line).collect()
 }
 
-/// What this test told holds every block that is from `command`.
+/// Checks that the blocks from `command` contain what this test printed.
 ///
 /// # Panics
 /// A line of the guide was not told, or there is no such block.

@@ -10,7 +10,7 @@ type TerminalMember = (&'static str, &'static str, &'static str);
 /// Terminal, its text, its members. Forces, torques and heat go out of the unit: they act on what is connected.
 type Terminal = (&'static str, &'static str, &'static [TerminalMember]);
 
-/// Of each rotor.
+/// Terminals of each rotor.
 const TERMINALS: [Terminal; 2] = [
     (
         "shaft",

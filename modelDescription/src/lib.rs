@@ -34,9 +34,9 @@ pub struct Description<'a> {
     pub token: &'a str,
     /// One or a few sentences for an importer's catalogue.
     pub description: &'a str,
-    /// What the unit does and how it is used, for the page.
+    /// Purpose and use of the unit, for the page.
     pub about: &'a str,
-    /// What is to be known of communication steps, for the page.
+    /// Text about communication steps, for the page.
     pub steps: &'a str,
     /// Generation date as `xs:dateTime`, for example `2026-01-31T12:00:00Z`. The caller decides, so that equal input
     /// can give equal files.
@@ -63,7 +63,7 @@ pub struct Description<'a> {
     pub fmi3_arrays: bool,
     /// Structures of the scene with their ROMs, for the page.
     pub structures: Vec<(&'a str, &'a Rom)>,
-    /// What the scene asks for beyond a plain rub, for the page; one phrase each.
+    /// Features of the scene beyond a plain rub, for the page; one phrase each.
     pub features: Vec<String>,
     /// Limits of validity, for the page; one sentence each.
     pub limits: Vec<String>,

@@ -96,7 +96,7 @@ impl DescribedVariable<'_> {
         real.then(|| self.variable.unit.map_or(ONE, |unit| unit.name))
     }
 
-    /// What the unit measures.
+    /// Returns the quantity that the unit measures.
     pub(crate) fn quantity(&self) -> Option<&'static str> {
         self.variable.unit.map(|unit| unit.quantity)
     }

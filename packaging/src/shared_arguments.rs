@@ -92,7 +92,7 @@ impl std::str::FromStr for MeshSize {
 /// Two counts.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// The problem with the text.
 pub fn pair(text: &str) -> Result<[usize; 2], String> {
     let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
     match counts.as_deref() {
@@ -104,7 +104,7 @@ pub fn pair(text: &str) -> Result<[usize; 2], String> {
 /// Two axial positions (m).
 ///
 /// # Errors
-/// What is wrong with the text.
+/// The problem with the text.
 pub fn axial(text: &str) -> Result<[f64; 2], String> {
     let ends = text.split_once(':').map(|(from, to)| [from, to].map(|end| end.trim().parse::<f64>().ok()));
     match ends {

@@ -2,7 +2,7 @@
 
 mod digest;
 
-/// What the libraries are built from.
+/// Sources of the libraries.
 const SOURCES: [&str; 7] = [
     "src",
     "../core/src",

@@ -3,7 +3,7 @@
 #[path = "../format/digest.rs"]
 mod digest;
 
-/// What built-in models come from: the reduction, the types it fills, the file it is kept in, the numerical libraries.
+/// Sources of built-in models: the reduction, the types it fills, the file that holds them, the numerical libraries.
 const SOURCES: [&str; 5] =
     ["../model/src", "../core/src/rom.rs", "../core/src/rom", "../format/src/rom_file", "../../Cargo.lock"];
 

@@ -8,7 +8,7 @@ use crate::scene::UnpackedResources;
 use crate::{Journal, journal2, pointer};
 use tiprub_fmi_host::api::{Fmi2Api, Fmi2Callbacks, InstancePointer, StatePointer};
 
-/// What the instantiation is given; change a field to try something else.
+/// Arguments of the instantiation; change a field to try something else.
 #[derive(Debug, Clone)]
 pub struct Fmi2Arguments {
     /// `instanceName`.

@@ -8,7 +8,7 @@ use crate::scene::UnpackedResources;
 use crate::{Journal, OK, journal3, pointer};
 use tiprub_fmi_host::api::{Fmi3Api, InstancePointer, StatePointer, Update};
 
-/// What the instantiation is given; change a field to try something else.
+/// Arguments of the instantiation; change a field to try something else.
 #[derive(Debug, Clone)]
 pub struct Fmi3Arguments {
     /// `instanceName`.
@@ -43,7 +43,7 @@ impl Fmi3Arguments {
     }
 }
 
-/// What `instanceEnvironment` points to; begins with the journal, so that the logger finds it.
+/// Target of `instanceEnvironment`; begins with the journal, so that the logger finds it.
 #[derive(Debug)]
 #[repr(C)]
 pub struct CallbackContext {
@@ -59,7 +59,7 @@ pub struct CallbackContext {
     pub wish: f64,
 }
 
-/// What `fmi3DoStep` answered.
+/// Results of `fmi3DoStep`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Status.
@@ -81,7 +81,7 @@ pub struct Fmi3TestSlave<'a> {
     pub api: &'a Fmi3Api,
     /// The instance.
     pub handle: InstancePointer,
-    /// What callbacks are given.
+    /// Target of the environment pointer of callbacks.
     pub context: *mut CallbackContext,
 }
 
@@ -202,7 +202,7 @@ impl<'a> Fmi3TestSlave<'a> {
         unsafe { (self.api.fmi3SetFloat64)(self.handle, references.as_ptr(), count, values.as_ptr(), n) }
     }
 
-    /// What the test's callback noted.
+    /// Returns the notes of the test's callback.
     pub fn notes(&self) -> Vec<f64> {
         // SAFETY: as in `log`.
         std::mem::take(unsafe { &mut (*self.context).notes })

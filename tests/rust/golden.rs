@@ -56,7 +56,7 @@ fn outputs(simulation: &Simulation) -> Vec<u32> {
     rows.filter(|row| row.causality == Causality::Output && row.kind == DataType::Real).flat_map(elements).collect()
 }
 
-/// What a scene can be stepped by.
+/// Interface by which a scene can be stepped.
 trait SteppedBy {
     fn set(&mut self, reference: u32, value: f64, slope: Option<f64>);
     fn step(&mut self, time: f64, length: f64);
@@ -157,7 +157,7 @@ fn line(scene: &Scene) -> String {
     text
 }
 
-/// What a file holds, written anew where that is asked for.
+/// Returns the content of a file, which is rewritten on request.
 fn held(name: &str, found: &str) -> String {
     let path = root().join("tests/data").join(name);
     if std::env::var_os("GOLDEN").is_some_and(|value| value == "write") {

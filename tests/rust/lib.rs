@@ -77,7 +77,7 @@ pub struct Message {
     pub text: String,
 }
 
-/// What an instance's environment pointer points to.
+/// Target of an instance's environment pointer.
 #[derive(Debug, Default)]
 pub struct Journal {
     /// Messages so far.

@@ -77,7 +77,7 @@ pub trait CoSimulationUnit: Send {
     /// As [`CoSimulationUnit::real`]; an order other than 1.
     fn output_derivative(&self, reference: u32, order: i32) -> Result<f64>;
 
-    /// What inputs do over time, derivatives included, to go back to where a set of values is refused as a whole.
+    /// Returns the inputs over time, derivatives included, so that they can be restored if a set of values is rejected as a whole.
     fn courses(&self) -> Box<dyn Any>;
 
     /// Back to what [`CoSimulationUnit::courses`] gave at the same instant; values as read are set back before.
@@ -95,10 +95,10 @@ pub trait CoSimulationUnit: Send {
     /// Time of the last communication point, or of the internal step reached (s).
     fn time(&self) -> f64;
 
-    /// What is to be said of the parameters after [`CoSimulationUnit::initialise`].
+    /// Returns the warnings about the parameters after [`CoSimulationUnit::initialise`].
     fn warnings(&self) -> &[Warning];
 
-    /// What is to be said since this was last called.
+    /// Returns the warnings since the last call.
     fn take_notes(&mut self) -> Vec<Warning>;
 
     /// Begin a communication step of length `step_size` (s), which may end early (`partial`) where the unit allows only so many
@@ -158,7 +158,7 @@ pub trait CoSimulationUnit: Send {
     -> Result<()>;
 }
 
-/// What the resources of an FMU hold.
+/// Content of the resources of an FMU.
 pub struct Loaded {
     /// Makes the unit of them: start values in place, nothing computed. Asked once the token is known to be theirs.
     pub unit: Box<dyn FnOnce() -> Result<Box<dyn CoSimulationUnit>>>,
@@ -166,7 +166,7 @@ pub struct Loaded {
     pub token: String,
     /// Whether the description of FMI 3.0 has arrays; else scalars, as FMI 2.0 has.
     pub fmi3_arrays: bool,
-    /// What the library is, for messages; a program that packages it finds this in its bytes.
+    /// Name and version of the library, for messages; a program that packages the library finds this in its bytes.
     pub release: &'static str,
 }
 

@@ -49,7 +49,7 @@ pub struct ImportedVariable {
     pub elements: Option<usize>,
 }
 
-/// What an importer needs of modelDescription.xml.
+/// Content of modelDescription.xml that an importer needs.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ImportedDescription {
     /// Attribute fmiVersion.

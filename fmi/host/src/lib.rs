@@ -31,14 +31,14 @@ use tiprub_shell::{Failure, Result, recording::Recording, schedule::Schedule};
 const LARGEST_UNPACKED: u64 = 2 << 30;
 /// Describes the FMU, at the root of the archive.
 const DESCRIPTION: &str = "modelDescription.xml";
-/// Its largest size (bytes): that of a hundred thousand variables, whose descriptions are long.
+/// Largest size of a description (bytes): that of a hundred thousand variables with long descriptions.
 const LARGEST_DESCRIPTION: u64 = 64 << 20;
 
 /// An FMU unpacked to a temporary directory, which lives as long as this value.
 #[derive(Debug)]
 pub struct UnpackedFmu {
     directory: TempDir,
-    /// What modelDescription.xml says.
+    /// Content of modelDescription.xml.
     pub description: ImportedDescription,
 }
 
@@ -49,7 +49,7 @@ pub struct ImportedRun {
     pub recording: Recording,
     /// Time spent inside doStep.
     pub stepping: Duration,
-    /// What the FMU logged.
+    /// Log of the FMU.
     pub messages: Vec<String>,
 }
 
@@ -323,7 +323,7 @@ mod tests {
         }
     }
 
-    /// What compresses well, such as a text of newlines, may take no more than what it can mean: no disk, and no memory.
+    /// An entry that compresses well, such as a text of newlines, may not take more disk or memory than its content can mean.
     #[test]
     fn rejects_oversized_entries_before_unpacking() {
         for name in [DESCRIPTION, "resources/scene.toml", "resources/package.toml", "resources/a.safetensors"] {

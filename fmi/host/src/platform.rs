@@ -17,7 +17,7 @@ pub enum Platform {
     Aarch64Darwin,
 }
 
-/// What a platform is called and made of.
+/// Names and file type of a platform.
 struct PlatformFacts {
     platform: Platform,
     /// Folder of FMI 3.0 (section 2.5.1.4.1).

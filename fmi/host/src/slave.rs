@@ -79,7 +79,7 @@ pub(super) fn group_outputs(description: &ImportedDescription) -> Vec<OutputGrou
     groups
 }
 
-/// What the FMU logged; reached from its logger through a pointer to this value.
+/// Log of the FMU; its logger reaches it through a pointer to this value.
 #[derive(Debug, Default)]
 pub(super) struct MessageList(RefCell<Vec<String>>);
 

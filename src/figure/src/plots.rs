@@ -64,11 +64,11 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
     /// Index into [`COLORS`], instead of one after the other.
     pub color: Option<usize>,
-    /// How it is drawn.
+    /// Style of the series.
     pub form: SeriesForm,
 }
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SeriesForm {
     /// A line, peaks kept where there are too many points.

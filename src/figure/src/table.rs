@@ -5,7 +5,7 @@ use crate::escape;
 /// A table with a caption.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table {
-    /// What it shows.
+    /// Caption.
     pub caption: String,
     /// Headings.
     pub columns: Vec<String>,

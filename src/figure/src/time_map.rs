@@ -15,7 +15,7 @@ const ABOVE: f64 = 4.0;
 const BELOW: f64 = 46.0;
 const RIGHT: f64 = 16.0;
 
-/// What a cell that stands for several times shows, and which end of the scale is strong.
+/// Value of a cell that covers several times, and the strong end of the scale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shows {
     /// The largest value; large values are strong.
@@ -29,13 +29,13 @@ pub enum Shows {
 pub struct TimeMap {
     /// Axis label with unit.
     pub x_label: String,
-    /// What the colour stands for, with unit.
+    /// Quantity of the colour, with unit.
     pub value_label: String,
     /// Rows from top to bottom: name and values, all as long as `times`.
     pub rows: Vec<(String, Vec<f64>)>,
     /// Times, ascending.
     pub times: Vec<f64>,
-    /// What cells show.
+    /// Value of the cells.
     pub shows: Shows,
 }
 

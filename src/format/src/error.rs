@@ -14,9 +14,9 @@ pub enum Error {
         origin: String,
         /// Array or metadata entry.
         what: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
     /// A scene file has wrong syntax, a wrong key or a wrong value.
@@ -28,9 +28,9 @@ pub enum Error {
         position: Option<(usize, usize)>,
         /// Field path, for example `contact[1].gap`.
         what: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
     /// A file could not be read.
@@ -38,9 +38,9 @@ pub enum Error {
     File {
         /// Path as it was opened.
         path: String,
-        /// What went wrong, in the operating system's words.
+        /// The problem, in the operating system's words.
         problem: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
 }

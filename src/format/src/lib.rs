@@ -33,7 +33,7 @@ pub use thermal_file::{
     THERMAL_FILE, ThermalResources, load_thermal_resources, read_thermal, thermal_resource_files, write_thermal,
 };
 
-/// What the marks of all releases begin with.
+/// Beginning of the marks of all releases.
 pub const LIBRARY_MARK: &str = "tiprub library ";
 /// Stands in every library of an FMU, and in the program that packages it: the release and a digest of the sources of both.
 pub const LIBRARY_RELEASE: &str =

@@ -19,7 +19,7 @@ pub const SCENE_FILE: &str = "scene.toml";
 pub(crate) const PACKAGE_FILE: &str = "package.toml";
 /// Largest size of it (bytes).
 const LARGEST_PACKAGE: u64 = 1 << 12;
-/// How names of ROM files and thermal models end.
+/// End of the names of ROM files and thermal models.
 const ARRAYS_END: &str = ".safetensors";
 /// Version of the layout of `resources/`.
 pub(crate) const RESOURCES_FORMAT_VERSION: u32 = 1;
@@ -27,7 +27,7 @@ pub(crate) const RESOURCES_FORMAT_VERSION: u32 = 1;
 pub(crate) const INTACT: &str =
     "The FMU is damaged or was changed: import it again, or write it again with `tiprub package`";
 
-/// What an FMU instance needs.
+/// Resources of an FMU instance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resources {
     /// Settings and ROMs.
@@ -97,7 +97,7 @@ pub fn packed_roms(scene: &Scene) -> Vec<Rom> {
     structures.map(|(structure, rom)| Rom { extras: needed(structure, rom, &scene.settings), ..rom.clone() }).collect()
 }
 
-/// What is off leaves no data in the FMU.
+/// Returns the ROM without data of effects that are off.
 fn needed(structure: &StructureSettings, rom: &Rom, settings: &SceneSettings) -> RomExtras {
     let spins = structure.spin != SpinSettings::default();
     let carries = settings.surfaces.iter().any(|surface| surface.structure.as_ref() == Some(&structure.name));

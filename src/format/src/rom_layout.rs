@@ -41,8 +41,8 @@ const fn array(
     ArrayLayout { name, shape, unit, required, description }
 }
 
-/// How many of [`ARRAYS`] every structure may have; the others belong to structures that spin, heat up, or have coupled
-/// sectors. Only files that hold one of those mention it.
+/// Number of [`ARRAYS`] that every structure may have; the others belong to structures that spin, heat up, or have coupled sectors. Only files with
+/// one of those mention it.
 const GENERAL_ARRAYS: usize = 9;
 
 /// Every array.

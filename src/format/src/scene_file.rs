@@ -102,7 +102,7 @@ pub fn position_of(text: &str, path: &str) -> Option<(usize, usize)> {
     Document { text, origin: "", root: document.get_ref() }.position(path)
 }
 
-/// What a preset says of keys that the file leaves out.
+/// Sets the keys of a preset that the file leaves out.
 fn apply_preset(settings: &mut SceneSettings, document: &Document) {
     if settings.preset != Preset::Paper {
         return;

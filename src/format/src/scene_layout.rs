@@ -48,7 +48,7 @@ pub(crate) const INNER_TABLES: [(&str, &str); 8] = [
     ("contact.coating.cutting", "{ specific_energy = 5e8, normal_ratio = 1.0 }"),
 ];
 
-/// How a table is written in the file.
+/// Returns the header of a table in the file.
 pub(crate) fn header(table: &str) -> String {
     match table.split_once('.') {
         Some((outer, inner)) => format!("`{inner}` of {}", header(outer)),

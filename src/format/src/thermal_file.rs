@@ -18,7 +18,7 @@ const FORMAT: &str = "tiprub-thermal";
 const VERSION: &str = "1";
 const WRITE_AGAIN: &str = "Write the model again with `tiprub thermal`";
 
-/// What an instance of a thermal FMU needs.
+/// Resources of an instance of a thermal FMU.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalResources {
     /// The model.

@@ -44,7 +44,7 @@ pub(crate) const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
 
 /// The cube of the cube between two rings.
 pub const CUBE: &str = "cube";
-/// Its rings.
+/// Rings of the cube.
 pub const RINGS: [(&str, RingSide); 2] = [("ring-left", RingSide::Left), ("ring-right", RingSide::Right)];
 
 /// Every name that [`rom`] knows.
@@ -124,7 +124,7 @@ pub const MESHES: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, core::f64::
 pub struct ModelVariant {
     /// Number of modes, as a factor on its own.
     pub modes: f64,
-    /// What touches, where it [has a chord](has_chord).
+    /// Contact of the tip, if the model [has a chord](has_chord).
     pub tip: TipContact,
     /// Elements along the edges, as a factor on its own, where it has a chord: the number through the thickness stays.
     pub mesh: f64,

@@ -18,7 +18,7 @@ use tiprub_model::{
 
 /// One model that ships with what was found of it.
 struct KnownModel {
-    /// Its options as they were, in debug form.
+    /// Options of the model in debug form.
     options: String,
     /// The rub, in words.
     found_on: &'static str,

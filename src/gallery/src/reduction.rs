@@ -79,7 +79,7 @@ pub fn cube_ring(options: &RingOptions, console: &Console) -> Result<Reduction> 
 /// Work that tells where it stands, shown as a task; `title` says what is done.
 ///
 /// # Errors
-/// Those of the work.
+/// The errors of the work.
 pub fn with_progress<T>(
     title: &str,
     console: &Console,

@@ -65,7 +65,7 @@ impl RomCache {
     /// The model `name` with these options: as kept, or as `make` makes it, which is then kept.
     ///
     /// # Errors
-    /// Those of `make`.
+    /// The errors of `make`.
     pub fn get(
         &self,
         name: &str,

@@ -38,7 +38,7 @@ pub const BUILTIN_SCENES: [(&str, &str); 8] = [
     ("cube-between-rings", CUBE_SCENE),
 ];
 
-/// What names of embedded scenes and models begin with.
+/// Beginning of the names of embedded scenes and models.
 pub const BUILTIN: &str = "builtin:";
 
 /// Load a scene: a path, or `builtin:` and the name of one of [`BUILTIN_SCENES`]. Built-in models come from `cache`, or
@@ -54,7 +54,7 @@ pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) ->
     }
 }
 
-/// What [`load`] would load, without its models: nothing is reduced.
+/// Loads the settings of a scene without its models: nothing is reduced.
 ///
 /// # Errors
 /// As [`load`], but for the models.

@@ -76,7 +76,7 @@ pub fn assemble(mesh: &Mesh, material: &Material, listener: Listener<'_>) -> Res
 /// As [`assemble`], with hex8 elements in the given formulation.
 ///
 /// # Errors
-/// Those of [`assemble`].
+/// The errors of [`assemble`].
 pub fn assemble_with(
     mesh: &Mesh,
     material: &Material,

@@ -59,7 +59,7 @@ pub struct InnerBasis<'a> {
 /// As [`craig_bampton`], with the interior described as told. A load whose static response is there already adds nothing.
 ///
 /// # Errors
-/// Those of [`craig_bampton`].
+/// The errors of [`craig_bampton`].
 pub fn craig_bampton_with(
     stiffness: &SparseMatrix,
     mass: &SparseMatrix,

@@ -30,7 +30,7 @@ impl FeModel {
     /// Assemble a mesh of one material.
     ///
     /// # Errors
-    /// Those of [`assemble`].
+    /// The errors of [`assemble`].
     pub fn assembled(mesh: Mesh, material: &Material, origin: String, listener: Listener<'_>) -> Result<Self> {
         let matrices = assemble(&mesh, material, listener)?;
         Ok(Self {

@@ -33,7 +33,7 @@ pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, f
 /// twice as many are asked for. Clamped nodes are left out of the faces: CalculiX refuses to tie them.
 ///
 /// # Errors
-/// Those of [`calculix_input`]; [`Error::Invalid`] for a nodal diameter above half the number of sectors.
+/// The errors of [`calculix_input`]; [`Error::Invalid`] for a nodal diameter above half the number of sectors.
 pub fn calculix_cyclic_input(
     mesh: &Mesh,
     material: &Material,

@@ -58,7 +58,7 @@ pub fn contact_patches(
 /// sides of the tip. A tip that stays straight across its thickness stays outside of all that two rows stay outside of.
 ///
 /// # Errors
-/// Those of [`contact_patches`]; no rows, or more than the nodes of the tip tell apart.
+/// The errors of [`contact_patches`]; no rows, or more than the nodes of the tip tell apart.
 pub fn tip_patches(
     mesh: &Mesh,
     set: &[usize],

@@ -137,7 +137,7 @@ pub fn reduce(
 /// rest of the ROM stays the same, bit for bit.
 ///
 /// # Errors
-/// Those of [`reduce`]; [`Error::Invalid`] for a speed that is not a finite number above zero, for effects of spin without a mesh or
+/// The errors of [`reduce`]; [`Error::Invalid`] for a speed that is not a finite number above zero, for effects of spin without a mesh or
 /// without clamped nodes, and where the structure finds no equilibrium with the centrifugal force.
 pub fn reduce_model(
     model: FeModel,

@@ -61,7 +61,7 @@ fn rows(mesh: &Mesh, material: &Material, nodes: &[usize]) -> Result<Vec<StressR
 /// Stress components of these nodes per free degree of freedom, free dofs × 6·nodes, in the directions of the frame at each node.
 ///
 /// # Errors
-/// Those of [`nodal_stress`].
+/// The errors of [`nodal_stress`].
 fn stress_rows(
     (mesh, material): (&Mesh, &Material),
     free: &[usize],

@@ -97,7 +97,7 @@ pub(crate) enum ElementShare {
 /// Returns the part of each element that belongs to patches.
 ///
 /// # Errors
-/// Those of [`patch_of_elements`].
+/// The errors of [`patch_of_elements`].
 pub(crate) fn shares_of_elements(mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Vec<ElementShare>> {
     let share = |(element, found): (&Element, Option<usize>)| {
         let corners = || element.nodes[..element.kind.corner_count()].iter().map(|&node| mesh.nodes[node]);
@@ -150,7 +150,7 @@ pub(crate) fn patches_of_points(
 /// the integration points that lie in it, so that the loads of patches that fill the mesh add up to that of the whole.
 ///
 /// # Errors
-/// Those of [`patch_of_elements`]; [`Error::NegativeJacobian`].
+/// The errors of [`patch_of_elements`]; [`Error::NegativeJacobian`].
 pub fn patch_loads(mesh: &Mesh, material: &Material, patches: &[ThermalPatch]) -> Result<Mat<f64>> {
     let mut loads = Mat::zeros(3 * mesh.nodes.len(), patches.len());
     for (number, (element, share)) in mesh.elements.iter().zip(shares_of_elements(mesh, patches)?).enumerate() {

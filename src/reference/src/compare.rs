@@ -39,7 +39,7 @@ pub fn windowed(times: &[f64], force: &[f64], length: f64, end: f64) -> Vec<f64>
     windows
 }
 
-/// How far a history is from another.
+/// Distance of one history from another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HistoryDifference {
     /// Relative L2 difference of u1x, u1y + vt (the slowing down) and u1z while node 1 touches.

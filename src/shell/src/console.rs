@@ -51,9 +51,9 @@ const READER_LEFT: u8 = 128 + 13;
 pub struct CommandOutcome {
     /// For people: the answer.
     pub text: String,
-    /// What the answer is to be read with, on stderr behind it.
+    /// Warnings that belong to the answer; they follow it on stderr.
     pub warnings: Vec<Warning>,
-    /// What stands behind the warnings: where there is more.
+    /// Lines after the warnings: where to find more.
     pub rest: String,
     /// For programs: one object.
     pub json: serde_json::Value,
@@ -220,7 +220,7 @@ impl Task {
         }
     }
 
-    /// What it is doing now.
+    /// Shows the current activity.
     pub fn now(&self, message: &str) {
         self.bar.set_message(printable(message).into_owned());
     }

@@ -20,7 +20,7 @@ pub struct Extreme {
     pub time: f64,
 }
 
-/// Those of the variables that a recording has: forces, clearance, contacts.
+/// Returns the extremes of the variables that a recording has: forces, clearance, contacts.
 pub fn extremes(recording: &Recording) -> Vec<Extreme> {
     // The largest of a column, or with `sense` −1 the smallest, and when it is reached first.
     let found = |name, text, unit, sense: f64, values: Option<Vec<f64>>| {

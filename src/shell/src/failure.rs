@@ -9,11 +9,11 @@ use crate::console::warnings_json;
 /// Why a command did not do what it was asked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
-    /// What the trouble is about: a file, an option, a scene field.
+    /// The file, option or scene field with the problem.
     pub what: String,
-    /// What is wrong with it.
+    /// The problem.
     pub problem: String,
-    /// What to do about it; empty where the problem already says so.
+    /// The remedy; empty if the problem already contains it.
     pub remedy: String,
     /// True when the command line itself was wrong (exit code 2), false when the work failed (exit code 1).
     pub usage: bool,
@@ -21,7 +21,7 @@ pub struct Failure {
     pub warnings: Vec<Warning>,
 }
 
-/// What cannot be done with a file that is only read.
+/// Failed operations on a file that is only read.
 const READING: [&str; 2] = ["cannot be read", "cannot be opened"];
 
 /// Result of everything in this crate.

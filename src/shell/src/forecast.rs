@@ -29,7 +29,7 @@ struct WorkKind {
     seconds: f64,
 }
 
-/// What is planned and done.
+/// Planned and finished work.
 #[derive(Debug, Clone)]
 pub struct WorkPlan {
     kinds: Vec<WorkKind>,

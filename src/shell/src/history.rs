@@ -135,7 +135,7 @@ impl InputHistory {
         self.names.iter().any(|own| own == name || own.strip_prefix(name).is_some_and(|rest| rest.starts_with('[')))
     }
 
-    /// What the communication step leaves out of it, if anything.
+    /// Returns warnings about parts of the history that the communication step does not resolve.
     pub fn warnings(&self, step: f64) -> Vec<Warning> {
         let shortest = self.times.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
         if shortest >= 0.999 * step {
@@ -163,7 +163,7 @@ fn is_drivable(row: &Variable) -> bool {
     row.kind == DataType::Real && (row.causality == Causality::Input || tunable)
 }
 
-/// How a variable follows its column.
+/// Values of a variable that follow a column.
 #[derive(Debug, Clone, Copy)]
 enum ColumnTarget {
     /// Value at the start of a communication step and its derivative over it.
@@ -195,7 +195,7 @@ impl Driver<'_> {
         Ok(())
     }
 
-    /// What a communication step from a time to another (s) needs.
+    /// Sets the inputs of a communication step from one time to another (s).
     ///
     /// # Errors
     /// Values that the variables do not take.

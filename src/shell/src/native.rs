@@ -22,13 +22,13 @@ pub struct NativeRun {
     pub slowest: Duration,
     /// Internal steps done, of all blades together where each takes its own.
     pub internal_steps: u64,
-    /// What a tolerance has taken, where there is one.
+    /// Work of adaptive steps, if the run has them.
     pub effort: Option<Effort>,
     /// Warnings of the initialisation, of the run and of the schedule.
     pub warnings: Vec<Warning>,
 }
 
-/// What a run is given beside its scene.
+/// Inputs of a run besides its scene.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RunInputs<'a> {
     /// Start values (name, value as text).

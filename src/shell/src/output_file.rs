@@ -65,7 +65,7 @@ pub fn only_a_file(target: &Path) -> Result<()> {
     }
 }
 
-/// What already is under the name of a target.
+/// Existing file under the name of a target.
 enum OutputTarget {
     /// Nothing, or a file to replace, at this path (symbolic links resolved).
     File(PathBuf),
@@ -150,7 +150,7 @@ fn temporary<'a>() -> tempfile::Builder<'a, 'a> {
     builder
 }
 
-/// What the umask leaves of this is what new files get.
+/// Returns the permissions of new files under the umask.
 #[cfg(unix)]
 fn ordinary() -> fs::Permissions {
     std::os::unix::fs::PermissionsExt::from_mode(0o666)

@@ -18,7 +18,7 @@ pub struct NamedFile {
 }
 
 impl NamedFile {
-    /// What `role` says is at `path`.
+    /// Makes a file at `path` with its `role`.
     pub fn new(role: impl Into<String>, path: impl Into<PathBuf>) -> Self {
         Self { role: role.into(), path: path.into() }
     }
@@ -62,7 +62,7 @@ pub fn apart(inputs: &[NamedFile], outputs: &[NamedFile]) -> Result<()> {
     Ok(())
 }
 
-/// What a path stands for: what is there, and the names below it of what is not there yet.
+/// Identity of a path: the existing part of it, and the names below that do not exist yet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Identity {
     there: Key,

@@ -55,7 +55,7 @@ impl Schedule {
         Ok(Self { start, stop, step, count: count_steps(steps) })
     }
 
-    /// What is legal but hardly meant: a communication step longer than the whole run.
+    /// Returns a warning for a communication step longer than the whole run, which is legal but rarely meant.
     pub fn warnings(&self) -> Vec<Warning> {
         let length = self.stop - self.start;
         let one_step = self.step > length && !is_close(self.step, length);

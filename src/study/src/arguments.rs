@@ -240,7 +240,7 @@ fn transient(text: &str) -> Result<usize, String> {
 /// A positive number.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// The problem with the text.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -251,7 +251,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// `FROM:TO:COUNT` of positive angular velocities.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// The problem with the text.
 pub fn speeds(text: &str) -> Result<Speeds, String> {
     counted(text, 1000).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
         "give growing positive angular velocities in rad/s and a count from 2 to 1000 as FROM:TO:COUNT, for example 400:1600:25".into()
@@ -261,7 +261,7 @@ pub fn speeds(text: &str) -> Result<Speeds, String> {
 /// `NAME=VALUE`.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// The problem with the text.
 pub fn assignment(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {

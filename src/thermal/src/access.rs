@@ -57,7 +57,7 @@ impl ThermalSimulation {
         Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy))
     }
 
-    /// What a reference stands for, if it can be set now.
+    /// Returns the item of a reference, if it can be set now.
     fn settable(&self, reference: u32) -> Result<(Item, usize, &Variable)> {
         let (variable, element) = self.table.locate(reference)?;
         let what = || format!("variable `{}`", variable.name);

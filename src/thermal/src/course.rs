@@ -7,7 +7,7 @@ use tiprub_core::persist_fields;
 pub(crate) struct InputCourse {
     /// As set.
     pub(crate) value: f64,
-    /// Its time derivative, 0 unless given.
+    /// Time derivative, 0 unless given.
     pub(crate) slope: f64,
     /// Time since it was set (s), where a derivative was given.
     since: f64,

@@ -27,8 +27,8 @@ pub struct ConductionModel {
     pub gas_convection: DMatrix<f64>,
     /// H_a of the air outside, coordinates × coordinates (1/s).
     pub ambient_convection: DMatrix<f64>,
-    /// What one watt into each patch does, coordinates × patches (√(K/J)). Spread evenly over the heated surface of a patch, it is
-    /// also the mean temperature there: transposed.
+    /// Heating of the coordinates by one watt into each patch, coordinates × patches (√(K/J)). Spread evenly over the heated surface of a patch, its
+    /// transpose gives the mean temperature there.
     pub heat_loads: DMatrix<f64>,
     /// Mean temperature of the volume of each patch, patches × coordinates (√(K/J)).
     pub patch_means: DMatrix<f64>,

@@ -18,7 +18,7 @@ pub(crate) struct DiagonalOperator {
     pub(crate) heat: DMatrix<f64>,
     /// Loads per kelvin of the gas and of the air, their factors included; transposed, what flows back at a temperature.
     pub(crate) films: [DVector<f64>; 2],
-    /// What these are for a uniform temperature, s h A (W/K).
+    /// Conductances of the surfaces at a uniform temperature, s h A (W/K).
     pub(crate) conductances: [f64; 2],
     /// Rows of outputs, see [`crate::outputs::rows`].
     pub(crate) rows: DMatrix<f64>,
@@ -27,7 +27,7 @@ pub(crate) struct DiagonalOperator {
 }
 
 impl DiagonalOperator {
-    /// Of a model with `rows` of outputs.
+    /// Makes the operator of a model with `rows` of outputs.
     pub(crate) fn new(model: &ConductionModel, rows: &DMatrix<f64>, factors: [f64; 2]) -> Self {
         let films = [&model.gas_convection, &model.ambient_convection];
         let matrix = &model.conduction + films[0] * factors[0] + films[1] * factors[1];

@@ -22,7 +22,7 @@ pub(crate) fn rows(model: &ConductionModel) -> DMatrix<f64> {
     rows
 }
 
-/// Of the whole: the first coordinate alone.
+/// Returns the row of the mean temperature: the first coordinate alone.
 fn mean(model: &ConductionModel) -> DMatrix<f64> {
     let mut row = DMatrix::zeros(1, model.order());
     row[(0, 0)] = 1.0 / model.heat_capacity.sqrt();
@@ -86,7 +86,7 @@ impl ThermalSimulation {
         })
     }
 
-    /// What the balance of heat leaves (J).
+    /// Returns the residual of the heat balance (J).
     fn residual(&self) -> f64 {
         let came: f64 = self.state.totals.iter().map(tiprub_core::Sum::value).sum();
         stored(&self.operator, &self.state.coordinates) - self.state.initial_heat - came

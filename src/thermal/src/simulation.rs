@@ -28,7 +28,7 @@ pub struct ThermalSimulation {
     pub(crate) table: VariableTable,
     pub(crate) items: Vec<Item>,
     pub(crate) fingerprint: u64,
-    /// Of the model's outputs, in its own coordinates.
+    /// Rows of the model's outputs, in its own coordinates.
     pub(crate) model_rows: nalgebra::DMatrix<f64>,
     pub(crate) operator: DiagonalOperator,
     pub(crate) state: ThermalState,
@@ -49,7 +49,7 @@ impl ThermalSimulation {
     /// Start values are in place, nothing is computed yet.
     ///
     /// # Errors
-    /// Those of [`ConductionModel::validate`].
+    /// The errors of [`ConductionModel::validate`].
     pub fn new(model: ConductionModel) -> Result<Self> {
         model.validate()?;
         let (table, items) = table::build(&model)?;

@@ -34,7 +34,7 @@ pub(crate) struct ThermalState {
     pub(crate) films: [InputCourse; 2],
     /// Convection factors as set.
     pub(crate) factors: [f64; 2],
-    /// Those of the last step, in whose eigenvectors the coordinates are.
+    /// Factors of the last step, in whose eigenvectors the coordinates are.
     pub(crate) factors_used: [f64; 2],
     /// z.
     pub(crate) coordinates: Vec<f64>,
@@ -78,7 +78,7 @@ pub struct ThermalInputs {
 }
 
 impl ThermalSimulation {
-    /// What the inputs do, derivatives included.
+    /// Returns the inputs over time, derivatives included.
     pub fn courses(&self) -> ThermalInputs {
         ThermalInputs { heat: self.state.heat.clone(), films: self.state.films }
     }
@@ -148,7 +148,7 @@ fn damaged<T>(problem: &str) -> Result<T> {
     Err(Error::State { problem: problem.to_owned() })
 }
 
-/// Of a model's numbers.
+/// Returns the fingerprint of a model's numbers.
 pub(crate) fn fingerprint_of<'a>(arrays: impl Iterator<Item = &'a [f64]>) -> u64 {
     arrays.flatten().fold(0, |seed, value| fingerprint(&value.to_bits().to_le_bytes(), seed))
 }

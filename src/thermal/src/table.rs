@@ -47,7 +47,7 @@ static INTERPOLATIONS: Enumeration = Enumeration {
     ],
 };
 
-/// What a variable stands for; an item for each row, in the order of the table.
+/// Quantity of a variable; an item for each row, in the order of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Item {
     Time,

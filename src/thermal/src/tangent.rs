@@ -9,7 +9,7 @@ use crate::outputs::{row_times, stored};
 use crate::simulation::ThermalSimulation;
 use crate::table::Item;
 
-/// How coordinates, their integrals over the step and heats change.
+/// Changes of coordinates, their integrals over the step, and heats.
 struct ThermalChange {
     coordinates: Vec<f64>,
     /// Supplied, from the gas, from the air (J).

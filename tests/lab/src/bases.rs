@@ -33,13 +33,13 @@ const MODEL_DIVISION: u32 = 40;
 /// Errors at which costs are compared.
 const EQUAL: [f64; 2] = [3e-2, 1e-2];
 
-/// How big it is.
+/// Size of the models.
 struct BasisSize {
     mesh: MeshCounts,
     modes: &'static [usize],
     /// With fewer of them responses go beyond the frequencies that are kept.
     covered: usize,
-    /// Of the truth, and modes of the full model that responses are compared between.
+    /// Number of modes of the reference, and of the full model for the comparison of responses.
     true_modes: usize,
     checked: usize,
     patches: usize,
@@ -48,7 +48,7 @@ struct BasisSize {
     divisions: &'static [u32],
 }
 
-/// Of the time of a step.
+/// Steps per sample of the run by which the time of a step is measured.
 const TYPICAL: u32 = 20;
 
 const FULL: BasisSize = BasisSize {
@@ -72,7 +72,7 @@ const QUICK: BasisSize = BasisSize {
     divisions: &[2, 5, TYPICAL],
 };
 
-/// What touches, and which modes stand beside.
+/// Contact of the tip, and the modes besides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct BasisChoice {
     /// Patches, or else three nodes.
@@ -98,7 +98,7 @@ impl BasisChoice {
         format!("{contact}, {kind}")
     }
 
-    /// Its model with so many modes.
+    /// Reduces a model with `modes` modes.
     fn rom(self, size: &BasisSize, modes: usize, console: &Console) -> Result<Rom> {
         let tip = self.patches.map_or(TipContact::Nodes(3), TipContact::Patches);
         let own = Rotor37Options { mesh: size.mesh, tip, kind: self.kind, modes, ..Rotor37Options::default() };

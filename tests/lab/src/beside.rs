@@ -28,7 +28,7 @@ const LONGEST: f64 = 5e-7;
 /// Both must meet within so many times what they change when their steps are halved.
 const MARGIN: f64 = 4.0;
 
-/// What one of the two found.
+/// Result of one of the two programs.
 struct SideBySideRun {
     /// Displacements of all contact rows and blades at the communication points (m), sample by sample.
     displacements: Vec<f64>,

@@ -33,7 +33,7 @@ pub struct LabCli {
     /// No progress on stderr; results, warnings and errors are still printed.
     #[arg(long, short, global = true)]
     pub quiet: bool,
-    /// What to do.
+    /// The study.
     #[command(subcommand)]
     pub command: LabCommand,
 }
@@ -62,13 +62,13 @@ pub enum LabCommand {
     Cube(LabCubeArguments),
     /// Forces and moments on both sides of contacts, torque against the work of the shaft, and the ledger, over all features.
     Conjugacy(StudyCommon),
-    /// What the communication step does to a whirling shaft and other inputs that move, ramped, with derivatives, and held.
+    /// Effect of the communication step on a whirling shaft and on other moving inputs: ramped, with derivatives, and held.
     Inputs(StudyCommon),
     /// A rub and a shaft in its bearings, stepped by turns: once, by iterations, by Newton's method with derivatives over the step.
     Coupling(StudyCommon),
-    /// What steps, modes, patches and the mesh are estimated to leave, against rubs refined far in each direction.
+    /// Estimated errors of steps, modes, patches and the mesh against rubs that are refined in each direction.
     Estimates(EstimatesArguments),
-    /// What refining rubs of rotor 37 and of the stage changes: patches, mesh, modes, steps; limits, and the errors of what ships.
+    /// Refinement of rubs of rotor 37 and of the stage: patches, mesh, modes, steps; limits, and the errors of the built-in models.
     Refinement(RefinementArguments),
     /// Modes with the contact held or free, contact at nodes or patches: error, largest steps and cost against the number of modes.
     Bases(StudyCommon),
@@ -90,7 +90,7 @@ pub struct EstimatesArguments {
     /// Only what the mesh leaves: minutes instead of an hour.
     #[arg(long)]
     pub mesh_only: bool,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -101,7 +101,7 @@ pub struct LabCubeArguments {
     /// Only the faces of the cube as patches: a minute.
     #[arg(long)]
     pub patches_only: bool,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -112,7 +112,7 @@ pub struct BesideArguments {
     /// Scene file (TOML), or a built-in scene.
     #[arg(value_name = "SCENE", default_value = "builtin:rotor37-paper")]
     pub scene: String,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -129,7 +129,7 @@ pub struct RefinementArguments {
     /// Runs at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -144,7 +144,7 @@ pub struct LabErrorArguments {
     /// scenes.
     #[arg(long, value_name = "DIR")]
     pub guide: Option<PathBuf>,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -203,7 +203,7 @@ pub struct ModesArguments {
     /// Speed of the engine orders (rad/s) [default: where an oval casing meets the first mode of nodal diameter 2].
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
     pub speed: Option<f64>,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }
@@ -218,7 +218,7 @@ pub struct LabStageArguments {
     /// Runs at the same time [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
-    /// What all studies take.
+    /// Options of all studies.
     #[command(flatten)]
     pub common: StudyCommon,
 }

@@ -71,7 +71,7 @@ impl Shaft {
     }
 }
 
-/// How a step of both is done.
+/// Method of stepping both models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum CouplingMethod {
     /// The shaft goes by the last force, then the rub by the shaft.
@@ -97,7 +97,7 @@ impl CouplingMethod {
     }
 }
 
-/// What came of a run.
+/// Result of a run.
 #[derive(Debug, Clone, Default)]
 struct CouplingRun {
     /// At multiples of the longest step.

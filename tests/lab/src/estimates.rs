@@ -68,10 +68,10 @@ const FACTOR: f64 = 3.0;
 /// Errors below this are as good as none: 1e-4 of displacements is beyond what anybody asks of a rub.
 const NONE: f64 = 1e-4;
 const DIRECTIONS: [&str; 5] = ["steps", "modes", "patches", "mesh, from one coarser", "mesh, from two coarser"];
-/// Those that the product estimates from the scene alone.
+/// Number of directions that the product estimates from the scene alone.
 const OF_SCENE: usize = 3;
 
-/// What was estimated of the displacements, and what is true.
+/// Estimated and true errors of the displacements.
 #[derive(Debug, Clone, Copy)]
 struct Compared {
     scene: usize,
@@ -145,7 +145,7 @@ fn edge([chord, _, span]: [usize; 3]) -> f64 {
     1.0 / ((chord * span) as f64).sqrt()
 }
 
-/// What the mesh leaves, from one coarser mesh and from two.
+/// Estimates the error of the mesh, from one coarser mesh and from two.
 fn of_mesh(rub: &EstimatedRub, own: &RunSummary, samples: usize) -> [Option<f64>; 2] {
     let [coarsest, coarse] = rub.coarser.each_ref().map(|scene| run(scene, DIVISION, samples).ok());
     let [first, second] = rub.group.coarser.map(edge);

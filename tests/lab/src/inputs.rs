@@ -22,9 +22,9 @@ const STEPS: [f64; 3] = [1e-6, 1e-5, 1e-4];
 const PART: f64 = 1e-4;
 /// Radius of the whirl (m), its speed (rad/s), and the time in which it grows (s).
 const WHIRL: (f64, f64, f64) = (0.39e-3, 600.0, 2e-3);
-/// How far casing or bumps come in beyond the clearance (m).
+/// Depth of casing or bumps beyond the clearance (m).
 const DEPTH: f64 = 3e-5;
-/// How far the casing's patches cool (K).
+/// Cooling of the casing's patches (K).
 const COOLING: f64 = 40.0;
 /// Length of the runs (s).
 const LENGTH: f64 = 8e-3;
@@ -32,7 +32,7 @@ const QUICK_LENGTH: f64 = 3e-3;
 /// Inputs that do not jump may exceed the fine run by this factor.
 const MILD: f64 = 1.5;
 
-/// How the importer gives an input.
+/// Method by which the importer gives an input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum InputMethod {
     /// Values only, ramped by the FMU.
@@ -64,7 +64,7 @@ struct InputCase {
     values: fn(&Scene, f64, f64) -> Vec<(&'static str, f64)>,
 }
 
-/// What came of a run.
+/// Result of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct InputRun {
     /// Largest normal force of any node in any internal step (N).

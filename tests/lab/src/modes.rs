@@ -38,7 +38,7 @@ fn nearest_order(number: usize, frequency: f64, turns: f64, sectors: usize) -> O
     orders.filter(|order| folded(*order, sectors).0 == number).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
-/// What is drawn: where modes and engine orders are.
+/// Draws modes and engine orders.
 fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<StudyFigure> {
     let turns = speed / std::f64::consts::TAU;
     let kept = |diameter: &NodalDiameter| diameter.full_frequencies.iter().take(FAMILIES).copied().collect::<Vec<_>>();

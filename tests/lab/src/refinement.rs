@@ -36,7 +36,7 @@ const HEAVY: f64 = 1.0;
 const FRICTION: f64 = 0.15;
 /// Scenes that are drawn together.
 const FAMILIES: [&str; 2] = ["rotor37", "stage"];
-/// What is in no picture.
+/// Family of scenes that are in no picture.
 const APART: &str = "apart";
 /// Tips of a blade of the stage: two rows of patches, and three nodes.
 const STAGE_TIPS: [(TipContact, &str, &str); 2] =
@@ -52,7 +52,7 @@ const STAGE_FINEST: usize = 2;
 struct Standard {
     name: String,
     title: String,
-    /// Of which pictures it is in: `rotor37` or `stage`, or none.
+    /// Picture of the scene: `rotor37` or `stage`, or none.
     family: &'static str,
     settings: SceneSettings,
     /// Tip and mesh of the structure that touches, instead of what the scene names.
@@ -114,7 +114,7 @@ impl Standard {
     }
 }
 
-/// What was found of a scene, or why it does not run.
+/// Results of a scene, or why it does not run.
 struct RefinementCase {
     title: String,
     name: String,
@@ -206,12 +206,12 @@ fn percent(error: Option<f64>, to_finest: Option<f64>) -> String {
     }
 }
 
-/// Of a scene without friction its strain energy, else the work of friction: which quantity, counted with the displacements.
+/// Returns the energy that is compared, counted with the displacements: strain energy of a scene without friction, else the work of friction.
 fn energy(refined: &Refined) -> usize {
     if refined.ran().iter().any(|(_, run)| run.friction_work > 0.0) { 2 } else { 4 }
 }
 
-/// What is refined, in a word or two.
+/// Returns the name of a direction in a word or two.
 fn short(direction: &RefinementDirection) -> &str {
     match direction.name {
         refine::STEP if direction.unit == refine::OF_CLEARANCE => "tolerance",
@@ -315,7 +315,7 @@ fn markdown(cases: &[RefinementCase]) -> String {
     all.map(|table| table.to_markdown() + "\n").collect()
 }
 
-/// What pictures show of a direction, in the order of their names.
+/// Quantities in the pictures of a direction, in the order of their names.
 const DRAWN: [&str; 3] = ["displacements (L2)", "impulse", "friction work (strain energy, µ = 0)"];
 /// Family, direction, label of its values, names of the pictures.
 const PICTURES: [(&str, &str, &str, [&str; 3]); 10] = [

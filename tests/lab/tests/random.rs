@@ -4,7 +4,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// What a run that ends with `code` writes on stdout.
+/// Returns the output of a run that ends with `code`.
 fn random(arguments: &[&str], code: i32) -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
     command.args(["--json", "--quiet", "random"]).args(arguments);

@@ -4,7 +4,7 @@ use std::{path::Path, process::Command};
 
 use serde_json::Value;
 
-/// What a run that ends with `code` writes on stdout.
+/// Returns the output of a run that ends with `code`.
 fn stability(root: &Path, arguments: &[&str], code: i32) -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
     command.current_dir(root).args(["--json", "--quiet", "stability", "--out", "out"]).args(arguments);

@@ -42,7 +42,7 @@ fn judge(name: &str, allowed: &str, state: char, status: i32, log: &str) {
     }
 }
 
-/// What is called: the contact unit, or that of heat conduction.
+/// The called unit: contact or heat conduction.
 struct Subject {
     path: PathBuf,
     resources: UnpackedResources,

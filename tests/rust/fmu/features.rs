@@ -204,7 +204,7 @@ fn a_packaged_scene_of_features_runs_as_it_does_without_packaging() {
     assert!(touching > 5, "{touching} steps with contact");
 }
 
-/// What an importer does with the outputs: mean torque times speed, step after step, while the rotor slows down.
+/// An importer multiplies mean torque and speed, step after step, while the rotor slows down.
 #[test]
 fn mean_torque_times_speed_is_the_work_of_the_shaft() {
     let (path, mut scene) = (shipped(), scene());

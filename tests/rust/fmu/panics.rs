@@ -9,7 +9,7 @@ use tiprub_tests::{ERROR, OK, fmi2, fmi3, library, shipped};
 /// The magic number of the feature `test-panic`.
 const PANIC: f64 = 1.234_567_890_123e-5;
 
-/// What the child process does: panics in both versions, in two threads at once, everything checked.
+/// The child process: panics in both versions, in two threads at once, everything checked.
 fn abuse() {
     let path = library("release", &["test-panic"]);
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));

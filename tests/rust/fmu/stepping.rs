@@ -455,7 +455,7 @@ fn marched() -> Scene {
 /// Communication step of these tests (s): five spans of the longest step.
 const LONG: f64 = 4e-4;
 
-/// What a scene does without a bound: the communication step that takes most, how many internal steps that is, and the values there.
+/// Run of a scene without a bound: the communication step with the most internal steps, their number, and the values there.
 struct Free {
     scene: Scene,
     references: Vec<u32>,

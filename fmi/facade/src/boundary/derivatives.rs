@@ -7,7 +7,7 @@ use crate::slave::{AccessRequest, Dialect, FmiStatus, Result, Slave};
 /// Value references with the number of their values, and the names of both arguments.
 pub(crate) type ReferenceArguments = (In<u32>, usize, usize, &'static str);
 
-/// What a function asks for.
+/// Function of the slave that computes derivatives.
 type DerivativeFunction = fn(&mut Slave, &[u32], &[u32], &[f64]) -> Result<Vec<f64>>;
 
 /// Forward: outputs move as inputs do.

@@ -25,8 +25,8 @@ pub(crate) struct Callbacks {
     pub environment: ImporterEnvironment,
 }
 
-/// What a handle points to. The mutex costs some twenty nanoseconds a call and buys two answers that the standard leaves
-/// open: a call on an instance that another thread is using is refused, and a panic inside the slave poisons it for good.
+/// Target of a handle. The mutex costs some twenty nanoseconds per call and settles two cases that the standard leaves open: a call on an instance
+/// that another thread is using is rejected, and a panic inside the slave poisons the instance for good.
 pub(crate) struct Instance {
     dialect: Dialect,
     slave: Mutex<Slave>,

@@ -12,7 +12,7 @@ use crate::boundary::{Callbacks, In, InstanceHandle, IntermediateUpdate, Out, en
 use crate::slave::order::fmi3 as order;
 use crate::slave::{AccessRequest, FmiStatus, Refusal, Result, Slave};
 
-/// How a step ended.
+/// End of a step.
 struct StepOutcome {
     status: FmiStatus,
     early: bool,
@@ -72,7 +72,7 @@ fn step(instance: InstanceHandle, current: f64, size: f64, missing: Option<&str>
     }
 }
 
-/// What to do after an internal step.
+/// Decides how to continue after an internal step.
 fn settle(slave: &mut Slave, progress: StepProgress, return_at: Option<f64>) -> Result<bool> {
     let early = !progress.finished && return_at.is_some_and(|time| progress.time >= time);
     if progress.finished || early {

@@ -5,8 +5,8 @@ use tiprub_core::{shown, shown_time};
 
 use super::{FmiStatus, InstancePhase, Refusal, Result, Slave};
 
-/// How far beyond the stop time a step may end, as a fraction of the step: importers add up their communication points,
-/// and the sum of many steps misses the stop time by rounding.
+/// Distance by which a step may end beyond the stop time, as a fraction of the step: importers add up their communication points, and the sum of many
+/// steps misses the stop time by rounding.
 const STOP_TOLERANCE: f64 = 1e-3;
 /// The same as a fraction of the stop time, for runs of very many steps.
 const STOP_ROUNDING: f64 = 1e-9;

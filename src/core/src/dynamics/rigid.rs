@@ -42,7 +42,7 @@ impl Translations {
 /// Modes of a free structure, the translations first.
 ///
 /// # Errors
-/// Those of [`ModalModel::from_rom`]; a structure that something holds.
+/// The errors of [`ModalModel::from_rom`]; a structure that something holds.
 pub fn free_modes(rom: &Rom, damping_ratio: f64) -> Result<(ModalModel, Translations)> {
     let mut model = ModalModel::from_rom(rom, damping_ratio)?;
     let largest = model.largest_frequency();

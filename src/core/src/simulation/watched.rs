@@ -45,7 +45,7 @@ impl WatchedGaps {
     /// At rest nothing is known yet.
     ///
     /// # Errors
-    /// Those of the gap functions.
+    /// The errors of the gap functions.
     pub fn new(compiled: &Compiled) -> Result<Self> {
         let watched = &compiled.scene.settings.outputs.watched_sectors;
         let sectors: Vec<usize> = watched.iter().map(|sector| sector - 1).collect();

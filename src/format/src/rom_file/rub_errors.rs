@@ -8,7 +8,7 @@ use crate::{Result, suggestion};
 /// Entries of the metadata.
 const ERRORS: &str = "rub_errors";
 const FOUND_ON: &str = "rub_errors_found_on";
-/// What leaves an error.
+/// Sources of errors.
 const DIRECTIONS: [&str; 4] = ["modes", "patches", "rows", "mesh"];
 
 impl RomReader<'_> {

@@ -101,7 +101,7 @@ pub const CLAMPED: &str = "clamped";
 /// Mesh of the ring, with the clamped nodes as a set of their own.
 ///
 /// # Errors
-/// Those of [`ring_mesh`]; a contact ring on a clamped face cannot be, since contact rings lie inside the casing.
+/// The errors of [`ring_mesh`]; a contact ring on a clamped face cannot be, since contact rings lie inside the casing.
 pub fn supported_ring(options: &CasingOptions) -> Result<RingMesh> {
     let mut ring = ring_mesh(&options.geometry, options.counts, options.rings, options.kind)?;
     let faces: &[&str] = match options.support {

@@ -62,7 +62,7 @@ pub struct ConductionReduction {
 /// The casing that `reduce_ring` reduces, for its heat: same mesh, same patches, heated between its contact rings.
 ///
 /// # Errors
-/// Those of [`supported_ring`] and [`reduce_conduction`].
+/// The errors of [`supported_ring`] and [`reduce_conduction`].
 pub fn reduce_ring_conduction(
     casing: &CasingOptions,
     options: &ConductionOptions,
@@ -80,7 +80,7 @@ pub fn reduce_ring_conduction(
 /// [`InnerSurface`] of the `set` of nodes (of all where absent) is heated between the axial positions `heated` (m; all of it where absent).
 ///
 /// # Errors
-/// Those of [`InnerSurface::find`] and [`reduce_conduction`].
+/// The errors of [`InnerSurface::find`] and [`reduce_conduction`].
 pub fn reduce_mesh_conduction(
     mesh: &Mesh,
     (set, heated): (Option<&[usize]>, Option<[f64; 2]>),
@@ -99,7 +99,7 @@ pub fn reduce_mesh_conduction(
 /// Reduce the conduction of a mesh around the z axis.
 ///
 /// # Errors
-/// Those of [`FullConduction::new`], of the eigenvalue iteration, and of [`ConductionModel::validate`].
+/// The errors of [`FullConduction::new`], of the eigenvalue iteration, and of [`ConductionModel::validate`].
 pub fn reduce_conduction(
     mesh: &Mesh,
     patches: &[ThermalPatch],

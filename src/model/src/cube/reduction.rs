@@ -95,7 +95,7 @@ impl RingOptions {
 /// face on.
 ///
 /// # Errors
-/// Those of `reduce_free_body`.
+/// The errors of `reduce_free_body`.
 pub fn reduce_cube(options: &CubeOptions, listener: Listener<'_>) -> Result<Reduction> {
     let mesh = cube_of(options.elements);
     let contact = match options.patches {
@@ -116,7 +116,7 @@ pub fn reduce_cube(options: &CubeOptions, listener: Listener<'_>) -> Result<Redu
 /// Mesh, reduce and check a ring, both ends clamped.
 ///
 /// # Errors
-/// Those of `reduce_panel`.
+/// The errors of `reduce_panel`.
 pub fn reduce_cube_ring(options: &RingOptions, listener: Listener<'_>) -> Result<Reduction> {
     let mesh = ring_of(options.side, options.elements);
     let (clamped, grid) = (mesh.set("CLAMPED")?.to_vec(), ring_grid(options.side, options.elements));

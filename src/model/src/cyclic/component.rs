@@ -70,7 +70,7 @@ impl Component {
     /// Reduce to fixed-interface modes. `at_rest` has no shift, `full` is the operator of the modes with free contact.
     ///
     /// # Errors
-    /// Those of [`lowest_modes`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
+    /// The errors of [`lowest_modes`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
     pub(super) fn fixed_interface(
         at_rest: &CyclicPencil<'_>,
         full: &CyclicPencil<'_>,
@@ -87,7 +87,7 @@ impl Component {
     /// Reduce to modes with free contact, `found` of `full`.
     ///
     /// # Errors
-    /// Those of [`free_interface`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
+    /// The errors of [`free_interface`]; [`Error::NotPositiveDefinite`] when the reduced mass is not.
     pub(super) fn free_interface(
         at_rest: &CyclicPencil<'_>,
         full: &CyclicPencil<'_>,
@@ -180,7 +180,7 @@ impl Component {
 /// Modes of an operator over its first `order` rows: with free contact where these are all.
 ///
 /// # Errors
-/// Those of [`lowest_modes`].
+/// The errors of [`lowest_modes`].
 pub(super) fn modes(operator: &CyclicPencil<'_>, order: usize, wanted: DiameterModes) -> Result<ComplexModes> {
     match wanted {
         DiameterModes::Count(count) => lowest_modes(operator, order, count),

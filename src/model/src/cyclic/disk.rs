@@ -16,7 +16,7 @@ pub struct WholeDisk {
 /// Turned copies of a sector, merged at their faces: the high face of one is the low face of the next.
 ///
 /// # Errors
-/// Those of [`Mesh::validate`].
+/// The errors of [`Mesh::validate`].
 pub fn whole_disk(sector: &Mesh, boundary: &CyclicBoundary) -> Result<WholeDisk> {
     let count = sector.nodes.len();
     let mut low_of = vec![usize::MAX; count];

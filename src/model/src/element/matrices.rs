@@ -156,7 +156,7 @@ pub fn thermal_load(
 /// The same of some integration points only.
 ///
 /// # Errors
-/// Those of [`thermal_load`].
+/// The errors of [`thermal_load`].
 pub(crate) fn thermal_load_of(
     kind: ElementKind,
     coordinates: &[[f64; 3]],

@@ -47,7 +47,7 @@ impl<'a> HeldContact<'a> {
     /// Craig-Bampton of these matrices of the free dofs, contact displacements in the frame; its transformation is to the displacements of nodes.
     ///
     /// # Errors
-    /// Those of [`craig_bampton_with`].
+    /// The errors of [`craig_bampton_with`].
     pub(crate) fn craig_bampton(
         &self,
         stiffness: &SparseMatrix,
@@ -64,7 +64,7 @@ impl<'a> HeldContact<'a> {
     /// of an elastic one φ less the constraint modes, but for its scale; of a rigid one what inertia relief asks for.
     ///
     /// # Errors
-    /// Those of [`craig_bampton_with`].
+    /// The errors of [`craig_bampton_with`].
     pub(crate) fn free_interface(
         &self,
         stiffness: &SparseMatrix,

@@ -82,7 +82,7 @@ impl BladeMesh {
     /// `count` contact patches over the whole tip: `patch_1`, `patch_2`, ... from leading to trailing edge.
     ///
     /// # Errors
-    /// Those of [`contact_patches`](crate::patches::contact_patches).
+    /// The errors of [`contact_patches`](crate::patches::contact_patches).
     pub fn contact_patches(&self, count: usize) -> Result<Vec<ContactPoint>> {
         contact_patches(&self.mesh, self.mesh.set("tip")?, count, |index| format!("patch_{}", index + 1))
     }
@@ -90,7 +90,7 @@ impl BladeMesh {
     /// The same in rows across the thickness, side to side: `patch_1_row_1`, `patch_2_row_1`, ...
     ///
     /// # Errors
-    /// Those of [`tip_patches`](crate::patches::tip_patches).
+    /// The errors of [`tip_patches`](crate::patches::tip_patches).
     pub fn contact_rows(&self, [count, rows]: [usize; 2]) -> Result<Vec<ContactPoint>> {
         let name = |index: usize| row_name(&format!("patch_{}", index % count + 1), index / count, rows);
         tip_patches(&self.mesh, self.mesh.set("tip")?, [count, rows], name)

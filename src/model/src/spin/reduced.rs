@@ -76,7 +76,7 @@ impl SpinningStates {
     /// told how many there are.
     ///
     /// # Errors
-    /// Those of [`Rotating::equilibrium`].
+    /// The errors of [`Rotating::equilibrium`].
     pub(crate) fn find(body: &Rotating<'_>, largest_speed: f64, found: &dyn Fn(usize)) -> Result<Self> {
         let scaled = |state: &SpinningState, share: f64| {
             let ratio = share * largest_speed / state.speed;
@@ -179,7 +179,7 @@ fn line(first: (f64, &DMatrix<f64>), second: (f64, &DMatrix<f64>)) -> (DMatrix<f
 /// through the two speeds; G is that of the largest speed.
 ///
 /// # Errors
-/// Those of [`full_modes`]; [`Error::NotPositiveDefinite`] for an unstable reduced model; [`Error::Invalid`] when the
+/// The errors of [`full_modes`]; [`Error::NotPositiveDefinite`] for an unstable reduced model; [`Error::Invalid`] when the
 /// modes change beyond recognition.
 pub(crate) fn reduced_spin(
     states: &SpinningStates,

@@ -139,7 +139,7 @@ pub fn stage_casing_mesh(options: &StageCasingOptions) -> Result<RingMesh> {
 /// Build, reduce and check the casing of the stage.
 ///
 /// # Errors
-/// Those of [`stage_casing_mesh`] and [`reduce_casing`].
+/// The errors of [`stage_casing_mesh`] and [`reduce_casing`].
 pub fn reduce_stage_casing(options: &StageCasingOptions, listener: Listener<'_>) -> Result<Reduction> {
     report(listener, ReductionStage::Mesh, 0, 1);
     let ring = stage_casing_mesh(options)?;

@@ -154,7 +154,7 @@ pub fn sector_mesh(options: &SectorOptions) -> Result<SectorMesh> {
 /// Mesh of the blade alone, clamped at its root.
 ///
 /// # Errors
-/// Those of [`sector_mesh`].
+/// The errors of [`sector_mesh`].
 pub fn blade_mesh(options: &SectorOptions) -> Result<SectorMesh> {
     let lattice = Lattice::new(options)?;
     lattice.mesh(lattice.hub)

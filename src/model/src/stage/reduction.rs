@@ -81,7 +81,7 @@ const TOLERANCE: f64 = 1e-9;
 /// Mesh and assemble a sector of the stage.
 ///
 /// # Errors
-/// Those of [`sector_mesh`] and of the assembly; more contact nodes or patches than the tip has places for.
+/// The errors of [`sector_mesh`] and of the assembly; more contact nodes or patches than the tip has places for.
 pub fn stage_model(options: &StageOptions, listener: Listener<'_>) -> Result<StageModel> {
     report(listener, ReductionStage::Mesh, 0, 1);
     let sector: SectorMesh = sector_mesh(&options.sector)?;
@@ -103,7 +103,7 @@ pub fn stage_model(options: &StageOptions, listener: Listener<'_>) -> Result<Sta
 /// Build, reduce and check the bladed disk of the stage.
 ///
 /// # Errors
-/// Those of [`stage_model`] and [`reduce_cyclic`].
+/// The errors of [`stage_model`] and [`reduce_cyclic`].
 pub fn reduce_stage(options: &StageOptions, listener: Listener<'_>) -> Result<CyclicReduction> {
     let stage = stage_model(options, listener)?;
     let cyclic = options.cyclic("stage");

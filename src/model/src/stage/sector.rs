@@ -177,7 +177,7 @@ impl SectorMesh {
     /// `count` contact patches over the whole tip, named as contact nodes are.
     ///
     /// # Errors
-    /// Those of [`contact_patches`].
+    /// The errors of [`contact_patches`].
     pub fn contact_patches(&self, count: usize) -> Result<Vec<ContactPoint>> {
         contact_patches(&self.mesh, self.mesh.set("TIP")?, count, |index| place_name(index, count))
     }
@@ -185,7 +185,7 @@ impl SectorMesh {
     /// The same in rows across the thickness, side to side.
     ///
     /// # Errors
-    /// Those of [`tip_patches`].
+    /// The errors of [`tip_patches`].
     pub fn contact_rows(&self, [count, rows]: [usize; 2]) -> Result<Vec<ContactPoint>> {
         let name = |index: usize| row_name(&place_name(index % count, count), index / count, rows);
         tip_patches(&self.mesh, self.mesh.set("TIP")?, [count, rows], name)

@@ -16,11 +16,11 @@ use super::run;
 /// End of the rebounds of the first touch in CalculiX's solution (s).
 const REBOUNDED: f64 = 1.2e-4;
 
-/// What a CalculiX `.dat` file says of the cube.
+/// Content of a CalculiX `.dat` file of the cube.
 #[derive(Default)]
 struct CalculixResults {
     times: Vec<f64>,
-    /// Of node 1 (m).
+    /// Displacements of node 1 (m).
     displacements: Vec<[f64; 3]>,
     /// Contact pressures of node 1 (Pa), one per time.
     pressures: Vec<f64>,

@@ -40,7 +40,7 @@ pub fn pairs(named: &[(&str, CubeHistory)], speed: f64) {
     }
 }
 
-/// What one reads off the figures, run by run.
+/// Prints the readings of the figures, run by run.
 pub fn readings(named: &[(&str, CubeHistory)]) {
     println!(
         "\n| run | u1x least, largest (mm) | u1z least, largest (mm) | peak λ1, means over 2 µs and 20 µs (N) | node 1 until (ms) | cube until (ms) | exit (m/s) | asymmetry ux, λ | deepest (µm) | steps (s), preparation (s) |"

@@ -38,7 +38,7 @@ pub fn level(directory: &Path, n: usize, case: &str, courant: f64, end: f64) {
     write_json(&file(directory, n, case), &history).expect("the history can be written");
 }
 
-/// What every mesh says, and how far each is from the next and from the finest.
+/// Tabulates the results of every mesh, and their distances from the next and from the finest.
 pub fn table(directory: &Path, counts: &[usize]) {
     let read = |n: usize, case: &str| read_json::<CubeHistory>(&file(directory, n, case)).ok();
     let fast: Vec<(usize, CubeHistory)> = counts.iter().filter_map(|&n| Some((n, read(n, "fast")?))).collect();

@@ -9,7 +9,7 @@ use tiprub_model::{Material, Mesh, Result};
 /// every brick.
 ///
 /// # Errors
-/// Those of [`calculix_input`].
+/// The errors of [`calculix_input`].
 pub fn pushed(mesh: &Mesh, material: &Material, clamped: &str, forces: &[(usize, [f64; 3])]) -> Result<String> {
     let mut text = calculix_input(mesh, material, Some(clamped), 1)?;
     text.truncate(text.find("*STEP").unwrap_or(text.len()));
@@ -27,7 +27,7 @@ pub fn pushed(mesh: &Mesh, material: &Material, clamped: &str, forces: &[(usize,
 /// points where it is most exact. One node is free, since CalculiX solves nothing without an unknown.
 ///
 /// # Errors
-/// Those of [`calculix_input`].
+/// The errors of [`calculix_input`].
 pub fn moved(mesh: &Mesh, material: &Material, displacements: &[[f64; 3]], free: usize) -> Result<String> {
     let mut text = calculix_input(mesh, material, None, 1)?.replace("TYPE=C3D20,", "TYPE=C3D20R,");
     text.truncate(text.find("*STEP").unwrap_or(text.len()));

@@ -69,7 +69,7 @@ pub fn equivalent([rr, tt, zz, rt, tz, zr]: [f64; COMPONENTS]) -> f64 {
     1.5_f64.sqrt() * deviator.norm()
 }
 
-/// What stands for the gradient of every node's shape function at a natural place: its values at the eight points, carried there.
+/// Returns the gradients of the nodes' shape functions at a natural place, extrapolated from the eight points.
 fn gradients(mesh: &Mesh, element: &Element, place: [f64; 3]) -> Result<Vec<[f64; 3]>> {
     let coordinates = mesh.coordinates(element);
     let root = 3.0_f64.sqrt();

@@ -19,7 +19,7 @@ use crate::reduced::rub::{BumpedCasing, Touch};
 /// Parts farther than this do not take part in a step (m): a hundred times what a tip moves in one.
 const NEAR: f64 = 1e-4;
 
-/// How to go.
+/// Step size and number of steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BladeSteps {
     /// Time between samples (s).
@@ -30,7 +30,7 @@ pub struct BladeSteps {
     pub samples: usize,
 }
 
-/// What a run leaves behind, sample by sample.
+/// Results of a run, sample by sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BladeHistory {
     /// Displacements of the watched nodes, node by node along radius, circumference, axis (m).
@@ -51,7 +51,7 @@ pub struct BladeHistory {
     pub residual: f64,
 }
 
-/// What is pushed, as the step sees it.
+/// A closed contact in a step.
 struct PushedContact {
     parts: Vec<TipPart>,
     /// Displacements of the parts (three rows each) per displacement of the tip's nodes.

@@ -28,7 +28,7 @@ pub struct FullBlade {
     rows: Vec<Option<usize>>,
     stiffness: SparseMatrix,
     mass: SparseMatrix,
-    /// Of every node that moves the others with their masses (kg): the same along x, y and z.
+    /// Nodes that move each node, with their masses (kg): the same along x, y and z.
     masses: Vec<Vec<(usize, f64)>>,
 }
 
@@ -36,7 +36,7 @@ impl FullBlade {
     /// Assemble; `clamped` nodes stand still.
     ///
     /// # Errors
-    /// Those of the assembly.
+    /// The errors of the assembly.
     pub fn new(mesh: &Mesh, material: &Material, clamped: &[usize]) -> Result<Self> {
         let model = FeModel::assembled(mesh.clone(), material, String::new(), &|_| ())?;
         let free = free_dofs(model.nodes.len(), clamped);

@@ -49,7 +49,7 @@ impl TipPart {
         found
     }
 
-    /// Of a face the point with parameters from 0 to 1.
+    /// Returns the point of a face with parameters from 0 to 1.
     fn point(mesh: &Mesh, element: &Element, corners: &[usize], [a, b]: [f64; 2]) -> Self {
         let (natural, along) = on_face(element.kind, corners, [a, b]);
         let shape = element.kind.shape(natural);

@@ -67,7 +67,7 @@ pub struct ThrownMotion {
     pub positions: Vec<f64>,
     /// Kinetic and strain energy at the samples, that of the contact included (J).
     pub energies: Vec<f64>,
-    /// How often the block stops sliding.
+    /// Number of times that the block stops sliding.
     pub stops: usize,
 }
 

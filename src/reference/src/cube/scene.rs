@@ -21,7 +21,7 @@ pub enum Mass {
     Consistent,
 }
 
-/// What can be chosen about the scene.
+/// Options of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CubeSetting {
     /// Speed of the cube along −y (m/s).
@@ -62,7 +62,7 @@ impl CubeBody {
     /// Assemble a mesh.
     ///
     /// # Errors
-    /// Those of assembly; a missing set.
+    /// The errors of assembly; a missing set.
     pub(crate) fn new(mesh: Mesh, material: Material, mass: Mass, contact: Vec<usize>) -> Result<Self> {
         let matrices = assemble(&mesh, &material, &silent)?;
         let mut body =
@@ -116,7 +116,7 @@ impl CubeBody {
 /// Cube, left ring, right ring.
 #[derive(Debug, Clone)]
 pub struct CubeScene {
-    /// What was chosen.
+    /// Options of the scene.
     pub setting: CubeSetting,
     /// Cube, left ring, right ring.
     pub bodies: [CubeBody; 3],
@@ -132,7 +132,7 @@ impl CubeScene {
     /// The paper's meshes.
     ///
     /// # Errors
-    /// Those of assembly.
+    /// The errors of assembly.
     pub fn new(setting: CubeSetting) -> Result<Self> {
         Self::of(setting, cube_mesh(), RingSide::BOTH.map(ring_mesh), [RING_ELEMENTS[2], RING_ELEMENTS[1]])
     }
@@ -140,7 +140,7 @@ impl CubeScene {
     /// Meshes of another refinement; `divisions` are those of a ring's surface along arc and width.
     ///
     /// # Errors
-    /// Those of assembly; a set that a mesh lacks.
+    /// The errors of assembly; a set that a mesh lacks.
     pub fn of(setting: CubeSetting, cube: Mesh, [left, right]: [Mesh; 2], divisions: [usize; 2]) -> Result<Self> {
         let masters = [cube.set("MASTER_LEFT")?, cube.set("MASTER_RIGHT")?].concat();
         let ring = |mesh: Mesh| {

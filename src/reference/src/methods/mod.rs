@@ -14,7 +14,7 @@ mod recorder;
 use crate::cube::history::CubeHistory;
 use crate::cube::scene::CubeScene;
 
-/// How long and how finely to run.
+/// Duration and resolution of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodRun {
     /// Step h (s).

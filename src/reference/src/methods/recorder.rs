@@ -5,7 +5,7 @@ use super::contact::{RingContact, Vectors};
 use crate::cube::history::{CubeHistory, CubeSnapshot, processor_time};
 use crate::cube::scene::CubeScene;
 
-/// What a method knows about one step.
+/// Data of one step of a method.
 pub(super) struct StepEntry<'a> {
     pub(super) time: f64,
     pub(super) displacements: &'a Vectors,

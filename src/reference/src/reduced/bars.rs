@@ -15,7 +15,7 @@ pub struct RodModel {
     pub mass: DMatrix<f64>,
     /// Stiffness (N/m).
     pub stiffness: DMatrix<f64>,
-    /// How the gap closes with the displacements: g = gap − closing·u.
+    /// Change of the gap with the displacements: g = gap − closing·u.
     pub closing: DVector<f64>,
     /// Gap at zero displacement (m).
     pub gap: f64,
@@ -67,7 +67,7 @@ pub fn carpenter(elements: usize, end_mass: f64) -> RodModel {
     }
 }
 
-/// How far Carpenter's bars have come towards each other at a time (s): the relative displacement of their ends (m).
+/// Returns the approach of Carpenter's bars at a time (s): the relative displacement of their ends (m).
 pub fn carpenter_exact(time: f64) -> f64 {
     let exact = carpenter::exact();
     let flight = time.min(exact.touch) - (time - exact.release).max(0.0);

@@ -62,7 +62,7 @@ pub struct NodeContact {
     pub group: usize,
     /// Gap (m).
     pub gap: f64,
-    /// What prescribed motion adds to its rate (m/s).
+    /// Rate of the gap by prescribed motion (m/s).
     pub rate: f64,
     /// ∂g/∂q.
     pub normal: SparseRow,
@@ -88,7 +88,7 @@ pub trait ReducedScene {
     fn observed(&self, position: &[f64]) -> Vec<f64>;
 }
 
-/// What a step of any method leaves behind.
+/// Results of a step of any method.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReducedStep {
     /// Multipliers of the step: node and normal force (N).

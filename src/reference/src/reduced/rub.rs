@@ -42,7 +42,7 @@ pub(crate) struct Touch {
     pub(crate) normal: [f64; 3],
     /// Force per unit multiplier, friction included.
     pub(crate) force: [f64; 3],
-    /// What turning and growth add to the rate of the gap (m/s).
+    /// Rate of the gap by rotation and growth (m/s).
     pub(crate) rate: f64,
 }
 
@@ -99,7 +99,7 @@ pub struct Blades {
     pub frequency_factors: Vec<f64>,
     /// Radial clearance of each blade (m); empty: that of the obstacle.
     pub clearances: Vec<f64>,
-    /// What they rub against.
+    /// The casing.
     pub obstacle: BumpedCasing,
 }
 

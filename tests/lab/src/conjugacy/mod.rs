@@ -36,7 +36,7 @@ struct ConjugacyCase {
     friction: f64,
 }
 
-/// What its runs showed.
+/// Results of its runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConjugacyRow {
     case: ConjugacyCase,

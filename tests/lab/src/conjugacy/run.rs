@@ -22,7 +22,7 @@ const RATE: f64 = 900.0;
 /// Angular acceleration of the rotor (rad/s²).
 const RAMP: f64 = 4e4;
 
-/// What the contact nodes meet, and what moves.
+/// Surface that the contact nodes meet, and the moving parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SurfaceFeature {
     /// Rigid surface of revolution.
@@ -59,7 +59,7 @@ impl SurfaceFeature {
         }
     }
 
-    /// What is known of the other side.
+    /// Returns the known side of forces and moments.
     pub(crate) fn side(self) -> WrenchSide {
         match self {
             Self::Revolution | Self::Disk => WrenchSide::Surface,
@@ -113,7 +113,7 @@ impl SurfaceFeature {
     }
 }
 
-/// What forces and moments on the slave follow from.
+/// Source of the forces and moments on the slave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WrenchSide {
     /// Forces on control points, where they stand.
@@ -124,7 +124,7 @@ pub(crate) enum WrenchSide {
     Dented,
 }
 
-/// What a run showed; residuals are relative.
+/// Results of a run; residuals are relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct ConjugacyRun {
     /// Contacts, summed over the steps.

@@ -205,7 +205,7 @@ mod tests {
         assert!(rows[2][1].to_bits() == 2.0_f64.to_bits() && rows[2][2].is_nan(), "{rows:?}");
     }
 
-    /// Of the eight corners some are behind the cube itself or a ring.
+    /// Some of the eight corners are behind the cube itself or a ring.
     #[test]
     fn the_picture_of_the_scene_hides_what_is_behind() {
         let svg = scene().picture.svg;

@@ -186,7 +186,7 @@ fn report(scene: &Scene, flown: &[Flown], sizes: &SizeStudy, patches: &PatchStud
     })
 }
 
-/// How far two runs may be apart: u1x, slowing, u1z.
+/// Compares two runs with bounds of u1x, slowing and u1z.
 fn near(flown: &Flown, first: &str, second: &str, bounds: [f64; 3], why: &str) -> Statement {
     let expected = format!("{second} follows {first}{why}: u1x, slowing and u1z of node 1 within {bounds:?} %");
     match flown.pair(first, second) {
@@ -222,7 +222,7 @@ fn meeting(main: &Flown) -> Vec<Statement> {
     all
 }
 
-/// What is left out by reducing the rings.
+/// States the error of reducing the rings.
 fn truncation(sizes: &SizeStudy) -> Statement {
     let modal: Vec<_> = sizes.rings.iter().filter(|size| size.static_responses == 0).collect();
     let falls = modal.windows(2).all(|pair| (0..3).all(|i| pair[1].apart[i] < pair[0].apart[i]));
@@ -237,7 +237,7 @@ fn truncation(sizes: &SizeStudy) -> Statement {
     )
 }
 
-/// What holds in every flight.
+/// States properties of every flight.
 fn at_any_speed(flown: &[Flown]) -> Vec<Statement> {
     let products = || flown.iter().flat_map(|flown| flown.outcomes.iter().map(move |outcome| (flown, outcome)));
     let products = || products().filter(|(_, outcome)| outcome.is_product());

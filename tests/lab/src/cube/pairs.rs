@@ -75,7 +75,7 @@ pub(super) fn pairs(outcomes: &[CubeRun], flight: &CubeFlight) -> Vec<RunPair> {
     pairs
 }
 
-/// What one reads off a run.
+/// Returns the readings of a run.
 fn readings(outcome: &CubeRun) -> Vec<String> {
     let Ok(run) = &outcome.result else { return vec![String::new(); RUN.len()] };
     let history = &run.history;

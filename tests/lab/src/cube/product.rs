@@ -18,7 +18,7 @@ fn corners(face: usize) -> [usize; 8] {
     std::array::from_fn(|corner| own[corner % 4] + corner / 4 * face)
 }
 
-/// How the product is asked to solve.
+/// Scheme and solver of the product.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Product {
     pub solver: Solver,

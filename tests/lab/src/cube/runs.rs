@@ -16,7 +16,7 @@ use tiprub_shell::{Failure, Result};
 
 use super::product::{Product, ProductRun};
 
-/// How the cube flies.
+/// Flight of the cube.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CubeFlight {
     /// Speed along −y (m/s).

@@ -63,7 +63,7 @@ impl BeltCase {
         Self { model, massless_limit, quick }
     }
 
-    /// How far the belt presses the contact node back (m).
+    /// Returns the displacement of the contact node by the belt (m).
     fn pressed() -> f64 {
         BLOCK.flexibility * BLOCK.friction / FRICTION
     }

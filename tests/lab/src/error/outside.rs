@@ -12,7 +12,7 @@ use super::{
     run::{StepExtremes, TimedRun},
 };
 
-/// How soft contact may be: what augmented Lagrangian and penalty need to know of a scene.
+/// Softness of contact in a scene, for augmented Lagrangian and penalty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Softness {
     /// Contact stiffness of the softer penalty (N/m); the augmented Lagrangian has ten times as much.

@@ -24,7 +24,7 @@ pub(crate) struct CoreRod {
     pub(super) start: [Vec<f64>; 2],
     pub(super) gap: f64,
     pub(super) whole: bool,
-    /// What tolerances are shares of (m): the gap, or the largest displacement at the start.
+    /// Reference length of tolerances (m): the gap, or the largest displacement at the start.
     pub(super) length: f64,
     /// Largest step that closed contact allows massless-boundary (s).
     massless_limit: massless::MasslessLimit,

@@ -36,7 +36,7 @@ const QUICK_REFERENCES: (u32, u32) = (320, 160);
 /// Contact stiffness of soft methods (N/m) per node, the penetration they may leave and how near a node takes part (m).
 const SOFTNESS: Softness = Softness { stiffness: 1e8, tolerance: 5e-6, margin: 2e-5 };
 
-/// How deep the bumps are.
+/// Depth of the bumps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum BumpDepth {
     Light,

@@ -13,14 +13,14 @@ use super::{
     window,
 };
 
-/// What is told of a rotor, and how it is stepped.
+/// Description and steps of a rotor.
 pub(crate) struct TurningFacts {
     pub name: &'static str,
     /// Names of its two figures.
     pub figures: [&'static str; 2],
     pub title: &'static str,
     pub description: String,
-    /// What a size counts.
+    /// Meaning of a size.
     pub size_name: &'static str,
     /// Time between samples (s).
     pub interval: f64,

@@ -19,7 +19,7 @@ pub(crate) struct LibraryFaces {
     three: Fmi3Api,
 }
 
-/// What came of a scene natively.
+/// Native result of a scene.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Native<'a> {
     /// It was rejected with this message.
@@ -88,7 +88,7 @@ impl LibraryFaces {
     }
 }
 
-/// How a face differs from the native run, if it does.
+/// Returns the difference of an FMI version from the native run, if there is one.
 fn difference<I: PortableInstance>(
     name: &str,
     start: impl Fn(f64) -> std::result::Result<I, String>,

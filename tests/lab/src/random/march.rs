@@ -17,7 +17,7 @@ pub(crate) trait SteppedInstance {
     fn bits(&self, references: &[u32]) -> Vec<u64>;
 }
 
-/// What all runs of a scene have in common.
+/// Common data of all runs of a scene.
 #[derive(Debug)]
 pub(crate) struct RandomPlan {
     courses: Vec<RandomInput>,
@@ -39,7 +39,7 @@ pub(crate) struct OutputRecord {
 }
 
 impl RandomPlan {
-    /// Of a scene whose tables are those of `simulation`, which was not started yet.
+    /// Makes the plan of a scene whose tables are those of `simulation`, which has not started.
     pub(crate) fn new(trial: &RandomScene, simulation: &Simulation) -> Self {
         let mut times = vec![0.0];
         for length in &trial.lengths {
@@ -110,7 +110,7 @@ impl RandomPlan {
 }
 
 impl OutputRecord {
-    /// What is after a communication point.
+    /// Returns the part after a communication point.
     pub(crate) fn from(&self, index: usize) -> Self {
         Self { points: self.points[index.min(self.points.len())..].to_vec(), end: self.end.clone() }
     }

@@ -26,7 +26,7 @@ use march::RandomPlan;
 use oracles::{Finding, OracleWatch};
 use scenes::RandomScene;
 
-/// What came of a scene.
+/// Result of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum SceneOutcome {
     /// It ran to its end.

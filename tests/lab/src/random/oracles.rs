@@ -21,11 +21,11 @@ const FACTOR: f64 = 4.0;
 const INSTANT_LATER: f64 = 1.0;
 /// Rounding of gaps, as a fraction of the clearance.
 const GAP_ROUNDING: f64 = 1e-9;
-/// What the guide announces (chapter 12, "Losses only grow"): impacts may give back this fraction of the work of contact forces where the method is
-/// known for it, and friction of free bodies this fraction of all energy exchanged. A run ends beyond it.
+/// Limits of the guide (chapter 12, "Losses only grow"): impacts may give back this fraction of the work of contact forces where the method is known
+/// for it, and friction of free bodies this fraction of all energy exchanged. A run ends beyond it.
 const RETURNED: f64 = 0.02;
 const STOPPED: f64 = 0.01;
-/// What it announces of `film` (chapter 5): nodes stay inside by less than this fraction of the clearance without a warning, of a free body by this
+/// Limit of the guide for `film` (chapter 5): nodes stay inside by less than this fraction of the clearance without a warning, of a free body by this
 /// fraction of a thousandth of its extent; warnings follow once it is twice as deep.
 const FILM_INSIDE: f64 = 0.05;
 const FILM_INSIDE_FREE: f64 = 0.2e-3;
@@ -52,7 +52,7 @@ const GROWING: [&str; 8] = [
     "internal_steps",
 ];
 
-/// How a quantity may fall nevertheless, as the guide announces it.
+/// Allowed fall of a quantity, as the guide announces it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fall {
     /// By this fraction of its scale.
@@ -125,7 +125,7 @@ pub(crate) struct OracleWatch {
 }
 
 impl OracleWatch {
-    /// Of a simulation that was not started yet.
+    /// Makes the watch of a simulation that has not started.
     pub(crate) fn new(trial: &RandomScene, simulation: &Simulation) -> Self {
         let table = simulation.table();
         let grows = |row: &&tiprub_core::variables::Variable| {
@@ -158,7 +158,7 @@ impl OracleWatch {
         }
     }
 
-    /// Of a simulation that was started.
+    /// Begins with a simulation that has started.
     pub(crate) fn begin(&mut self, simulation: &Simulation) {
         self.step = simulation.system().step_size();
         self.bound_before = self.factor * simulation.system().ledger().initial;
@@ -213,7 +213,7 @@ impl OracleWatch {
         }
     }
 
-    /// What does not hold.
+    /// Returns the violated properties.
     pub(crate) fn findings(&self) -> Vec<Finding> {
         let mut findings = Vec::new();
         let mut add = |oracle: &'static str, text: String| findings.push(Finding { oracle, text });
@@ -253,7 +253,7 @@ impl OracleWatch {
     }
 }
 
-/// How deep a contact node may be within a surface at the end of a step (m).
+/// Returns the allowed depth of a contact node within a surface at the end of a step (m).
 fn promised(scene: &Scene, gap: f64) -> f64 {
     let coated = scene.settings.contacts.iter().filter_map(|contact| contact.coating.as_ref());
     let thickness = coated.map(|coating| coating.thickness).fold(0.0, f64::max);
@@ -275,7 +275,7 @@ fn loosest_gap(scene: &Scene, gap: f64) -> f64 {
     contacts.iter().map(|contact| of(&contact.master)).filter(|gap| gap.is_finite()).fold(gap, f64::max)
 }
 
-/// How deep `film` may leave a node inside without a warning (m).
+/// Returns the depth at which `film` may leave a node inside without a warning (m).
 fn film_inside(scene: &Scene) -> f64 {
     if scene.roms.iter().any(|rom| rom.frame == DisplacementFrame::Cartesian) {
         return FILM_INSIDE_FREE * scene.roms.iter().map(extent).fold(f64::INFINITY, f64::min);
@@ -292,14 +292,14 @@ fn extent(rom: &Rom) -> f64 {
     (0..3).map(side).fold(0.0, f64::max)
 }
 
-/// How deep the last warning says that `film` has left a node inside (m).
+/// Returns the depth of the last warning about nodes that `film` has left inside (m).
 fn warned_depth(simulation: &Simulation) -> f64 {
     let warned = simulation.warnings().iter().filter(|warning| warning.topic() == Topic::FilmInside);
     let depth = |text: &str| text.split_once(" by ")?.1.split_once(" m")?.0.parse().ok();
     warned.map(|warning| depth(&warning.lines()[0]).unwrap_or(f64::NAN)).fold(0.0, f64::max)
 }
 
-/// How a quantity that only grows may fall nevertheless, as the guide announces it.
+/// Returns the allowed fall of a quantity that should only grow, as the guide announces it.
 fn announced(name: &str, scene: &Scene) -> Fall {
     let scheme = scene.settings.time.scheme;
     let is_free = scene.roms.iter().any(|rom| rom.frame == DisplacementFrame::Cartesian);

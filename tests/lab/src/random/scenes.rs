@@ -15,7 +15,7 @@ use super::structures::{self, casing, chance, largest_frequency, lowest_frequenc
 /// A scene with the communication steps that it is run by.
 #[derive(Debug, Clone)]
 pub(crate) struct RandomScene {
-    /// What all of it follows from.
+    /// Seed of the scene.
     pub seed: u64,
     /// The scene.
     pub scene: Scene,

@@ -35,7 +35,7 @@ fn frequencies(rom: &Rom) -> impl Iterator<Item = f64> {
     squares.into_iter().map(|square| square.max(0.0).sqrt())
 }
 
-/// What a rotor looks like.
+/// Form of a rotor.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RotorShape {
     /// Identical sectors.
@@ -128,7 +128,7 @@ fn blade(random: &mut SeededRandom, shape: RotorShape) -> Rom {
     rom
 }
 
-/// What only uncoupled blades have: spin matrices, heat, places of stress, watched points.
+/// Adds data that only uncoupled blades have: spin matrices, heat, places of stress, watched points.
 fn add_extras(random: &mut SeededRandom, rom: &mut Rom) {
     let order = rom.order();
     rom.extras.spin = Some(spin(order));

@@ -8,7 +8,7 @@ use tiprub_core::settings::{Scheme, Solver};
 use super::features::FEATURES;
 use super::{RandomRow, SceneOutcome};
 
-/// How many scenes ran, were rejected, ended with their reason, are wrong.
+/// Numbers of scenes that ran, were rejected, ended with their reason, or are wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct SceneCounts([usize; 4]);
 
@@ -71,7 +71,7 @@ impl RandomTable {
         }))
     }
 
-    /// How many findings there are of each oracle, most first.
+    /// Returns the number of findings of each oracle, largest first.
     fn oracles(&self) -> Vec<(&'static str, usize)> {
         let mut counts: Vec<(&'static str, usize)> = Vec::new();
         for finding in self.rows.iter().flat_map(|row| &row.findings) {

@@ -105,7 +105,7 @@ fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     (square / size).sqrt()
 }
 
-/// What came of a rub.
+/// Result of a rub.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ScatterRub {
     /// Errors over the tolerances.
@@ -230,7 +230,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     })
 }
 
-/// What shortest steps leave: longest step (s), tolerance, error, steps missed and taken.
+/// Errors with the shortest steps: longest step (s), tolerance, error, steps missed and accepted.
 type Left = (f64, f64, f64, [u64; 2]);
 
 fn left() -> Result<Vec<Left>> {

@@ -149,7 +149,7 @@ pub(super) fn problems(degree: usize, friction: f64, trials: u64) -> Problems {
     found
 }
 
-/// How many solutions contact problems have.
+/// Numbers of solutions of contact problems.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Solutions {
     pub(super) degree: usize,

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 /// Wall-clock limit of most cases (s): far beyond what any of them takes on a loaded machine.
 const TIME_LIMIT: f64 = 120.0;
 
-/// What is expected of a case.
+/// Expected end of a case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Expected {
     /// A right answer, and what it is held against.
@@ -62,7 +62,7 @@ fn owned(lists: &[&[&str]]) -> Vec<Vec<String>> {
     lists.iter().map(|words| words.iter().map(|word| (*word).to_owned()).collect()).collect()
 }
 
-/// What a refusal leaves unnamed, if none of the lists is named in full. An empty word names nothing.
+/// Returns a word that a message lacks, if none of the lists is complete. An empty word names nothing.
 fn unnamed(message: &str, lists: &[Vec<String>]) -> Option<String> {
     let named = |word: &String| !word.is_empty() && message.contains(word.as_str());
     if lists.iter().any(|words| !words.is_empty() && words.iter().all(named)) {
@@ -78,7 +78,7 @@ fn unnamed(message: &str, lists: &[Vec<String>]) -> Option<String> {
 /// One comparison: holds while `found` is a number and at most `bound`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Check {
-    /// What is compared.
+    /// The compared quantity.
     pub what: String,
     /// Size of the difference found.
     pub found: f64,
@@ -114,7 +114,7 @@ impl Check {
         format!("{} {:.1e} (at most {:.0e})", self.what, self.found, self.bound)
     }
 
-    /// How much of its bound it takes up.
+    /// Returns the used fraction of the bound.
     fn share(&self) -> f64 {
         if self.found.is_nan() {
             f64::INFINITY
@@ -126,12 +126,12 @@ impl Check {
     }
 }
 
-/// What a case came to, when it came to an end of its own.
+/// End of a case that ended by itself.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct CaseEnd {
     /// The refusal, if there was one.
     pub refusal: Option<String>,
-    /// What was compared.
+    /// Comparisons.
     pub checks: Vec<Check>,
     /// Figures worth telling beside the checks.
     pub remarks: Vec<String>,
@@ -169,7 +169,7 @@ impl CaseEnd {
         json!({ "refusal": self.refusal, "checks": checks.collect::<Vec<_>>(), "remarks": self.remarks })
     }
 
-    /// What a child process wrote.
+    /// Reads the output of a child process.
     pub(crate) fn from_json(value: &Value) -> Option<Self> {
         let number = |value: &Value| value.as_u64().map(f64::from_bits);
         let check = |check: &Value| {
@@ -185,7 +185,7 @@ impl CaseEnd {
     }
 }
 
-/// What a case is worth.
+/// Verdict on a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum CaseVerdict {
     /// A right answer.
@@ -224,7 +224,7 @@ impl CaseVerdict {
     }
 }
 
-/// What a message says that ends a run in a step.
+/// Text of a message that ends a run in a step.
 const IN_A_STEP: &str = "last good time";
 
 /// Verdict on what happened, and what to say about it.
@@ -264,7 +264,7 @@ fn tightest(checks: &[Check]) -> String {
     most.map_or_else(String::new, |check| format!("{}{others}", check.to_text()))
 }
 
-/// What a case may use beside its own models.
+/// Data that a case may use besides its own models.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CaseContext {
     /// Directory with packaged FMUs, where the parent made some.
@@ -278,7 +278,7 @@ type CaseWork = Box<dyn Fn(&CaseContext) -> CaseEnd + Send + Sync>;
 pub(crate) struct StabilityCase {
     /// Family, slash, what sets it apart: `step-limit/central-difference/lcp/h=0.9`.
     pub name: String,
-    /// What is expected.
+    /// Expected end.
     pub expected: Expected,
     /// In the quick table as well.
     pub quick: bool,
@@ -321,7 +321,7 @@ impl StabilityCase {
         Self { imports: true, ..self }
     }
 
-    /// What comes before the first slash.
+    /// Returns the part before the first slash.
     pub(crate) fn family(&self) -> &str {
         self.name.split('/').next().unwrap_or(&self.name)
     }

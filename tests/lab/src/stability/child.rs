@@ -25,11 +25,11 @@ const LAST_WORDS: usize = 300;
 pub(crate) struct StabilityRow {
     /// Name of the case.
     pub name: String,
-    /// What was expected.
+    /// Expected end.
     pub expected: String,
-    /// What happened.
+    /// Actual end.
     pub happened: String,
-    /// What that is worth.
+    /// Verdict.
     pub verdict: CaseVerdict,
     /// Wall-clock time (s).
     pub seconds: f64,
@@ -90,7 +90,7 @@ fn drain(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<String>
     })
 }
 
-/// How it ended, empty if well; `None` if it had to be killed.
+/// Waits for the end of a child; empty if well, `None` if it had to be killed.
 fn wait(child: &mut Child, limit: Duration) -> std::io::Result<Option<String>> {
     let clock = Instant::now();
     loop {

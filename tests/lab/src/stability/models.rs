@@ -17,7 +17,7 @@ pub(crate) const LONGEST: f64 = tiprub_core::settings::ADAPTIVE_STEP;
 pub(crate) const SOLVERS: [(Solver, &str); Solver::ALL.len()] =
     [(Solver::Film, "film"), (Solver::Lcp, "lcp"), (Solver::Coulomb, "coulomb")];
 
-/// How the length of a step is chosen.
+/// Choice of the step length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StepChoice {
     /// The case gives the internal step; for galerkin the longest one, with the largest tolerance that scenes accept.
@@ -119,7 +119,7 @@ impl StabilityMethod {
         if self.is_adaptive() { Self { steps: StepChoice::Adaptive(tolerance), ..self } } else { self }
     }
 
-    /// What an answer is compared with: a smaller tolerance; and the step is to be divided by the second number.
+    /// Returns the method for comparison: a smaller tolerance; and the divisor of the step.
     pub(crate) fn finer(self) -> (Self, f64) {
         match self.steps {
             StepChoice::Adaptive(tolerance) => (self.within((tolerance / 16.0).max(1e-9)), 1.0),

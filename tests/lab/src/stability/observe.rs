@@ -61,8 +61,8 @@ pub(crate) fn bits(simulation: &Simulation) -> Vec<u64> {
     outputs(simulation).into_iter().map(f64::to_bits).collect()
 }
 
-/// Of the radial displacement of the first ring of the 36 × 3 nodes of the casing: amplitudes of cos nθ and of sin nθ, and the
-/// largest rest at any node (m).
+/// Returns the radial displacement of the first ring of the 36 × 3 nodes of the casing: amplitudes of cos nθ and of sin nθ, and the largest rest at
+/// any node (m).
 pub(crate) fn amplitudes(simulation: &Simulation, order: u32) -> [f64; 3] {
     let Some(row) = simulation.table().find("casing_displacement").map(|row| row.reference) else {
         return [f64::NAN; 3];
@@ -251,7 +251,7 @@ impl StabilityWatch {
         Check::at_most("ledger residual", self.residual, 1e-9)
     }
 
-    /// How far the impact loss fell in a communication step, relative to the energy exchanged in all.
+    /// Returns the largest fall of the impact loss in a communication step, relative to all energy exchanged.
     pub(crate) fn impact_drop(&self) -> f64 {
         self.share(self.impact_drop)
     }
@@ -285,7 +285,7 @@ pub(crate) fn worse(before: f64, now: f64) -> f64 {
     if before >= now || before.is_nan() { before } else { now }
 }
 
-/// What the round casing stands further away than in the scene (m).
+/// Returns the additional distance of the round casing (m).
 fn open(simulation: &Simulation) -> f64 {
     let change = real(simulation, "casing_radius_change");
     real(simulation, "gap_offset") + if change.is_nan() { 0.0 } else { change }

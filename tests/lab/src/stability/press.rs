@@ -28,17 +28,17 @@ const PRECISION: f64 = 1e-3;
 pub(crate) struct Press {
     /// Rotor in a round rigid casing.
     pub scene: Scene,
-    /// How far beyond the clearance (m).
+    /// Depth beyond the clearance (m).
     pub depth: f64,
     /// Time to close (s).
     pub rise: f64,
     /// Time to come to rest (s).
     pub hold: f64,
-    /// How near λ, strain energy and torque must come to the static ones.
+    /// Allowed relative distance of λ, strain energy and torque from the static ones.
     pub tolerance: f64,
 }
 
-/// What the blades are pressed with at rest.
+/// Static forces of blades at rest.
 #[derive(Debug, Clone)]
 pub(crate) struct Static {
     /// λ of each node of a blade (N).

@@ -16,7 +16,7 @@ pub(crate) struct StabilityTable {
 }
 
 impl StabilityTable {
-    /// What [`Table::write`] writes.
+    /// Files that [`StabilityTable::write`] writes.
     pub(crate) const FILES: [&str; 4] = ["index.html", "results.json", "stability.csv", "stability.md"];
 
     /// Number of rows of a verdict.
@@ -213,7 +213,7 @@ struct FamilyCount<'a> {
     family: &'a str,
     /// Scheme with its choice of the step, and solver; as far as the names of cases tell.
     method: (Option<&'static str>, Option<&'static str>),
-    /// Of each verdict.
+    /// Numbers of each verdict.
     counts: [usize; CaseVerdict::ALL.len()],
 }
 

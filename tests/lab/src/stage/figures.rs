@@ -133,7 +133,7 @@ fn amplitudes(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &[St
     })
 }
 
-/// What was found at every speed.
+/// Tabulates the results at every speed.
 fn speeds_sheet(setup: &StageSetup, runs: &[Run], names: &[String]) -> Sheet {
     let diameters = runs.first().map_or(0, |run| run.amplitudes.len());
     let mut sheet = Sheet::new(["speed (rad/s)", "speed / critical speed"]);

@@ -36,7 +36,7 @@ const SHOWN: [usize; 2] = [2, 4];
 /// Largest clearance, as a share of the clearance at rest, that counts as contact.
 const CLOSED: f64 = 1e-6;
 
-/// What the blades turn in.
+/// Casing of the blades.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum StageCasing {
     /// Oval by its shape; nothing gives way. Without friction.
@@ -60,9 +60,9 @@ impl StageCasing {
     }
 }
 
-/// What is asked of one stage.
+/// Request for one stage.
 struct StageSetup {
-    /// Of all casings, without speed.
+    /// Scenes of all casings, without speed.
     scenes: [Scene; 3],
     /// Amplitude of the load that closes the clearance of the flexible casing and [`OVERLAP`] more (N/m).
     amplitude: f64,

@@ -11,11 +11,11 @@ const MOST_POINTS: usize = 1000;
 pub(super) struct Run {
     pub speed: f64,
     pub times: Vec<f64>,
-    /// Of the contact nodes of blade 1, node by node, at these times (m).
+    /// Clearances of the contact nodes of blade 1, node by node, at these times (m).
     pub clearances: Vec<Vec<f64>>,
     /// Smallest clearances of the same nodes at any internal step (m).
     pub least: Vec<f64>,
-    /// How often each of them closes and opens again once the oval is there.
+    /// Number of times that each of them closes and opens again once the casing is oval.
     pub touches: Vec<usize>,
     /// Amplitudes by nodal diameter from 0 (m).
     pub amplitudes: Vec<Vec<f64>>,
@@ -24,11 +24,11 @@ pub(super) struct Run {
     /// Smallest clearance of all blades at any communication point (m).
     pub least_clearance: f64,
     pub energy_residual: f64,
-    /// Of any node at any internal step (N).
+    /// Largest force of any node at any internal step (N).
     pub largest_force: f64,
     pub stepping: std::time::Duration,
     pub internal_steps: u64,
-    /// What the simulation warned of, such as flutter of closed contact.
+    /// Warnings of the simulation, such as flutter of closed contact.
     pub warnings: Vec<String>,
     /// Why it ended early, where it did.
     pub ended: Option<String>,
@@ -98,7 +98,7 @@ impl Elements {
     }
 }
 
-/// What is looked at after every communication step: extremes, and how often nodes of blade 1 touch.
+/// Extremes after every communication step, and the number of contacts of blade 1.
 struct StageWatch {
     closed: Vec<bool>,
     limit: f64,

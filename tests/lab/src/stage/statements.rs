@@ -12,7 +12,7 @@ const OFTEN: usize = 2;
 /// Largest residual of a ledger that closes, relative to the energy exchanged.
 const LEDGER: f64 = 1e-9;
 
-/// What is said of one casing.
+/// Returns the statements about one casing.
 pub(super) fn of(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &[String]) -> Result<Vec<Statement>> {
     let [numerator, denominator] = [SHOWN[1], SHOWN[0]];
     let share = |run: &Run| run.effective(numerator, setup.full()) / run.effective(denominator, setup.full());
@@ -109,7 +109,7 @@ pub(crate) fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
     Statement::tested(expected, fast.iter().all(|(_, share)| *share < 1.0), found)
 }
 
-/// What the paper says of its figure 12: it falls all the way, and is negligible in the end.
+/// Checks the statement of the paper about its figure 12: the share falls all the way, and is negligible in the end.
 pub(crate) fn becomes_negligible(shares: &[(f64, f64)], resonance: &str) -> Statement {
     let expected = format!(
         "The share of nodal diameter {} becomes negligible against that of {} as the angular velocity grows (fig. 12): their ratio \

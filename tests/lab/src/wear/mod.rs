@@ -34,7 +34,7 @@ const FIRST: u32 = 16;
 const CLOSING: f64 = 4e-4;
 /// Clearance of the blades that do not touch (m).
 const AWAY: f64 = 5e-3;
-/// What a window has to add on the average to be judged (m): a twentieth of the closing.
+/// Mean addition of a window that is judged (m): a twentieth of the closing.
 const JUDGED: f64 = CLOSING / 20.0;
 /// Multiples of what the tip swings at that lobes may stand next to.
 const MULTIPLES: u32 = 3;
@@ -71,7 +71,7 @@ impl WearCase {
     }
 }
 
-/// What came of some revolutions of a run.
+/// Results of some revolutions of a run.
 #[derive(Debug, Clone)]
 struct WearWindow {
     case: WearCase,
@@ -84,7 +84,7 @@ struct WearWindow {
     wear: [f64; 2],
     /// Mean wear that it added (m).
     added: f64,
-    /// What the tip swings most at, per revolution.
+    /// Strongest vibrations of the tip, per revolution.
     swings: Vec<SpectralLine>,
     /// Largest orders of the wear that it added.
     lobes: Vec<SpectralLine>,

@@ -38,7 +38,7 @@ pub(crate) use stress::study as stress;
 const INTERVAL: f64 = 4e-6;
 /// From the middle of the tip at the start to that of the first bump (rad).
 const AHEAD: f64 = 0.5;
-/// How big it is.
+/// Size of the models.
 struct WitnessSize {
     mesh: MeshCounts,
     /// Samples: two touches, or one.
@@ -70,7 +70,7 @@ const QUICK: WitnessSize = WitnessSize {
     rows: 2,
 };
 
-/// What of the tip touches.
+/// Contact of the tip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Touching {
     Nodes(usize),
@@ -111,7 +111,7 @@ type WitnessRun = std::result::Result<RunSummary, String>;
 const DEFAULT: ((Scheme, Solver), u32) = ((Scheme::ModalExact, Solver::Lcp), 8);
 const FINE: ((Scheme, Solver), u32) = ((Scheme::ModalExact, Solver::Lcp), 64);
 const MASSLESS: ((Scheme, Solver), u32) = ((Scheme::MasslessBoundary, Solver::Lcp), 8);
-/// Its steps are as long as its tolerance lets them.
+/// Adaptive steps as long as the tolerance permits.
 const GALERKIN: ((Scheme, Solver), u32) = ((Scheme::Galerkin, Solver::Lcp), 1);
 const PAPER: ((Scheme, Solver), u32) = ((Scheme::CentralDifference, Solver::Film), 4);
 

@@ -20,9 +20,9 @@ use super::{FINE, GALERKIN, INTERVAL, Touching, WitnessModel, WitnessScene, perc
 /// Modes whose places of largest stress are looked at.
 const PLACES: usize = 6;
 
-/// What a run tells, sample by sample.
+/// Results of a run, sample by sample.
 struct StressHistory {
-    /// Of the watched points (m).
+    /// Displacements of the watched points (m).
     displacements: Vec<Vec<f64>>,
     /// Six components of every place (Pa).
     stresses: Vec<Vec<f64>>,
@@ -31,7 +31,7 @@ struct StressHistory {
 }
 
 impl StressHistory {
-    /// Of the full model.
+    /// Converts the history of the full model.
     fn full(history: BladeHistory) -> (Self, Vec<Vec<f64>>) {
         let each = |sample: &Vec<f64>| places(sample).map(equivalent).collect();
         let equivalents = history.stresses.iter().map(each).collect();
@@ -52,7 +52,7 @@ impl StressHistory {
         (0..count).map(of).collect()
     }
 
-    /// How far it is from another.
+    /// Returns the distance from another history.
     fn apart(&self, other: &Self) -> Apart {
         let of = |a: &[Vec<f64>], b: &[Vec<f64>]| parts_apart(a, b, &[b.first().map_or(0, Vec::len)]);
         let (own, others) = (self.largest(), other.largest());

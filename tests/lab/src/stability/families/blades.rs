@@ -217,7 +217,7 @@ fn at_rest(scene: &Scene, depth: f64) -> Result<(Simulation, StabilityWatch)> {
     Ok((simulation, watch))
 }
 
-/// How near static forces come, relative to them: galerkin closes gaps to a fraction of its tolerance.
+/// Returns the relative accuracy of static forces: galerkin closes gaps to a fraction of its tolerance.
 fn near(scene: &Scene, depth: f64) -> f64 {
     1e-6 + 1e-3 * allowed(scene) / depth
 }

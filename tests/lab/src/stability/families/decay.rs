@@ -19,7 +19,7 @@ use super::super::{
     press::pressed,
 };
 
-/// How far the casing is pressed on before it lets go (m).
+/// Depth of the casing before it lets go (m).
 const DEPTH: f64 = 5e-5;
 /// The motion is followed until this share of the slowest mode is left.
 const LEFT: f64 = 1e-4;
@@ -63,7 +63,7 @@ pub(crate) struct Released {
 struct Decay {
     roots: [Complex<f64>; 2],
     shares: [Complex<f64>; 2],
-    /// Of the slower root.
+    /// Radius of the slower root.
     radius: f64,
 }
 
@@ -201,7 +201,7 @@ impl Released {
 /// Where the casing is taken to (m).
 const AWAY: f64 = 2e-2;
 
-/// How near the release of galerkin comes: its tolerance, but at most what a force that acts half a step longer does.
+/// Returns the accuracy of the release of galerkin: its tolerance, but at most the effect of a force that acts half a step longer.
 fn near(scene: &tiprub_core::Scene, step: f64, frequency: f64) -> f64 {
     (allowed(scene) / DEPTH).min(0.5 * frequency * step)
 }

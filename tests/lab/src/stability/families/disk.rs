@@ -20,7 +20,7 @@ use super::super::{
 
 /// Stiffness of the spring from sector to sector (N/m).
 const COUPLING: f64 = 8e6;
-/// How far the casing is pressed on (m).
+/// Depth of the casing (m).
 const DEPTH: f64 = 5e-5;
 
 /// All of them.

@@ -168,7 +168,7 @@ fn steady(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
     Ok(checks)
 }
 
-/// How near the tolerance of a scene brings static forces, as a fraction: gaps are closed to a ten-thousandth of it, with a margin of ten.
+/// Returns the accuracy of static forces by the tolerance of a scene, as a fraction: gaps are closed to a ten-thousandth of it, with a margin of ten.
 fn near(scene: &Scene) -> f64 {
     1e-3 * allowed(scene) / 5e-5
 }

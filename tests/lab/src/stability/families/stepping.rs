@@ -216,7 +216,7 @@ fn kicked(method: StabilityMethod, step: f64) -> Result<(Simulation, f64)> {
     Ok((simulation, step))
 }
 
-/// What the scheme conserves (J).
+/// Returns the energy that the scheme conserves (J).
 fn energy(simulation: &Simulation) -> f64 {
     real(simulation, "scheme_energy")
 }

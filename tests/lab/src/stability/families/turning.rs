@@ -27,7 +27,7 @@ const STEP: f64 = 2e-6;
 const LOBE_STRIDE: f64 = 5e-4;
 /// Angle of a load, or of a mode, in the longest step of galerkin (rad).
 const LOAD_STEP: f64 = 0.05;
-/// How near the wave of λ comes to that of a blade without any scheme: its highest modes are followed coarsely.
+/// Distance of the wave of λ from that of a blade without any scheme: its highest modes are followed coarsely.
 const BESIDE: f64 = 5e-4;
 
 /// All of them.

@@ -14,7 +14,7 @@ use super::super::{
     observe::{bits, outputs},
 };
 
-/// What is tried on every variable.
+/// Values that are tried on every variable.
 pub(crate) const VALUES: [(&str, f64); 12] = [
     ("NaN", f64::NAN),
     ("inf", f64::INFINITY),
@@ -322,7 +322,7 @@ fn by_import(context: &CaseContext, scene: &str, version: u8, variable: &str, va
     outcome.unwrap_or_else(CaseEnd::refused)
 }
 
-/// How a finite but extreme value of a setting may be refused: the field, and what is wrong or what to do.
+/// Returns the accepted messages for a finite but extreme value of a setting: the field, and the problem or the remedy.
 fn refusals(field: &str) -> &'static [&'static [&'static str]] {
     match field {
         "speed" => &[&["variable `speed`", "Use a lower speed"], &["structure[1].speed", "between -1e6 and 1e6"]],
