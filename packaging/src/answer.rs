@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clearance_within_the_tolerance_is_contact_and_a_deeper_one_is_not() {
+    fn clearance_within_the_tolerance_counts_as_contact() {
         let at = |clearance: f64| {
             let rows: [&[f64]; 3] = [&[1e-4], &[clearance], &[1e-4]];
             text(&lines(&recording(&["clearance_minimum"], &rows), 1e-7))

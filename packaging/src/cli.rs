@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn every_command_explains_itself_with_examples_that_are_understood() {
+    fn every_command_has_examples_that_parse() {
         let mut cli = Cli::command();
         cli.build();
         explained(&cli, "tiprub");

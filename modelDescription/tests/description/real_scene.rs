@@ -75,7 +75,7 @@ fn means_and_totals_are_zero_at_the_start_whatever_the_inputs() {
 }
 
 #[test]
-fn array_inputs_and_kelvin_are_described_as_each_version_has_them() {
+fn describes_arrays_and_kelvin_for_each_version() {
     let simulation = Simulation::new(&scene::complete()).unwrap();
     let roms = scene::complete().roms;
     let description = |fmi3_arrays| scene::description(simulation.table(), &roms, fmi3_arrays);

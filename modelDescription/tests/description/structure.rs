@@ -209,7 +209,7 @@ fn units_and_types_used_are_defined() {
 }
 
 #[test]
-fn continuous_inputs_and_outputs_take_part_in_intermediate_updates() {
+fn intermediate_updates_have_continuous_variables() {
     let [_, (_, three), _] = all();
     let mut counts = [0, 0];
     for (_, attributes) in three.iter().filter(|(_, attributes)| attributes.contains_key("causality")) {
@@ -222,7 +222,7 @@ fn continuous_inputs_and_outputs_take_part_in_intermediate_updates() {
 }
 
 #[test]
-fn the_page_names_every_variable_and_check_and_is_self_contained() {
+fn page_names_all_variables_and_checks() {
     let (table, rom) = (common::table(), common::rom());
     let page = html(&common::description(&table, &rom, true));
     for variable in table.variables() {

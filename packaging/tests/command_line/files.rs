@@ -54,7 +54,7 @@ fn pipe(project: &Project, name: &str) -> PathBuf {
 
 #[test]
 #[cfg(unix)]
-fn pipes_and_devices_are_no_inputs_and_stdout_is_no_second_output() {
+fn rejects_pipes_as_inputs_and_stdout_twice() {
     let project = Project::new();
     for name in ["pipe", "pipe.toml", "pipe.fmu", "pipe.safetensors", "pipe.inp", "pipe.so"] {
         pipe(&project, name);
@@ -86,7 +86,7 @@ fn pipes_and_devices_are_no_inputs_and_stdout_is_no_second_output() {
 
 #[test]
 #[cfg(unix)]
-fn a_pipe_that_nobody_reads_is_waited_for_with_a_word_and_takes_all() {
+fn waits_for_the_reader_of_a_pipe_with_a_message() {
     use std::io::{BufRead, BufReader};
     let project = Project::new();
     let path = pipe(&project, "pipe");

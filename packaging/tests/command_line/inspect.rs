@@ -24,7 +24,7 @@ fn damaged_fmus_are_named_by_inspect_at_every_length() {
 }
 
 #[test]
-fn inspect_shows_where_contact_nodes_are_and_what_the_scene_sets() {
+fn inspect_shows_contact_nodes_and_settings() {
     let project = Project::new();
     let rom = project.succeed(&["inspect", "small.rom.safetensors"]);
     assert!(rom.contains("r 0.250000 m, θ 0.000000 rad, z 0.000000 m, slope 0.0000"), "{rom}");

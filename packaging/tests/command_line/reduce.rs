@@ -5,7 +5,7 @@ use std::fs;
 use crate::project::Project;
 
 #[test]
-fn a_reduction_replaces_another_rom_only_by_force_and_warns_of_a_poor_one() {
+fn reduction_replaces_a_rom_only_by_force() {
     let project = Project::new();
     let coarse = ["reduce", "rotor37", "--mesh", "4x1x6", "-o", "blade.rom.safetensors", "--quiet"];
     project.succeed(&coarse);
@@ -35,7 +35,7 @@ fn a_reduction_replaces_another_rom_only_by_force_and_warns_of_a_poor_one() {
 }
 
 #[test]
-fn a_casing_is_reduced_and_options_of_the_other_model_are_refused() {
+fn reduces_a_casing_and_rejects_options_of_other_models() {
     let project = Project::new();
     let coarse = ["reduce", "casing", "--mesh", "24x1x8", "--fixed-interface-modes", "48", "--modes", "36"];
     let ring = ["--contact-grid", "8x3", "--patches", "4x2", "--material", "titanium", "--high-flange", "none"];

@@ -37,7 +37,7 @@ fn failures_exit_with_one_and_are_json_too() {
     assert!(truncated.contains("small.rom.safetensors"), "{truncated}");
 }
 
-/// Of every command, whoever refuses: the parser, the check of names, or the work.
+/// Errors of every command, from the parser, the check of names, or the work.
 #[test]
 fn every_error_is_one_json_object_too() {
     let project = Project::new();
@@ -51,8 +51,8 @@ fn every_error_is_one_json_object_too() {
         ("--json reduce", 2, "command line", "a command is missing"),
         ("study --json", 2, "tiprub study", "a command is missing. Choose one of map"),
         ("study tip --json", 2, "study tip", "`stability`"),
-        ("study stage --json", 2, "stage", "tiprub-lab"),
-        ("stability --case friction/ --json", 2, "stability", "tiprub study stability SCENE"),
+        ("study stage --json", 2, "study stage", "`map`"),
+        ("stability --json", 2, "stability", "unrecognized subcommand"),
         ("reduce bar.inp --contact-set A --clamp-set B --json", 2, "reduce bar.inp", "tiprub reduce blade bar.inp"),
         ("reduce rotor38 --json", 2, "reduce rotor38", "rotor37"),
         ("reduce rotor37 --thickness 0.003 --json", 2, "--thickness", "unexpected argument"),

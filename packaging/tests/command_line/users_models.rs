@@ -153,7 +153,7 @@ fn matrices_of_calculix_give_the_rom_of_the_mesh() {
 }
 
 #[test]
-fn a_sector_of_gmsh_becomes_a_disk_with_the_frequencies_of_calculix() {
+fn gmsh_sector_has_the_frequencies_of_calculix() {
     let project = ModelProject::new(&["sector.msh"]);
     let line = "reduce sector sector.msh --contact-set TIP --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --young 210e9 --poisson 0.3 --density 7850 --contact-nodes 3 --modes 12 \

@@ -169,7 +169,7 @@ fn no_path_is_dead() {
 }
 
 #[test]
-fn every_page_is_in_the_summary_once_and_every_picture_on_a_page() {
+fn every_page_is_listed_once_and_every_picture_is_used() {
     let summary = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
     let mut listed: Vec<_> = targets(&summary).iter().map(|target| Path::new("docs").join(target)).collect();
     listed.sort();

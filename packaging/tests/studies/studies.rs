@@ -310,7 +310,7 @@ fn the_study_of_stability_answers_as_runs_do() {
 }
 
 #[test]
-fn the_study_of_stability_asks_a_scene_without_friction_what_it_would_take() {
+fn stability_study_works_without_friction_in_the_scene() {
     let root = tempfile::tempdir().unwrap();
     own_scene(root.path());
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
@@ -330,7 +330,7 @@ fn the_study_of_stability_asks_a_scene_without_friction_what_it_would_take() {
 }
 
 #[test]
-fn the_study_of_stability_shows_more_than_refusals_where_the_step_is_too_long() {
+fn stability_study_shows_usable_steps_below_a_long_one() {
     let root = tempfile::tempdir().unwrap();
     own_scene(root.path());
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
@@ -355,7 +355,7 @@ fn convergence(root: &Path, more: &[&str]) -> Value {
 
 /// Steps of any scene, fewer modes of any ROM; more modes and other contact nodes where the mesh is named, and it is the ROM's.
 #[test]
-fn the_study_of_convergence_refines_what_it_can_and_says_what_it_cannot() {
+fn convergence_study_reports_what_it_cannot_refine() {
     let root = tempfile::tempdir().unwrap();
     own_scene(root.path());
     let study = |more: &[&str]| convergence(root.path(), more);

@@ -75,7 +75,7 @@ fn run(scheme: Scheme, step: f64, sticking: f64, sliding: f64, steps: usize) -> 
 }
 
 #[test]
-fn stick_slip_has_the_amplitude_and_the_times_of_the_closed_form() {
+fn stick_slip_matches_the_closed_form() {
     let (static_force, kinetic_force) = (FRICTION * 300.0, FRICTION * 200.0);
     let stiffness = MASS * OMEGA * OMEGA;
     let closed = StickSlipBelt { mass: MASS, stiffness, speed: BELT, sticking: static_force, sliding: kinetic_force };
@@ -112,7 +112,7 @@ fn stick_slip_has_the_amplitude_and_the_times_of_the_closed_form() {
 }
 
 #[test]
-fn with_one_coefficient_the_block_swings_about_the_friction_force() {
+fn block_swings_about_the_friction_force() {
     let (step, load) = (2.5e-5, 250.0);
     let steps = 40_000;
     let record = run(Scheme::ModalExact, step, load, load, steps);
@@ -162,7 +162,7 @@ fn by_tolerance(tolerance: f64, longest: f64) -> System {
 }
 
 #[test]
-fn by_a_tolerance_a_flexible_contact_sticks_and_slips_as_its_closed_form() {
+fn adaptive_tolerance_matches_stick_slip_closed_form() {
     let (longest, count) = (2e-3, 500);
     let block = ThrownBlock { mass: MASS, omega: OMEGA, flexibility: FLEXIBILITY, friction: FORCE, velocity: THROWN };
     let exact = block.motion(longest, count);

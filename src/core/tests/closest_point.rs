@@ -157,7 +157,7 @@ fn starts_on_the_opposite_side_lead_back() {
 }
 
 #[test]
-fn the_other_side_of_a_seam_that_kinks_is_found_when_it_is_closer() {
+fn finds_the_closer_side_of_a_kinked_seam() {
     let around = 36;
     let points = data(around, 3, round);
     let surface = SurfaceSpline::new(&points, around, 3, Closure::FreeEnds, Interpolation::Spline).unwrap();
@@ -185,7 +185,7 @@ fn a_corner_on_an_inner_ring_of_facets_is_no_edge() {
 }
 
 #[test]
-fn a_node_finds_the_surface_beyond_its_edge_and_not_beyond_its_reach() {
+fn node_finds_the_surface_within_its_extension_only() {
     for (closure, interpolation) in KINDS {
         let points = data(36, 3, conical);
         let surface = SurfaceSpline::new(&points, 36, 3, closure, interpolation).unwrap();
@@ -315,7 +315,7 @@ fn hopeless_nodes_are_lost_without_panic() {
 }
 
 #[test]
-fn a_start_from_the_last_step_ends_where_a_start_from_elsewhere_does() {
+fn warm_start_finds_the_same_solution() {
     let mut random = SeededRandom(11);
     for (closure, interpolation) in KINDS {
         let (around, along, turn) = (36, 5, 1e-3);
@@ -344,7 +344,7 @@ fn a_start_from_the_last_step_ends_where_a_start_from_elsewhere_does() {
 }
 
 #[test]
-fn a_sliding_node_is_kicked_at_every_border_of_facets_and_nowhere_on_the_spline() {
+fn facets_kick_a_sliding_node_and_splines_do_not() {
     use sliding::{AROUND, INTERFERENCE, MASS, SPEED, STEP, STIFFNESS, casing, slide};
     let largest = |history: &sliding::SlidingHistory| history.changes().into_iter().fold(0.0, f64::max);
     let facets = slide(&casing(Closure::Smooth, Interpolation::Facets));

@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_its_own_holds_the_legend_and_unlabelled_lines_stay_out_of_it() {
+    fn separate_legend_holds_labelled_lines_only() {
         let line = |label: &str| Series::line(label, vec![(0.0, 1.0), (1.0, 2.0)]);
         let series = vec![line("first"), line("").drawn(SeriesForm::Thin, 4), line("third").drawn(SeriesForm::Dots, 7)];
         let plot = Plot::new("x", "y", series);

@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_curve_is_drawn_last_and_values_beyond_the_axis_are_cut_off() {
+    fn draws_the_nearest_curve_last_and_clips_values() {
         let svg = sample().to_svg();
         let (far, near) = (svg.find("stroke=\"rgb(79,").unwrap(), svg.find("stroke=\"rgb(31,93,160)").unwrap());
         assert!(far < near);

@@ -272,7 +272,7 @@ fn the_file_that_the_python_example_writes_is_a_rom() {
 
 /// Written by the second Python example of the chapter (safetensors 0.8.0, NumPy 2.4.6).
 #[test]
-fn the_disk_that_the_python_example_writes_is_a_rom_of_coupled_sectors() {
+fn python_example_writes_a_disk_of_coupled_sectors() {
     let rom = read_rom(include_bytes!("data/disk_by_python.rom.safetensors"), "disk_by_python").unwrap();
     assert_eq!((rom.sectors, rom.extras.harmonics.len(), rom.total_order()), (24, 12, 72));
     let (spring, half) = (2e4, std::f64::consts::PI / 24.0);

@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn failures_are_not_kept_and_a_cache_that_cannot_be_is_no_failure() {
+    fn caches_no_failures_and_works_without_a_cache() {
         let root = tempfile::tempdir().unwrap();
         let console = Console::new(true, false);
         let failure = || Err(Failure::new("a", "b", "c"));

@@ -189,7 +189,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn the_embedded_scene_is_valid_and_its_file_form_differs_in_two_fields_only() {
+    fn embedded_scene_is_valid_and_equals_its_file_form() {
         let embedded = tiprub_format::parse_scene(ROTOR37_SCENE, "embedded").unwrap();
         let written = tiprub_format::parse_scene(&rotor37_text("blade.rom.safetensors", 0.25), "written").unwrap();
         assert_eq!(written.structures[0].rom, "blade.rom.safetensors");

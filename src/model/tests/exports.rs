@@ -90,7 +90,7 @@ fn cyclic(diameters: &[usize]) -> tiprub_model::Result<String> {
 }
 
 #[test]
-fn a_sector_is_written_with_its_symmetry_and_a_step_per_nodal_diameter() {
+fn writes_a_sector_with_a_step_per_nodal_diameter() {
     let (mesh, text) = (coarse(), cyclic(&[0, 2, 28]).unwrap());
     let blocks = blocks(&text);
     let clamped = mesh.set("CLAMPED").unwrap();

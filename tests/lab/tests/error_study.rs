@@ -35,7 +35,7 @@ fn finest(scene: &Value, competitor: &str, key: &str) -> f64 {
 }
 
 #[test]
-fn bars_converge_to_the_exact_solution_with_the_elements_and_to_the_reference_with_the_steps() {
+fn bars_converge_with_elements_and_steps() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), &["carpenter", "bouncing-bar"]);
     for scene in json["results"]["scenes"].as_array().unwrap() {

@@ -89,7 +89,7 @@ fn the_quick_study_of_modes_draws_folded_engine_orders() {
 /// Three casings. The rigid oval closes all nodes; with friction contact on it flutters, and presses harder than without. The
 /// elastic casing is held at one end and gives way: the leading edge does not touch.
 #[test]
-fn the_quick_study_of_the_stage_tells_rigid_and_flexible_casings_apart() {
+fn quick_stage_study_separates_rigid_and_flexible_casings() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "stage", &["--speeds", "900:1300:2"]);
     only_no(&json, &["Flexible casing: The clearance of each of the three nodes"]);
@@ -148,7 +148,7 @@ fn the_quick_study_of_the_cube_meets_independent_methods() {
 }
 
 #[test]
-fn the_quick_study_of_conjugacy_finds_forces_moments_and_work_that_agree() {
+fn quick_conjugacy_study_finds_agreement() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "conjugacy", &[]);
     for statement in json["statements"].as_array().unwrap() {
@@ -190,7 +190,7 @@ fn the_quick_study_of_inputs_tells_ramps_from_hammers() {
 }
 
 #[test]
-fn the_quick_study_of_coupling_needs_derivatives_where_the_shaft_has_no_mass() {
+fn quick_coupling_study_needs_derivatives_without_mass() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "coupling", &[]);
     only_no(&json, &[]);

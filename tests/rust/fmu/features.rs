@@ -178,7 +178,7 @@ fn features_that_are_off_have_no_variables_and_no_data() {
 }
 
 #[test]
-fn a_packaged_scene_of_features_runs_as_it_does_without_packaging() {
+fn packaged_scene_runs_as_unpackaged() {
     let (path, scene) = (shipped(), warm_scene());
     let array = of(&scene, "casing_temperature");
     let (api, resources) = (fmi3::load(&path), UnpackedResources::of(&scene, true));

@@ -260,7 +260,7 @@ mod control {
 /// An unmasked exception ends this very process with SIGFPE: then no test of this file passes.
 #[test]
 #[cfg(target_arch = "x86_64")]
-fn the_floating_point_environment_of_the_host_neither_matters_nor_changes() {
+fn host_floating_point_environment_has_no_effect() {
     const MASKED: u32 = 0x1F80;
     let traps = MASKED & !(0x0080 | 0x0200 | 0x0400 | 0x0800); // invalid, division by zero, overflow, underflow
     let (path, resources) = (shipped(), UnpackedResources::new(false));

@@ -211,7 +211,7 @@ fn wrong_damaged_and_foreign_states_are_refused() {
 /// To read outputs in Initialization Mode changes nothing that a saved state holds: what is set after it is restored is where the
 /// run starts, at once.
 #[test]
-fn a_state_saved_after_reading_in_initialization_mode_is_that_of_before() {
+fn reading_in_initialization_mode_leaves_the_state() {
     let api = fmi3::load(&shipped());
     let resources = UnpackedResources::new(true);
     let slave = fmi3::Fmi3TestSlave::new(&api, &resources);

@@ -184,7 +184,7 @@ fn watched(resources: &UnpackedResources, early_return: bool) -> fmi3::Fmi3Argum
 }
 
 #[test]
-fn intermediate_updates_see_every_internal_step_and_change_nothing_by_looking() {
+fn intermediate_updates_see_every_internal_step() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), UnpackedResources::new(false));
     let core = simulation();
@@ -329,7 +329,7 @@ fn steps_of_any_length_are_refused_or_leave_numbers_only() {
 
 /// As many modes as three contact nodes have directions: massless-boundary leaves none.
 #[test]
-fn a_scheme_that_leaves_no_mode_is_refused_without_a_panic_and_can_be_taken_back() {
+fn rejects_a_scheme_without_modes_reversibly() {
     let mut scene = scene();
     scene.settings.contacts[0].friction = 0.0;
     let rom = &mut scene.roms[0];
@@ -415,7 +415,7 @@ fn whirling() -> tiprub_core::Scene {
 }
 
 #[test]
-fn values_refused_together_within_a_step_leave_the_ramps_as_they_were() {
+fn rejected_values_within_a_step_leave_the_ramps() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), UnpackedResources::of(&whirling(), true));
     let core = Simulation::new(&whirling()).expect("the scene is valid");
@@ -484,7 +484,7 @@ fn free(scene: Scene) -> Free {
 }
 
 #[test]
-fn too_many_internal_steps_are_discarded_by_fmi2_and_the_step_can_be_repeated() {
+fn fmi2_discards_too_many_steps_and_can_repeat() {
     let (path, scenes) = (shipped(), [bounded(), marched()]);
     let api = fmi2::load(&path);
     for found in scenes.map(free) {
@@ -530,7 +530,7 @@ fn too_many_internal_steps_are_discarded_by_fmi2_and_the_step_can_be_repeated() 
 }
 
 #[test]
-fn too_many_internal_steps_end_a_step_of_fmi3_early_or_discard_it() {
+fn fmi3_returns_early_or_discards_too_many_steps() {
     let (path, scenes) = (shipped(), [bounded(), marched()]);
     let api = fmi3::load(&path);
     for found in scenes.map(free) {

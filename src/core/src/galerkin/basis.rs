@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn polynomials_are_one_at_their_point_and_lobatto_weights_come_out() {
+    fn polynomials_and_lobatto_weights_are_exact() {
         let weights = [
             vec![0.5, 0.5],
             vec![1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0],
@@ -184,7 +184,7 @@ mod tests {
 
     /// S + Sᵀ is what the ends leave of a product; S of a constant is 0.
     #[test]
-    fn the_work_of_a_force_and_that_of_its_displacement_are_parts_of_one_product() {
+    fn force_work_and_displacement_work_share_one_product() {
         for degree in 1..=MOST {
             let basis = TimeBasis::new(degree);
             for i in 0..=degree {

@@ -186,7 +186,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn energy_is_work_less_losses_with_friction_damping_and_a_wall_that_moves() {
+fn energy_balance_closes_with_all_losses() {
     let mut random = RandomNumbers(3);
     for (friction, damping) in [(0.0, 0.0), (0.15, 0.0), (0.3, 0.01)] {
         let modes = modes(12, 2, damping, &mut random);

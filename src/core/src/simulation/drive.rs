@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_starts_where_it_is_and_ends_at_the_value_asked_for_to_the_bit() {
+    fn ramp_ends_exactly_at_the_requested_value() {
         let mut input = held(0.1);
         for (value, length) in [(0.7, 1e-3), (-1.0 / 3.0, 3e-7), (-1.0 / 3.0, 1e-4), (0.2, 7.0)] {
             let before = input.at(0.0);

@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn frictionless_contact_adds_no_growth_and_damped_contact_decays() {
+    fn frictionless_contact_does_not_grow_and_damping_decays() {
         let shapes = [[1.0, 0.2, 0.0], [0.3, -0.8, 0.1], [0.7, 0.4, 0.0]];
         for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
             let model = model(&[900.0, 2300.0, 8000.0], &shapes, 0.0);
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn growth_of_a_fluttering_contact_converges_to_the_continuous_rate() {
+    fn flutter_growth_converges_to_the_continuous_rate() {
         // Two close modes coupled by friction through the contact; 178.516 1/s is the largest real part of the
         // eigenvalues of the constrained equations, computed independently with NumPy.
         let shapes = [[-0.1, -0.5, 0.0], [-0.3, 1.0, 0.0], [0.9, -0.8, 0.0]];

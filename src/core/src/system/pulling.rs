@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_counts_is_the_node_most_pulled_at_against_the_one_most_pushed() {
+    fn compares_the_most_pulled_node_with_the_most_pushed() {
         let mut pulling = Pulling::new(3);
         assert_eq!(pulling.most(0), None);
         for (node, impulse) in [(0, 3.0), (1, -0.5), (2, -0.25), (0, 1.0), (1, 2.0), (2, -0.5)] {

@@ -161,7 +161,7 @@ type Term = (fn(&mut Ledger) -> &mut Sum, f64);
 
 /// Every term has its sign, and large work in and out leaves the small rest that is in the ledger.
 #[test]
-fn the_residual_is_the_balance_of_all_terms_without_cancellation() {
+fn residual_is_the_balance_without_cancellation() {
     let terms: [Term; 12] = [
         (|ledger| &mut ledger.shaft_work, 1.0),
         (|ledger| &mut ledger.friction_loss, -1.0),

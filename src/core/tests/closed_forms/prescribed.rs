@@ -346,7 +346,7 @@ fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
 
 /// Friction F on a mass on a spring k takes 2F/k of the amplitude at every turn, whichever of the two bodies swings.
 #[test]
-fn a_mass_that_swings_on_a_plane_loses_the_same_amplitude_every_half_turn() {
+fn friction_takes_equal_amplitude_every_half_period() {
     println!("| swings | scheme | solver | amplitudes (mm) | largest error |\n|---|---|---|---|---|");
     let (friction, amplitude, step) = (0.1, 4e-3, 5e-5);
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary] {

@@ -232,7 +232,7 @@ fn bilinear(case: Bilinear, solver: Solver, step: f64, turns: u32) -> [f64; 3] {
 }
 
 #[test]
-fn the_period_of_an_impact_oscillator_from_grazing_to_hard_impacts() {
+fn impact_oscillator_period_matches_the_closed_form() {
     told!("| solver | A/d | period (s) | period, h = 200, 100, 50 µs | order | force at 50 µs | energy |");
     told!("|---|---|---|---|---|---|---|");
     for solver in SOLVERS {

@@ -255,7 +255,7 @@ fn the_order_of_the_casing_load_is_a_parameter() {
 }
 
 #[test]
-fn wearing_takes_at_least_the_yield_stress_times_the_worn_volume() {
+fn wear_takes_at_least_yield_stress_times_volume() {
     let mut simulation = started(&scene_with(("coating", coating), Scheme::ModalExact, Solver::Lcp));
     let mut before = 0.0;
     for _ in 0..60 {

@@ -131,7 +131,7 @@ impl ChatterCase {
 
 /// Just below and above the limit at three speeds of a lobe: rates and the limit are of first order in the step.
 #[test]
-fn chatter_grows_beyond_the_limit_of_its_lobe_and_dies_out_below() {
+fn chatter_grows_beyond_the_limit_of_its_lobe() {
     println!(
         "| speed, chatter | step | growth at 0.9, 1.1 of the limit (1/s) | closed form | with a force one step ahead | limit off by |"
     );

@@ -52,7 +52,7 @@ fn scene([cells_around, cells_along]: [usize; 2], step: f64) -> Scene {
 
 /// The casing closes in at a steady rate: every blade takes the same depth of cut, whatever it yields.
 #[test]
-fn a_steady_incursion_has_the_force_torque_and_volume_of_its_kinematics() {
+fn steady_incursion_follows_its_kinematics() {
     println!("| cells | step (s) | torque | volume | work/(u V) | shaft work | cutting/shaft work | residual |");
     let (rate, turn) = (5e-3, TAU / SPEED);
     let depth = rate * turn / BLADES as f64;
@@ -182,7 +182,7 @@ fn cutting_keeps_to_states_and_asks_for_no_memory() {
 
 /// A normal mode that bends along the way, into the coating in one sense of it: what ends the run is called what it is.
 #[test]
-fn what_grows_under_the_cut_is_told_where_it_ends_a_run_and_a_cut_at_rest_before_it() {
+fn warns_of_growth_under_a_cut_when_it_ends_a_run() {
     let mut scene = scene([200, 2], 1e-6);
     let rom = &mut scene.roms[0];
     for node in 0..2 {

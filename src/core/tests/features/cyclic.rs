@@ -115,7 +115,7 @@ fn every_pair(mut check: impl FnMut(&TestDisk, [Simulation; 2], String)) {
 }
 
 #[test]
-fn a_thousand_contact_steps_equal_those_of_the_whole_disk_as_one_structure() {
+fn thousand_contact_steps_equal_the_whole_disk() {
     println!("| sectors x nodes x coordinates | scheme | solver | µ | most contacts | displacement | λ | energies |");
     println!("|---|---|---|---|---|---|---|---|");
     every_pair(|disk, mut both, name| {
@@ -130,7 +130,7 @@ fn a_thousand_contact_steps_equal_those_of_the_whole_disk_as_one_structure() {
 /// Blades that bounce between each other amplify rounding with every impact, whoever computes it: the same disk
 /// stepped by the same code with the casing 1e-19 m away is the measure.
 #[test]
-fn a_disk_that_bounces_all_around_differs_no_more_than_from_itself_nudged_by_rounding() {
+fn bouncing_disk_differs_only_as_by_rounding() {
     println!(
         "| sectors x nodes x coordinates | scheme | solver | µ | most contacts | displacement | energies | nudged |"
     );

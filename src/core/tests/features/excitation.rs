@@ -64,7 +64,7 @@ fn turned(angle: f64) -> Complex<f64> {
 
 /// At resonance the component that the mode moves most answers with A/(2ζk), k = ω²/φ², a quarter of a period late.
 #[test]
-fn a_mode_at_resonance_moves_by_the_force_over_twice_damping_and_stiffness() {
+fn mode_at_resonance_has_the_closed_form_amplitude() {
     println!("| scheme | error of A/(2ζk) at h | at h/2 |");
     for scheme in Scheme::RECURRENCES {
         let rom = models::rich_blade(7);
@@ -139,7 +139,7 @@ fn central_differences_warn_of_excitation_on_long_steps() {
 
 /// A force at a contact node answers in all modes, also in quasi-static ones, which follow it one step late.
 #[test]
-fn a_force_at_a_node_answers_by_the_frequency_response_of_all_modes() {
+fn force_at_a_node_follows_the_frequency_response() {
     for (scheme, tolerance) in
         [(Scheme::ModalExact, 1e-4), (Scheme::CentralDifference, 1e-4), (Scheme::MasslessBoundary, 2e-3)]
     {
@@ -169,7 +169,7 @@ fn a_force_at_a_node_answers_by_the_frequency_response_of_all_modes() {
 
 /// Coupled sectors under every engine order against the whole disk as one structure, whose modes know no nodal diameters.
 #[test]
-fn every_engine_order_travels_around_a_disk_as_on_the_whole_structure() {
+fn engine_orders_travel_as_on_the_whole_disk() {
     let mut worst = 0.0_f64;
     for (sectors, orders) in [(5, 0..11_u32), (6, 0..13)] {
         let disk = TestDisk::random(sectors, 1, 6, 0.2, 11);
@@ -213,7 +213,7 @@ fn every_engine_order_travels_around_a_disk_as_on_the_whole_structure() {
 
 /// One mode family of a disk that is not coupled answers as that of uncoupled sectors.
 #[test]
-fn a_family_of_a_disk_without_coupling_answers_as_that_of_one_blade() {
+fn family_of_an_uncoupled_disk_responds_as_one_blade() {
     let mut disk = TestDisk::random(6, 1, 6, 0.2, 5);
     disk.mass[1].fill(0.0);
     disk.stiffness[1].fill(0.0);
@@ -235,7 +235,7 @@ fn a_family_of_a_disk_without_coupling_answers_as_that_of_one_blade() {
 
 /// While blades rub too: F cos(…) at a node times its own displacement, which knows no modes, is what the ledger has.
 #[test]
-fn the_work_of_an_excitation_is_force_times_displacement_while_blades_rub() {
+fn excitation_work_is_force_times_displacement() {
     let disk = TestDisk::random(6, 2, 10, 0.2, 3);
     for (rom, node, loaded) in [(models::rich_blade(6), "mid_chord", 4), (disk.cyclic(), "node_0_1", 4)] {
         for scheme in Scheme::RECURRENCES {
@@ -287,7 +287,7 @@ fn the_work_of_an_excitation_is_force_times_displacement_while_blades_rub() {
 }
 
 #[test]
-fn a_state_keeps_the_excitation_and_steps_of_other_lengths_carry_it() {
+fn state_keeps_the_excitation_over_other_steps() {
     for rom in [models::blade(5), TestDisk::random(5, 1, 6, 0.2, 3).cyclic()] {
         let scene = scene(rom, Scheme::ModalExact, 6, 800.0);
         let mut run = started(&scene);
@@ -347,7 +347,7 @@ fn an_excitation_that_cannot_be_is_refused() {
 
 /// The pattern turns by the speed and by its phase: what the phase adds counts, either way round.
 #[test]
-fn an_excitation_that_its_phase_turns_too_far_in_a_step_is_refused() {
+fn rejects_an_excitation_phase_that_turns_too_far() {
     let mut scene = scene(models::blade(3), Scheme::ModalExact, 2, 500.0);
     scene.settings.time.step = 1e-6;
     for (turn, refused) in [(1.9, false), (2.1, true), (-1.9, false), (-2.1, true)] {

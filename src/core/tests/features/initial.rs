@@ -83,7 +83,7 @@ fn blades_go_on_from_where_they_start_as_free_vibration() {
 }
 
 #[test]
-fn a_nodal_diameter_of_a_disk_starts_as_told_and_rings_down_alone() {
+fn nodal_diameter_starts_as_set_and_decays_alone() {
     for scheme in [Scheme::ModalExact, Scheme::Galerkin] {
         let rom = TestDisk::random(6, 1, 7, 0.2, 3).cyclic();
         let model = CyclicModel::from_rom(&rom, 0.02).unwrap();
@@ -139,7 +139,7 @@ fn every_mode_decays_by_its_own_ratio() {
 }
 
 #[test]
-fn starts_and_ratios_are_parameters_and_refused_where_they_cannot_be() {
+fn starts_and_ratios_are_checked_parameters() {
     let one = InitialSettings { displacement: 1e-6, ..NONE };
     let given = scene(models::blade(4), Scheme::ModalExact, vec![one]);
     let mut run = Simulation::new(&given).unwrap();

@@ -121,7 +121,7 @@ fn angular_momentum(simulation: &Simulation, rom: &tiprub_core::Rom) -> f64 {
 }
 
 #[test]
-fn an_edge_that_hits_turns_the_body_by_the_moment_of_its_impulse() {
+fn edge_impact_turns_the_body_by_its_moment() {
     for (scheme, friction) in [(Scheme::CentralDifference, 0.0), (Scheme::ModalExact, 0.3)] {
         let (_, scene, _) = events().swap_remove(1);
         let scene = with(scene, friction, Solver::Lcp, scheme);
@@ -265,7 +265,7 @@ fn friction_with_sticking_blocks_the_body() {
 }
 
 #[test]
-fn a_saved_state_continues_with_the_same_bits_and_reset_starts_again() {
+fn saved_state_continues_with_equal_bits_and_reset_restarts() {
     for solver in SOLVERS {
         let scene = with(squeezed(), 0.15, solver, Scheme::ModalExact);
         let values = |simulation: &Simulation| {

@@ -198,7 +198,7 @@ fn light_contact_nodes_fly_as_massless_ones() {
 }
 
 #[test]
-fn a_saved_flight_goes_on_with_the_same_bits_and_allocates_nothing() {
+fn saved_flight_continues_with_equal_bits() {
     let (_, scene, steps) = events().swap_remove(1);
     let sliding = marched(scene, 1e-3, 0.2);
     let mut sticking = sliding.clone();

@@ -123,7 +123,7 @@ fn friction_that_jams_a_contact_on_a_plate_is_refused() {
 }
 
 #[test]
-fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
+fn warns_of_friction_without_a_unique_solution_in_flight() {
     let simulation = started(&with_local_mode(0.0203, &[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]));
     let told = simulation.warnings().join(" ");
     assert!(told.contains("cannot be shown to have one solution"), "{told}");
@@ -134,7 +134,7 @@ fn friction_that_may_leave_the_flight_without_one_solution_is_warned_of() {
 }
 
 #[test]
-fn a_body_too_fast_for_the_step_is_refused_and_passes_nothing_unseen() {
+fn rejects_a_body_that_is_too_fast_for_the_step() {
     // Obliquely through the plate within one step: beyond its edge before and after.
     for velocity in [[-1e5, 1e5, 0.0], [-1e5, 0.0, 0.0], [0.0, 0.0, -5e4], [5000.0, 0.0, 0.0]] {
         let mut scene = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.06)], false, velocity);

@@ -88,7 +88,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn it_is_what_massless_boundary_tends_to_and_errors_are_those_asked_for() {
+fn is_the_limit_of_massless_boundary_within_its_tolerance() {
     let exact = run(&scene(Scheme::Galerkin, H, 1e-7), still);
     assert!(exact.residual < 1e-13 && exact.lowest > -1e-9, "{:e}, {:e}", exact.residual, exact.lowest);
     // The longest step changes nothing, a shape that grows in included.
@@ -169,7 +169,7 @@ const FEATURES: [CombinedFeature; 8] = [
 ];
 
 #[test]
-fn every_combination_keeps_its_books_and_agrees_with_massless_boundary() {
+fn every_combination_agrees_with_massless_boundary() {
     for (name, distance_allowed, change, drive) in FEATURES {
         let of = |scheme: Scheme, step: f64, tolerance: f64| {
             let mut scene = scene(scheme, step, tolerance);
@@ -233,7 +233,7 @@ fn disk_displacements(mut scene: Scene, tolerance: f64) -> Vec<f64> {
 
 /// A tolerance that asks for nothing: books close all the same, and nothing is above what was put in.
 #[test]
-fn an_elastic_casing_and_blades_at_rest_get_no_energy_from_nowhere() {
+fn elastic_casing_with_blades_at_rest_gains_no_energy() {
     let mut scene = scene(Scheme::Galerkin, H, 0.1);
     flexible(&mut scene);
     scene.settings.contacts[0].friction = 0.0;
@@ -316,7 +316,7 @@ fn what_is_not_sound_is_refused_by_name() {
 }
 
 #[test]
-fn a_saved_state_goes_on_with_the_same_bits_and_no_step_asks_for_memory() {
+fn saved_state_continues_with_equal_bits_without_allocation() {
     let alone = scene(Scheme::Galerkin, H, 1e-4);
     let (mut carried, mut coupled) = (alone.clone(), alone.clone());
     flexible(&mut carried);
@@ -440,7 +440,7 @@ fn everything(simulation: &Simulation) -> (Vec<u64>, Vec<u8>) {
 }
 
 #[test]
-fn a_step_that_takes_too_many_steps_is_as_if_it_had_not_been_tried() {
+fn discarded_step_changes_nothing() {
     let scene = scene(Scheme::Galerkin, H, 1e-4);
     let mut free = started(&scene);
     let mut bounded = started(&scene);

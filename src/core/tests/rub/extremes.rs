@@ -9,7 +9,7 @@ use tiprub_test_models::{self as models, disk, go, lattice, real, reference, sta
 use crate::blades::refusal;
 
 #[test]
-fn a_rotor_that_skips_over_the_lobes_is_refused_and_can_go_on_slower() {
+fn rejects_a_rotor_that_skips_over_the_lobes() {
     let mut scene = models::rub(12);
     scene.settings.accept_implausible = true;
     for speed in [5e5, -1e6, 1e6] {
@@ -54,7 +54,7 @@ fn casings_that_small_displacements_cannot_describe_are_refused() {
 }
 
 #[test]
-fn a_load_that_is_too_large_at_the_start_is_named_and_not_the_surface_it_folds() {
+fn names_a_load_that_is_too_large_at_the_start() {
     let mut scene = models::rub(12);
     models::flexible(&mut scene);
     for amplitude in [1e9, 1e12] {
@@ -65,7 +65,7 @@ fn a_load_that_is_too_large_at_the_start_is_named_and_not_the_surface_it_folds()
 }
 
 #[test]
-fn a_derivative_that_leaves_the_range_within_the_step_is_refused_and_changes_nothing() {
+fn rejects_a_derivative_that_leaves_the_range_within_the_step() {
     let mut scene = models::rub(12);
     scene.settings.surfaces[0].moving = true;
     let (mut refused, mut other) = (started(&scene), started(&scene));
@@ -94,7 +94,7 @@ fn a_derivative_that_leaves_the_range_within_the_step_is_refused_and_changes_not
 }
 
 #[test]
-fn a_speed_beyond_the_fitted_one_is_refused_before_anything_changes() {
+fn rejects_a_speed_beyond_the_fitted_one() {
     let mut scene = models::rub(12);
     let order = scene.roms[0].order();
     scene.roms[0].extras.spin = Some(models::spin(order));
@@ -274,7 +274,7 @@ fn simulation_step(simulation: &Simulation) -> f64 {
 }
 
 #[test]
-fn steps_that_rounding_would_fill_are_refused_wherever_they_begin() {
+fn rejects_steps_at_the_level_of_rounding() {
     for scene in kinds() {
         for start in [0.0, -0.0, 1e-300, -3e-6] {
             let mut simulation = Simulation::new(&scene).unwrap();

@@ -115,7 +115,7 @@ fn a_whirl_given_as_a_staircase_does_not_hit() {
 }
 
 #[test]
-fn a_ramp_is_the_line_that_derivatives_would_give_one_step_later() {
+fn ramp_equals_derivatives_one_step_later() {
     let (mut ramp, mut line) = (started(&whirling()), started(&whirling()));
     let length = 2e-5;
     for index in 0..100 {
@@ -136,7 +136,7 @@ fn a_ramp_is_the_line_that_derivatives_would_give_one_step_later() {
 }
 
 #[test]
-fn a_value_is_reached_at_the_end_of_the_step_to_the_bit_and_read_as_it_was_set() {
+fn value_is_reached_exactly_at_the_end_of_the_step() {
     let mut simulation = started_at(&bumps(), 3.25);
     let factor = |simulation: &Simulation| simulation.shape_factor();
     // Start values are reached at the start.
@@ -211,7 +211,7 @@ fn derivatives_say_where_the_step_ends_and_do_not_make_it_jump() {
 }
 
 #[test]
-fn a_value_set_within_a_step_turns_the_ramp_where_it_is_and_an_early_return_keeps_it() {
+fn value_set_within_a_step_turns_the_ramp() {
     let mut simulation = started(&bumps());
     set(&mut simulation, "casing_shape_factor", 0.0);
     simulation.begin_step(0.0, 1e-5).unwrap();

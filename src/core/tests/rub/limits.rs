@@ -27,7 +27,7 @@ fn massless_boundary_knows_the_stiffest_blade() {
 
 /// Communication steps may become longer than the one that the start expects.
 #[test]
-fn a_step_beyond_that_of_massless_boundary_is_refused_on_the_way() {
+fn rejects_a_later_step_beyond_massless_boundary() {
     let usable = usable_step(round(Scheme::MasslessBoundary));
     let mut scene = with_step(round(Scheme::MasslessBoundary), 1e-4);
     scene.settings.experiment.communication_step = 0.2 * usable;
@@ -41,7 +41,7 @@ fn a_step_beyond_that_of_massless_boundary_is_refused_on_the_way() {
 }
 
 #[test]
-fn pressed_blades_gain_no_energy_at_the_largest_step_of_massless_boundary() {
+fn pressed_blades_gain_no_energy_at_the_massless_limit() {
     for factor in [1.0, 1.3] {
         let mut scene = round(Scheme::MasslessBoundary);
         scene.settings.structures[0].frequency_factors = vec![factor; 12];
@@ -65,7 +65,7 @@ fn pressed_blades_gain_no_energy_at_the_largest_step_of_massless_boundary() {
 
 /// One blade presses on a ring whose modes are raised up to where the step that the blade allows passes over them: they count.
 #[test]
-fn a_stiff_casing_gains_no_energy_at_the_largest_step_of_massless_boundary() {
+fn stiff_casing_gains_no_energy_at_the_massless_limit() {
     for (raised, seen) in [(1.0, 1.0), (10.0, 1.0), (10.0, 4.0), (60.0, 10.0)] {
         let mut scene = on_a_ring(round(Scheme::MasslessBoundary));
         scene.settings.contacts[0].sector_gaps = vec![2e-3; 12];

@@ -53,7 +53,7 @@ fn stiffening_does_not_make_unresolved_modes_grow() {
 }
 
 #[test]
-fn central_differences_are_refused_when_stiffening_takes_them_over_their_limit() {
+fn rejects_central_differences_beyond_stiffened_limit() {
     let step = 1.99995 / (std::f64::consts::TAU * 40_000.0);
     let all = stiffening(Scheme::CentralDifference, step);
     // The highest mode alone.
@@ -91,7 +91,7 @@ fn a_change_of_step_leaves_the_pressed_casing_at_rest() {
 }
 
 #[test]
-fn a_node_that_wanders_over_the_edge_and_back_rubs_as_on_an_endless_surface() {
+fn node_over_the_edge_and_back_rubs_as_on_a_wide_surface() {
     // A cylinder, whose extension beyond the edge is the cylinder: a surface of revolution has no edge at all.
     let run = |spline: Option<SplineSettings>, reach: f64| {
         let mut scene = round(Scheme::ModalExact);
@@ -135,7 +135,7 @@ fn a_node_that_wanders_over_the_edge_and_back_rubs_as_on_an_endless_surface() {
 }
 
 #[test]
-fn a_node_that_wanders_over_the_edge_of_a_flexible_casing_loses_no_more_than_is_put_in() {
+fn node_over_the_edge_of_a_casing_keeps_the_energy_bound() {
     for slope in [0.0, -0.2] {
         let mut scene = on_a_ring(round(Scheme::ModalExact));
         for node in &mut scene.roms[0].contact_nodes {
@@ -157,7 +157,7 @@ fn a_node_that_wanders_over_the_edge_of_a_flexible_casing_loses_no_more_than_is_
 }
 
 #[test]
-fn a_node_that_starts_out_of_reach_of_the_surface_is_refused_by_name() {
+fn rejects_a_node_that_starts_beyond_the_surface() {
     let mut scene = on_a_ring(round(Scheme::ModalExact));
     // Rings from z = -20 mm to 50 mm, which go on for 17.5 mm.
     scene.roms[0].contact_nodes.iter_mut().for_each(|node| node.position[2] -= 0.015);
@@ -330,7 +330,7 @@ proptest! {
 }
 
 #[test]
-fn a_scheme_that_leaves_no_mode_is_refused_and_the_instance_goes_on() {
+fn rejects_a_scheme_without_modes_and_continues() {
     // Eight modes, three contact nodes: massless-boundary would make all of them quasi-static.
     let scene = models::rub(3);
     let mut simulation = Simulation::new(&scene).unwrap();
@@ -343,7 +343,7 @@ fn a_scheme_that_leaves_no_mode_is_refused_and_the_instance_goes_on() {
 }
 
 #[test]
-fn without_friction_more_contact_nodes_than_modes_are_no_end_of_a_run() {
+fn runs_with_more_contact_nodes_than_modes() {
     for (nodes, seed) in [(9, 1), (9, 2), (16, 3), (16, 4), (25, 5), (33, 6)] {
         for scheme in Scheme::RECURRENCES {
             for (solver, coated) in
@@ -381,7 +381,7 @@ fn without_friction_more_contact_nodes_than_modes_are_no_end_of_a_run() {
 
 /// Two contact nodes of which the only mode takes one out of the casing by as much as it takes the other in.
 #[test]
-fn nodes_that_no_mode_takes_out_at_once_are_named_and_friction_is_not_blamed() {
+fn names_nodes_that_no_mode_takes_out() {
     let shape = |row: usize, _: usize| if row.is_multiple_of(3) { 1.0 - 2.0 * (row / 3) as f64 } else { 0.0 };
     let place = |node: usize| [models::RADIUS, 0.02 * node as f64, 0.015 * node as f64];
     let nodes = (0..2).map(|node| models::node(format!("node_{}", node + 1), place(node), 0.0)).collect();

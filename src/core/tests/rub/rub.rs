@@ -69,7 +69,7 @@ fn shaft_power(friction: f64) {
 }
 
 #[test]
-fn forces_and_torque_are_those_of_the_touching_blade_in_the_fixed_frame() {
+fn forces_and_torque_are_in_the_fixed_frame() {
     // A round casing moved by 0.4 mm towards 0.7 rad + π: blades are pressed inwards at 0.7 rad and dragged against +z.
     let mut scene = models::rub(12);
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4.1e-4, order: 1, phase: 0.7 };
@@ -179,7 +179,7 @@ fn rates_of_clearances_and_of_the_angle_are_those_of_the_motion() {
 
 /// Outputs over a communication step, gathered a second time from what can be seen between its internal steps.
 #[test]
-fn outputs_over_a_communication_step_are_those_of_its_internal_steps() {
+fn outputs_cover_all_internal_steps() {
     let (sectors, nodes) = (12, 3);
     let mut simulation = started(&models::rub(sectors));
     let lanes = simulation.system().bank().lanes();

@@ -74,7 +74,7 @@ fn energy(bank: &ModalBank) -> f64 {
 }
 
 #[test]
-fn whirl_has_the_frequency_of_the_closed_form_and_keeps_its_energy() {
+fn whirl_has_the_closed_form_frequency() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
         for (stiffening, coriolis) in [(false, true), (true, false), (true, true)] {
             let rate = whirl(stiffening, coriolis);
@@ -154,7 +154,7 @@ fn growth_and_stiffening_follow_a_speed_without_its_jumps() {
 
 /// Blades stretched by a speed stand where K(Ω)u = Ω²c₂ + Ω⁴c₄ says, solved in the coordinates of the ROM, and stay there.
 #[test]
-fn blades_grow_by_the_forces_of_their_speed_over_the_stiffness_of_their_speed() {
+fn blades_grow_by_the_stiffness_at_speed() {
     let mut scene = whirling();
     scene.roms[0] = spinning_rom();
     scene.settings.contacts[0].gap = 5e-3;

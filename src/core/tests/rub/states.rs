@@ -145,7 +145,7 @@ fn run_on(simulation: &mut Simulation, created: bool, length: f64) -> Result<(),
 }
 
 #[test]
-fn damaged_content_under_a_right_checksum_is_refused_with_nothing_changed_or_runs_on() {
+fn survives_damage_under_a_valid_checksum() {
     let tries = 12;
     for (name, scene) in scenes() {
         let length = scene.settings.experiment.communication_step;

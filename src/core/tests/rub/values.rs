@@ -56,7 +56,7 @@ fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
 }
 
 #[test]
-fn thermal_loads_that_are_not_finite_or_not_of_the_rom_are_refused() {
+fn rejects_thermal_loads_that_do_not_fit() {
     let heated = |change: fn(&mut nalgebra::DMatrix<f64>)| {
         let mut rom = models::ring(8, 2);
         change(&mut rom.extras.thermal.as_mut().expect("it is heated").loads);

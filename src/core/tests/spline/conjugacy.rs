@@ -184,7 +184,7 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
 }
 
 #[test]
-fn friction_heat_goes_to_the_patch_that_the_displaced_node_faces() {
+fn friction_heat_goes_to_the_patch_facing_the_node() {
     let scene = scene(FEATURES[1], Scheme::ModalExact, Solver::Lcp, 0.15, 1e-6);
     let mut simulation = started(&scene);
     let first = simulation.table().find("casing_friction_power").unwrap().reference;

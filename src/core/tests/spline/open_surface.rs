@@ -43,7 +43,7 @@ fn at(index: usize, around: usize, along: usize) -> ClosestPoint {
 }
 
 #[test]
-fn data_points_are_interpolated_and_forces_go_back_with_the_same_work() {
+fn interpolation_and_forces_do_equal_work() {
     let (mut off, mut partition, mut work) = (0.0_f64, 0.0_f64, 0.0_f64);
     for (around, along) in GRIDS {
         for kind in KINDS {

@@ -103,7 +103,7 @@ fn rub_errors() -> RubErrors {
 }
 
 #[test]
-fn what_a_reduction_leaves_of_a_rub_is_kept_as_far_as_it_is_known() {
+fn reads_back_known_rub_errors() {
     let with = |errors: Option<RubErrors>| {
         let mut rom = plain(&complete(3, 4, 2));
         rom.checks.rub_errors = errors;

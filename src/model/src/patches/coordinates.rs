@@ -404,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tip_of_too_many_nodes_is_refused_before_memory_is_asked_for() {
+    fn rejects_a_tip_with_too_many_nodes_before_allocation() {
         let count = 2400;
         let nodes: Vec<[f64; 3]> = (0..count).map(|i| [1.0, 0.0, i as f64]).collect();
         let all: Vec<(usize, f64)> = (0..count).map(|node| (node, 1.0 / count as f64)).collect();

@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn a_face_gives_nodes_in_the_middle_of_its_thickness_with_the_slope_of_the_contour() {
+    fn face_gives_mid_thickness_nodes_with_contour_slopes() {
         let nodes = tip(21, 3);
         let set: Vec<usize> = (0..nodes.len()).collect();
         let points = choose_contact_nodes(&nodes, &set, &ContactChoice::default()).unwrap();

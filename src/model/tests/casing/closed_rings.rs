@@ -69,7 +69,7 @@ fn pair(rom: &Rom, n: u32, component: usize) -> [f64; 2] {
 }
 
 #[test]
-fn free_rings_of_a_reduction_bend_in_and_out_of_their_plane_as_in_the_books() {
+fn reduced_free_rings_have_textbook_frequencies() {
     let Material { young_modulus, density, poisson_ratio, .. } = CasingOptions::default().material;
     told!("| n | plane | side/R | ROM (Hz) | thin ring (Hz) | deviation | pair split |");
     told!("|---|---|---|---|---|---|---|");

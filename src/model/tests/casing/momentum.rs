@@ -251,7 +251,7 @@ fn compare(options: &CasingOptions, drive: CasingDrive, scheme: Scheme, step: f6
 /// With all modes the core in central differences is the mesh in central differences: contact force and reaction are the momentum of
 /// the mesh in every step. No row of the support can be left out.
 #[test]
-fn a_support_in_motion_takes_what_changes_the_momentum_of_the_mesh() {
+fn support_reaction_balances_the_momentum_of_the_mesh() {
     let options = ring(144, 1000);
     let off = |size: f64, change: &dyn Fn(&mut Rows)| {
         let drive = CasingDrive {
@@ -278,7 +278,7 @@ fn a_support_in_motion_takes_what_changes_the_momentum_of_the_mesh() {
 /// With fewer modes the equation of the free nodes holds in the space of the modes alone: momentum is missed by what they leave of a
 /// soft push, and by the step where steps are not the mesh's own.
 #[test]
-fn with_fewer_modes_the_momentum_is_that_of_the_mesh_in_the_limit() {
+fn momentum_converges_to_the_mesh_with_more_modes() {
     let of_modes = |fixed: usize, modes: usize, change: &dyn Fn(&mut Rows)| {
         let found = compare(&ring(fixed, modes), PUSH, Scheme::CentralDifference, 2e-7, change);
         println!("{fixed} fixed-interface modes, {modes} modes: {found}");

@@ -142,7 +142,7 @@ fn full_run(full: &FullConduction, times: &[f64], step: f64) -> (Vec<Vec<f64>>, 
 
 /// What another method on all nodes finds, the exact step of few coordinates finds too, from its beginning on.
 #[test]
-fn transients_are_those_of_the_full_model_by_the_trapezoidal_rule() {
+fn transients_match_the_full_model() {
     let casing = casing();
     let mesh = supported_ring(&casing).unwrap().mesh;
     let patches = equal_patches(12, 1, casing.geometry.contour.axial());

@@ -163,7 +163,7 @@ fn the_disk_is_closed() {
 }
 
 #[test]
-fn two_sectors_held_at_two_points_can_turn_about_the_line_through_them() {
+fn two_sectors_held_at_two_points_turn_about_a_line() {
     let mesh = sector(ElementKind::Hex8, 2, CellCounts { around: 5, ..COARSE });
     let options = options(ModeSelection::Count(2), 0);
     let faces = boundary(&mesh, 2);

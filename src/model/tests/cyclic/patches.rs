@@ -44,7 +44,7 @@ fn directions([x, y, _]: [f64; 3]) -> [[f64; 3]; 3] {
 
 /// Displacements of all patches of the disk by forces on those of one sector, in the disk itself and through the nodal diameters.
 #[test]
-fn forces_on_patches_of_one_blade_bend_the_disk_as_in_the_full_model() {
+fn patch_forces_bend_the_disk_as_the_full_model() {
     let force = [1.0, -0.4, 0.3, 0.2, 0.7, -0.9];
     for (sectors, element) in [(7, ElementKind::Penta15), (6, ElementKind::Hex8)] {
         let mesh = sector(element, sectors, COARSE);
@@ -150,7 +150,7 @@ fn receptance([mass, stiffness, map]: &[DMatrix<Complex<f64>>; 3], angular: f64)
 /// Forced responses between the second and the third frequency, against a reduction with all modes: those of free-interface modes are nearer with
 /// fewer of them, and inertia relief makes them so where the disk is free.
 #[test]
-fn forced_responses_of_a_patch_converge_faster_with_free_interface_modes() {
+fn patch_responses_converge_faster_with_free_interface() {
     let sectors = 5;
     let mesh = sector(ElementKind::Hex8, sectors, CellCounts { along: 1, ..COARSE });
     let contact = patches(&mesh, 2);
@@ -202,7 +202,7 @@ fn five_patches_of_the_stage() {
 }
 
 #[test]
-fn a_patch_on_a_face_and_patches_that_follow_from_others_are_refused() {
+fn rejects_dependent_patches_and_a_patch_on_a_face() {
     let mesh = sector(ElementKind::Hex8, 5, COARSE);
     let (own, bore) = (patches(&mesh, 2), mesh.set("BORE").unwrap());
     let refused = |contact: &[ContactPoint]| {

@@ -11,7 +11,7 @@ use tiprub_model::progress::silent;
 use tiprub_model::sparse::principal_pair;
 
 #[test]
-fn each_shape_function_is_one_at_its_node_and_zero_at_the_others() {
+fn shape_functions_are_one_at_their_node_only() {
     for kind in ElementKind::ALL {
         for (j, &node) in kind.natural_nodes().iter().enumerate() {
             let shape = kind.shape(node);

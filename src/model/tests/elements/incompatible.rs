@@ -12,7 +12,7 @@ use tiprub_model::sparse::principal_pair;
 const KIND: ElementKind = ElementKind::Hex8;
 
 #[test]
-fn a_distorted_element_has_six_rigid_body_modes_and_is_never_stiffer() {
+fn distorted_element_has_six_rigid_body_modes() {
     let nodes = distorted_nodes(KIND);
     let incompatible = incompatible_stiffness(&nodes, &Material::steel(), 0).unwrap();
     let mut values: Vec<f64> = incompatible.symmetric_eigenvalues().iter().copied().collect();

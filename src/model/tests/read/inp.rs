@@ -48,7 +48,7 @@ fn imported(text: &str) -> Imported {
 }
 
 #[test]
-fn numbers_with_gaps_continued_records_and_empty_fields_are_read() {
+fn reads_gaps_continued_records_and_empty_fields() {
     let mesh = mesh(&deck());
     assert_eq!((mesh.nodes.len(), mesh.elements.len()), (12, 2));
     assert_eq!(mesh.elements[1].nodes, [4, 5, 6, 7, 8, 9, 10, 11]);
@@ -57,7 +57,7 @@ fn numbers_with_gaps_continued_records_and_empty_fields_are_read() {
 }
 
 #[test]
-fn case_comments_blank_lines_windows_ends_and_continued_keywords_do_not_matter() {
+fn ignores_case_comments_blank_lines_and_line_ends() {
     let plain = mesh(&deck());
     let noisy = deck()
         .replace("*NODE, NSET=NALL", "** nodes\n\n  *node ,\n   nset = nall")

@@ -162,7 +162,7 @@ impl Written {
 }
 
 #[test]
-fn matrix_market_gives_the_same_bits_whichever_triangle_is_written() {
+fn matrix_market_triangles_give_equal_bits() {
     let bar = bar();
     let expected = rom(&bar);
     for triangle in [Triangle::Lower, Triangle::Upper, Triangle::Both] {
@@ -193,7 +193,7 @@ fn labelled(imported: &Imported, mass: bool, keep: &dyn Fn(usize) -> bool) -> St
 }
 
 #[test]
-fn labelled_text_of_abaqus_gives_the_model_and_held_dofs_may_be_absent_or_huge() {
+fn reads_labelled_abaqus_text_with_held_dofs() {
     let bar = bar();
     let expected = rom(&bar);
     let root = bar.model.set("ROOT").unwrap().to_vec();
@@ -217,7 +217,7 @@ fn labelled_text_of_abaqus_gives_the_model_and_held_dofs_may_be_absent_or_huge()
 }
 
 #[test]
-fn coordinates_without_the_clamped_nodes_are_placed_by_their_set() {
+fn places_coordinates_without_clamped_nodes_by_their_set() {
     let bar = bar();
     let root = bar.model.set("ROOT").unwrap().to_vec();
     let free: Vec<usize> = (0..bar.model.nodes.len()).filter(|node| !root.contains(node)).collect();

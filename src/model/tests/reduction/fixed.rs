@@ -139,7 +139,7 @@ fn craig_bampton_with_all_modes_is_exact() {
 }
 
 #[test]
-fn constraint_modes_keep_the_static_answer_whatever_the_number_of_modes() {
+fn constraint_modes_keep_static_responses_exact() {
     let (stiffness, mass) = clamped_pencil(&beam());
     let order = stiffness.order();
     let interface = [order - 3, order - 2, order - 1];

@@ -204,7 +204,7 @@ fn a_free_structure_keeps_its_modes_beside_patches() {
 
 /// Point forces dig in as the mesh is refined; forces on patches do not.
 #[test]
-fn the_flexibility_of_a_patch_converges_and_that_of_a_point_does_not() {
+fn patch_flexibility_converges_and_point_flexibility_does_not() {
     let own = |tip: TipContact, chord: usize| -> f64 {
         let mesh = MeshCounts { chord, thickness: (chord / 8).max(1), span: chord };
         let options = Rotor37Options {

@@ -74,7 +74,7 @@ fn elements_are_well_shaped() {
 }
 
 #[test]
-fn quality_is_one_for_regular_elements_and_signed_for_inverted_ones() {
+fn quality_is_one_if_regular_and_negative_if_inverted() {
     let prism = |height: f64| {
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.5, 0.75_f64.sqrt()]];
         [0.0, height].into_iter().flat_map(|z| corners.map(|[x, y]| [x, y, z])).collect::<Vec<_>>()
@@ -98,7 +98,7 @@ fn quality_is_one_for_regular_elements_and_signed_for_inverted_ones() {
 }
 
 #[test]
-fn the_tip_is_a_cylinder_and_contact_is_in_the_middle_of_its_thickness() {
+fn tip_contact_is_at_mid_thickness_of_a_cylinder() {
     for (_, options) in all_options() {
         let sector = sector_mesh(&options).unwrap();
         let mesh = &sector.mesh;
@@ -171,7 +171,7 @@ fn the_blade_has_the_mass_of_its_sections() {
 }
 
 #[test]
-fn refinement_keeps_the_mass_and_the_stage_is_of_a_sensible_size() {
+fn refinement_keeps_the_mass_of_the_stage() {
     let [default, fine, coarse] =
         [SectorOptions::default(), SectorOptions::with_3764_elements(), SectorOptions::coarse()]
             .map(|options| mass(&sector_mesh(&options).unwrap().mesh));

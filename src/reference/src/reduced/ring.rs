@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn the_surface_goes_through_its_points_and_feet_are_perpendicular() {
+    fn surface_interpolates_and_feet_are_perpendicular() {
         let ring = Ring::new(28, 3).unwrap();
         let data = round(28, 3);
         let control = ring.control(&data);

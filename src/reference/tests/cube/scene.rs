@@ -38,7 +38,7 @@ fn the_meshes_are_the_papers() {
 }
 
 #[test]
-fn masses_are_those_of_the_solids_and_rigid_motion_costs_no_energy() {
+fn masses_are_exact_and_rigid_motion_costs_no_energy() {
     let arc = 2.0 * std::f64::consts::FRAC_PI_3;
     for mass in [Mass::Lumped, Mass::Consistent] {
         let scene = CubeScene::new(CubeSetting { mass, ..CubeSetting::default() }).unwrap();
@@ -75,7 +75,7 @@ fn guess(side: RingSide, arc: usize, wide: usize, [x, y, z]: [f64; 3]) -> [f64; 
 }
 
 #[test]
-fn the_spline_goes_through_the_nodes_and_nears_the_cylinder_at_fourth_order() {
+fn spline_nears_the_cylinder_at_fourth_order() {
     for side in RingSide::BOTH {
         let mut errors = Vec::new();
         for arc in [20, 40, 80] {

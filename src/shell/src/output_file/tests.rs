@@ -64,7 +64,7 @@ fn mode(path: &Path) -> u32 {
 /// The umask belongs to the whole process; a file that the system makes shows what it is.
 #[test]
 #[cfg(unix)]
-fn new_files_follow_the_umask_and_replaced_ones_keep_their_permissions() {
+fn files_follow_the_umask_or_keep_permissions() {
     use std::os::unix::fs::PermissionsExt;
     let root = tempfile::tempdir().unwrap();
     let [plain, target] = ["plain", "target"].map(|name| root.path().join(name));

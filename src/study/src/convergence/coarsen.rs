@@ -167,7 +167,7 @@ mod tests {
 
     /// Hat functions are nested: patches of patches are the patches of half as many, where the mesh integrates both alike.
     #[test]
-    fn patches_of_patches_are_those_of_the_reduction_with_half_as_many() {
+    fn merged_patches_equal_a_reduction_with_half_as_many() {
         let of = |patches: usize| {
             let options = Rotor37Options {
                 mesh: MeshCounts { chord: 8, thickness: 1, span: 4 },

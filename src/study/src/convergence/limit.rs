@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn what_falls_faster_is_read_as_second_order_and_what_does_not_fall_is_not_read() {
+    fn reads_orders_up_to_two_and_none_without_decrease() {
         let sizes = [4.0, 2.0, 1.0];
         let fast = of_changes(sizes, [100.0, 1.0], LEAST).unwrap();
         assert_eq!((fast.order, fast.rest), (MOST, 1.0 / 3.0));

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nodes_that_touch_stay_those_of_the_scene_with_more_modes_and_on_another_mesh() {
+    fn contact_nodes_stay_with_other_modes_and_meshes() {
         let own = ["tip_3", "seal", "tip_1"];
         let [modes, _, mesh] = refined(own, &["tip", "seal"]);
         assert_eq!(names(&modes), [own, own, own], "{:?}", modes.missing);

@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rom_with_more_contact_than_coordinates_keeps_its_lowest_modes() {
+    fn rom_with_more_contacts_than_coordinates_keeps_low_modes() {
         let options = Rotor37Options {
             mesh: MeshCounts { chord: 4, thickness: 1, span: 6 },
             tip: TipContact::Nodes(2),

@@ -51,7 +51,7 @@ fn meeting(scene: &Scene) -> f64 {
 
 /// A casing as soft as nothing pushes without holding: the response is linear, and resonance where linear theory has it.
 #[test]
-fn the_softest_contact_leaves_resonance_where_linear_theory_has_it() {
+fn soft_contact_has_the_linear_resonance() {
     let mut scene = blade37();
     scene.settings.contacts[0].coating = Some(tiprub_core::settings::CoatingSettings {
         thickness: 2e-3,
@@ -222,7 +222,7 @@ fn scenes_with_more_than_one_thing_to_vary_are_refused() {
 }
 
 #[test]
-fn a_master_that_does_not_turn_is_refused_before_anything_is_reduced() {
+fn rejects_a_master_at_rest_before_reduction() {
     let settings = scene_source::settings("builtin:cube-between-rings").unwrap();
     let failure = start::master(&settings).unwrap_err();
     assert!(failure.usage && failure.problem.contains("`cube`, flies freely"), "{failure}");

@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_is_right_only_if_something_was_compared_and_all_of_it_holds() {
+    fn answer_is_right_only_if_all_comparisons_hold() {
         let right = || Expected::right("x");
         let within = Check::at_most("a", 1e-12, 1e-9);
         assert_eq!(verdict(right(), CaseEnd::answer(vec![within.clone()])), CaseVerdict::Right);
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_counts_only_where_it_is_expected_and_names_what_it_should() {
+    fn refusal_counts_only_where_expected_with_its_names() {
         let refused = || Expected::refused(["µ", "h ="]);
         assert_eq!(verdict(refused(), CaseEnd::refused("µ = 2 with h = 1 s")), CaseVerdict::Refused);
         assert_eq!(verdict(refused(), CaseEnd::refused("µ = 2")), CaseVerdict::Wrong);

@@ -39,7 +39,7 @@ fn a_share_that_rises_again_or_stays_is_not_negligible() {
 
 /// Nothing is said of speeds at which there was no run.
 #[test]
-fn what_prevails_is_decided_by_every_run_from_the_critical_speed_on() {
+fn every_run_above_the_critical_speed_decides() {
     let holds = |shares: &[(f64, f64)]| statements::prevails(shares, 2.0).holds;
     assert_eq!(holds(&[(1.0, 5.0), (2.0, 0.9), (3.0, 0.8)]), Some(true));
     assert_eq!(holds(&[(1.0, 0.5), (2.0, 0.9), (3.0, 1.2)]), Some(false));

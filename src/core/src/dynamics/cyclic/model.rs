@@ -350,7 +350,7 @@ mod tests {
 
     /// u = Ψq and p = Ψᴴf, whatever the amplitudes and the forces.
     #[test]
-    fn a_paired_nodal_diameter_moves_and_is_pushed_as_the_complex_one() {
+    fn paired_nodal_diameter_equals_the_complex_one() {
         let (sectors, modes) = (5, 4);
         let of = |nodal_diameter: usize| {
             let Harmonic { contact_map, .. } = pencil(modes, 8);

@@ -137,7 +137,7 @@ mod tests {
 
     /// Sectors see coordinates as sector 0 does, turned; forces on coordinates are the transpose of displacements.
     #[test]
-    fn forces_on_coordinates_and_displacements_by_them_are_transposes() {
+    fn force_and_displacement_maps_are_transposes() {
         for sectors in [2, 5, 12] {
             let model = model(sectors, 2);
             let mut bank = CyclicBank::new(&model, false);

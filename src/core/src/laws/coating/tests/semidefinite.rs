@@ -79,7 +79,7 @@ fn without_friction_what_can_be_solved_on_a_coating_is() {
 
 /// One mode takes either node out of the hard casing as far as it takes the other in.
 #[test]
-fn nodes_that_nothing_takes_off_the_hard_casing_at_once_are_not_solved() {
+fn rejects_nodes_stuck_on_the_hard_casing() {
     for monotone in [false, true] {
         let coating = coating(&material(1.0, 0.05, 0.1, 4, 2), 2);
         let mut problem = coating.problem(1);
