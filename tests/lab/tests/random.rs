@@ -51,6 +51,12 @@ fn a_scene_follows_from_its_seed_alone() {
     assert!(out.join("12345/scene.toml").is_file());
 }
 
+/// Massless nodes of a free body that swing between the points of the shortest steps: such steps miss the tolerance, and are counted.
+#[test]
+fn gaps_between_the_points_of_shortest_steps_keep_the_tolerance() {
+    random(&["--only", "3119184997545909494", "--fmu", "0"], 0);
+}
+
 /// Blades that turn slowly in their cut: the force of the cut would feed them.
 #[test]
 fn cutting_that_feeds_tips_ends_a_run_by_name() {

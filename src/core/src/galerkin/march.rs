@@ -71,7 +71,7 @@ pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Eff
         let (verdict, kind) = attempt(body, step, effort);
         let refused = !verdict.solved
             || (kind == ForceInterpolation::Polynomial
-                && (verdict.error > demand.tolerance
+                && (verdict.misses(demand.tolerance)
                     || (verdict.near && body.length(level) > SHORTEST_LOOK)
                     || (verdict.switches && verdict.switched > *body.pace().0)
                     || (verdict.switched < 0.0
@@ -83,7 +83,7 @@ pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Eff
         if !verdict.solved {
             return Err(Stopped::Unsolved);
         }
-        effort.missed += count * u64::from(verdict.error > demand.tolerance);
+        effort.missed += count * u64::from(verdict.misses(demand.tolerance));
         let left = body.take(step, kind, &verdict);
         *body.pace().0 += left;
         (effort.steps, done) = (effort.steps + count, done + units);

@@ -1,6 +1,6 @@
 //! How good a step is that has been solved: its error, what switches leave, and what came near between the points.
 
-use super::{ForceInterpolation, FreeMotion, Obstacle, Trial};
+use super::{ForceInterpolation, FreeMotion, Obstacle, Trial, vector3_at};
 use crate::galerkin::basis::{POINTS, TimeBasis};
 use crate::galerkin::kernels::AddProduct;
 use crate::galerkin::level::StepTables;
@@ -32,15 +32,22 @@ pub struct TrialResult {
     pub switched: f64,
     /// A node may have touched between the points.
     pub near: bool,
+    /// Depth of open nodes within a surface between the points (m), by the polynomial through their gaps.
+    pub depth: f64,
     /// Linear systems factorised.
     pub factorisations: usize,
 }
 
 impl TrialResult {
+    /// Returns whether the error or the depth of the step exceeds the tolerance (m).
+    pub fn misses(&self, tolerance: f64) -> bool {
+        self.error > tolerance || self.depth > tolerance
+    }
+
     /// Returns whether the polynomials of the step describe the motion between its points: its force is a polynomial, and its error is within
     /// the tolerance (m).
     pub fn resolves_motion(&self, kind: ForceInterpolation, tolerance: f64) -> bool {
-        kind == ForceInterpolation::Polynomial && self.error <= tolerance
+        kind == ForceInterpolation::Polynomial && !self.misses(tolerance)
     }
 }
 
@@ -54,13 +61,17 @@ impl Trial {
     ) {
         let (basis, count) = (&level.basis, level.basis.count());
         self.impulses.fill(0.0);
-        (verdict.switches, verdict.switched, verdict.near, verdict.error) = (false, 0.0, false, 0.0);
+        (verdict.switches, verdict.switched, verdict.near, verdict.error, verdict.depth) = (false, 0.0, false, 0.0, 0.0);
+        self.depths.fill(0.0);
         let mut pushed = false;
         for node in 0..self.nodes() {
             let pushes = |point: usize| self.multiplier(point, node) > 0.0;
             let (any, all) = ((0..count).any(pushes), (0..count).all(pushes));
             if !any {
-                verdict.near |= self.comes_near(level, node, obstacle);
+                let (near, depth) = self.comes_near(level, node, obstacle);
+                verdict.near |= near;
+                verdict.depth = verdict.depth.max(depth);
+                self.depths[node] = depth;
                 continue;
             }
             pushed = true;
@@ -117,29 +128,44 @@ impl Trial {
         if self.multiplier(1, node) == 0.0 && slope.abs() > before.abs() { slope } else { before }
     }
 
-    /// Whether the gap of an open node comes near zero between the points.
-    fn comes_near(&self, level: &StepTables, node: usize, obstacle: &impl Obstacle) -> bool {
+    /// Returns the largest depth of open nodes between the points (m), without those whose surface has jumped at the start of the step:
+    /// the polynomial through their gaps overshoots. Displacements at the start must be known.
+    ///
+    /// `gap_at_start` returns the gap of a node at the start (m) displaced by a vector (m); `None` if it is unknown, and the node is left out.
+    pub fn depth_without_jumps(&self, mut gap_at_start: impl FnMut(usize, [f64; 3]) -> Option<f64>) -> f64 {
+        let open = (0..self.nodes()).filter(|node| self.depths[*node] > 0.0);
+        open.fold(0.0, |deepest, node| {
+            let gap = gap_at_start(node, vector3_at(&self.start, node));
+            // Less than 0.15 times a jump lies below the gaps at the points.
+            let is_steady = gap.is_some_and(|gap| (gap - self.begun.gaps[node]).abs() < self.depths[node]);
+            if is_steady { deepest.max(self.depths[node]) } else { deepest }
+        })
+    }
+
+    /// Whether the gap of an open node comes near zero between the points, and the depth to which it falls below zero there (m).
+    fn comes_near(&self, level: &StepTables, node: usize, obstacle: &impl Obstacle) -> (bool, f64) {
         let basis = &level.basis;
         let mut gaps = [0.0; POINTS];
         let gaps = &mut gaps[..basis.count()];
         gaps.iter_mut().enumerate().for_each(|(point, gap)| *gap = self.gap(point, node));
         if !gaps[0].is_finite() || !gaps[1].is_finite() {
-            return false;
+            return (false, 0.0);
         }
         if basis.degree == 1 {
             let (lowest, bend) = self.bend_of_gap(level.step, node, [gaps[0], gaps[1]], obstacle);
             // A parabola with this deviation goes below its ends and its middle by a quarter of it at most.
-            return lowest < 0.25 * NEAR * bend;
+            return (lowest < 0.25 * NEAR * bend, 0.0);
         }
         // Between its points a cubic leaves their range by less than half of it, and what it leaves out is less than all of it.
         let extremes = |(low, high): (f64, f64), gap: &f64| (gap.min(low), gap.max(high));
         let (low, high) = gaps.iter().fold((f64::INFINITY, f64::NEG_INFINITY), extremes);
         if low > (0.5 + NEAR) * (high - low) {
-            return false;
+            return (false, 0.0);
         }
         let sum = |weights: &[f64; POINTS]| gaps.iter().zip(weights).map(|(gap, weight)| gap * weight).sum::<f64>();
         let left = NEAR * sum(&basis.left_out).abs();
-        basis.between.iter().any(|weights| sum(weights) < left)
+        let lowest = basis.between.iter().map(sum).fold(f64::INFINITY, f64::min);
+        (lowest < left, (-lowest).max(0.0))
     }
 
     /// Estimates the smallest gap of a node at the ends and in the middle of the step (m), and by how much the gap in the middle can deviate from
@@ -150,7 +176,7 @@ impl Trial {
     /// taken to be at rest.
     fn bend_of_gap(&self, step: f64, node: usize, ends: [f64; 2], obstacle: &impl Obstacle) -> (f64, f64) {
         let (from, to, normal) = (self.displacement(0, node), self.displacement(1, node), self.normal(1, node));
-        let velocity = super::vector3_at(&self.velocities, node);
+        let velocity = vector3_at(&self.velocities, node);
         let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &self.free_motion;
         let (end, amplitude) = if *is_known {
             (end_velocities.vector3(0, node, self.nodes()), unresolved_amplitudes.vector3(0, node, self.nodes()))

@@ -105,6 +105,8 @@ pub struct Trial {
     /// Impulses left out (N·s), and what the error makes of them (m²/(N·s)).
     impulses: Vec<f64>,
     left: Vec<f64>,
+    /// Depth of each node between the points (m), 0 if it touches at a point.
+    depths: Vec<f64>,
     minima: Minima,
     /// Where contacts may stick; and 1/h of the step (1/s), 0 where its force does not follow on that before.
     sticking: Option<Box<Sticking>>,
@@ -188,6 +190,7 @@ impl Trial {
             withdrawn: rows(),
             impulses: rows(),
             left: rows(),
+            depths: vec![0.0; nodes],
             minima: Minima::new(modes, nodes),
             sticking: None,
             per_step: 0.0,
@@ -255,8 +258,23 @@ impl Trial {
                 *is_known = true;
             }
             self.judge((level, rows), obstacle, &mut verdict);
+            self.check_depth(rows, state, obstacle, &mut verdict);
         }
         verdict
+    }
+
+    /// Corrects the depth of a step for jumps of the surfaces at its start.
+    fn check_depth(
+        &mut self,
+        rows: &ContactRows,
+        state: &SectorState,
+        obstacle: &mut impl Obstacle,
+        verdict: &mut TrialResult,
+    ) {
+        if verdict.depth > 0.0 {
+            self.find_start(rows, state);
+            verdict.depth = self.depth_without_jumps(|node, moved| Some(obstacle.gap(node, 0, moved).0));
+        }
     }
 
     /// Gaps at the start where nobody has looked.

@@ -76,6 +76,7 @@ impl Trial {
         self.steady = Some(own);
         if verdict.solved {
             self.judge((level, rows), obstacle, &mut verdict);
+            self.check_depth(rows, state, obstacle, &mut verdict);
             // What friction puts in at the start would have to be paid for.
             verdict.solved = !verdict.switches;
         }

@@ -459,6 +459,10 @@ impl CoupledStepper<'_> {
             verdict.switches |= own.switches;
             verdict.switched += own.switched;
             verdict.near |= own.near;
+            if own.depth > 0.0 {
+                let depth = trial.depth_without_jumps(|node, moved| facing.gap_within(node, 0.0, moved));
+                verdict.depth = verdict.depth.max(depth);
+            }
             for node in 0..trial.nodes() {
                 let impulse = trial.impulse(node);
                 if impulse.iter().any(|component| *component != 0.0) {
