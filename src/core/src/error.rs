@@ -17,7 +17,7 @@ pub enum Error {
     },
     /// A value reference that the table does not hold.
     #[error(
-        "value reference {reference} does not exist in this FMU. Take it from modelDescription.xml of the same FMU"
+        "value reference {reference} does not exist in this FMU. Use a value reference of its modelDescription.xml"
     )]
     UnknownReference {
         /// The reference as given.

@@ -109,7 +109,7 @@ impl Check {
 
     fn to_text(&self) -> String {
         if self.bound == 0.0 {
-            return if self.holds() { self.what.clone() } else { format!("not so: {}", self.what) };
+            return if self.holds() { self.what.clone() } else { format!("not fulfilled: {}", self.what) };
         }
         format!("{} {:.1e} (at most {:.0e})", self.what, self.found, self.bound)
     }
