@@ -24,7 +24,7 @@ pub enum Error {
         reference: u32,
     },
     /// The scheme would be unstable, or the contact problem not solvable, with these settings.
-    #[error("refused: {problem}. {remedy}")]
+    #[error("{problem}. {remedy}")]
     Unstable {
         /// Which limit is exceeded, with numbers.
         problem: String,

@@ -56,7 +56,7 @@ impl Failure {
             tiprub_core::Error::Invalid { what: field, problem, remedy } => {
                 Self::new(format!("{what}: {field}"), problem, remedy)
             }
-            tiprub_core::Error::Unstable { problem, remedy } => Self::new(what, format!("refused: {problem}"), remedy),
+            tiprub_core::Error::Unstable { problem, remedy } => Self::new(what, problem, remedy),
             other => Self::from_below(what, other),
         }
     }

@@ -275,7 +275,6 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
 
 /// The beginning of a reason: it stands whole in the statements.
 fn first_words(why: &str) -> String {
-    let why = why.trim_start_matches("refused: ");
     why.split_whitespace().take(18).collect::<Vec<_>>().join(" ")
 }
 

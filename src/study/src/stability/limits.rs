@@ -38,7 +38,7 @@ impl Usable {
         match &self.sought {
             Sought::All(step) => format!("none rejected up to {step:.1e} s"),
             Sought::Below(step, _) => format!("{step:.3e} s"),
-            Sought::None(why) => format!("rejected: {}", why.trim_start_matches("refused: ")),
+            Sought::None(why) => format!("rejected: {why}"),
         }
     }
 
