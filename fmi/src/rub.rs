@@ -59,10 +59,12 @@ impl CoSimulationUnit for RubUnit {
             return None;
         }
         Some(if self.0.table().find("step_derivatives").is_some() {
-            "this FMU has no derivatives at an instant: outputs do not depend on inputs of the same instant. For those of outputs at the \
-             end of the last step by inputs over it, set the parameter step_derivatives to on (2) before initialisation"
+            "this FMU has no instantaneous derivatives: outputs do not depend on inputs at the same instant. For \
+             derivatives of outputs at the end of the last step with respect to inputs over that step, set the \
+             parameter step_derivatives to on (2) before initialisation"
         } else {
-            "this FMU has no inputs that move or load something, and no derivatives. Ask for such inputs in the scene (whirl, moving, thermal), or do without"
+            "this FMU has no derivatives because it has no inputs that move or load a structure. Add such inputs to \
+             the scene (whirl, moving, thermal), or do not request derivatives"
         })
     }
 }

@@ -19,7 +19,7 @@ const TERMINALS: [Terminal; 2] = [
     ),
     (
         "centre",
-        "Where whirl and axial shift move the shaft, and what the contacts do there",
+        "Centre of the shaft with its whirl and axial shift, and the contact forces and moments on it",
         &[
             ("x", "whirl_x", SIGNAL),
             ("y", "whirl_y", SIGNAL),

@@ -34,7 +34,7 @@ pub fn html(description: &Description) -> String {
     model(&mut page, description);
     time(&mut page, description);
     variables(&mut page, description);
-    list(&mut page, "What this scene adds", &description.features, "");
+    list(&mut page, "Features of this scene", &description.features, "");
     list(&mut page, "Limits", &description.limits, "");
     list(&mut page, "Warnings", &description.warnings, " class=\"warning\"");
     structures(&mut page, description);
@@ -58,10 +58,10 @@ fn time(page: &mut String, description: &Description) {
     let experiment = &description.experiment;
     let _ = writeln!(
         page,
-        "<h2>Running it</h2>\n<p>Proposed experiment: from {} s to {} s with a communication step of {} s. Any other \
-         step works, also one that changes.</p>\n\
+        "<h2>Running the FMU</h2>\n<p>Proposed experiment: from {} s to {} s with a communication step of {} s. Any \
+         other step size works, including a varying one.</p>\n\
          <p>{} The column &#8220;value&#8221; \
-         of the tables says which it is:</p>\n<dl>",
+         of the tables shows which of these applies:</p>\n<dl>",
         readable(experiment.start),
         readable(experiment.stop),
         readable(experiment.step),
@@ -78,8 +78,8 @@ fn time(page: &mut String, description: &Description) {
 }
 
 fn variables(page: &mut String, description: &Description) {
-    page.push_str("<h2>Variables</h2>\n<p>SI units throughout; where a display unit is more usual it is in brackets. ");
-    page.push_str("FMI 2.0 sees each element of an array as a scalar, counted from 1.</p>\n");
+    page.push_str("<h2>Variables</h2>\n<p>All values are in SI units; a common display unit is given in brackets. ");
+    page.push_str("In FMI 2.0, each element of an array is a scalar; elements are numbered from 1.</p>\n");
     for (heading, causality) in [
         ("Inputs", Causality::Input),
         ("Parameters", Causality::Parameter),
@@ -196,12 +196,12 @@ fn structure(page: &mut String, name: &str, rom: &Rom) {
         DisplacementFrame::Cartesian => "x, y, z",
     };
     let nodes = match rom.extras.grid {
-        Some(grid) => format!("a grid of {} around and {} along", grid.around, grid.along),
+        Some(grid) => format!("a grid of {} around the circumference and {} along the axis", grid.around, grid.along),
         None => rom.contact_nodes.iter().map(|node| node.name.as_str()).collect::<Vec<_>>().join(", "),
     };
     let _ = writeln!(
         page,
-        "<h3>{}</h3>\n<p>{}</p>\n<p>{}; contact nodes of a sector: {} \
+        "<h3>{}</h3>\n<p>{}</p>\n<p>{}; contact nodes per sector: {} \
          (components {frame}); modal damping ratio proposed by the model: {}.</p>",
         text(name),
         text(&rom.origin),
@@ -243,11 +243,11 @@ fn size(rom: &Rom) -> String {
     if rom.is_cyclic() {
         let (sectors, largest, order) = (rom.sectors, rom.largest_nodal_diameter(), rom.total_order());
         return format!(
-            "{sectors} coupled sectors, nodal diameters 0 to {largest}, {order} reduced coordinates in all"
+            "{sectors} coupled sectors, nodal diameters 0 to {largest}, {order} reduced coordinates in total"
         );
     }
     let plural = if rom.sectors == 1 { "" } else { "s" };
-    format!("{} sector{plural} of {} reduced coordinates each", rom.sectors, rom.order())
+    format!("{} sector{plural} with {} reduced coordinates each", rom.sectors, rom.order())
 }
 
 /// Modes listed: coupled sectors may come with hundreds.
@@ -266,7 +266,7 @@ fn checks(page: &mut String, rom: &Rom) {
     let modes = columns.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
     let numbers = &rom.checks.nodal_diameters;
     if modes == 0 {
-        page.push_str("<p>The ROM came without checks of the reduction.</p>\n");
+        page.push_str("<p>The ROM contains no checks of the reduction.</p>\n");
         return;
     }
     page.push_str("<table>\n<thead><tr><th class=\"number\">Mode</th>");

@@ -153,10 +153,10 @@ pub fn meaning_of_span(span: Span) -> (&'static str, &'static str) {
         Span::Point => ("point", "the value at the communication point"),
         Span::Mean => (
             "mean",
-            "the average over the communication step just finished: multiplied by the length of the step it gives \
-             exactly the impulse or energy handed over",
+            "the average over the last communication step; multiplied by the length of the step, it is exactly the \
+             transferred impulse or energy",
         ),
-        Span::Window => ("window", "the smallest, largest or summed value within the communication step just finished"),
+        Span::Window => ("window", "the smallest, largest or accumulated value within the last communication step"),
         Span::Total => ("total", "accumulated since the start of the simulation"),
     }
 }

@@ -9,10 +9,10 @@ use crate::text::number;
 
 /// Log categories of both versions: (name, description).
 pub const LOG_CATEGORIES: [(&str, &str); 5] = [
-    ("logStatusWarning", "Results are usable, but something deserves attention"),
-    ("logStatusDiscard", "A call that was refused without consequences"),
-    ("logStatusError", "A call that failed; the instance must be reset or restored"),
-    ("logStatusFatal", "The instance cannot be used any more"),
+    ("logStatusWarning", "Results are usable, but there is a warning"),
+    ("logStatusDiscard", "A call was rejected and had no effect"),
+    ("logStatusError", "A call failed; the instance must be reset or restored"),
+    ("logStatusFatal", "The instance can no longer be used"),
     ("logAll", "All messages"),
 ];
 

@@ -51,12 +51,12 @@ fn at(extreme: &Extreme) -> String {
 
 fn force(largest: Option<&Extreme>) -> AnswerLine {
     let (value, meaning) = match largest {
-        Some(extreme) if extreme.value == 0.0 => (Some((0.0, "N")), "nothing touched".to_owned()),
+        Some(extreme) if extreme.value == 0.0 => (Some((0.0, "N")), "no contact occurred".to_owned()),
         Some(extreme) => {
-            let meaning = "largest normal force of all contacts together, mean over a communication step";
+            let meaning = "largest total normal force of all contacts, mean over a communication step";
             (Some((extreme.value, "N")), format!("{meaning}, {}", at(extreme)))
         }
-        None => (None, "the scene has no contact force".to_owned()),
+        None => (None, "the scene has no output of the total contact force".to_owned()),
     };
     AnswerLine { name: "force", value, meaning }
 }
@@ -65,8 +65,8 @@ fn heat(recording: &Recording) -> AnswerLine {
     let total = recording.column("friction_loss").and_then(|column| column.last().copied());
     let powers = || recording.column("friction_power").map(|powers| integral(recording, &powers));
     let (value, meaning) = match total.or_else(powers) {
-        Some(heat) => (Some((heat, "J")), "friction heat of the whole run"),
-        None => (None, "no contact of the scene has friction"),
+        Some(heat) => (Some((heat, "J")), "friction heat over the whole run"),
+        None => (None, "no contact in the scene has friction"),
     };
     AnswerLine { name: "heat", value, meaning: meaning.to_owned() }
 }
@@ -85,7 +85,7 @@ fn torque(recording: &Recording) -> AnswerLine {
     };
     let rotors: Vec<(&String, f64)> = recording.names.iter().filter(is_torque).map(|name| (name, mean(name))).collect();
     let (value, meaning) = match rotors.as_slice() {
-        [] => (None, "nothing rotates".to_owned()),
+        [] => (None, "the scene has no rotor".to_owned()),
         [(_, torque)] => (Some((*torque, "N m")), "contact torque on the rotor about +z, mean over the run".to_owned()),
         several => {
             let each = several.iter().map(|(name, torque)| format!("{name} {}", six_digits(*torque)));
@@ -109,11 +109,11 @@ fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Answer
             // Contact that is closed has a clearance of rounding.
             let is_rounding = extreme.value.abs() < ROUNDING;
             let value = if is_rounding { 0.0 } else { extreme.value };
-            let within = if is_rounding { "" } else { " within the tolerance of the steps" };
+            let within = if is_rounding { "" } else { " within the tolerance of the adaptive steps" };
             (Some((value, "m")), format!("smallest: tips touch{within}, first at t = {} s", six_digits(first)))
         }
         Some(extreme) => (Some((extreme.value, "m")), format!("smallest, {}", at(extreme))),
-        None => (None, "some contact nodes meet nothing; --all lists clearances node by node".to_owned()),
+        None => (None, "some contact nodes face no surface; use --all to list the clearance of each node".to_owned()),
     };
     AnswerLine { name: "clearance", value, meaning }
 }
@@ -134,13 +134,13 @@ fn growth(recording: &Recording) -> AnswerLine {
     let (value, meaning) = match ratio {
         Some((before, last)) if before > 0.0 => {
             let meaning = format!(
-                "largest vibration energy of the last third ({} J) over that of the third before",
+                "largest vibration energy in the last third of the run ({} J) divided by that in the middle third",
                 six_digits(last)
             );
             (Some((last / before, "")), meaning)
         }
-        Some(_) => (None, "nothing vibrates before the last third of the run".to_owned()),
-        None => (None, "needs `outputs.energies = true` and three communication steps".to_owned()),
+        Some(_) => (None, "there is no vibration before the last third of the run".to_owned()),
+        None => (None, "requires `outputs.energies = true` and at least three communication steps".to_owned()),
     };
     AnswerLine { name: "growth", value, meaning }
 }

@@ -14,7 +14,7 @@ const MARGIN: f64 = 0.1;
 /// Shape of a casing; absent options are those of casing37.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct RingArguments {
-    /// Inner contour as points z:r in m, by growing z (the tip of rotor 37 and the design gap when absent).
+    /// Inner contour as points z:r in m, in order of increasing z [default: the tip of rotor 37 plus the design gap].
     #[arg(long, value_name = "Z:R,Z:R,...", value_parser = contour, allow_hyphen_values = true)]
     pub contour: Option<InnerContour>,
     /// Radial thickness of the shell (m) [default: 0.004].
@@ -23,7 +23,7 @@ pub struct RingArguments {
     /// Flange at the low end of z: axial thickness and radial height (m), or `none` [default: 0.005x0.010].
     #[arg(long, value_name = "TxH", value_parser = flange)]
     pub low_flange: Option<FlangeChoice>,
-    /// Flange at the high end of z, in the same way [default: 0.004x0.006].
+    /// Flange at the high end of z, in the same form [default: 0.004x0.006].
     #[arg(long, value_name = "TxH", value_parser = flange)]
     pub high_flange: Option<FlangeChoice>,
     /// Material [default: steel].
@@ -35,14 +35,14 @@ pub struct RingArguments {
     /// Contact nodes around the circumference and along the axis [default: 24x3].
     #[arg(long, value_name = "AxL", value_parser = pair)]
     pub contact_grid: Option<[usize; 2]>,
-    /// Axial positions of the first and the last contact ring (m) [default: around rotor 37; of a contour of your own,
-    /// 10 % of its length from its ends].
+    /// Axial positions of the first and the last contact ring (m) [default: those around rotor 37; with --contour, 10 %
+    /// of its length from either end].
     #[arg(long, value_name = "FROM:TO", value_parser = axial, allow_hyphen_values = true)]
     pub contact_axial: Option<[f64; 2]>,
-    /// Thermal patches around and along; in `reduce casing` 0x0 leaves heat out [default: 12x1].
+    /// Thermal patches around the circumference and along the axis; in `reduce casing`, 0x0 omits heat [default: 12x1].
     #[arg(long, value_name = "AxL", value_parser = pair)]
     pub patches: Option<[usize; 2]>,
-    /// Elements around, through the thickness and along the axis [default: 72x1x12].
+    /// Elements around the circumference, through the thickness and along the axis [default: 72x1x12].
     #[arg(long, value_name = "AxTxL")]
     pub mesh: Option<MeshSize>,
 }
@@ -53,16 +53,16 @@ pub struct CasingArguments {
     /// Shape of the casing.
     #[command(flatten)]
     pub ring: RingArguments,
-    /// End faces that are held [default: low].
+    /// Clamped end faces [default: low].
     #[arg(long, value_enum)]
     pub support: Option<SupportChoice>,
     /// Coefficient of linear thermal expansion (1/K), instead of the material's.
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     pub expansion: Option<f64>,
-    /// Modes kept in the ROM, those below the cut-off [default: 60].
+    /// Number of lowest modes kept in the ROM [default: 60].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Fixed-interface modes to reduce with [default: 156].
+    /// Number of fixed-interface modes used for the reduction [default: 156].
     #[arg(long, value_name = "N")]
     pub fixed_interface_modes: Option<usize>,
     /// Output options; a casing other than casing37 is called casing.
@@ -77,11 +77,11 @@ pub struct FlangeChoice(Option<Flange>);
 /// Which end faces are held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SupportChoice {
-    /// The one at low z.
+    /// The end face at low z.
     Low,
-    /// The one at high z.
+    /// The end face at high z.
     High,
-    /// Both.
+    /// Both end faces.
     Both,
     /// None: the casing can move as a rigid body.
     Free,
@@ -162,7 +162,7 @@ impl ElementChoice {
 }
 
 fn contour(text: &str) -> Result<InnerContour, String> {
-    let example = "give points z:r in m by growing z, for example -0.02:0.256,0.04:0.245";
+    let example = "give points z:r in m in order of increasing z, for example -0.02:0.256,0.04:0.245";
     let point = |text: &str| -> Option<[f64; 2]> {
         let (z, r) = text.split_once(':')?;
         Some([z.trim().parse().ok()?, r.trim().parse().ok()?])
@@ -185,6 +185,8 @@ fn flange(text: &str) -> Result<FlangeChoice, String> {
     let lengths: Result<Vec<f64>, String> = text.split(['x', 'X']).map(length).collect();
     match lengths.as_deref() {
         Ok([thickness, height]) => Ok(FlangeChoice(Some(Flange { thickness: *thickness, height: *height }))),
-        _ => Err("give axial thickness and radial height in m as TxH, for example 0.005x0.010, or `none`".into()),
+        _ => {
+            Err("give the axial thickness and the radial height in m as TxH, for example 0.005x0.010, or `none`".into())
+        }
     }
 }

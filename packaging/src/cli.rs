@@ -19,24 +19,26 @@ use crate::{
     version,
     about = "Blade-tip/casing contact (rub) as an FMU: reduce, package, run, inspect, study, demo",
     long_about = "Simulates the contact of a bladed disk (a reduced-order model) with a rigid or flexible casing, \
-                  and packs it as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\nSI units everywhere (m, kg, s, N, rad).",
+                  and packages it as an FMU for any FMI 2.0 or FMI 3.0 importer.\n\n\
+                  All quantities are in SI units (m, kg, s, N, rad).",
     after_help = "Examples:\n  tiprub demo\n  tiprub run builtin:rotor37 --csv rub.csv\n  \
                   tiprub package scene.toml -o out/\n\n\
-                  Built-in scenes:\n  builtin:rotor37           rotor 37 in a rigid casing with two bumps, recommended\n  \
-                  builtin:rotor37-one-row   one row of patches, which averages over the thickness of the tip\n  \
-                  builtin:rotor37-paper     with the model and the method of the paper\n  \
-                  builtin:flexible-casing   in an elastic casing with heat, friction power per patch\n  \
-                  builtin:abradable         wearing the coating of a rigid casing\n  \
+                  Built-in scenes:\n  \
+                  builtin:rotor37           rotor 37 in a rigid casing with two bumps (recommended)\n  \
+                  builtin:rotor37-one-row   rotor37 with one row of patches, which averages over the tip thickness\n  \
+                  builtin:rotor37-paper     rotor37 with the model and the method of the paper\n  \
+                  builtin:flexible-casing   rotor 37 in an elastic casing with heat and friction power per patch\n  \
+                  builtin:abradable         rotor 37 wearing the coating of a rigid casing\n  \
                   builtin:stage             56 coupled blades in an oval elastic casing\n  \
-                  builtin:stage-nodes       with contact at three nodes and more friction\n  \
+                  builtin:stage-nodes       stage with contact at three nodes per blade and more friction\n  \
                   builtin:cube-between-rings  a free cube between two clamped rings\n\n\
-                  Exit codes: 0 done, 1 the work failed, 2 the command line is wrong, 141 the reader of stdout closed it early."
+                  Exit codes: 0 success, 1 failure, 2 invalid command line, 141 stdout was closed early by its reader."
 )]
 pub struct Cli {
-    /// Print one JSON object with the result on stdout (errors too); progress stays on stderr.
+    /// Print the result, or the error, as one JSON object on stdout; progress stays on stderr.
     #[arg(long, global = true, display_order = 900)]
     pub json: bool,
-    /// No progress on stderr; results, warnings and errors are still printed.
+    /// Print no progress on stderr; results, warnings and errors are still printed.
     #[arg(long, short, global = true, display_order = 901)]
     pub quiet: bool,
     /// The command.
@@ -47,36 +49,39 @@ pub struct Cli {
 /// All commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// All steps on a real blade: reduce rotor 37, package both FMUs, import and run them, write a report.
+    /// Run all steps on a real blade: reduce rotor 37, package both FMUs, import and run them, and write a report.
     #[command(after_help = "Examples:\n  tiprub demo\n  tiprub demo --out /tmp/rub --revolutions 4\n\n\
-                            DIR then holds report.html (opens offline), the two .fmu files, the ROM, the scene and \
+                            DIR then contains report.html (opens offline), the two .fmu files, the ROM, the scene and \
                             the results as CSV.")]
     Demo(DemoArguments),
-    /// Reduce a finite-element model, your own or a built-in one, to a reduced-order model (ROM), with checks.
+    /// Reduce your own or a built-in finite-element model to a reduced-order model (ROM), and check it.
     #[command(after_help = "Examples:\n  tiprub reduce rotor37\n  tiprub reduce casing --material titanium\n  \
                             tiprub reduce blade blade.inp --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
                             tiprub reduce blade --help\n\n\
-                            docs/models.md describes models of your own; docs/rom-file.md writes a ROM from Python.")]
+                            docs/models.md explains how to use your own models; docs/rom-file.md explains how to write \
+                            a ROM from Python.")]
     Reduce(ReduceArguments),
-    /// Package a scene as .fmu files. Scene and ROM are data for one FMU library, which is built once where it is missing.
+    /// Package a scene as .fmu files. Scene and ROM are data for one FMU library, which is built once if it is missing.
     #[command(after_help = "Examples:\n  tiprub package scene.toml                 both FMUs in this directory\n  \
                             tiprub package scene.toml --fmi 3 -o rub.fmu\n  \
                             tiprub package scene.toml --arrays        FMI 3 variables as arrays\n  \
                             tiprub package scene.toml --platform x86_64-windows\n\n\
-                            Same inputs, same bytes. The optional generation date is left out, unless \
+                            The same inputs give identical files. The optional generation date is omitted unless \
                             SOURCE_DATE_EPOCH (seconds since 1970) is set.")]
     Package(PackageArguments),
-    /// Package the heat conduction of a casing as .fmu files: the partner of a scene whose casing heats up.
+    /// Package the heat conduction of a casing as .fmu files, to be coupled to a scene whose casing heats up.
     #[command(
         after_help = "Examples:\n  tiprub thermal -o out/\n  tiprub thermal --patches 24x1 --gas-film 800 --fmi 3\n  \
                             tiprub thermal --material titanium --modes 60 --name fan_case\n\n\
-                            Its casing_heat takes casing_friction_power of the scene's FMU, which takes casing_temperature back."
+                            Connect casing_friction_power of the scene's FMU to casing_heat of this FMU, and \
+                            casing_temperature of this FMU to that of the scene's FMU."
     )]
     Thermal(Box<ThermalArguments>),
-    /// Run a scene natively, without FMI; one row per communication point.
+    /// Run a scene natively, without FMI; the results have one row per communication point.
     #[command(after_help = "Examples:\n  tiprub run scene.toml --csv rub.csv\n  \
                             tiprub run builtin:rotor37 --stop 0.002 --set speed=1700 --csv - | head\n\n\
-                            Column names are the FMI 2.0 variable names; numbers read back to the same bits.")]
+                            Column names are the FMI 2.0 variable names; numbers are written with all significant \
+                            digits.")]
     Run(RunArguments),
     /// Inspect and validate an FMU, ROM or scene file.
     #[command(
@@ -84,21 +89,22 @@ pub enum Command {
                             tiprub inspect scene.toml --json\n  tiprub inspect builtin:flexible-casing"
     )]
     Inspect(InspectArguments),
-    /// Study a scene: pictures, numbers, and statements that are tested.
+    /// Study a scene: figures, numbers and tested statements.
     #[command(after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study stability scene.toml\n  \
                             tiprub study map scene.toml --speeds 1200:1500:61\n  tiprub study error --help\n\n\
-                            DIR then holds index.html (opens offline), an SVG and a CSV per figure, and results.json.")]
+                            DIR then contains index.html (opens offline), an SVG and a CSV per figure, and \
+                            results.json.")]
     Study(StudyArguments),
 }
 
 /// Libraries that go into an FMU.
 #[derive(Debug, Clone, Default, Args)]
 pub struct LibraryArguments {
-    /// Library of one platform, or a directory of libraries, instead of those found beside tiprub (or built
-    /// from its sources); may be repeated. The platform is read from the content of each file.
+    /// Library for one platform, or a directory of libraries, instead of those found next to tiprub (or built
+    /// from its sources); may be repeated. The platform is detected from the content of each file.
     #[arg(long, value_name = "FILE|DIR")]
     pub library: Vec<PathBuf>,
-    /// Include only this platform; may be repeated. Default: every library that was found.
+    /// Include only this platform; may be repeated [default: all platforms with a library].
     #[arg(long, value_enum, value_name = "PLATFORM")]
     pub platform: Vec<PlatformChoice>,
 }
@@ -112,7 +118,7 @@ pub struct DemoArguments {
     /// Libraries that go into the FMU.
     #[command(flatten)]
     pub libraries: LibraryArguments,
-    /// Revolutions of the rotor to simulate (the scene's own stop time when absent).
+    /// Revolutions of the rotor to simulate [default: up to the stop time of the scene].
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     pub revolutions: Option<f64>,
 }
@@ -129,10 +135,11 @@ pub struct PackageArguments {
     /// The .fmu file, or a directory for it (always a directory with `--fmi both`).
     #[arg(long, short, value_name = "FILE|DIR", default_value = ".")]
     pub output: PathBuf,
-    /// FMI 3: keep arrays whole. Without this and --scalars an FMU has arrays where it would have more than 300 scalars.
+    /// FMI 3: write arrays. Without --arrays and --scalars, an FMU has arrays if it would otherwise have more than 300
+    /// scalars.
     #[arg(long, conflicts_with = "scalars")]
     pub arrays: bool,
-    /// FMI 3: scalars instead of arrays however many there are, with the names of FMI 2.
+    /// FMI 3: write scalars instead of arrays, however many there are, with the names of FMI 2.
     #[arg(long)]
     pub scalars: bool,
     /// Libraries that go into the FMU.
@@ -152,10 +159,10 @@ pub struct RunArguments {
     /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
-    /// Also print the final values of all outputs, extremes, times and full warnings.
+    /// Also print the final values of all outputs, the extremes, the computing times and the full warnings.
     #[arg(long)]
     pub all: bool,
-    /// Write all outputs as CSV; `-` is stdout.
+    /// Write all outputs to a CSV file; `-` is stdout.
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
     /// Stop time (s), instead of the scene's.
@@ -164,15 +171,17 @@ pub struct RunArguments {
     /// Communication step H (s), instead of the scene's.
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Start value of an input or parameter; for an array one value for all elements, or one for each: `NAME=[1,2,3]`. May be repeated.
+    /// Start value of an input or parameter; for an array, one value for all elements or a list such as `NAME=[1,2,3]`.
+    /// May be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     pub set: Vec<(String, String)>,
-    /// Inputs over time from a CSV file with the columns `time,NAME,NAME,...`: linear between the lines, without delay; also
-    /// tunable parameters.
+    /// Read inputs and tunable parameters over time from a CSV file with the columns `time,NAME,NAME,...`; inputs are
+    /// interpolated linearly between the lines, without delay.
     #[arg(long, value_name = "FILE", conflicts_with = "estimate")]
     pub inputs: Option<PathBuf>,
-    /// Also estimate the discretisation errors of time step, modes, patches along the chord and rows across the thickness, from about ten coarser
-    /// runs. The error of the mesh is printed if the ROM contains it (`tiprub study convergence --into`).
+    /// Also estimate the discretisation errors of time step, modes, patches along the chord and rows across the
+    /// thickness, from about ten coarser runs. The error of the mesh is printed if the ROM contains it (`tiprub study
+    /// convergence --into`).
     #[arg(long)]
     pub estimate: bool,
     /// Changes to the scene.
@@ -189,7 +198,7 @@ pub struct InspectArguments {
     /// An .fmu, a ROM (.safetensors), a scene (.toml) or a built-in scene (`builtin:abradable`).
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// Also measure the computing time of each effect that a scene leaves out, over its first 100 communication steps.
+    /// Also measure the computing time of each effect that the scene omits, over its first 100 communication steps.
     #[arg(long)]
     pub measure: bool,
     /// Changes to the scene.
@@ -211,35 +220,38 @@ pub struct StudyArguments {
 /// Studies of a scene.
 #[derive(Debug, Subcommand)]
 pub enum StudyCommand {
-    /// Amplitudes of rubbing blades over angular velocity and frequency, with engine orders and natural frequencies.
+    /// Map the amplitudes of rubbing blades over angular velocity and frequency, with engine orders and natural
+    /// frequencies.
     #[command(after_help = "Examples:\n  tiprub study map\n  tiprub study map scene.toml --speeds 1200:1500:61\n  \
                             tiprub study map --set friction_coefficient=0 --set gap_offset=6e-5")]
     Map(MapArguments),
-    /// Error against run time of every scheme and solver on a scene, of the steps and in total, with other numbers of patches and modes;
-    /// and the cheapest setting for a given error.
+    /// Compare error and run time of every scheme and solver on a scene, for the time steps alone and in total, with
+    /// other numbers of patches and modes, and find the cheapest setting for a given error.
     #[command(
         after_help = "Examples:\n  tiprub study error scene.toml\n  tiprub study error builtin:flexible-casing --quick\n  \
                             tiprub study error scene.toml --window 2e-3 --set speed=1700\n\n\
-                            The reference for errors of the steps is a fine run, checked by another scheme. The reference for total errors is a \
-                            finer model. It needs the mesh of the ROM: a built-in model, or --mesh with the options of \
-                            `tiprub reduce blade`."
+                            The reference for time-step errors is a run with fine steps, checked with another scheme. \
+                            The reference for total errors is a finer model, which requires the mesh of the ROM: use a \
+                            built-in model, or give --mesh with the options of `tiprub reduce blade`."
     )]
     Error(Box<ErrorCommand>),
-    /// Map friction, speed and internal step: accepted, warned of or rejected, and why; growth rates of sliding contact, and the largest
-    /// accepted step of every scheme and solver.
+    /// Map which combinations of friction, speed and internal step are accepted, give a warning or are rejected, and
+    /// why; also show the growth rates of sliding contact and the largest accepted step of every scheme and solver.
     #[command(
         after_help = "Examples:\n  tiprub study stability scene.toml\n  tiprub study stability builtin:rotor37 --quick\n  \
                             tiprub study stability scene.toml --friction 0:0.6:13 --speeds -1700:1700:2 --steps 1e-7:2e-5:12\n\n\
-                            The checks are those at the start of `tiprub run`. They take long with coupled sectors, so the default map is small for these."
+                            The checks are those at the start of `tiprub run`. They are slow for coupled sectors, so \
+                            the default map is smaller there."
     )]
     Stability(StabilityArguments),
-    /// Refine internal step, modes, contact nodes and mesh: changes of displacements, impulse, friction work, peak force and strain energy,
-    /// the estimated limit, and the error of the scene.
+    /// Refine internal step, modes, contact nodes and mesh, and show the changes of displacements, impulse, friction
+    /// work, peak force and strain energy, the estimated limit, and the error of the scene.
     #[command(
         after_help = "Examples:\n  tiprub study convergence scene.toml\n  tiprub study convergence builtin:rotor37 --quick\n  \
                             tiprub study convergence scene.toml --mesh blade.inp --contact-set TIP --clamp-set ROOT --sectors 36 --units mm-t-s\n\n\
-                            Modes can be removed from any ROM. More modes and other contact nodes need its mesh: a built-in model, \
-                            or --mesh with the options of `tiprub reduce blade`. Other meshes are given with --other-mesh."
+                            Modes can be removed from any ROM. More modes and other contact nodes require its mesh: \
+                            use a built-in model, or give --mesh with the options of `tiprub reduce blade`. Give other \
+                            meshes with --other-mesh."
     )]
     Convergence(Box<ConvergenceCommand>),
 }
@@ -253,7 +265,7 @@ pub enum FmiChoice {
     /// FMI 3.0.
     #[value(name = "3")]
     Three,
-    /// Both, as two files.
+    /// Both versions, as two files.
     Both,
 }
 
@@ -390,7 +402,7 @@ mod tests {
             ("study stability a.toml --steps 0:1:3", "positive steps"),
             ("study stability a.toml --speeds 5:1:3", "FROM:TO:COUNT"),
             ("reduce casing --contour 0.1", "z:r"),
-            ("reduce casing --contour=0.1:0.2,0.1:0.2", "does not lie beyond"),
+            ("reduce casing --contour=0.1:0.2,0.1:0.2", "is not greater"),
             ("reduce casing --thickness 0", "positive length"),
             ("reduce casing --low-flange 5", "TxH"),
             ("reduce casing --contact-grid 24", "AROUNDxALONG"),

@@ -106,7 +106,7 @@ fn study(argument: &str, out: &Path, more: Vec<NamedFile>) -> Result<()> {
     for input in scene(argument).into_iter().chain(more) {
         if identity(&input.path).is_some_and(|place| files.contains(&place)) {
             let problem =
-                format!("holds {}, {}, which a file of the study may replace", input.role, input.path.display());
+                format!("contains {} {}, which the study may overwrite", input.role, input.path.display());
             return Err(Failure::usage(format!("--out {}", out.display()), problem, "Give another directory"));
         }
     }

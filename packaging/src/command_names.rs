@@ -34,7 +34,7 @@ fn study(name: &str) -> Option<Failure> {
     if name.starts_with('-') || name == "help" || known.iter().any(|known| known == name) {
         return None;
     }
-    let remedy = format!("Choose {}, see `tiprub study --help`", listed(&known));
+    let remedy = format!("Choose {}; see `tiprub study --help`", listed(&known));
     Some(Failure::usage(format!("study {name}"), "no such study", remedy))
 }
 
@@ -93,7 +93,7 @@ fn reduce(words: &[String]) -> Option<Failure> {
     }
     let line: Vec<String> = now.into_iter().chain(global.into_iter().map(String::as_str)).map(quoted).collect();
     let remedy = format!("Run `tiprub reduce {}`", line.join(" "));
-    Some(Failure::usage(format!("reduce {first}"), "the kind of model comes first", remedy))
+    Some(Failure::usage(format!("reduce {first}"), "the kind of model must come first", remedy))
 }
 
 fn is_mesh(word: &str) -> bool {
@@ -107,7 +107,7 @@ fn no_model(name: &str, models: &[String]) -> Failure {
     let near = near.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
     let hint = near.map_or(String::new(), |(_, model)| format!("Did you mean `{model}`? "));
     let remedy = format!(
-        "{hint}Choose {}; a model of your own is a file: `tiprub reduce blade FILE`, .inp or .msh",
+        "{hint}Choose {}; for your own mesh (.inp or .msh), use `tiprub reduce blade FILE`",
         listed(models)
     );
     Failure::usage(format!("reduce {name}"), "no such kind of model", remedy)
@@ -138,7 +138,7 @@ fn failure(error: &clap::Error, program: &str) -> Option<Failure> {
     if error.exit_code() == 0 {
         return None;
     }
-    let help = &format!("See `{program} --help`, or `--help` of the command");
+    let help = &format!("See `{program} --help` or the `--help` of the command");
     let text = |kind: ContextKind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.clone()),
         Some(ContextValue::Strings(all)) => Some(all.join(", ")),

@@ -38,16 +38,17 @@ pub const MOST_VARIABLES: usize = 100_000;
 pub type Related<'a> = (&'a str, &'a str, &'a str, &'a str);
 
 /// The scene inside the FMU.
-const SCENE: Related = ("resources/scene.toml", "application/toml", "model", "The scene this FMU was made from");
+const SCENE: Related =
+    ("resources/scene.toml", "application/toml", "model", "The scene that this FMU was generated from");
 
 /// Text above all variables on the page inside the FMU.
-const ABOUT: &str = "This unit marches reduced-order models of flexible structures in time, together with their unilateral \
-    contact against a surface around them, rigid or flexible. The importer sets inputs, calls the unit step by step, and reads clearances, \
-    forces, torques and energies. Inside each communication step the unit takes as many smaller steps of its own \
-    as its time step asks for, and lands exactly on the communication point.";
+const ABOUT: &str = "This FMU integrates reduced-order models of flexible structures in time, together with their \
+    unilateral contact with a rigid or flexible surface. The importer sets inputs, advances the FMU step by step, and \
+    reads clearances, forces, torques and energies. Within each communication step, the FMU takes as many internal \
+    steps as needed and ends exactly at the communication point.";
 /// Text about the steps of the FMU.
-const STEPS: &str = "A communication step is usually much longer than an impact. Forces and torques are therefore given as \
-    averages over the step just finished, and extremes within it stand beside them.";
+const STEPS: &str = "A communication step is usually much longer than an impact. Forces and torques are therefore \
+    averages over the last communication step, and the extremes within the step are separate outputs.";
 
 const ICON: &[u8] = include_bytes!("../assets/icon.png");
 const THIRD_PARTY: &str = include_str!("../assets/third-party.txt");
@@ -56,7 +57,7 @@ const LICENSE_APACHE: &str = include_str!("../../LICENSE-APACHE");
 const LICENSE: &str = "This FMU and the library in it are licensed under either of\n\
     - the MIT license (LICENSE-MIT.txt), or\n- the Apache License, Version 2.0 (LICENSE-APACHE.txt)\n\
     at your option. third-party.txt lists the libraries it contains and their licenses.\n\
-    The scene and the reduced-order models in resources/ belong to whoever made them.\n";
+    The scene and the reduced-order models in resources/ belong to their authors.\n";
 
 /// FMI version of a package.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,9 +143,9 @@ impl<'a> FmuPackage<'a> {
     }
 
     fn too_many(&self, values: usize, version: FmiVersion) -> Failure {
-        let without = if version == FmiVersion::Two { "FMI 2.0 has no arrays" } else { "--scalars gives it no arrays" };
+        let without = if version == FmiVersion::Two { "FMI 2.0 has no arrays" } else { "--scalars writes no arrays" };
         let rows = self.simulation.table().variables().iter();
-        let largest = rows.max_by_key(|row| row.len()).map(|row| format!("; `{}` has {}", row.name, row.len()));
+        let largest = rows.max_by_key(|row| row.len()).map(|row| format!("; `{}` alone has {}", row.name, row.len()));
         Failure::new(
             format!("scene `{}`", self.scene.settings.name),
             format!(
@@ -221,7 +222,7 @@ pub fn contents(
     let identifier = description.identifier;
     let name = format!("documentation/{identifier}_ref.csv");
     let told = reference.map(|(_, steps)| {
-        format!("All outputs of the default experiment, of its first {steps} communication steps if there are more")
+        format!("All outputs of the default experiment, for at most its first {steps} communication steps")
     });
     let result = told.as_deref().map(|told| (name.as_str(), "text/csv", "result", told));
     let page = (

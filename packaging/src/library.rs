@@ -115,21 +115,21 @@ pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) 
             if !arguments.library.contains(&path) {
                 continue;
             }
-            let problem = "a library of another unit: scenes and heat conduction have one each";
+            let problem = "is the library of the other FMU: scenes and heat conduction have separate libraries";
             return Err(Failure::new(path.display(), problem, format!("Give {}", unit.names().1)));
         }
         if let Some((other, _)) = found.get(&platform) {
             return Err(Failure::new(
                 path.display(),
-                format!("a second library for {}, after {}", platform.tuple(), other.display()),
-                "Give one for each platform",
+                format!("is a second library for {}, after {}", platform.tuple(), other.display()),
+                "Give only one library per platform",
             ));
         }
         found.insert(platform, (path, bytes));
     }
     if found.is_empty() {
-        let problem = format!("none of {} is among the files given", unit.names().1);
-        return Err(Failure::new("FMU library", problem, "Make it with packaging/libraries.sh and give --library DIR"));
+        let problem = format!("the given files contain no {}", unit.names().1);
+        return Err(Failure::new("FMU library", problem, "Build it with packaging/libraries.sh and give --library DIR"));
     }
     check_platforms(&arguments.platform, found.keys().copied().collect())?;
     Ok(found
@@ -147,8 +147,8 @@ fn check_platforms(asked: &[PlatformChoice], found: Vec<Platform>) -> Result<()>
     let names: Vec<&str> = found.into_iter().map(Platform::tuple).collect();
     Err(Failure::new(
         format!("--platform {}", missing.0.tuple()),
-        format!("no library for it, only for {}", names.join(", ")),
-        "Install tiprub with the libraries of all platforms, or make them with packaging/libraries.sh and give \
+        format!("no library for this platform, only for {}", names.join(", ")),
+        "Install tiprub with the libraries of all platforms, or build them with packaging/libraries.sh and give \
          --library DIR",
     ))
 }
@@ -229,7 +229,8 @@ fn find(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> R
         Origin::Nowhere => Err(Failure::new(
             "FMU library",
             format!(
-                "not found beside {} or in ../lib/tiprub relative to it (file name such as {}{}), and the sources of this program no longer exist",
+                "not found next to {} or in ../lib/tiprub relative to it (file name such as {}{}), and the sources of \
+                 this program no longer exist",
                 executable.display(),
                 unit.prefix(),
                 Platform::X86_64Linux.file_name()
@@ -250,8 +251,8 @@ fn files(path: &Path) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).filter(library).collect();
     files.sort();
     if files.is_empty() {
-        let problem = format!("holds no library (.{})", EXTENSIONS.join(", ."));
-        return Err(Failure::new(path.display(), problem, "Make them with packaging/libraries.sh"));
+        let problem = format!("contains no library (.{})", EXTENSIONS.join(", ."));
+        return Err(Failure::new(path.display(), problem, "Build the libraries with packaging/libraries.sh"));
     }
     Ok(files)
 }
@@ -277,26 +278,26 @@ fn recognised(path: &Path, bytes: &[u8]) -> Result<Platform> {
         Failure::new(path.display(), problem, "Give a library built from the fmi crate with --library FILE")
     };
     let platform = Platform::of_library(bytes)
-        .ok_or_else(|| refused("not a whole 64-bit shared library for Linux, Windows or macOS"))?;
+        .ok_or_else(|| refused("is not a complete 64-bit shared library for Linux, Windows or macOS"))?;
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let name = name.strip_prefix(LibraryUnit::Thermal.prefix()).unwrap_or(name);
     let called = Platform::ALL.into_iter().find(|named| name == &*named.file_name());
     if called.is_some_and(|called| called != platform) {
         return Err(Failure::new(
             path.display(),
-            format!("a library for {}, whatever its name says", platform.tuple()),
-            "Put the right library there, or call this one as what it is",
+            format!("is a library for {}, but its name is that of another platform", platform.tuple()),
+            "Use the library for the platform in the name, or rename this one",
         ));
     }
     if !(holds(bytes, b"fmi2DoStep") && holds(bytes, b"fmi3DoStep")) {
-        return Err(refused("a library, but of no FMU: it has no function fmi2DoStep or none fmi3DoStep"));
+        return Err(refused("is a library without the function fmi2DoStep or fmi3DoStep of an FMU"));
     }
     if !holds(bytes, LIBRARY_RELEASE.as_bytes()) {
-        let found = release(bytes).unwrap_or_else(|| "a library that names no release".into());
+        let found = release(bytes).unwrap_or_else(|| "it contains no release number".into());
         return Err(Failure::new(
             path.display(),
             format!("{found}; this program needs {LIBRARY_RELEASE}"),
-            "Use the library of the same release and sources, or build it again with packaging/libraries.sh",
+            "Use the library of the same release and sources, or rebuild it with packaging/libraries.sh",
         ));
     }
     Ok(platform)

@@ -17,8 +17,8 @@ fn main() -> ExitCode {
     if stdout_at_start::was_closed() {
         return console.finish(Err(Failure::new(
             "stdout",
-            "is closed: no result can be printed",
-            "Open it, or send it to /dev/null",
+            "is closed, so no result can be printed",
+            "Open it, or redirect it to /dev/null",
         )));
     }
     console.finish(commands::run(&cli.command, &console))

@@ -17,7 +17,8 @@ use crate::shared_arguments::{KindChoice, MaterialChoice, OutputArguments, axial
 /// Arguments of `tiprub reduce blade`.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct BladeArguments {
-    /// Mesh file: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh). With --stiffness its nodes and sets are taken.
+    /// Mesh file: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh). With --stiffness, only its nodes and
+    /// sets are used.
     #[arg(value_name = "FILE", required_unless_present = "stiffness")]
     pub file: Option<PathBuf>,
     /// Contact nodes.
@@ -40,17 +41,17 @@ pub struct BladeOptions {
     /// Number of uncoupled blades around the axis [default: 1].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub sectors: Option<u32>,
-    /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s); from a mesh only.
+    /// Also compute the effects of spin (stiffening, growth, Coriolis force) up to this speed (rad/s); requires a mesh.
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true, conflicts_with = "stiffness")]
     pub spin: Option<f64>,
-    /// Which modes are kept [default: craig-bampton; free-interface with patches].
+    /// Kind of modes to keep [default: craig-bampton; free-interface with patches].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
-    /// Number of lowest modes at whose places of largest stress, away from clamped nodes, stress is recovered; from a mesh of one material
-    /// only [default: 0].
+    /// Number of lowest modes at whose points of largest stress, away from clamped nodes, stress is recovered; requires
+    /// a mesh of one material [default: 0].
     #[arg(long, value_name = "N", conflicts_with = "stiffness")]
     pub stress_modes: Option<usize>,
-    /// Nodes where stress is recovered: a set, or numbers of nodes in the file, such as 12,57,103.
+    /// Nodes where stress is recovered: a set, or node numbers in the file such as 12,57,103.
     #[arg(long, value_name = "SET", conflicts_with = "stiffness")]
     pub stress_set: Option<String>,
     /// Input options.
@@ -86,12 +87,12 @@ pub struct ErrorCommand {
 /// Where the ROM of a scene is from.
 #[derive(Debug, Args)]
 pub struct FromMesh {
-    /// Mesh (or, with --stiffness, nodes and sets) that the ROM of the blades was reduced from, with the options of `tiprub reduce
-    /// blade`: more modes and other contact nodes are then tried.
+    /// Mesh (or, with --stiffness, nodes and sets) from which the ROM of the blades was reduced, with the options of
+    /// `tiprub reduce blade`. The study then also tries more modes and other contact nodes.
     #[arg(long = "mesh", value_name = "FILE", help_heading = MESH)]
     pub file: Option<PathBuf>,
-    /// Another mesh of the same blades, coarser or finer, with the same sets, in the same units: what meshes change is then told. May be
-    /// repeated; two or more let the error of the mesh be read.
+    /// Coarser or finer mesh of the same blades, with the same sets and units, to show the effect of the mesh. May be
+    /// repeated; the error of the mesh requires two or more.
     #[arg(long = "other-mesh", value_name = "FILE", help_heading = MESH, requires = "file", conflicts_with = "stiffness")]
     pub others: Vec<PathBuf>,
     /// Options of the blade.
@@ -99,7 +100,7 @@ pub struct FromMesh {
     pub blade: BladeOptions,
 }
 
-const MESH: &str = "Where the ROM is from, as for `tiprub reduce blade`";
+const MESH: &str = "Source of the ROM, as for `tiprub reduce blade`";
 
 impl FromMesh {
     /// Whether a mesh or matrices are given.
@@ -111,8 +112,8 @@ impl FromMesh {
         if given || self.blade == BladeOptions::default() {
             return Ok(given);
         }
-        let problem = "an option given describes a mesh, and there is none";
-        Err(Failure::usage("--mesh", problem, "Give --mesh FILE, or leave the options of `tiprub reduce blade` out"))
+        let problem = "an option describes a mesh, but no mesh is given";
+        Err(Failure::usage("--mesh", problem, "Give --mesh FILE, or omit the options of `tiprub reduce blade`"))
     }
 
     /// All files that are read.
@@ -125,23 +126,24 @@ impl FromMesh {
 /// Arguments of `tiprub reduce sector`.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct SectorArguments {
-    /// Mesh file of one sector: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh). With --stiffness its nodes and sets are taken.
+    /// Mesh file of one sector: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh). With --stiffness, only its nodes and
+    /// sets are used.
     #[arg(value_name = "FILE", required_unless_present = "stiffness")]
     pub file: Option<PathBuf>,
     /// Number of sectors of the disk.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub sectors: u32,
-    /// Face of the sector towards its lower neighbour (smaller angle).
+    /// Face of the sector towards its lower neighbour (the one at the smaller angle).
     #[arg(long, value_name = "SET")]
     pub cyclic_low: String,
     /// Face of the sector towards its upper neighbour.
     #[arg(long, value_name = "SET")]
     pub cyclic_high: String,
-    /// Largest distance (m) of a node of the upper face from the turned one of the lower face [default: 1e-5 of the
-    /// largest radius].
+    /// Largest distance (m) between a node of the upper face and the rotated node of the lower face [default: 1e-5 of
+    /// the largest radius].
     #[arg(long, value_name = "M", value_parser = positive)]
     pub cyclic_tolerance: Option<f64>,
-    /// Which modes are kept, per nodal diameter [default: craig-bampton; free-interface with patches].
+    /// Kind of modes to keep per nodal diameter [default: craig-bampton; free-interface with patches].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
     /// Contact nodes.
@@ -170,16 +172,17 @@ pub struct CasingMeshArguments {
     /// Contact nodes around the circumference and along the axis.
     #[arg(long, value_name = "AxL", value_parser = pair)]
     pub contact_grid: [usize; 2],
-    /// Axial positions of the first and the last contact ring (m) [default: those of the set].
+    /// Axial positions of the first and the last contact ring (m) [default: those of the contact set].
     #[arg(long, value_name = "FROM:TO", value_parser = axial, allow_hyphen_values = true)]
     pub contact_axial: Option<[f64; 2]>,
-    /// Thermal patches around and along [default: none].
+    /// Thermal patches around the circumference and along the axis [default: none].
     #[arg(long, value_name = "AxL", value_parser = pair)]
     pub patches: Option<[usize; 2]>,
     /// Coefficient of linear thermal expansion (1/K), instead of the material's.
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     pub expansion: Option<f64>,
-    /// Fixed-interface modes to reduce with; `--modes` is the number of modes kept in the ROM [default: 156].
+    /// Number of fixed-interface modes used for the reduction; `--modes` is the number of modes kept in the ROM
+    /// [default: 156].
     #[arg(long, value_name = "N")]
     pub fixed_interface_modes: Option<usize>,
     /// Input options.
@@ -196,19 +199,19 @@ pub struct CasingMeshArguments {
 /// Contact nodes of blades.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct TipOptions {
-    /// Number of contact nodes, chosen evenly along the chord out of the contact set or the tip, instead of patches.
+    /// Number of contact nodes, chosen evenly along the chord from the contact set or the tip; replaces the patches.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Number of patches along the chord that the faces within the contact set or the tip are divided into [default: 9, fewer where
-    /// elements are wider; none for a contact set of at most 12 nodes, which are the contact nodes].
+    /// Number of patches along the chord into which the faces of the contact set or the tip are divided [default: 9,
+    /// fewer if the elements are wider; none for a contact set of at most 12 nodes, which are then the contact nodes].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
-    /// Rows of patches across the thickness, from side to side: with two or more the sides of a tilted tip touch [default: 2; 1 where
-    /// the mesh does not tell two apart].
+    /// Rows of patches across the thickness, from side to side; with two or more, the sides of a tilted tip touch
+    /// separately [default: 2; 1 if the mesh is too coarse for two].
     #[arg(long, value_name = "R", conflicts_with = "contact_nodes")]
     pub contact_rows: Option<usize>,
-    /// Names of the contact nodes or patches along the chord, by growing z; of patches in rows NAME_row_1, NAME_row_2, ... [default:
-    /// tip_1,tip_2,... and patch_1,patch_2,...].
+    /// Names of the contact nodes or patches along the chord, in order of increasing z; patches in rows are named
+    /// NAME_row_1, NAME_row_2, ... [default: tip_1,tip_2,... and patch_1,patch_2,...].
     #[arg(long, value_name = "NAME,NAME,...", value_delimiter = ',', value_parser = identifier)]
     pub contact_names: Vec<String>,
 }
@@ -216,24 +219,24 @@ pub struct TipOptions {
 /// Options of every user mesh.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct ModelOptions {
-    /// Set of nodes that can touch. With more than 12 nodes it is a tip, and contact is on patches; with fewer all of them are contact nodes,
-    /// and so are nodes given by their numbers in the file, such as 12,57,103. Without it the tip of a mesh of blades is found: its outermost
-    /// faces.
+    /// Set of nodes that can touch. A set of more than 12 nodes is a tip, with contact on patches; the nodes of a
+    /// smaller set are the contact nodes, as are nodes given by their numbers in the file, such as 12,57,103. Without
+    /// this option, the tip of a blade mesh is detected as its outermost faces.
     #[arg(long, value_name = "SET")]
     pub contact_set: Option<String>,
-    /// Set of nodes that are held, or their numbers in the file; may be repeated. `none`: the structure flies freely.
+    /// Set of clamped nodes, or their numbers in the file; may be repeated. `none`: the structure is a free body.
     #[arg(long, value_name = "SET")]
     pub clamp_set: Vec<String>,
-    /// Units of the file; everything on the command line is in SI units, whatever the file's are [default: m].
+    /// Units of the file; values on the command line are always in SI units [default: m].
     #[arg(long, value_enum)]
     pub units: Option<UnitChoice>,
-    /// Engine axis in the file; the others follow in turn [default: z].
+    /// Engine axis in the file; the other axes follow in cyclic order [default: z].
     #[arg(long, value_enum)]
     pub axis: Option<AxisChoice>,
-    /// Material of all elements, instead of the file's.
+    /// Material of all elements, instead of that in the file.
     #[arg(long, value_enum, conflicts_with = "young")]
     pub material: Option<MaterialChoice>,
-    /// Young's modulus (Pa) of all elements, instead of the file's material.
+    /// Young's modulus (Pa) of all elements, instead of the material in the file.
     #[arg(long, value_name = "E", value_parser = positive, requires = "poisson", requires = "density")]
     pub young: Option<f64>,
     /// Poisson's ratio of all elements.
@@ -242,7 +245,7 @@ pub struct ModelOptions {
     /// Density (kg/m³) of all elements.
     #[arg(long, value_name = "RHO", value_parser = positive, requires = "young")]
     pub density: Option<f64>,
-    /// Temperature at which the file's tables of properties are read, in its unit.
+    /// Temperature at which the material tables of the file are evaluated, in the unit of the file.
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub temperature: Option<f64>,
 }
@@ -250,13 +253,14 @@ pub struct ModelOptions {
 /// Reduction options of a user mesh.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct KeptOptions {
-    /// Modes kept [default: 25, of blades with patches up to 80, of a disk per nodal diameter; 60 of a casing].
+    /// Number of modes kept [default: 25 for blades, up to 80 with patches; 25 per nodal diameter for a disk; 60 for a
+    /// casing].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Modal damping ratio proposed with the model [default: 0.005].
+    /// Default modal damping ratio of the model [default: 0.005].
     #[arg(long, value_name = "RATIO", value_parser = share)]
     pub damping: Option<f64>,
-    /// Name of the structure [default: that of the file].
+    /// Name of the structure [default: name of the file].
     #[arg(long, value_name = "NAME", value_parser = model_name)]
     pub name: Option<String>,
 }
@@ -264,13 +268,14 @@ pub struct KeptOptions {
 /// Matrices instead of a mesh.
 #[derive(Debug, Clone, PartialEq, Default, Args)]
 pub struct MatrixOptions {
-    /// Stiffness matrix: Matrix Market, CalculiX .sti, Abaqus text. With a mesh FILE, nodes and sets are its.
+    /// Stiffness matrix (Matrix Market, CalculiX .sti or Abaqus text). Nodes and sets are those of the mesh FILE, if
+    /// given.
     #[arg(long, value_name = "FILE", requires = "mass", conflicts_with_all = ["material", "young"])]
     pub stiffness: Option<PathBuf>,
     /// Mass matrix, in the same format.
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub mass: Option<PathBuf>,
-    /// Table of nodes of the matrices: `NODE,X,Y,Z[,SETS]`, instead of a mesh file.
+    /// Table of the nodes of the matrices, with lines `NODE,X,Y,Z[,SETS]`, instead of a mesh file.
     #[arg(long, value_name = "FILE", requires = "stiffness", conflicts_with = "file")]
     pub nodes: Option<PathBuf>,
     /// CalculiX's list of degrees of freedom [default: the stiffness file with the extension .dof].
@@ -380,7 +385,7 @@ pub enum UnitChoice {
     /// mm, t, s, N, MPa.
     #[value(name = "mm-t-s")]
     MillimetreTonneSecond,
-    /// m, kg, s, N, Pa: taken as it stands, however unusual it looks.
+    /// m, kg, s, N, Pa: values are accepted as they are, however unusual.
     #[value(name = "m")]
     Metre,
 }
@@ -392,7 +397,7 @@ pub enum AxisChoice {
     X,
     /// y: the file's z, x, y become x, y, z.
     Y,
-    /// z: nothing is turned.
+    /// z: the axes are unchanged.
     Z,
 }
 
@@ -435,13 +440,13 @@ fn identifier(text: &str) -> Result<String, String> {
     if starts_well && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
         return Ok(text.to_owned());
     }
-    Err("use letters, digits and underscores, not starting with a digit: it becomes part of variable names".into())
+    Err("use letters, digits and underscores, not starting with a digit; the name is part of variable names".into())
 }
 
 /// Part of a file name.
 fn model_name(text: &str) -> Result<String, String> {
     if text.is_empty() || text.contains(['/', '\\']) || text.starts_with('.') {
-        return Err("give a plain name; where the ROM file goes is what -o says".into());
+        return Err("give a plain name without a path; set the path of the ROM file with -o".into());
     }
     Ok(text.to_owned())
 }
@@ -449,6 +454,6 @@ fn model_name(text: &str) -> Result<String, String> {
 fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
-        _ => Err("give a number from 0, below 1".into()),
+        _ => Err("give a number from 0 to less than 1".into()),
     }
 }

@@ -29,20 +29,21 @@ pub struct ReduceArguments {
 /// Models that can be reduced.
 #[derive(Debug, Subcommand)]
 pub enum ModelToReduce {
-    /// Blades of your own on a rigid hub: a mesh (CalculiX/Abaqus .inp, Gmsh 4.1 .msh), or matrices of any code.
+    /// Your own blades on a rigid hub, from a mesh (CalculiX/Abaqus .inp, Gmsh 4.1 .msh) or from matrices of any code.
     #[command(
         after_help = "Examples:\n  tiprub reduce blade blade.inp --clamp-set ROOT --sectors 36 --units mm-t-s\n  \
                             tiprub reduce blade blade.msh --contact-set TIP --clamp-set ROOT --material titanium --contact-patches 17\n  \
                             tiprub reduce blade job.inp --stiffness job.sti --mass job.mas --contact-set TIP --clamp-set ROOT\n\n\
-                            Without --contact-set the tip is found in the mesh; without --clamp-set the sets of the file are listed."
+                            Without --contact-set, the tip is detected in the mesh; without --clamp-set, the sets of \
+                            the file are listed."
     )]
     Blade(Box<BladeArguments>),
-    /// A bladed disk of your own from a mesh or matrices of one sector: coupled sectors, nodal diameter by nodal diameter.
+    /// Your own bladed disk with coupled sectors, from a mesh or matrices of one sector, reduced per nodal diameter.
     #[command(
         after_help = "Example:\n  tiprub reduce sector sector.inp --clamp-set BORE --sectors 56 --cyclic-low LOW --cyclic-high HIGH"
     )]
     Sector(Box<SectorArguments>),
-    /// A casing of your own from a mesh, with a grid of contact nodes that a surface is laid through.
+    /// Your own casing from a mesh, with a grid of contact nodes that define its surface.
     #[command(
         after_help = "Example:\n  tiprub reduce casing-mesh ring.inp --contact-set INNER --clamp-set FLANGE --contact-grid 24x3 --contact-axial 0.002:0.038"
     )]
@@ -59,16 +60,16 @@ pub enum ModelToReduce {
     /// The built-in disk with 56 blades.
     #[command(after_help = "Example:\n  tiprub reduce stage --coarse --inp sector.inp --vtk sector.vtu")]
     Stage(StageArguments),
-    /// The casing around that disk.
+    /// The built-in casing around the disk.
     #[command(after_help = "Example:\n  tiprub reduce stage-casing --coarse --material titanium")]
     StageCasing(StageCasingArguments),
-    /// The free cube between two rings.
+    /// The built-in free cube between two rings.
     #[command(after_help = "Example:\n  tiprub reduce cube --modes 100")]
     Cube(CubeArguments),
-    /// The ring at its left.
+    /// The built-in ring to the left of the cube.
     #[command(after_help = "Example:\n  tiprub reduce ring-left --modes 50 --static-responses 12")]
     RingLeft(CubeRingArguments),
-    /// The ring at its right.
+    /// The built-in ring to the right of the cube.
     #[command(after_help = "Example:\n  tiprub reduce ring-right --modes 50 --static-responses 12")]
     RingRight(CubeRingArguments),
 }
@@ -76,20 +77,21 @@ pub enum ModelToReduce {
 /// Arguments of `tiprub reduce rotor37`.
 #[derive(Debug, Args)]
 pub struct Rotor37Arguments {
-    /// Modes kept [default: 80; 20 with --contact-nodes].
+    /// Number of modes kept [default: 80; 20 with --contact-nodes].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// The paper's contact nodes along the tip chord, leading edge to trailing edge (≥ 2), instead of patches.
+    /// Number of contact nodes along the tip chord from leading to trailing edge (≥ 2), as in the paper, instead of
+    /// patches.
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Contact patches along the tip chord [default: 9].
+    /// Number of contact patches along the tip chord [default: 9].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
-    /// Rows of patches across the thickness, from side to side: with two or more the sides of a tilted tip touch; one row averages
-    /// contact over the thickness [default: 2].
+    /// Rows of patches across the thickness, from side to side; with two or more, the sides of a tilted tip touch
+    /// separately; one row averages contact over the thickness [default: 2].
     #[arg(long, value_name = "R", conflicts_with = "contact_nodes")]
     pub contact_rows: Option<usize>,
-    /// Which modes are kept [default: free-interface; craig-bampton with --contact-nodes].
+    /// Kind of modes to keep [default: free-interface; craig-bampton with --contact-nodes].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
     /// Elements along the chord, through the thickness and along the span [default: 24x2x40; 16x2x20 with --contact-nodes].
@@ -157,22 +159,22 @@ impl StageArguments {
 /// Arguments of `tiprub reduce stage`.
 #[derive(Debug, Args)]
 pub struct StageArguments {
-    /// A coarse mesh and few modes, for trials.
+    /// Use a coarse mesh and few modes, for trials.
     #[arg(long)]
     pub coarse: bool,
-    /// Modes kept per nodal diameter, in whole families [default: 25; 12 of the coarse mesh].
+    /// Number of modes kept per nodal diameter, in whole families [default: 25; 12 for the coarse mesh].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Contact nodes along the tip chord, instead of patches [default: none; 3 of the coarse mesh].
+    /// Number of contact nodes along the tip chord, instead of patches [default: none; 3 for the coarse mesh].
     #[arg(long, value_name = "N")]
     pub contact_nodes: Option<usize>,
-    /// Contact patches along the tip chord [default: 9; none of the coarse mesh].
+    /// Number of contact patches along the tip chord [default: 9; none for the coarse mesh].
     #[arg(long, value_name = "N", conflicts_with = "contact_nodes")]
     pub contact_patches: Option<usize>,
     /// Rows of patches across the thickness, from side to side [default: 2].
     #[arg(long, value_name = "R", conflicts_with = "contact_nodes")]
     pub contact_rows: Option<usize>,
-    /// Which modes are kept [default: free-interface; craig-bampton with contact nodes].
+    /// Kind of modes to keep [default: free-interface; craig-bampton with contact nodes].
     #[arg(long, value_enum)]
     pub kind: Option<KindChoice>,
     /// Output options.
@@ -183,19 +185,19 @@ pub struct StageArguments {
 /// Arguments of `tiprub reduce stage-casing`.
 #[derive(Debug, Args)]
 pub struct StageCasingArguments {
-    /// An eighth of the elements around, for trials.
+    /// Use an eighth of the elements around the circumference, for trials.
     #[arg(long)]
     pub coarse: bool,
-    /// Modes kept below the cut-off [default: 60].
+    /// Number of lowest modes kept in the ROM [default: 60].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Fixed-interface modes to reduce with [default: 160].
+    /// Number of fixed-interface modes used for the reduction [default: 160].
     #[arg(long, value_name = "N")]
     pub fixed_interface_modes: Option<usize>,
     /// Contact nodes around the circumference and along the axis [default: 28x3].
     #[arg(long, value_name = "AxL", value_parser = pair)]
     pub contact_grid: Option<[usize; 2]>,
-    /// Thermal patches around and along [default: none].
+    /// Thermal patches around the circumference and along the axis [default: none].
     #[arg(long, value_name = "AxL", value_parser = pair)]
     pub patches: Option<[usize; 2]>,
     /// Material [default: titanium].
@@ -209,13 +211,13 @@ pub struct StageCasingArguments {
 /// Arguments of `tiprub reduce cube`.
 #[derive(Debug, Args)]
 pub struct CubeArguments {
-    /// Modes kept, of free-interface ones beside the rigid-body motions [default: all].
+    /// Number of modes kept; free-interface modes are counted without the rigid-body modes [default: all].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Contact patches along y and along z on either face, instead of its nodes.
+    /// Contact patches along y and along z on each face, instead of the nodes of the face.
     #[arg(long, value_name = "YxZ", value_parser = pair)]
     pub contact_patches: Option<[usize; 2]>,
-    /// Which modes are kept [default: craig-bampton; free-interface with patches].
+    /// Kind of modes to keep [default: craig-bampton; free-interface with patches].
     #[arg(long, value_enum, requires = "modes")]
     pub kind: Option<KindChoice>,
     /// Mass matrix of the finite elements [default: lumped].
@@ -229,10 +231,10 @@ pub struct CubeArguments {
 /// Arguments of `tiprub reduce ring-left` and `ring-right`.
 #[derive(Debug, Args)]
 pub struct CubeRingArguments {
-    /// Modes kept [default: 100].
+    /// Number of modes kept [default: 100].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Static responses to contact forces kept beside the modes [default: 0].
+    /// Number of static responses to contact forces kept in addition to the modes [default: 0].
     #[arg(long, value_name = "N")]
     pub static_responses: Option<usize>,
     /// Mass matrix of the finite elements [default: lumped].
@@ -246,9 +248,9 @@ pub struct CubeRingArguments {
 /// Mass matrix of finite elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MassChoice {
-    /// On the nodes.
+    /// Mass lumped at the nodes.
     Lumped,
-    /// As the elements' shape functions share it out.
+    /// Mass distributed by the shape functions of the elements.
     Consistent,
 }
 

@@ -105,7 +105,7 @@ impl ReducedModel {
 
     fn mesh_for(&self, option: &str) -> Result<&(Mesh, Material)> {
         self.mesh.as_ref().ok_or_else(|| {
-            Failure::usage(option, "the model has no mesh of one material to export", format!("Leave {option} out"))
+            Failure::usage(option, "the model has no mesh of one material to export", format!("Omit {option}"))
         })
     }
 

@@ -230,7 +230,8 @@ impl RomFacts {
             let (rest, forced) = (worst(&checks.flexibility_deviation), worst(&checks.response_deviation));
             let _ = writeln!(
                 text,
-                "\n  response at the contact nodes: at rest within {rest:.1e} % of the full model, up to {last:.0} Hz within {forced:.1e} %"
+                "\n  deviation from the full model at the contact nodes: static response {rest:.1e} %, \
+                 dynamic response up to {last:.0} Hz {forced:.1e} %"
             );
         }
     }
@@ -249,14 +250,14 @@ impl RomFacts {
             return None;
         }
         let other =
-            if backward.is_finite() { format!("only from {backward:.2}") } else { "with no friction".to_owned() };
+            if backward.is_finite() { format!("only from µ = {backward:.2}") } else { "for no friction".to_owned() };
         let ahead = self.leading_edge().map_or(String::new(), |node| {
-            format!(" With positive `speed` the edge at z = {:.4} m ({}) is ahead.", node.position[2], node.name)
+            format!(" With a positive `speed`, the edge at z = {:.4} m ({}) leads.", node.position[2], node.name)
         });
         Some(format!(
-            "the tip locks up from friction µ* = {forward:.2} when the rotor turns towards +θ (positive `speed`), and {other} when it turns \
-             towards −θ: is the blade staggered for a rotor that turns the other way?{ahead} If the other edge is to be ahead, give a negative \
-             `speed`, or mirror the mesh"
+            "the tip locks up from friction µ* = {forward:.2} when the rotor turns towards +θ (positive `speed`), but \
+             {other} when it turns towards −θ: is the blade staggered for the opposite sense of rotation?{ahead} If \
+             the other edge should lead, give a negative `speed`, or mirror the mesh"
         ))
     }
 
@@ -283,11 +284,13 @@ impl RomFacts {
             Some(KnownContact { friction, speed }) if friction > 0.0 && !self.rom.is_cyclic() => {
                 let sense = if speed > 0.0 { "+θ" } else { "−θ" };
                 let sense = if speed == 0.0 { "either sense" } else { sense };
-                format!("of one sector, with µ = {friction} and sliding in {sense}")
+                format!("for one sector, with µ = {friction} and sliding in {sense}")
             }
-            Some(sliding) if sliding.friction > 0.0 => "of the disk; with friction a scene may ask for less".to_owned(),
+            Some(sliding) if sliding.friction > 0.0 => {
+                "for the disk; with friction, a scene may require smaller steps".to_owned()
+            }
             Some(_) => "without friction".to_owned(),
-            None => "without friction; with it a scene may ask for less".to_owned(),
+            None => "without friction; with friction, a scene may require smaller steps".to_owned(),
         }
     }
 
@@ -452,7 +455,7 @@ pub(crate) fn order_text(rom: &Rom) -> String {
     let orders = rom.extras.harmonics.iter().map(|harmonic| harmonic.mass.nrows()).chain([rom.order()]);
     let (low, high) = orders.fold((usize::MAX, 0), |(low, high), order| (low.min(order), high.max(order)));
     let each = if low == high { format!("{low}") } else { format!("{low} to {high}") };
-    format!("{each} per nodal diameter, {} of the whole disk", rom.total_order())
+    format!("{each} per nodal diameter, {} for the whole disk", rom.total_order())
 }
 
 /// Rows of patches around an axis, for people; nothing for contact nodes.
@@ -461,7 +464,7 @@ fn rows_text(rom: &Rom) -> String {
         return String::new();
     }
     let alone = match rom.rows() {
-        1 => ": the sides of the tip do not touch by themselves (two rows stand there, --contact-rows 2)",
+        1 => ": the sides of the tip do not touch separately (this requires --contact-rows 2)",
         _ => "",
     };
     format!("  rows across the thickness {}{alone}\n", rom.rows())

@@ -22,16 +22,17 @@ pub fn features(scene: &Scene) -> Vec<String> {
         of_contact(contact, &mut found);
     }
     if settings.time.scheme == Scheme::MasslessBoundary {
-        found.push("highest modes quasi-static: contact nodes have no mass (massless-boundary)".into());
+        found.push("the highest modes are quasi-static: contact nodes have no mass (massless-boundary)".into());
     }
     if settings.time.scheme == Scheme::Galerkin {
         let tolerance = settings.time.tolerance.unwrap_or(TOLERANCE);
         found.push(format!(
-            "steps of every blade by a tolerance of {tolerance:e} of the clearance; contact nodes have no mass (galerkin)"
+            "adaptive steps of every blade, with a tolerance of {tolerance:e} of the clearance; contact nodes have no \
+             mass (galerkin)"
         ));
     }
     if settings.time.input_interpolation == InputInterpolation::Hold {
-        found.push("inputs act at once and hit like hammers where they jump (input_interpolation = \"hold\")".into());
+        found.push("inputs act immediately, and their jumps act as impacts (input_interpolation = \"hold\")".into());
     }
     found
 }
@@ -41,8 +42,8 @@ pub fn scheme(settings: &SceneSettings) -> String {
     let name = settings.time.scheme.name();
     match (&settings.time.scheme_reason, settings.preset) {
         (Some(reason), _) => format!("{name}, {reason}"),
-        (None, Preset::Paper) => format!("{name}, the scheme of preset = \"paper\""),
-        (None, Preset::None) => format!("{name}, named in the scene"),
+        (None, Preset::Paper) => format!("{name}, set by preset = \"paper\""),
+        (None, Preset::None) => format!("{name}, set in the scene"),
     }
 }
 
@@ -50,19 +51,19 @@ fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String
     let name = &structure.name;
     if structure.motion == BodyMotion::Free {
         let [x, y, z] = structure.velocity;
-        found.push(format!("`{name}` flies freely, at the start with {x}, {y}, {z} m/s along x, y, z"));
+        found.push(format!("`{name}` is a free body with the initial velocity {x}, {y}, {z} m/s along x, y, z"));
     }
     let spin = structure.spin;
     let effects = [("stiffening", spin.stiffening), ("growth", spin.growth), ("coriolis", spin.coriolis)];
     let effects: Vec<&str> = effects.into_iter().filter(|(_, on)| *on).map(|(effect, _)| effect).collect();
     if !effects.is_empty() {
-        found.push(format!("spin of `{name}`: {}", effects.join(", ")));
+        found.push(format!("spin effects of `{name}`: {}", effects.join(", ")));
     }
     if structure.whirl {
-        found.push(format!("shaft of `{name}` whirls: its displacement in x and y is an input"));
+        found.push(format!("the shaft of `{name}` whirls: its displacements in x and y are inputs"));
     }
     if structure.axial_shift {
-        found.push(format!("`{name}` shifts: its axial displacement is an input"));
+        found.push(format!("`{name}` shifts axially: its axial displacement is an input"));
     }
     let factors = &structure.frequency_factors;
     if !factors.is_empty() {
@@ -76,20 +77,23 @@ fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String
     }
     if let Some(excitation) = &structure.excitation {
         let where_to = match (excitation.mode, &excitation.node) {
-            (Some(mode), Some(node)) => format!("mode {mode} as by a force at {node}"),
+            (Some(mode), Some(node)) => format!("mode {mode}, as excited by a force at {node}"),
             (Some(mode), None) => format!("mode {mode}"),
             (None, node) => format!("a force at {}", node.as_deref().unwrap_or_default()),
         };
         found.push(format!("`{name}` is excited by engine order {}: {where_to}", excitation.order));
     }
     if !structure.initial.is_empty() {
-        found.push(format!("blades of `{name}` move at the start: {} motions", structure.initial.len()));
+        found.push(format!("blades of `{name}` move at the start, with {} initial motions", structure.initial.len()));
     }
     if !structure.damping_ratios.is_empty() {
-        found.push(format!("the first {} modes of `{name}` have damping of their own", structure.damping_ratios.len()));
+        found.push(format!(
+            "the first {} modes of `{name}` have individual damping ratios",
+            structure.damping_ratios.len()
+        ));
     }
     if structure.softening > 0.0 {
-        found.push(format!("`{name}` softens: {} of its stiffness per kelvin", structure.softening));
+        found.push(format!("`{name}` loses a fraction {} of its stiffness per kelvin", structure.softening));
     }
     if structure.thermal && structure.motion == BodyMotion::Rotating {
         found.push(format!("`{name}` heats up: its temperature is an input"));
@@ -97,7 +101,7 @@ fn of_structure(structure: &StructureSettings, rom: &Rom, found: &mut Vec<String
         found.push(format!("`{name}` heats up: temperatures of {} patches are inputs", thermal.patches.len()));
     }
     if let Some(load) = structure.load {
-        found.push(format!("nodal-diameter load on `{name}`: {} diameters", load.order));
+        found.push(format!("load with {} nodal diameters on `{name}`", load.order));
     }
 }
 
@@ -105,7 +109,7 @@ fn of_surface(surface: &SurfaceSettings, scene: &Scene, found: &mut Vec<String>)
     let named = |name: &String| scene.settings.structures.iter().position(|structure| structure.name == *name);
     let carrier = surface.structure.as_ref().and_then(|name| Some((name, scene.roms.get(named(name)?)?)));
     if let Some((name, _)) = carrier.filter(|_| surface.rigid) {
-        found.push(format!("surface `{}` is rigid: `{name}` says where it is", surface.name));
+        found.push(format!("surface `{}` is rigid: `{name}` defines its position", surface.name));
     } else if let Some((name, rom)) = carrier {
         found.push(format!("surface `{}` is flexible: carried by `{name}` with {} modes", surface.name, rom.order()));
     } else if let Some(spline) = surface.spline {
@@ -114,7 +118,7 @@ fn of_surface(surface: &SurfaceSettings, scene: &Scene, found: &mut Vec<String>)
     }
     if let Some(patches) = surface.patches {
         let (around, along) = (patches.around, patches.along);
-        found.push(format!("friction power into {around} x {along} patches of `{}`", surface.name));
+        found.push(format!("friction power is output for {around} x {along} patches of `{}`", surface.name));
     }
 }
 
@@ -126,16 +130,19 @@ fn of_contact(contact: &ContactSettings, found: &mut Vec<String>) {
     {
         let cut = cutting.map_or(String::new(), |cut| {
             let CuttingSettings { specific_energy, normal_ratio } = cut;
-            format!(", cut at {specific_energy:e} J/m3, normal force {normal_ratio} times the tangential one")
+            format!(", cut at {specific_energy:e} J/m3, normal force {normal_ratio} times the tangential force")
         });
-        let pressed = contact_width.map_or(String::new(), |width| format!(", pressed by tips {width} m wide"));
+        let pressed = contact_width.map_or(String::new(), |width| format!(", contact width {width} m"));
         found.push(format!(
             "abradable coating on `{}`: {thickness} m, {cells_around} x {cells_along} cells{cut}{pressed}",
             contact.slave
         ));
     }
     if let Some(share) = contact.heat_to_slave {
-        found.push(format!("friction heat is shared: {share} into `{}`, the rest into the blades", contact.slave));
+        found.push(format!(
+            "friction heat is shared: a fraction of {share} goes into `{}`, the rest into the blades",
+            contact.slave
+        ));
     }
 }
 
@@ -152,7 +159,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
     let whirls = settings.structures.iter().any(|structure| structure.whirl || structure.axial_shift);
     let choose = |first: bool, one: &'static str, other: &'static str| if first { one } else { other };
     let mut limits = vec![
-        "Displacements within each structure are small; the rotation between rotor and casing is not.",
+        "Displacements within each structure are small; the rotation between rotor and casing may be large.",
         choose(
             any(|contact| contact.solver == Solver::Coulomb),
             "Friction is Coulomb friction that sticks and slides, with one coefficient for both.",
@@ -160,28 +167,28 @@ pub fn limits(scene: &Scene) -> Vec<String> {
         ),
         choose(
             flexible,
-            "The casing is laid parallel to the contour of the blade tips at the given clearance, whatever radius its mesh \
-             has, and bends with the modes of its reduced model; beyond its rings it goes on along its tangents for a \
-             quarter of its axial extent.",
+            "The casing surface is parallel to the contour of the blade tips at the given clearance, whatever the \
+             radius of its mesh, and bends with the modes of its reduced model; beyond its contact rings it is \
+             extended along its tangents by a quarter of its axial extent.",
             "The casing is a rigid surface of the given shape, parallel to the contour of the blade tips.",
         ),
         blades(coupled, stiffens),
-        "Forces and torques are means over the communication step, so that the momentum handed over is exact; the force \
-         at an instant of impact grows as 1/h.",
-        "Sliding friction can make the structure itself flutter; a scheme that would add growth of its own is refused.",
+        "Forces and torques are means over the communication step, so that the transferred momentum is exact; the \
+         instantaneous force of an impact grows as 1/h.",
+        "Sliding friction can make the structure itself flutter; a scheme that would add numerical growth is rejected.",
         choose(
             settings.time.scheme.is_massless(),
-            "The highest modes, three per contact node, follow contact at once and have no inertia.",
+            "The highest modes, three per contact node, follow contact immediately and have no inertia.",
             "The mass of a contact node loses its kinetic energy at impact: an error of first order in mesh size, not in h.",
         ),
     ];
     if whirls {
-        limits.push("Whirl and shift of the shaft move the blades as they are: they bring no inertia forces on them.");
+        limits.push("Whirl and shift of the shaft displace the blades, but cause no inertia forces on them.");
     }
     if any(|contact| contact.coating.is_some()) {
         limits.push(
-            "Clearances are measured to the unworn coating: they turn negative where a blade dips into it. Worn cells do \
-             not heal, and the coating has no mass.",
+            "Clearances are measured to the unworn coating: they become negative where a blade penetrates it. Wear is \
+             permanent, and the coating has no mass.",
         );
     }
     limits.into_iter().map(String::from).collect()
@@ -191,17 +198,17 @@ pub fn limits(scene: &Scene) -> Vec<String> {
 fn limits_of_flight(settings: &SceneSettings) -> [&'static str; 5] {
     let sticks = settings.contacts.iter().any(|contact| contact.solver == Solver::Coulomb);
     [
-        "Displacements within each structure are small; the free structure may travel any way, but not turn by more than small \
-         angles.",
+        "Displacements within each structure are small; the free structure may travel any distance, but its rotations \
+         must stay small.",
         if sticks {
             "Friction is Coulomb friction that sticks and slides, with one coefficient for both."
         } else {
             "Friction is Coulomb friction in sliding; sticking is not modelled."
         },
-        "Surfaces are laid through the contact grids of their structures; a contact node that leaves a grid over an edge has no \
-         contact with it.",
-        "Forces are means over the communication step, so that the momentum handed over is exact; the force at an instant of \
-         impact grows as 1/h.",
+        "Surfaces pass through the contact grids of their structures; a contact node that moves beyond an edge of a \
+         grid has no contact with it.",
+        "Forces are means over the communication step, so that the transferred momentum is exact; the instantaneous \
+         force of an impact grows as 1/h.",
         "The mass of a contact node loses its kinetic energy at impact: an error of first order in mesh size, not in h.",
     ]
 }
@@ -210,13 +217,13 @@ fn limits_of_flight(settings: &SceneSettings) -> [&'static str; 5] {
 fn blades(coupled: bool, stiffens: bool) -> &'static str {
     match (coupled, stiffens) {
         (true, _) => {
-            "Blades are coupled by their disk; all sectors are equal, and speed neither stiffens them nor brings Coriolis \
-             forces."
+            "Blades are coupled through the disk; all sectors are equal, and speed causes neither stiffening nor \
+             Coriolis forces."
         }
         (false, true) => {
-            "Blades stand on a rigid hub and are not coupled to each other; speed stiffens them as fitted in their model."
+            "Blades are mounted on a rigid hub and are not coupled; speed stiffens them as fitted in their model."
         }
-        (false, false) => "Blades stand on a rigid hub and are not coupled to each other; speed does not stiffen them.",
+        (false, false) => "Blades are mounted on a rigid hub and are not coupled; speed does not stiffen them.",
     }
 }
 
@@ -240,7 +247,7 @@ mod tests {
         let plain = scene(|_| {});
         assert_eq!(features(&plain), Vec::<String>::new());
         let held = features(&scene(|scene| scene.settings.time.input_interpolation = InputInterpolation::Hold));
-        assert!(held.len() == 1 && held[0].contains("act at once"), "{held:?}");
+        assert!(held.len() == 1 && held[0].contains("act immediately"), "{held:?}");
         assert_eq!(limits(&plain).len(), 7);
         let text = limits(&plain).concat();
         assert!(text.contains("sticking is not modelled") && text.contains("a rigid surface"), "{text}");
@@ -252,8 +259,8 @@ mod tests {
         let mut scene = Scene { settings, roms: vec![two_sectors(false); 3] };
         scene.settings.surfaces[1].rigid = true;
         let text = features(&scene).join("\n");
-        for part in ["`cube` flies freely, at the start with 0, -100, 0 m/s", "`left` is flexible", "`right` is rigid"]
-        {
+        let free = "`cube` is a free body with the initial velocity 0, -100, 0 m/s";
+        for part in [free, "`left` is flexible", "`right` is rigid"] {
             assert!(text.contains(part), "{part}: {text}");
         }
         let text = limits(&scene).join("\n");

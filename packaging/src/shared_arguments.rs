@@ -11,16 +11,17 @@ pub struct OutputArguments {
     /// ROM file to write [default: NAME.rom.safetensors with the name of the model].
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Replace files that are there already.
+    /// Replace existing files.
     #[arg(long)]
     pub force: bool,
-    /// Accept values that are rarely meant (contact nodes far inside, lengths in millimetres, overlapping sectors) with a warning.
+    /// Accept implausible values (contact nodes far inside, lengths in millimetres, overlapping sectors), with a
+    /// warning.
     #[arg(long)]
     pub accept_implausible: bool,
     /// Also write the mesh as a CalculiX/Abaqus input file that computes its frequencies.
     #[arg(long, value_name = "FILE")]
     pub inp: Option<PathBuf>,
-    /// Also write mesh, sets and mode shapes for ParaView (.vtu).
+    /// Also write the mesh, sets and mode shapes for ParaView (.vtu).
     #[arg(long, value_name = "FILE")]
     pub vtk: Option<PathBuf>,
 }
@@ -28,10 +29,10 @@ pub struct OutputArguments {
 /// Which modes a reduction keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum KindChoice {
-    /// Modes with the contact nodes held (Craig and Bampton): the paper's. Contact nodes have mass.
+    /// Modes with fixed contact nodes (Craig and Bampton), as in the paper. Contact nodes have mass.
     CraigBampton,
-    /// Modes with the contact nodes free, and exact responses at rest to contact forces (MacNeal, Rubin): fewer modes for the
-    /// same error; with the scheme massless-boundary contact nodes have no mass.
+    /// Modes with free contact nodes, and exact static responses to contact forces (MacNeal, Rubin). Requires fewer
+    /// modes for the same error. Contact nodes have no mass with the scheme massless-boundary.
     FreeInterface,
 }
 
@@ -81,8 +82,8 @@ impl std::str::FromStr for MeshSize {
         match counts.as_deref() {
             Ok([a, b, c]) if [a, b, c].iter().all(|count| (1..=200).contains(*count)) => Ok(Self([*a, *b, *c])),
             _ => {
-                Err("give three element counts from 1 to 200: CHORDxTHICKNESSxSPAN of the blade, for example 10x1x14, \
-                      AROUNDxTHROUGHxALONG of the casing, for example 72x1x12"
+                Err("give three element counts from 1 to 200: CHORDxTHICKNESSxSPAN for a blade, for example 10x1x14, \
+                      or AROUNDxTHROUGHxALONG for a casing, for example 72x1x12"
                     .into())
             }
         }
@@ -109,6 +110,6 @@ pub fn axial(text: &str) -> Result<[f64; 2], String> {
     let ends = text.split_once(':').map(|(from, to)| [from, to].map(|end| end.trim().parse::<f64>().ok()));
     match ends {
         Some([Some(from), Some(to)]) if from < to => Ok([from, to]),
-        _ => Err("give two growing axial positions in m as FROM:TO, for example 0.002:0.038".into()),
+        _ => Err("give two increasing axial positions in m as FROM:TO, for example 0.002:0.038".into()),
     }
 }

@@ -16,25 +16,25 @@ use crate::{
 /// Arguments of `tiprub thermal`.
 #[derive(Debug, Args)]
 pub struct ThermalArguments {
-    /// Mesh file of a casing of your own, of one material: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh), instead of a contour.
+    /// Mesh file of your own casing, of one material: CalculiX/Abaqus (.inp) or Gmsh 4.1 (.msh), instead of a contour.
     #[arg(value_name = "FILE", conflicts_with_all = ["contour", "thickness", "low_flange", "high_flange", "element", "mesh"])]
     pub file: Option<PathBuf>,
-    /// Set of the nodes of the inner surface of FILE [default: found in the mesh].
+    /// Set of the nodes of the inner surface of FILE [default: detected in the mesh].
     #[arg(long, value_name = "SET", requires = "file")]
     pub contact_set: Option<String>,
-    /// Units of FILE; everything on the command line is in SI units [default: m].
+    /// Units of FILE; values on the command line are always in SI units [default: m].
     #[arg(long, value_enum, requires = "file")]
     pub units: Option<UnitChoice>,
-    /// Engine axis in FILE; the others follow in turn [default: z].
+    /// Engine axis in FILE; the other axes follow in cyclic order [default: z].
     #[arg(long, value_enum, requires = "file")]
     pub axis: Option<AxisChoice>,
     /// The casing, as for `tiprub reduce casing`: with the same options patches are the same.
     #[command(flatten)]
     pub ring: RingArguments,
-    /// Conductivity (W/(m K)), instead of the material's [default: 53.3 of steel, 6.7 of titanium].
+    /// Conductivity (W/(m K)), instead of the material's [default: 53.3 for steel, 6.7 for titanium].
     #[arg(long, value_name = "K")]
     pub conductivity: Option<f64>,
-    /// Specific heat capacity (J/(kg K)), instead of the material's [default: 439.8 of steel, 526.3 of titanium].
+    /// Specific heat capacity (J/(kg K)), instead of the material's [default: 439.8 for steel, 526.3 for titanium].
     #[arg(long, value_name = "C")]
     pub heat_capacity: Option<f64>,
     /// Film coefficient of the gas inside (W/(m2 K)) [default: 500].
@@ -43,14 +43,15 @@ pub struct ThermalArguments {
     /// Film coefficient of the air outside (W/(m2 K)) [default: 25].
     #[arg(long, value_name = "H")]
     pub ambient_film: Option<f64>,
-    /// Axial positions (m) between which the inner surface is heated [default: from the first to the last contact ring; of
-    /// FILE without --contact-axial all of it].
+    /// Axial positions (m) between which the inner surface is heated [default: from the first to the last contact ring;
+    /// the whole surface of FILE without --contact-axial].
     #[arg(long, value_name = "FROM:TO", value_parser = axial, allow_hyphen_values = true)]
     pub heated: Option<[f64; 2]>,
-    /// Eigenmodes kept besides responses at rest [default: 20].
+    /// Number of eigenmodes kept in addition to the steady-state responses [default: 20].
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
-    /// Name of the model [default: casing37_thermal, of another casing casing_thermal, of FILE its name and _thermal].
+    /// Name of the model [default: casing37_thermal; casing_thermal for another casing; for FILE, its name with
+    /// _thermal].
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
     /// FMI version of the FMU.
@@ -59,7 +60,7 @@ pub struct ThermalArguments {
     /// The .fmu file, or a directory for it (always a directory with `--fmi both`).
     #[arg(long, short, value_name = "FILE|DIR", default_value = ".")]
     pub output: PathBuf,
-    /// FMI 3: keep arrays whole, instead of scalars with the names of FMI 2.
+    /// FMI 3: write arrays instead of scalars with the names of FMI 2.
     #[arg(long)]
     pub arrays: bool,
     /// Libraries that go into the FMU.

@@ -19,15 +19,16 @@ const MODEL: (&str, &str, &str, &str) = (
     "resources/casing.thermal.safetensors",
     "application/octet-stream",
     "model",
-    "The reduced-order model of conduction this FMU is",
+    "The reduced-order model of heat conduction",
 );
 
-const ABOUT: &str = "This unit conducts heat through a casing: a reduced-order model of finite elements, with the gas inside and the air \
-    outside. The importer sets the heat into each patch and the temperatures of gas and air, and reads temperatures and heat. It is \
-    the partner of the contact unit: casing_friction_power there is casing_heat here, casing_temperature here is casing_temperature \
-    there. Each communication step is solved exactly, however long it is.";
-const STEPS: &str = "Heat is held over a step, so that what is handed over is its value times the length of the step. Heat flows from gas \
-    and air are averages over the step just finished.";
+const ABOUT: &str = "This FMU computes heat conduction through a casing with a reduced finite-element model, with gas \
+    inside and air outside. The importer sets the heat into each patch and the temperatures of gas and air, and reads \
+    temperatures and heat flows. To couple it with a contact FMU, connect casing_friction_power there to casing_heat \
+    here, and casing_temperature here to casing_temperature there. Each communication step is solved exactly, \
+    however long it is.";
+const STEPS: &str = "Heat inputs are constant over a step, so that the transferred heat is the value times the \
+    length of the step. Heat flows from gas and air are averages over the last communication step.";
 
 /// A model made ready for packaging.
 #[derive(Debug)]
@@ -82,10 +83,10 @@ impl<'a> ThermalPackage<'a> {
             structures: Vec::new(),
             features: vec![model.origin.clone()],
             limits: vec![
-                "Conductivity, heat capacity and film coefficients do not depend on temperature; nothing radiates."
+                "Conductivity, heat capacity and film coefficients do not depend on temperature; there is no radiation."
                     .into(),
-                "The end faces let no heat through.".into(),
-                "Heat comes in evenly over the heated surface of a patch: flashes of single contacts are not resolved."
+                "The end faces are adiabatic.".into(),
+                "Heat enters evenly over the heated surface of a patch: flashes of single contacts are not resolved."
                     .into(),
             ],
             warnings: Vec::new(),

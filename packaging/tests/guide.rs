@@ -90,8 +90,8 @@ fn the_first_run_at_halved_steps() {
             let rest = line.split_once(name).unwrap().1.trim_start_matches(|c: char| !c.is_ascii_digit());
             rest.split(' ').next().unwrap().parse::<f64>().unwrap()
         };
-        let sum = number("largest normal force of all contact nodes together, mean over a communication step:");
-        let node = number("largest normal force of one contact node in an internal step:");
+        let sum = number("largest total normal force of all contact nodes, mean over a communication step:");
+        let node = number("largest normal force on a single contact node in an internal step:");
         let [heat, curvature] = ["friction_loss", "curvature_work"].map(number);
         told!("| {step} | {sum} | {node} | {heat} | {curvature} |");
     }

@@ -212,7 +212,7 @@ def test_progress_goes_to_stderr_unless_quiet(blade, tmp_path, capsys):
 def test_reductions_say_where_they_are(tmp_path):
     made = module.reduce("casing", output=tmp_path / "casing.rom.safetensors", element="hex8", mesh="24x1x6", contact_grid="12x3", patches="0x0", modes=12, quiet=True)
     assert made.path == tmp_path / "casing.rom.safetensors" and made.path.is_file() and made["rom"]["name"]
-    with pytest.raises(module.Error, match="there already.*--force"):
+    with pytest.raises(module.Error, match="already exists.*--force"):
         module.reduce("casing", output=made, quiet=True)
 
 

@@ -72,7 +72,7 @@ fn existing(path: PathBuf, argument: &str, remedy: &str) -> Result<PathBuf, Stri
         return Err(format!("{argument} \"{}\" is not absolute. {remedy}", path.display()));
     }
     if !path.is_dir() {
-        return Err(format!("{argument} \"{}\" is not a directory that can be read. {remedy}", path.display()));
+        return Err(format!("{argument} \"{}\" is not a readable directory. {remedy}", path.display()));
     }
     Ok(path)
 }
@@ -140,7 +140,7 @@ mod tests {
             ("file:relative/resources", "not absolute"),
             ("file:///tmp/a%00b", "NUL"),
             ("file:///tmp/%ff%fe", "UTF-8"),
-            ("file:///no/such/directory", "not a directory"),
+            ("file:///no/such/directory", "not a readable directory"),
             ("f\u{fc}le", "not a file: URI"),
         ] {
             let message = from_uri(uri).unwrap_err();
@@ -176,6 +176,6 @@ mod tests {
         assert_eq!(from_native(&format!("file://{}", text.replace('%', "%25"))).as_deref(), Ok(path));
         assert!(from_native("").unwrap_err().contains("empty"));
         assert!(from_native("resources").unwrap_err().contains("not absolute"));
-        assert!(from_native("/no/such/directory").unwrap_err().contains("not a directory"));
+        assert!(from_native("/no/such/directory").unwrap_err().contains("not a readable directory"));
     }
 }

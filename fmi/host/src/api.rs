@@ -41,7 +41,8 @@ macro_rules! api {
             pub fn load(path: &Path) -> Result<Self> {
                 // SAFETY: loading runs the library's initialisers; that is what importing an FMU means, and the user named it.
                 let library = unsafe { Library::new(path) }.map_err(|error| {
-                    Failure::new(path.display(), format!("cannot be loaded: {error}"), "Is it for this machine?")
+                    let remedy = "Check that the library was built for this machine";
+                    Failure::new(path.display(), format!("cannot be loaded: {error}"), remedy)
                 })?;
                 Ok(Self {
                     // SAFETY: the types are those of the standard's header; the library is kept as long as the functions.

@@ -53,7 +53,7 @@ pub(crate) fn write_into(target: impl Write + Seek, entries: &[ArchiveEntry]) ->
             .start_file(entry.name.as_str(), options(entry))
             .map_err(|error| Failure::new(&entry.name, format!("cannot be added: {error}"), ""))?;
         writer.write_all(&entry.bytes).map_err(|error| {
-            Failure::new(&entry.name, format!("cannot be written: {error}"), "Check the space on the disk")
+            Failure::new(&entry.name, format!("cannot be written: {error}"), "Check the free disk space")
         })?;
     }
     writer.finish().map_err(|error| Failure::new("archive", format!("cannot be finished: {error}"), ""))?;
@@ -81,15 +81,16 @@ fn check_names(entries: &[ArchiveEntry]) -> Result<()> {
         if !parts_legal || !characters_legal {
             return Err(Failure::new(
                 name,
-                "not a name for a file in an FMU",
+                "not a valid file name in an FMU",
                 "Use ASCII letters and digits, relative paths and forward slashes",
             ));
         }
         if u32::try_from(entry.bytes.len()).is_err() {
-            return Err(Failure::new(name, "4 GiB or more", "An FMU cannot hold such a file; reduce the model"));
+            let remedy = "Reduce the model: files in an FMU must be smaller than 4 GiB";
+            return Err(Failure::new(name, "the file has 4 GiB or more", remedy));
         }
         if !seen.insert(name) {
-            return Err(Failure::new(name, "twice in the same archive", "Give the files different names"));
+            return Err(Failure::new(name, "the archive contains this name twice", "Give the files different names"));
         }
     }
     Ok(())

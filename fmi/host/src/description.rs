@@ -110,7 +110,7 @@ pub fn parse(text: &str) -> Result<ImportedDescription> {
 }
 
 fn wrong(problem: impl std::fmt::Display) -> Failure {
-    Failure::new("modelDescription.xml", problem, "Make the FMU again with the tool that wrote it")
+    Failure::new("modelDescription.xml", problem, "Create the FMU again with the tool that wrote it")
 }
 
 #[derive(Default)]
@@ -136,7 +136,9 @@ impl Parser {
             }
             ("fmiModelDescription", "DefaultExperiment") => {
                 for (key, value) in attributes {
-                    let value = value.parse().map_err(|_| wrong(format!("DefaultExperiment {key} = {value:?}")))?;
+                    let value = value
+                        .parse()
+                        .map_err(|_| wrong(format!("DefaultExperiment {key} = {value:?} is not a number")))?;
                     self.description.experiment.insert(key, value);
                 }
             }
@@ -172,7 +174,7 @@ impl Parser {
     }
 
     fn variable(&mut self, attributes: &Attributes, kind: VariableType) -> Result<()> {
-        let name = attributes.get("name").cloned().ok_or_else(|| wrong("a variable without a name"))?;
+        let name = attributes.get("name").cloned().ok_or_else(|| wrong("a variable has no name"))?;
         let reference = attributes.get("valueReference").and_then(|text| text.parse().ok());
         let reference = reference.ok_or_else(|| wrong(format!("variable {name} has no valid valueReference")))?;
         if attributes.get("causality").is_some_and(|causality| causality == "structuralParameter")
@@ -246,10 +248,10 @@ fn read_attributes(element: &BytesStart<'_>) -> Result<Attributes> {
         if index == MOST_ATTRIBUTES {
             return Err(wrong(format!("an element has more than {MOST_ATTRIBUTES} attributes")));
         }
-        let attribute = attribute.map_err(|error| wrong(format!("attribute: {error}")))?;
+        let attribute = attribute.map_err(|error| wrong(format!("invalid attribute: {error}")))?;
         let value = attribute
             .normalized_value(XmlVersion::Implicit1_0)
-            .map_err(|error| wrong(format!("value of an attribute: {error}")))?;
+            .map_err(|error| wrong(format!("invalid attribute value: {error}")))?;
         attributes.insert(attribute.key.local_name().as_ref().to_string(), value.into_owned());
     }
     Ok(attributes)

@@ -122,8 +122,8 @@ impl HostedSlave for Fmi3Slave {
         if terminate || early || last_time.to_bits() != (time + step).to_bits() {
             return Err(Failure::new(
                 "FMU",
-                format!("fmi3DoStep from {time} s by {step} s ended at {last_time} s"),
-                "Neither early return nor event mode was asked for",
+                format!("fmi3DoStep from {time} s with step size {step} s ended at {last_time} s"),
+                "Report this to the author of the FMU: neither early return nor event mode was requested",
             ));
         }
         Ok(())

@@ -62,8 +62,8 @@ pub fn open_archive(path: &Path) -> Result<ZipArchive<io::BufReader<fs::File>>> 
     ZipArchive::new(io::BufReader::new(file)).map_err(|error| {
         Failure::new(
             path.display(),
-            format!("not a whole zip archive ({error})"),
-            "The file is truncated or no FMU. Copy it again, or make it again with `tiprub package`",
+            format!("not a complete zip archive ({error})"),
+            "Copy the file again or recreate it with `tiprub package`; it is truncated or not an FMU",
         )
     })
 }
@@ -83,11 +83,11 @@ pub fn entries(archive: &mut ZipArchive<impl Read + io::Seek>) -> Result<Vec<(St
     }
     if total > LARGEST_UNPACKED {
         let problem =
-            format!("its files would take {total} bytes unpacked, more than the {LARGEST_UNPACKED} that are unpacked");
+            format!("its files would take {total} bytes unpacked, more than the limit of {LARGEST_UNPACKED} bytes");
         return Err(Failure::new(
             "archive",
             problem,
-            "Do not trust this file; an FMU of this size needs a smaller ROM",
+            "Do not trust this file; if it is your own FMU, use a smaller ROM",
         ));
     }
     Ok(entries)
@@ -109,7 +109,7 @@ pub(crate) fn unpack_entry(
     // Past the end the checksum is compared.
     let more = entry.read(&mut [0]).map_err(|error| damaged(name, &error))?;
     if written != size || more != 0 {
-        return Err(damaged(name, &format!("its size is not the {size} bytes announced")));
+        return Err(damaged(name, &format!("its size differs from the {size} bytes that the archive declares")));
     }
     Ok(())
 }
@@ -117,16 +117,16 @@ pub(crate) fn unpack_entry(
 /// A file may not be larger than what it can mean.
 fn check_size(name: &str, size: u64, largest: Option<u64>) -> Result<()> {
     let Some(most) = largest.filter(|most| size > *most) else { return Ok(()) };
-    let problem = format!("it would take {size} bytes unpacked, more than the {most} that such a file may have");
+    let problem = format!("it would take {size} bytes unpacked, more than the limit of {most} bytes for this file");
     Err(Failure::new(
         format!("entry {name}"),
         problem,
-        "Do not trust this file; make the FMU again with `tiprub package`",
+        "Do not trust this file; recreate the FMU with `tiprub package`",
     ))
 }
 
 fn damaged(name: &str, error: &dyn std::fmt::Display) -> Failure {
-    let remedy = "Copy the file again, or make it again with `tiprub package`";
+    let remedy = "Copy the file again or recreate it with `tiprub package`";
     Failure::new(format!("entry {name}"), format!("damaged ({error})"), remedy)
 }
 
@@ -153,7 +153,7 @@ impl UnpackedFmu {
             check_size(name, *size, largest(name)).map_err(in_file)?;
         }
         let directory = TempDir::with_prefix("tiprub-fmu-")
-            .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
+            .map_err(|error| Failure::file(&std::env::temp_dir(), "cannot create a temporary directory", &error))?;
         for (index, (name, _)) in entries.into_iter().enumerate() {
             let unpacked = if largest(&name).is_some() {
                 unpack(&mut archive, index, &name, directory.path())
@@ -169,7 +169,7 @@ impl UnpackedFmu {
             Failure::new(
                 path.display(),
                 format!("has no readable modelDescription.xml ({error})"),
-                "An FMU has this file at its root; is this one?",
+                "Give an FMU: a zip archive with this file at its root",
             )
         })?;
         let description = parse(&text).map_err(in_file)?;
@@ -192,7 +192,7 @@ impl UnpackedFmu {
         Err(Failure::new(
             "FMU",
             format!(
-                "has no library for {}-{}, but for {}",
+                "has no library for {}-{}; available platforms: {}",
                 std::env::consts::ARCH,
                 std::env::consts::OS,
                 if held.is_empty() { "none" } else { &held }
@@ -219,7 +219,9 @@ impl UnpackedFmu {
         match self.description.fmi_version.as_str() {
             "2.0" => Ok(Box::new(fmi2::Fmi2Slave::new(self)?)),
             "3.0" => Ok(Box::new(fmi3::Fmi3Slave::new(self)?)),
-            other => Err(Failure::new("FMU", format!("FMI version {other}"), "Only 2.0 and 3.0 can be imported")),
+            other => {
+                Err(Failure::new("FMU", format!("FMI version {other} is not supported"), "Use FMI 2.0 or 3.0"))
+            }
         }
     }
 }
@@ -230,7 +232,7 @@ fn unpack(archive: &mut ZipArchive<impl Read + io::Seek>, index: usize, name: &s
     }
     let target = inside(directory, name)?;
     if let Some(parent) = target.parent() {
-        fs::create_dir_all(parent).map_err(|error| Failure::file(parent, "cannot be made", &error))?;
+        fs::create_dir_all(parent).map_err(|error| Failure::file(parent, "cannot be created", &error))?;
     }
     let mut file = fs::File::create(&target).map_err(|error| Failure::file(&target, "cannot be written", &error))?;
     unpack_entry(archive, index, name, &mut file)
@@ -242,7 +244,7 @@ fn inside(directory: &Path, name: &str) -> Result<PathBuf> {
     if relative.components().all(|component| matches!(component, Component::Normal(_))) {
         return Ok(directory.join(relative));
     }
-    Err(Failure::new(name, "leads out of the archive", "Do not trust this file"))
+    Err(Failure::new(name, "points outside the archive", "Do not trust this file"))
 }
 
 #[cfg(test)]
@@ -265,7 +267,7 @@ mod tests {
             fs::write(&path, &bytes[..length]).unwrap();
             let failure = UnpackedFmu::open(&path).unwrap_err();
             assert!(failure.what.ends_with("x.fmu"), "{failure}");
-            assert!(failure.problem.contains("not a whole zip") && failure.remedy.contains("again"), "{failure}");
+            assert!(failure.problem.contains("not a complete zip") && failure.remedy.contains("again"), "{failure}");
         }
     }
 

@@ -94,7 +94,7 @@ impl MessageList {
 
     /// The last message as the end of a sentence.
     pub(super) fn last_words(&self) -> String {
-        self.0.borrow().last().map_or_else(|| " without a message".into(), |message| format!(" and said: {message}"))
+        self.0.borrow().last().map_or_else(|| " without a message".into(), |message| format!(": {message}"))
     }
 }
 
@@ -109,7 +109,7 @@ pub(super) fn check(function: &str, time: Option<f64>, status: i32, messages: &M
         _ => "an unknown status",
     };
     let at = time.map(|time| format!(" at t = {time} s")).unwrap_or_default();
-    Err(Failure::new("FMU", format!("{function}{at} answered {status_name}{}", messages.last_words()), ""))
+    Err(Failure::new("FMU", format!("{function}{at} returned {status_name}{}", messages.last_words()), ""))
 }
 
 /// A string for the C side.
@@ -128,7 +128,7 @@ mod tests {
         messages.push(c"speed is NaN");
         assert!(check("f", None, 0, &messages).is_ok() && check("f", None, 1, &messages).is_ok());
         let failure = check("fmi3DoStep", Some(0.5), 3, &messages).unwrap_err();
-        assert_eq!(failure.problem, "fmi3DoStep at t = 0.5 s answered Error and said: speed is NaN");
+        assert_eq!(failure.problem, "fmi3DoStep at t = 0.5 s returned Error: speed is NaN");
     }
 
     #[test]

@@ -121,7 +121,7 @@ fn the_page_tells_of_grid_heat_and_spin() {
     let roms = scene::complete().roms;
     let page = html(&scene::description(simulation.table(), &roms, true));
     for part in [
-        "a grid of 24 around and 3 along",
+        "a grid of 24 around the circumference and 3 along the axis",
         "speeds up to 2000 rad/s",
         "<td class=\"number\">90.0000 to 180.000</td><td class=\"number\">-0.02000 to 0.05000</td>",
         "<code>casing_temperature[1..4]</code></td><td>K</td>",

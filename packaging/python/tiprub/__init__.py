@@ -188,7 +188,7 @@ def reduce(kind: str, file: Optional[Place] = None, output: Optional[Place] = No
     Raises
     ------
     Error
-        Wrong files or options, or a file that is there already (`force=True` replaces it).
+        Wrong files or options, or a file that already exists (`force=True` replaces it).
     """
     words = ["reduce", kind_of(kind), *options({"output": output}, more)]
     answer = call(words, [place("file", file)] if file is not None else [], quiet)

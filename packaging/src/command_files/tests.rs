@@ -129,7 +129,7 @@ fn no_command_replaces_what_it_reads() {
             let line = line.replace("{}", &link.display().to_string()).replace("SCENE", &scene.display().to_string());
             let line = format!("{line} {}", words.replace("{}", &target.display().to_string()));
             let failure = answer(&line).expect_err(&line);
-            let is_named = ["is the same file as", "a file of the study may replace"];
+            let is_named = ["is the same file as", "the study may overwrite"];
             assert!(failure.usage && is_named.iter().any(|words| failure.problem.contains(words)), "{line}: {failure}");
             pairs += 1;
         }

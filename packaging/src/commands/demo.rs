@@ -47,11 +47,11 @@ pub const FILES: [&str; 6] = [ROM_FILE, SCENE_FILE, REPORT_FILE, CSV_FILE, "roto
 const LARGEST_SCENE: u64 = 1 << 20;
 
 /// Where the error study is that the demo does not run.
-const STUDY: &str = "error against run time of every method: see the picture in the report; to measure it here (minutes), run\n  \
-                     tiprub study error builtin:rotor37 --quick\n";
+const STUDY: &str = "The report shows the error against run time of every method. To measure it on this machine (takes \
+                     minutes), run\n  tiprub study error builtin:rotor37 --quick\n";
 
 /// Remedy for a scene in the directory that somebody changed.
-const KEEP: &str = "Give the demo another directory with --out, or copy your file elsewhere and delete it here";
+const KEEP: &str = "Choose another directory with --out, or move your file elsewhere";
 
 /// Wall times of the parts of the demo.
 #[derive(Debug, Default)]
@@ -210,7 +210,7 @@ impl Demo<'_> {
             ("rotor37_fmi2.fmu", "FMU for FMI 2.0 co-simulation"),
             ("rotor37_fmi3.fmu", "FMU for FMI 3.0 co-simulation"),
             (CSV_FILE, "all outputs at all communication points"),
-            (SCENE_FILE, "the scene; copy it, change it, and give it to tiprub run or tiprub package"),
+            (SCENE_FILE, "the scene; copy and edit it, then use it with tiprub run or tiprub package"),
             (ROM_FILE, "the reduced-order model of the blade"),
         ];
         list.map(|(name, meaning)| ReportFile {
@@ -228,12 +228,12 @@ impl Demo<'_> {
             return Err(Failure::new(
                 &run.label,
                 format!(
-                    "{} of {} values differ from the native run, first {name} at t = {time} s, by at most {:e}",
+                    "{} of {} values differ from the native run, first in {name} at t = {time} s, by at most {:e}",
                     run.agreement.different,
                     run.agreement.points * run.agreement.variables,
                     run.agreement.largest
                 ),
-                "The library was built from other sources than tiprub itself; build both together",
+                "Build the library and tiprub from the same sources",
             ));
         }
         let stepping = self.native.stepping.as_secs_f64();

@@ -41,8 +41,8 @@ pub fn run(command: &Command, console: &Console) -> Result<CommandOutcome> {
 fn walled(work: impl FnOnce() -> Result<CommandOutcome>) -> Result<CommandOutcome> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
-        let problem = format!("a defect of this program stopped the work: {}", text.unwrap_or("no message"));
-        let remedy = "Report it to the developers, with the command line, its files and what is said above";
+        let problem = format!("an internal error stopped the program: {}", text.unwrap_or("no message"));
+        let remedy = "Report it to the developers, with the command line, its files and the messages above";
         Err(Failure::new("tiprub", problem, remedy))
     })
 }

@@ -72,7 +72,7 @@ pub(crate) fn targets(fmi: FmiChoice, output: &Path, name: &str) -> Result<Vec<(
         (true, [version]) => Ok(vec![(*version, output.to_path_buf())]),
         (true, _) => Err(Failure::usage(
             format!("--output {}", output.display()),
-            "is one file for two FMUs",
+            "names one file for two FMUs",
             "Give a directory, or choose one with --fmi 2 or --fmi 3",
         )),
         (false, _) => {

@@ -77,7 +77,7 @@ fn check_slips(reduced: &ReducedModel, facts: &RomFacts, is_meant: bool) -> Resu
     let slips = [reduced.slips.clone(), facts.slips()].concat();
     match slips.first().filter(|_| !is_meant) {
         Some(Slip { what, problem, question }) => {
-            let remedy = format!("{question} If you mean it, use --accept-implausible");
+            let remedy = format!("{question} If the value is correct, use --accept-implausible");
             Err(Failure::new(what, problem, remedy))
         }
         None => Ok(slips.iter().map(Slip::warning).collect()),
@@ -91,7 +91,7 @@ fn check_slips(reduced: &ReducedModel, facts: &RomFacts, is_meant: bool) -> Resu
 pub fn check_target(path: &Path, force: bool) -> Result<()> {
     if path.is_file() && !force {
         let remedy = "Choose another file, or replace it with --force";
-        return Err(Failure::new(path.display(), "is there already", remedy));
+        return Err(Failure::new(path.display(), "already exists", remedy));
     }
     if path.exists() {
         return output_file::begin(path).map(drop);
@@ -121,7 +121,7 @@ fn text(reduced: &ReducedModel, facts: &RomFacts, paths: &[&Path]) -> String {
             check.frequency_deviation().into_iter().fold(0.0, |worst: f64, deviation| worst.max(deviation.abs()));
         let _ = write!(
             text,
-            "\n  at {} rad/s: {:.2} Hz first; frequencies off by up to {worst:.3} %, growth by {:.3} %",
+            "\n  at {} rad/s: first frequency {:.2} Hz; frequencies deviate by up to {worst:.3} %, growth by {:.3} %",
             check.speed,
             check.reduced_frequencies.first().copied().unwrap_or(0.0),
             check.growth_deviation()
@@ -229,8 +229,8 @@ fn spin_warning(checks: &[tiprub_model::spin::SpinCheck]) -> Option<String> {
     let check =
         checks.iter().max_by(|a, b| worst(a).total_cmp(&worst(b))).filter(|check| worst(check) > SPIN_DEVIATION)?;
     Some(format!(
-        "at {} rad/s frequencies or growth of the reduced model are off by {:.1} %: stiffening and growth over this range are \
-         not to be trusted. Give a lower --spin",
+        "at {} rad/s, frequencies or growth of the reduced model deviate by {:.1} % from the full model: stiffening \
+         and growth are unreliable over this range. Give a lower --spin",
         check.speed,
         worst(check)
     ))

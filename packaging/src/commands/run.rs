@@ -40,7 +40,8 @@ fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
 pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome> {
     let to_stdout = arguments.csv.as_deref() == Some(Path::new("-"));
     if to_stdout && console.is_json() {
-        return Err(Failure::usage("--csv -", "and --json both want stdout", "Give --csv a file"));
+        let problem = "cannot be used with --json, as both write to stdout";
+        return Err(Failure::usage("--csv -", problem, "Give a file to --csv"));
     }
     let scene = arguments.options.load(&arguments.scene, &arguments.cache.cache(), console)?;
     let schedule = Schedule::new(&scene.settings.experiment, arguments.stop, arguments.step)?;
@@ -107,7 +108,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         let told =
             if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::errors_text(&estimates)) };
         let hint =
-            if arguments.estimate { "" } else { "\nerrors of this run, estimated from coarser runs: --estimate" };
+            if arguments.estimate { "" } else { "\nto estimate the errors of this run with coarser runs: --estimate" };
         format!("{}{told}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))
     };
     let (text, rest) = if to_stdout { (run.recording.to_csv(), String::new()) } else { (answer::text(&answer), rest) };
@@ -123,7 +124,7 @@ fn where_the_rest_is(json: &Value, warned: bool) -> String {
     let mut text = format!(
         "\n{}: t = {} s to {} s, computed in {:.3} s ({:.3} s of computing per simulated second)\n\
          scheme: {}\n\
-         final outputs, extremes, times and full warnings: --all; outputs over time: {}",
+         for final outputs, extremes, times and full warnings: --all; outputs over time: {}",
         json["model"].as_str().unwrap_or_default(),
         json["start"],
         json["stop"],
@@ -133,7 +134,7 @@ fn where_the_rest_is(json: &Value, warned: bool) -> String {
         json["csv"].as_str().unwrap_or("--csv FILE"),
     );
     if warned {
-        text.push_str("\nmeaning of a warning: docs/warnings.md; to suppress it: --silence ID");
+        text.push_str("\nfor the meaning of a warning: docs/warnings.md; to suppress it: --silence ID");
     }
     text
 }
@@ -167,7 +168,7 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
         "{}: t = {} s to {} s, communication steps: {}, internal steps: {}\n\
          scheme: {}\n\
          stepping took {:.3} s: {:.3} µs per internal step, {:.3} s of computing per simulated second\n\
-         one communication step took {:.3} ms, at most {:.3} ms\n",
+         one communication step took {:.3} ms on average, {:.3} ms at most\n",
         json["model"].as_str().unwrap_or_default(),
         json["start"],
         json["stop"],
@@ -181,10 +182,12 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
         per_step("most"),
     );
     if let (Some(missed), Some(trials)) = (json["missed_steps"].as_u64(), json["internal_trials"].as_u64()) {
-        text.push_str(&format!("steps of all blades: {trials} tried, {missed} of the shortest missed the tolerance\n"));
+        text.push_str(&format!(
+            "steps of all blades: {trials} tried, {missed} of the shortest length missed the tolerance\n"
+        ));
     }
     if !extremes.is_empty() {
-        text.push_str("\nover the run:\n");
+        text.push_str("\nextremes over the run:\n");
         text.extend(extremes.iter().map(|extreme| format!("  {}\n", extreme.line())));
     }
     if !warnings.is_empty() {
@@ -200,7 +203,7 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
 
 /// All outputs at the end of the run.
 fn outputs(names: &[String], last: &[f64]) -> String {
-    let mut text = "at the end:\n".to_owned();
+    let mut text = "values at the end:\n".to_owned();
     let width = names.iter().map(String::len).max().unwrap_or(0);
     let array = |name: &str| name.rsplit_once('[').map_or(name, |(array, _)| array).to_owned();
     let mut rest = names.iter().zip(last).peekable();

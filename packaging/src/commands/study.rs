@@ -65,7 +65,8 @@ fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOut
             outcome.text.push_str(&format!("\n{}", estimate::errors_text(&estimate::of_rom(&rom))));
         } else {
             let warning = format!(
-                "{} is the ROM as it was: no error by its modes, patches or mesh was found, for the reasons above",
+                "{} contains the ROM unchanged: no error due to its modes, patches or mesh was found, for the reasons \
+                 above",
                 path.display()
             );
             outcome.text.push_str(&format!("\nwarning: {warning}"));

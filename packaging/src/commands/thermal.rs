@@ -40,9 +40,9 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<CommandOut
     };
     let property = |given: Option<f64>, known: Option<f64>, option: &str| {
         given.or(known).ok_or_else(|| {
-            let problem = "how this material conducts heat is not known here";
+            let problem = "the thermal properties of this material are unknown";
             let what = if arguments.ring.material.is_some() { "--material maraging-steel" } else { "material of FILE" };
-            Failure::usage(what, problem, format!("Give --{option} too"))
+            Failure::usage(what, problem, format!("Also give --{option}"))
         })
     };
     let options = ConductionOptions {
@@ -92,8 +92,9 @@ fn facts(reduced: &ConductionReduction) -> String {
         reduced;
     let mut text = format!(
         "{}: {nodes} nodes, {elements} elements, {} coordinates, {} patches\n  \
-         heat capacity {:.1} J/K; in the gas {:.4} m2, {:.2} W/K; in the air {:.4} m2, {:.2} W/K; heated {:.4} m2\n  \
-         slowest time constants of the full model: {} s\n  steady states against the full model, patches and heated surfaces:",
+         heat capacity {:.1} J/K; gas side {:.4} m2, {:.2} W/K; air side {:.4} m2, {:.2} W/K; heated area {:.4} m2\n  \
+         slowest time constants of the full model: {} s\n  \
+         steady-state deviation from the full model (patches, heated surfaces) for factors of the film coefficients:",
         model.name,
         model.order(),
         model.patches.len(),
@@ -107,7 +108,7 @@ fn facts(reduced: &ConductionReduction) -> String {
     );
     for check in checks {
         let [gas, air] = check.factors;
-        let _ = write!(text, "\n    factors {gas} and {air}: {:.1e}, {:.1e}", check.patches, check.surfaces);
+        let _ = write!(text, "\n    gas {gas}, air {air}: {:.1e}, {:.1e}", check.patches, check.surfaces);
     }
     text
 }

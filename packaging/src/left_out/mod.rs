@@ -124,8 +124,9 @@ fn seconds(scene: &Scene) -> Option<f64> {
 /// The list as text.
 pub fn text(all: &[LeftOut]) -> String {
     let mut text = String::new();
-    for (group, title) in [(RowGroup::Physics, "left out here"), (RowGroup::Machinery, "machinery that is off")] {
-        let _ = writeln!(text, "\n{title:<53} what it needs");
+    let groups = [(RowGroup::Physics, "effects left out here"), (RowGroup::Machinery, "features that are off")];
+    for (group, title) in groups {
+        let _ = writeln!(text, "\n{title:<53} how to include it");
         for LeftOut { effect, cost } in all.iter().filter(|one| one.effect.group == group) {
             let _ = writeln!(text, "  {:<51} {}{}", effect.name, effect.takes, cost_text(cost.as_ref()));
         }
@@ -172,8 +173,8 @@ pub fn json(all: &[LeftOut]) -> Value {
 /// The table of the guide.
 pub fn markdown() -> String {
     let mut text = String::new();
-    for (group, title) in [(RowGroup::Physics, "effect"), (RowGroup::Machinery, "machinery")] {
-        let _ = write!(text, "\n| {title} | what it takes |\n|---|---|\n");
+    for (group, title) in [(RowGroup::Physics, "effect"), (RowGroup::Machinery, "feature")] {
+        let _ = write!(text, "\n| {title} | how to include it |\n|---|---|\n");
         for effect in EFFECTS.iter().filter(|effect| effect.group == group) {
             let _ = writeln!(text, "| {} | {} |", effect.name, effect.takes);
         }

@@ -106,18 +106,18 @@ impl Effect {
 /// All of them.
 pub static EFFECTS: &[Effect] = &[
     physics("friction", "`contact.friction`", always, |scene| contact(scene, |one| one.friction > 0.0)),
-    physics("friction that sticks", "`contact.solver = \"coulomb\"`", always, |scene| {
+    physics("sticking friction", "`contact.solver = \"coulomb\"`", always, |scene| {
         contact(scene, |one| one.solver == Solver::Coulomb)
     })
     .by(|scene| scene.settings.contacts.iter_mut().for_each(|one| one.solver = Solver::Coulomb)),
     physics(
-        "contact at both sides of the tip",
+        "separate contact of both sides of the tip",
         "a ROM with two rows of patches (`--contact-rows 2`)",
         rotates,
         |scene| rotors(scene).any(|(_, rom)| rom.rows() > 1),
     ),
-    physics("a casing that bends", "`surface.structure`, a ROM of the casing", rotates, flexible),
-    physics("blades coupled by their disk", "a ROM of a sector (`tiprub reduce sector`)", rotates, |scene| {
+    physics("flexible casing", "`surface.structure`, a ROM of the casing", rotates, flexible),
+    physics("blades coupled through the disk", "a ROM of a sector (`tiprub reduce sector`)", rotates, |scene| {
         scene.roms.iter().any(Rom::is_cyclic)
     }),
     physics("mistuning", "`structure.frequency_factors`, one per blade", rotates, |scene| {
@@ -152,7 +152,7 @@ pub static EFFECTS: &[Effect] = &[
         rotor(scene, |one| one.thermal)
     })
     .by(|scene| each_rotor(scene, |one| one.thermal = true)),
-    physics("blades that soften with heat", "`structure.softening`, `structure.thermal`", rotates, |scene| {
+    physics("softening of heated blades", "`structure.softening`, `structure.thermal`", rotates, |scene| {
         rotor(scene, |one| one.softening > 0.0)
     })
     .by(|scene| each_rotor(scene, |one| (one.thermal, one.softening) = (true, 5e-4))),
@@ -164,7 +164,7 @@ pub static EFFECTS: &[Effect] = &[
             ExcitationSettings { order: 2, mode: Some(1), node: None, direction: None, amplitude: 0.0, phase: 0.0 };
         each_rotor(scene, |one| one.excitation = Some(excitation.clone()));
     }),
-    physics("blades that move at the start", "`structure.initial`", rotates, |scene| {
+    physics("initial motion of the blades", "`structure.initial`", rotates, |scene| {
         rotor(scene, |one| !one.initial.is_empty())
     })
     .by(|scene| {
@@ -178,11 +178,11 @@ pub static EFFECTS: &[Effect] = &[
         };
         each_rotor(scene, |one| one.initial = vec![initial]);
     }),
-    physics("damping of single modes", "`structure.damping_ratios`", rotates, |scene| {
+    physics("damping ratios of single modes", "`structure.damping_ratios`", rotates, |scene| {
         scene.settings.structures.iter().any(|one| !one.damping_ratios.is_empty())
     })
     .by(|scene| each_rotor(scene, |one| one.damping_ratios = vec![1e-3])),
-    physics("a casing that moves", "`surface.moving`", rotates, |scene| surface(scene, |one| one.moving))
+    physics("moving casing", "`surface.moving`", rotates, |scene| surface(scene, |one| one.moving))
         .by(|scene| scene.settings.surfaces.iter_mut().for_each(|one| one.moving = true)),
     physics("temperature of the casing", "`structure.thermal` of the casing", flexible, |scene| {
         casing(scene, |one| one.thermal)
@@ -192,10 +192,10 @@ pub static EFFECTS: &[Effect] = &[
         casing(scene, |one| one.load.is_some())
     })
     .by(|scene| each_casing(scene, |one| one.load = Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 }))),
-    physics("a coating that wears", "`contact.coating`, one-row ROM, fixed steps", rotates, |scene| {
+    physics("wear of a coating", "`contact.coating`, one-row ROM, fixed steps", rotates, |scene| {
         contact(scene, |one| one.coating.is_some())
     }),
-    physics("a coating that is cut", "`contact.coating.cutting`", rotates, |scene| {
+    physics("cutting of a coating", "`contact.coating.cutting`", rotates, |scene| {
         contact(scene, |one| one.coating.is_some_and(|coating| coating.cutting.is_some()))
     }),
     physics("friction heat shared with the casing", "`contact.heat_to_slave`", rotates, |scene| {
@@ -205,25 +205,30 @@ pub static EFFECTS: &[Effect] = &[
     physics("inertia of contact nodes", "a scheme other than `galerkin` and `massless-boundary`", always, |scene| {
         !scene.settings.time.scheme.is_massless()
     }),
-    physics("rebound of contact nodes", "not supported: a node that closes its gap stops", always, never),
+    physics("rebound of contact nodes", "not supported: a node stops when its gap closes", always, never),
     physics("rounded edges of the tip", "not supported: rows of patches touch at sharp edges", rotates, never),
     physics(
-        "gaps that curve with displacement",
-        "not supported: refused where u²/2r reaches the clearance",
+        "second-order change of gaps with displacement",
+        "not supported: rejected where u²/2r reaches the clearance",
         rotates,
         never,
     ),
-    physics("Euler force of a changing speed", "not supported", rotates, never),
-    physics("vibration that is large within a structure", "not supported: structures are linear", always, never),
+    physics("Euler force due to a changing speed", "not supported", rotates, never),
+    physics("large deformation within a structure", "not supported: structures are linear", always, never),
     physics("temperature fields within a blade", "not supported: one temperature per rotor", rotates, never),
-    physics("heat conduction", "an FMU of its own: `tiprub thermal`", rotates, never),
-    physics("dynamics of the shaft", "a partner of the FMU: examples/shaft", rotates, never),
-    physics("flow: aerodynamic force, damping", "a partner of the FMU, by `structure.excitation`", rotates, never),
-    physics("friction in blade roots and shrouds", "not supported: damping ratios stand for it", rotates, never),
-    physics("chips, and loss of material of the tip", "not supported: a coating alone wears", rotates, never),
+    physics("heat conduction", "a separate FMU: `tiprub thermal`", rotates, never),
+    physics("dynamics of the shaft", "a model coupled to the FMU: examples/shaft", rotates, never),
+    physics(
+        "aerodynamic forces and damping",
+        "a model coupled to the FMU through `structure.excitation`",
+        rotates,
+        never,
+    ),
+    physics("friction in blade roots and shrouds", "not supported: include it in the damping ratios", rotates, never),
+    physics("chips, and wear of the blade tip", "not supported: only a coating wears", rotates, never),
     machinery("adaptive steps", "`time.scheme = \"galerkin\"`", |scene| scene.settings.time.scheme == Scheme::Galerkin)
         .by(|scene| scene.settings.time.scheme = Scheme::Galerkin),
-    machinery("a bound on internal steps", "`time.steps_at_most`, or adaptive steps", |scene| {
+    machinery("limited number of internal steps", "`time.steps_at_most`, or adaptive steps", |scene| {
         scene.settings.bounds_steps()
     })
     .by(|scene| scene.settings.time.steps_at_most = Some(0)),
@@ -231,12 +236,12 @@ pub static EFFECTS: &[Effect] = &[
         scene.settings.time.input_interpolation == InputInterpolation::Hold
     })
     .by(|scene| scene.settings.time.input_interpolation = InputInterpolation::Hold),
-    machinery("a surface through data points", "`surface.spline`, or a casing that bends", |scene| {
+    machinery("spline surface through data points", "`surface.spline`, or a flexible casing", |scene| {
         surface(scene, |one| one.spline.is_some()) || flexible(scene)
     })
     .of_rotors()
     .by(|scene| scene.settings.surfaces.iter_mut().for_each(|one| one.spline = Some(Default::default()))),
-    machinery("several rotors or contact pairs", "more `[[structure]]` and `[[contact]]`", |scene| {
+    machinery("several rotors or contact pairs", "more `[[structure]]` and `[[contact]]` tables", |scene| {
         scene.settings.contacts.len() > 1
     }),
     machinery("energy balance", "`outputs.energies`", |scene| scene.settings.outputs.energies)
@@ -251,11 +256,11 @@ pub static EFFECTS: &[Effect] = &[
     })
     .of_rotors()
     .by(|scene| scene.settings.outputs.nodal_diameters = Some(2)),
-    machinery("forces of an instant", "`outputs.instantaneous_forces`", |scene| {
+    machinery("instantaneous forces", "`outputs.instantaneous_forces`", |scene| {
         scene.settings.outputs.instantaneous_forces
     })
     .by(|scene| scene.settings.outputs.instantaneous_forces = true),
-    machinery("stress", "`outputs.stress`, a ROM that recovers it", |scene| scene.settings.outputs.stress)
+    machinery("stress", "`outputs.stress`, a ROM with stress recovery", |scene| scene.settings.outputs.stress)
         .of_rotors()
         .by(|scene| scene.settings.outputs.stress = true),
     machinery("modal amplitudes", "`outputs.modal_amplitudes`", |scene| {
@@ -271,28 +276,32 @@ pub static EFFECTS: &[Effect] = &[
     })
     .of_rotors()
     .by(|scene| scene.settings.outputs.casing_forces = true),
-    machinery("reaction of the casing's support", "`outputs.support_reaction`, a casing that bends", |scene| {
+    machinery("reaction at the support of the casing", "`outputs.support_reaction`, a flexible casing", |scene| {
         scene.settings.outputs.support_reaction
     })
     .of_rotors()
     .by(|scene| scene.settings.outputs.support_reaction = true),
-    machinery("displacement of the casing", "`outputs.slave_displacement`, a casing that bends", |scene| {
+    machinery("displacement of the casing", "`outputs.slave_displacement`, a flexible casing", |scene| {
         scene.settings.outputs.slave_displacement
     })
     .of_rotors()
     .by(|scene| scene.settings.outputs.slave_displacement = true),
-    machinery("stress of coupled sectors and of casings", "not supported", never).of_rotors(),
-    machinery("one structure that touches and carries a surface", "not supported: two structures", never),
+    machinery("stress in coupled sectors and casings", "not supported", never).of_rotors(),
+    machinery("one structure with contact nodes and a surface", "not supported: use two structures", never),
     machinery(
         "shells, beams, constraints, anisotropic materials",
-        "not supported: solids, or matrices of your own",
+        "not supported: use solid elements, or your own matrices",
         never,
     ),
-    machinery("derivatives by inputs of the same instant", "not supported: outputs depend on the step's start", never),
+    machinery(
+        "derivatives with respect to current inputs",
+        "not supported: outputs depend on the start of the step",
+        never,
+    ),
     machinery("wear map", "`outputs.wear`, a coating", |scene| scene.settings.outputs.wear)
         .of_rotors()
         .by(|scene| scene.settings.outputs.wear = true),
-    machinery("friction power by patch", "`surface.patches`", |scene| {
+    machinery("friction power per patch", "`surface.patches`", |scene| {
         surface(scene, |one| one.patches.is_some()) || casing(scene, |one| one.thermal)
     })
     .of_rotors()

@@ -36,9 +36,9 @@ pub(super) fn build_once(
     let place = cache.filter(|directory| output_file::create_directory(directory).is_ok());
     let place = place.map_or_else(env::temp_dir, Path::to_path_buf);
     let target = TempDir::with_prefix_in("tiprub-library-", &place)
-        .map_err(|error| Failure::file(&place, "no temporary directory can be made", &error))?;
+        .map_err(|error| Failure::file(&place, "cannot create a temporary directory", &error))?;
     console.print_progress(
-        "Building the FMU library from the sources that tiprub was installed from; this takes some minutes, only once",
+        "Building the FMU library from the sources of tiprub; this takes a few minutes and is done only once",
     );
     let built = build(unit, workspace, target.path(), console)?;
     let bytes =
@@ -99,7 +99,7 @@ pub(super) fn build(unit: LibraryUnit, workspace: &Path, target: &Path, console:
             last_lines.pop_front();
         }
     }
-    let status = child.wait().map_err(|error| failed(format!("cargo was lost: {error}"), "Try again"))?;
+    let status = child.wait().map_err(|error| failed(format!("cannot wait for cargo: {error}"), "Try again"))?;
     if !status.success() {
         let lines = Vec::from(last_lines).join("\n");
         return Err(failed(format!("cargo ended with {status}:\n{lines}\n"), "Correct these errors, then try again"));

@@ -112,7 +112,7 @@ fn a_library_of_another_release_is_refused_by_name_and_version() {
     let root = tempfile::tempdir().unwrap();
     let path = root.path().join("old.so");
     let other = LIBRARY_RELEASE.replacen(env!("CARGO_PKG_VERSION"), "9.8.7", 1);
-    for (told, named) in [(other.as_str(), other.as_str()), ("", "names no release")] {
+    for (told, named) in [(other.as_str(), other.as_str()), ("", "contains no release number")] {
         let mut bytes = elf(62);
         bytes.truncate(64);
         std::fs::write(&path, [&bytes, FUNCTIONS, told.as_bytes()].concat()).unwrap();
@@ -130,7 +130,7 @@ fn a_file_that_is_no_library_is_refused_by_name() {
     let console = Console::new(true, false);
     let refused = |path: PathBuf| load(LibraryUnit::Scene, &arguments(&[path], &[]), &console).unwrap_err();
     std::fs::write(root.path().join("README.md"), "None yet.").unwrap();
-    assert!(refused(root.path().to_path_buf()).problem.contains("holds no library"));
+    assert!(refused(root.path().to_path_buf()).problem.contains("contains no library"));
     let mut program = elf(62);
     program[16] = 2;
     let (mut big_endian, mut other) = (elf(62), elf(243));
@@ -143,14 +143,14 @@ fn a_file_that_is_no_library_is_refused_by_name() {
     }
     let path = root.path().join("other.so");
     std::fs::write(&path, &elf(62)[..64]).unwrap();
-    assert!(refused(path).problem.contains("of no FMU"));
+    assert!(refused(path).problem.contains("of an FMU"));
     let mut cut = pe();
     // The one section begins behind the end.
     cut[88 + 240 + 8..][..4].copy_from_slice(&[0, 2, 0, 0]);
     cut[88 + 240 + 16..][..8].copy_from_slice(&[0, 2, 0, 0, 0, 2, 0, 0]);
     let path = root.path().join("cut.dll");
     std::fs::write(&path, cut).unwrap();
-    assert!(refused(path).problem.contains("not a whole"));
+    assert!(refused(path).problem.contains("not a complete"));
     let path = root.path().join("x86_64-linux.so");
     std::fs::write(&path, elf(183)).unwrap();
     let other = refused(path.clone());
@@ -171,6 +171,6 @@ fn libraries_of_both_units_are_told_apart() {
     for (unit, bytes, other) in [(LibraryUnit::Scene, elf(62), thermal), (LibraryUnit::Thermal, conducts, scene)] {
         let found = load(unit, &arguments(&[root.path().to_path_buf()], &[]), &console).unwrap();
         assert!(found.len() == 1 && found[0].bytes == bytes, "{unit:?}");
-        assert!(load(unit, &arguments(&[other], &[]), &console).unwrap_err().problem.contains("another unit"));
+        assert!(load(unit, &arguments(&[other], &[]), &console).unwrap_err().problem.contains("the other FMU"));
     }
 }

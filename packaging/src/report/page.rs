@@ -50,9 +50,9 @@ fn header(input: &ReportInput<'_>) -> String {
     let mut cards = vec![
         ("simulated".into(), format!("{} ms", rounded(1e3 * simulated)), revolutions(&results)),
         (
-            "computing per simulated second".into(),
+            "computing time per simulated second".into(),
             format!("{} s", rounded(stepping / simulated)),
-            "of stepping, on one core".to_string(),
+            "stepping only, on one core".to_string(),
         ),
         ("per internal step".into(), format!("{} µs", rounded(per_step)), step_of(settings).into()),
     ];
@@ -119,7 +119,7 @@ fn rom_section(facts: &[RomFacts]) -> String {
 
 fn checks_table(checks: &[CheckRow]) -> String {
     if checks.is_empty() {
-        return "<p>This ROM came without checks.</p>".into();
+        return "<p>This ROM contains no checks.</p>".into();
     }
     let coupled = checks[0].nodal_diameter.is_some();
     let mut html = format!(
@@ -162,7 +162,7 @@ fn run_section(input: &ReportInput<'_>) -> String {
         ("internal steps", native.internal_steps.to_string()),
         ("stepping time", format!("{} s", rounded(stepping))),
         ("computing time per internal step", format!("{} µs", rounded(1e6 * stepping / native.internal_steps as f64))),
-        ("computing per simulated second", format!("{} s", rounded(stepping / simulated))),
+        ("computing time per simulated second", format!("{} s", rounded(stepping / simulated))),
     ];
     let settings = &input.scene.settings;
     if settings.time.scheme == Scheme::Galerkin {
@@ -175,7 +175,7 @@ fn run_section(input: &ReportInput<'_>) -> String {
         ("friction loss", Quantity::FrictionLoss),
         ("damping loss", Quantity::DampingLoss),
         ("impact loss", Quantity::ImpactLoss),
-        ("work put in", Quantity::ExternalWork),
+        ("external work", Quantity::ExternalWork),
     ];
     for (label, quantity) in energies {
         if let Some(value) = results.last(quantity) {
@@ -192,7 +192,7 @@ fn run_section(input: &ReportInput<'_>) -> String {
         let _ = write!(html, "<p>{}.</p>", escape(&estimate::errors_text(input.estimates)));
     }
     html.push_str(&paper_part(input, &results));
-    html.push_str("<h3>Where the time went</h3>");
+    html.push_str("<h3>Wall times</h3>");
     let durations: Vec<(&str, String)> =
         input.durations.iter().map(|(what, seconds)| (what.as_str(), format!("{} s", rounded(*seconds)))).collect();
     html.push_str(&table(&durations));
@@ -210,8 +210,9 @@ fn paper_part(input: &ReportInput<'_>, own: &Results<'_>) -> String {
     let Some((table, run)) = input.paper else { return String::new() };
     let paper = Results::new(table, &run.recording);
     let mut html = String::from(
-        "<h3>Beside the paper's model and method</h3><p>The same rub with <code>preset = \"paper\"</code>: Craig-Bampton modes, \
-         three contact nodes, central differences, the film of eq. 11. Three points do not resolve the tip.</p>\
+        "<h3>Comparison with the paper's model and method</h3><p>The same rub with <code>preset = \"paper\"</code>: \
+         Craig-Bampton modes, three contact nodes, central differences, the film of eq. 11. Three points do \
+         not resolve the tip.</p>\
          <table class=\"numbers\"><thead><tr><th>at the end</th><th>this run</th><th>the paper's</th></tr></thead><tbody>",
     );
     for (label, quantity) in
@@ -225,7 +226,7 @@ fn paper_part(input: &ReportInput<'_>, own: &Results<'_>) -> String {
     let rates = [input.native, run].map(|run| rounded(run.stepping.as_secs_f64() / simulated));
     let _ = write!(
         html,
-        "<tr><td>computing per simulated second (s)</td><td>{}</td><td>{}</td></tr>\
+        "<tr><td>computing time per simulated second (s)</td><td>{}</td><td>{}</td></tr>\
          <tr><td>computing time per internal step (µs)</td><td>{} ({})</td><td>{} (whole disk)</td></tr>",
         rates[0],
         rates[1],
@@ -243,7 +244,7 @@ fn agreement_section(input: &ReportInput<'_>) -> String {
     }
     let mut html = String::from(
         "<section><h2>FMU against native run</h2><p>Each FMU was unzipped, loaded and driven through its C interface as an \
-         importer does it, with the same communication points as the native run.</p>\
+         importer does, with the same communication points as the native run.</p>\
          <table class=\"numbers\"><thead><tr><th>run</th><th>communication points</th><th>outputs</th>\
          <th>values that differ in any bit</th><th>largest difference</th><th>time in doStep (s)</th></tr></thead><tbody>",
     );

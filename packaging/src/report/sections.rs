@@ -133,9 +133,10 @@ pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, Stri
 fn error_study() -> NumberedFigure {
     // The picture has its own paper and its own legend.
     let body = format!("<div class=\"scroll adapts\">{ERROR_PICTURE}</div>");
-    let caption = "Error against run time of adaptive steps, fixed steps and the paper's method on a light rub of rotor 37 as it ships, measured \
-                   once (docs/error-study.md of the sources). The demo does not measure it again. On this machine and for this scene \
-                   <code>tiprub study error builtin:rotor37</code> does, with <code>--quick</code> in minutes."
+    let caption = "Error against run time of adaptive steps, fixed steps and the paper's method for a light rub of the \
+                   built-in rotor 37, measured once (docs/error-study.md of the sources). The demo does not repeat \
+                   this study. To run it on this machine, use <code>tiprub study error builtin:rotor37</code>; with \
+                   <code>--quick</code> it takes minutes."
         .to_owned();
     NumberedFigure { body, caption }
 }
@@ -182,8 +183,8 @@ fn casing(input: &ReportInput<'_>) -> Result<Vec<NumberedFigure>> {
     };
     let body = plot.to_html()?;
     let caption = format!(
-        "Casing shape: radial clearance of an undeformed blade around the circumference{ramp}. The clearances below are normal \
-         to the casing, which runs parallel to the tip contour, and a little smaller."
+        "Casing shape: radial clearance of an undeformed blade around the circumference{ramp}. The clearances below \
+         are measured normal to the casing, which is parallel to the tip contour, and are slightly smaller."
     );
     Ok(vec![NumberedFigure { body, caption }])
 }
@@ -207,7 +208,7 @@ fn clearances(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Numb
 fn passing(input: &ReportInput<'_>) -> &'static str {
     match input.scene.settings.surfaces.first().map(|surface| &surface.shape) {
         Some(Shape::TwoLobe { .. }) => {
-            " The casing's bumps pass the blade twice per revolution; between them the blade vibrates freely."
+            " The blade passes a bump of the casing twice per revolution and vibrates freely in between."
         }
         _ => "",
     }
@@ -239,7 +240,7 @@ fn forces(input: &ReportInput<'_>, results: &Results<'_>) -> Result<Vec<Numbered
         let all = input.scene.roms.iter().map(|rom| rom.sectors * rom.contact_nodes.len()).sum::<usize>();
         figures.push(NumberedFigure {
             body: plot.to_html()?,
-            caption: format!("Number of nodes in contact at the communication points, of {all} on the whole disk."),
+            caption: format!("Number of nodes in contact at the communication points, out of {all} on the whole disk."),
         });
     }
     if let Some(series) = results.series("torque", Quantity::Moment(2), 1.0) {
@@ -263,18 +264,18 @@ fn energies(results: &Results<'_>) -> Result<Vec<NumberedFigure>> {
         ("damping loss", Quantity::DampingLoss),
         ("impact loss", Quantity::ImpactLoss),
     ];
-    let exchanged = [("work put in", Quantity::ExternalWork), ("friction heat", Quantity::FrictionLoss)];
+    let exchanged = [("external work", Quantity::ExternalWork), ("friction heat", Quantity::FrictionLoss)];
     for (list, height, caption) in [
         (
             &vibration[..],
             260,
-            "Energy of vibration of all blades, and what damping and impacts took from it since the start.",
+            "Vibration energy of all blades, and the energy dissipated by damping and impacts since the start.",
         ),
         (
             &exchanged[..],
             200,
-            "Work put in by the drive and the casing, and friction heat, since the start. The difference is what vibrates, \
-             or was lost to damping and impacts (the figure before).",
+            "External work of the drive and the casing, and friction heat, since the start. The difference is the \
+             vibration energy and the losses to damping and impacts (previous figure).",
         ),
     ] {
         let series: Vec<Series> =
@@ -295,8 +296,8 @@ fn energies(results: &Results<'_>) -> Result<Vec<NumberedFigure>> {
         figures.push(NumberedFigure {
             body: plot.to_html()?,
             caption:
-                "Closure of the energy ledger: kinetic + strain + losses − initial − work put in, relative to initial \
-                      energy and all work exchanged. Values about 1e-16 are round-off."
+                "Residual of the energy balance: kinetic + strain + losses − initial − external work, relative to the \
+                 initial energy and all work exchanged. Values around 1e-16 are round-off."
                     .into(),
         });
     }
@@ -326,8 +327,8 @@ fn mode_shapes(reduction: &Reduction) -> NumberedFigure {
     }
     let _ = write!(body, "</div><div class=\"scale\">{}</div>", picture::color_scale("0", "largest"));
     let caption = format!(
-        "{}: finite-element surface with the contact nodes (red), and the first {} mode shapes at rest; colour is the \
-         magnitude of displacement.",
+        "{}: finite-element surface with the contact nodes (red), and the first {} mode shapes at rest; the colour \
+         shows the magnitude of the displacement.",
         escape(&reduction.rom.name),
         reduction.modes.len().min(MODES_SHOWN)
     );

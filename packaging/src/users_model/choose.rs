@@ -68,11 +68,11 @@ pub fn tips(
     let patch_count =
         tips.contact_patches.or_else(|| default_mesh.map(|mesh| default_patches(tips, &tip, mesh, &free)));
     if let (Some(_), None) = (tips.contact_rows, patch_count) {
-        let problem = "rows are of patches, and contact is at the nodes of the set";
+        let problem = "rows require contact patches, but contact is at the nodes of the set";
         return Err(Failure::usage(
             "--contact-rows",
             problem,
-            "Say how many patches along the chord: --contact-patches 9",
+            "Give the number of patches along the chord, for example --contact-patches 9",
         ));
     }
     let contact = if let Some(count) = patch_count {
@@ -125,12 +125,12 @@ fn patches(
     names: &[String],
 ) -> Result<Vec<ContactPoint>> {
     let Some((mesh, _)) = &imported.model.mesh else {
-        let problem = "patches are made of the faces of a mesh";
-        return Err(Failure::usage("--contact-patches", problem, "Give a mesh file, or ask for --contact-nodes"));
+        let problem = "contact patches require a mesh";
+        return Err(Failure::usage("--contact-patches", problem, "Give a mesh file, or use --contact-nodes"));
     };
     if !names.is_empty() && names.len() != count {
         let problem = format!("{} names for {count} contact patches", names.len());
-        return Err(Failure::usage("--contact-names", problem, "Give one name for each, by growing z"));
+        return Err(Failure::usage("--contact-names", problem, "Give one name per patch, in order of increasing z"));
     }
     let along = |index: usize| names.get(index).cloned().unwrap_or_else(|| format!("patch_{}", index + 1));
     let name = |index: usize| row_name(&along(index % count), index / count, rows);
@@ -165,8 +165,8 @@ pub fn stress(imported: &Imported, asked: &BladeOptions) -> Result<StressPlaces>
     if let Some(name) = &asked.stress_set {
         let (nodes, _) = nodes_of(imported, name, "--stress-set")?;
         if nodes.len() > MOST_PLACES {
-            let problem = format!("{} nodes, {MOST_PLACES} at most", nodes.len());
-            return Err(Failure::usage("--stress-set", problem, "Name a set of the places that matter"));
+            let problem = format!("the set has {} nodes, but at most {MOST_PLACES} are allowed", nodes.len());
+            return Err(Failure::usage("--stress-set", problem, "Give a smaller set with the nodes of interest"));
         }
         let named = |node: usize| (format!("node_{}", imported.node_numbers[node]), node);
         places.nodes = nodes.into_iter().map(named).collect();
@@ -203,7 +203,7 @@ fn free_contact_nodes(imported: &Imported, asked: &ModelOptions, fixed: &[usize]
     let (nodes, by_number) = nodes_of(imported, name, "--contact-set")?;
     let free: Vec<usize> = nodes.into_iter().filter(|node| fixed.binary_search(node).is_err()).collect();
     if free.is_empty() {
-        let problem = "all of its nodes are clamped or lie on the faces to the neighbours";
+        let problem = "all nodes of the set are clamped or lie on the cyclic faces";
         return Err(Failure::new(format!("--contact-set {name}"), problem, "Choose a set whose nodes can move"));
     }
     Ok((free, by_number))
@@ -219,9 +219,9 @@ fn pair_faces(imported: &Imported, asked: &SectorArguments) -> Result<(CyclicBou
 
 fn sets_of(imported: &Imported) -> String {
     if imported.model.sets.is_empty() {
-        return "the model has no sets: name groups of nodes, elements or faces where it is meshed".into();
+        return "the model has no sets: define groups of nodes, elements or faces in the mesh generator".into();
     }
-    format!("sets of the model, with their numbers of nodes: {}", set_counts(&imported.model.sets))
+    format!("sets of the model with their numbers of nodes: {}", set_counts(&imported.model.sets))
 }
 
 fn named_set<'a>(imported: &Imported, name: Option<&'a str>, option: &str) -> Result<&'a str> {
@@ -229,7 +229,7 @@ fn named_set<'a>(imported: &Imported, name: Option<&'a str>, option: &str) -> Re
 }
 
 fn missing(imported: &Imported, option: &str) -> Failure {
-    Failure::usage(option, "it is missing", format!("Give one; {}", sets_of(imported)))
+    Failure::usage(option, "no set is given", format!("Give a set; {}", sets_of(imported)))
 }
 
 fn set<'a>(imported: &'a Imported, name: &str) -> Result<&'a [usize]> {
@@ -247,7 +247,7 @@ pub fn nodes_of(imported: &Imported, text: &str, option: &str) -> Result<(Vec<us
         let found = imported.node_numbers.iter().position(|own| *own == number);
         nodes.push(found.ok_or_else(|| {
             let remedy =
-                "Give the name of a set, or numbers of nodes of the file that belong to solid elements: 12,57,103";
+                "Give the name of a set, or node numbers of the file that belong to solid elements, such as 12,57,103";
             Failure::new(format!("{option} {text}"), format!("the model has no node {number}"), remedy)
         })?);
     }
@@ -264,12 +264,12 @@ fn clamped_nodes(imported: &Imported, names: &[String]) -> Result<Vec<usize>> {
         let held = match imported.held.as_slice() {
             [] => String::new(),
             held => format!(
-                "; *BOUNDARY of the file holds {}",
+                "; *BOUNDARY in the file fixes {}",
                 held.iter().take(10).cloned().collect::<Vec<_>>().join(", ")
             ),
         };
-        let remedy = format!("Give the set that is held, or `none`; {}{held}", sets_of(imported));
-        return Err(Failure::usage("--clamp-set", "it is missing", remedy));
+        let remedy = format!("Give the set of clamped nodes, or `none`; {}{held}", sets_of(imported));
+        return Err(Failure::usage("--clamp-set", "no set is given", remedy));
     }
     for name in names.iter().filter(|_| !free) {
         // Of matrices the set was left out when they were read.

@@ -44,11 +44,11 @@ pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (
         let (pairs, pitch) = (boundary.pairs.len(), boundary.pitch().to_degrees());
         let _ = write!(
             text,
-            "\n  faces                     {pairs} pairs of nodes, {pitch:.4}° apart; off by {largest_mismatch:.2e} m at most, \
-             typically {typical_mismatch:.2e} m"
+            "\n  faces                     {pairs} pairs of nodes, {pitch:.4}° apart; mismatch at most \
+             {largest_mismatch:.2e} m, typically {typical_mismatch:.2e} m"
         );
         if report.swapped {
-            text.push_str("\n  note: the faces are named the other way round: low is the one at the smaller angle");
+            text.push_str("\n  note: the two faces were swapped: the low face is the one at the smaller angle");
         }
     }
     for note in &imported.notes {
@@ -81,12 +81,13 @@ pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (
 /// Contact nodes or patches, each with its node in the file; of a grid its size; the tip, where it was found.
 fn contact(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> String {
     let mut text = String::new();
-    let contact_set = asked.contact_set.as_deref().unwrap_or("the tip that was found");
+    let contact_set = asked.contact_set.as_deref().unwrap_or("the detected tip");
     if let Some((tip, true)) = &chosen.tip {
         let FoundTip { faces, nodes, chord, radius: [low, high], axial: [from, to], .. } = tip;
         let _ = write!(
             text,
-            "\n  tip found                 {faces} faces, {} nodes, chord {chord:.6} m, radius {low:.6} m to {high:.6} m, z {from:.6} m to {to:.6} m",
+            "\n  detected tip              {faces} faces, {} nodes, chord {chord:.6} m, radius {low:.6} m to \
+             {high:.6} m, z {from:.6} m to {to:.6} m",
             nodes.len()
         );
     }

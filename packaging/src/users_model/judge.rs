@@ -16,26 +16,27 @@ const USUAL_FREQUENCIES: [f64; 2] = [1.0, 1e6];
 /// Rejects values that cannot be meant, unless the units are said to be SI; asks about unusual values.
 pub fn judge(imported: &Imported, asked: &ModelOptions) -> Result<Vec<String>> {
     let found = plausibility(&imported.model, &imported.materials);
-    let question = |list: &[String]| format!("{}: is that meant?", list.join("; "));
+    let question = |list: &[String]| format!("{}: is this intended?", list.join("; "));
     let mut warnings = Vec::new();
     if !found.impossible.is_empty() {
         if asked.units != Some(UnitChoice::Metre) {
             let remedy = match asked.units {
                 _ if asked.young.is_some() && found.impossible.iter().all(|text| text.starts_with("material")) => {
-                    "--young and --density are in SI units, Pa and kg/m³, whatever the file's units are"
+                    "Give --young and --density in SI units, Pa and kg/m³, whatever the units of the file"
                 }
                 None => {
-                    "If lengths are in mm, masses in t and stresses in MPa, say --units mm-t-s; if it is meant, --units m"
+                    "If lengths are in mm, masses in t and stresses in MPa, use --units mm-t-s; if the values are \
+                     correct, use --units m"
                 }
-                Some(_) => "Are the file's units m, kg and s after all? Then leave --units out",
+                Some(_) => "If the units of the file are m, kg and s after all, omit --units",
             };
-            let problem = format!("{} cannot be meant", found.impossible.join("; "));
+            let problem = format!("implausible values ({})", found.impossible.join("; "));
             return Err(Failure::new("units of the model", problem, remedy));
         }
         warnings.push(question(&found.impossible));
     }
     if !found.doubtful.is_empty() {
-        warnings.push(format!("{} (--units mm-t-s is for files in mm, t and s)", question(&found.doubtful)));
+        warnings.push(format!("{} For files in mm, t and s, use --units mm-t-s", question(&found.doubtful)));
     }
     Ok(warnings)
 }
@@ -51,8 +52,8 @@ pub fn radius_slip(imported: &Imported, chosen: &Chosen) -> Option<Slip> {
     let contact = chosen.contact.iter().map(|point| radius(nodes[point.node])).fold(0.0, f64::max);
     (chosen.grid.is_none() && contact < TIPS * outermost).then(|| Slip {
         what: "contact nodes".into(),
-        problem: format!("they reach a radius of {contact:.6} m, the model one of {outermost:.6} m"),
-        question: "Are tip and root correct, and the axis of rotation?".into(),
+        problem: format!("they reach a radius of {contact:.6} m, but the model reaches {outermost:.6} m"),
+        question: "Are the tip, the root and the axis of rotation correct?".into(),
     })
 }
 
@@ -65,8 +66,8 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
     let mut warnings = Vec::new();
     if *automatic && tip.elsewhere > 0 {
         warnings.push(format!(
-            "beside the tip that was found, {} faces that are not connected with it are as far out: if they can also touch, name \
-             all of them in a set (--contact-set)",
+            "besides the detected tip, {} faces that are not connected to it are as far out: if they can also touch, \
+             give all of them in a set (--contact-set)",
             tip.elsewhere
         ));
     }
@@ -85,8 +86,9 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
     } else if count == 1 || edges > REFINED * (count - 1) as f64 {
         let nodes = if count == 1 { "a single node".to_owned() } else { format!("{count} nodes") };
         warnings.push(format!(
-            "contact at {nodes} of a tip about {edges:.0} edges of elements long: the indentation by a force at a node grows as the mesh is refined, \
-             and the tip between nodes passes through the casing; --contact-patches {} spreads contact over the tip",
+            "contact at {nodes} of a tip about {edges:.0} element edges long: the indentation under a nodal force \
+             grows as the mesh is refined, and the tip between the nodes passes through the casing; use \
+             --contact-patches {} to spread contact over the tip",
             tip.at_most(PATCHES)
         ));
     }
@@ -101,20 +103,21 @@ pub fn set_warnings(asked: &ModelOptions, chosen: &Chosen) -> Vec<String> {
         let (on_tip, all, own) = (within(&chosen.tip_set, &tip.nodes), tip.nodes.len(), chosen.tip_set.len());
         if on_tip < all {
             warnings.push(format!(
-                "{name} has {on_tip} of the {all} nodes of the outermost faces, and the other nodes of the tip pass through the casing: is that \
-                 meant? Without --contact-set all of them are contact nodes"
+                "{name} has {on_tip} of the {all} nodes of the outermost faces, and the other nodes of the tip pass \
+                 through the casing: is this intended? Without --contact-set, all of them are contact nodes"
             ));
         } else if own > all {
             warnings.push(format!(
-                "{name} has {own} nodes, of which {all} are all of the outermost faces: are the others meant to touch? Without --contact-set \
-                 they are left out"
+                "{name} has {own} nodes, but only {all} are on the outermost faces: can the others touch? Without \
+                 --contact-set, they are excluded"
             ));
         }
     }
     let (held, all) = (within(&chosen.clamped, &chosen.root), chosen.root.len());
     if 0 < held && held < all {
         warnings.push(format!(
-            "{} has {held} of the {all} nodes of the innermost faces, and the other nodes of the root are free: is that meant?",
+            "{} has {held} of the {all} nodes of the innermost faces, and the other nodes of the root are free: is \
+             this intended?",
             asked.clamp_set.join(", ")
         ));
     }
@@ -124,8 +127,9 @@ pub fn set_warnings(asked: &ModelOptions, chosen: &Chosen) -> Vec<String> {
 /// More patches than the elements of a tip tell apart.
 pub fn narrow(patches: usize, edges: f64, most: usize) -> String {
     format!(
-        "{patches} contact patches along about {edges:.0} edges of elements: patches narrower than elements are not independent, and the mesh \
-         does not resolve their forces; request at most {most} (--contact-patches {most}), or refine the tip"
+        "{patches} contact patches along about {edges:.0} element edges: patches narrower than elements are not \
+         independent, and the mesh does not resolve their forces; request at most {most} \
+         (--contact-patches {most}), or refine the tip"
     )
 }
 
@@ -133,8 +137,9 @@ pub fn narrow(patches: usize, edges: f64, most: usize) -> String {
 pub fn narrow_rows(rows: usize, elements: usize) -> String {
     let (plural, most) = (if elements == 1 { "" } else { "s" }, elements + 1);
     format!(
-        "{rows} rows of contact patches across {elements} element{plural}: rows narrower than elements are not independent, and the mesh \
-         does not resolve their forces; request at most {most} (--contact-rows {most}), or refine the tip"
+        "{rows} rows of contact patches across {elements} element{plural}: rows narrower than elements are not \
+         independent, and the mesh does not resolve their forces; request at most {most} (--contact-rows {most}), or \
+         refine the tip"
     )
 }
 
@@ -146,8 +151,8 @@ fn single(chosen: &Chosen) -> Option<String> {
         _ => return None,
     };
     Some(format!(
-        "contact at {what}: the position of contact along the chord is not resolved, and nothing prevents tilting; request more patches \
-         (--contact-patches {PATCHES})"
+        "contact at {what}: the position of contact along the chord is not resolved, and nothing prevents tilting; \
+         request more patches (--contact-patches {PATCHES})"
     ))
 }
 

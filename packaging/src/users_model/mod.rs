@@ -163,7 +163,7 @@ pub struct ConductingMesh {
 }
 
 fn no_mesh() -> Failure {
-    let problem = "a casing is reduced from a mesh of one material";
+    let problem = "a casing requires a mesh of one material";
     Failure::usage("FILE", problem, "Give a mesh file whose elements share one material")
 }
 
@@ -219,7 +219,7 @@ fn general(
     let model = RefCell::new(Some(model));
     with_progress(&title, console, &|listener| {
         // The matrices are handed over, not copied.
-        let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is reduced already", ""))?;
+        let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is already reduced", ""))?;
         reduce_model(model, &chosen.clamped, &chosen.contact, &options, asked.spin, listener)
     })
 }
@@ -253,7 +253,7 @@ fn ring(
     };
     let mesh = RefCell::new(Some(mesh));
     with_progress(&title, console, &|listener| {
-        let mesh = mesh.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is reduced already", ""))?;
+        let mesh = mesh.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is already reduced", ""))?;
         reduce_casing(mesh, &material, &chosen.clamped, grid, &patches, &options, listener)
     })
 }
@@ -301,7 +301,7 @@ fn import(source: &MeshSource, console: &Console) -> Result<Imported> {
     let matrices = source.matrices.and_then(|own| Some((own, own.stiffness.as_ref()?, own.mass.as_ref()?)));
     let Some((matrices, stiffness, mass)) = matrices else {
         let Some(path) = source.file else {
-            return Err(Failure::usage("FILE", "there is no file", "Give a mesh file, or --stiffness and --mass"));
+            return Err(Failure::usage("FILE", "no file is given", "Give a mesh file, or --stiffness and --mass"));
         };
         let options =
             MeshOptions { units: asked.units(), axis: asked.axis(), material, temperature: asked.temperature };

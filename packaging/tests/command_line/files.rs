@@ -95,7 +95,7 @@ fn waits_for_the_reader_of_a_pipe_with_a_message() {
     let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
     let said =
         BufReader::new(child.stderr.take().unwrap()).lines().find(|line| line.as_ref().unwrap().contains("pipe"));
-    assert_eq!(said.unwrap().unwrap(), "pipe is a pipe that nobody reads: waiting for its reader");
+    assert_eq!(said.unwrap().unwrap(), "pipe is a pipe without a reader: waiting for one");
     let read = fs::read_to_string(&path).unwrap();
     assert!(child.wait().unwrap().success());
     assert_eq!(read, project.succeed(&["run", "scene.toml", "--quiet", "--csv", "-"]));
@@ -133,7 +133,7 @@ fn no_output_is_an_input_or_another_output() {
         assert!(message.contains("is the same file as"), "{message}");
     }
     let message = project.fail(&["study", "map", "out/scene.json", "--out", "out"], 2);
-    assert!(message.contains("a file of the study may replace"), "{message}");
+    assert!(message.contains("which the study may overwrite"), "{message}");
     assert_eq!(fs::read_to_string(project.path("scene.toml")).unwrap(), SCENE);
     assert_eq!(fs::read_to_string(project.path("speed.csv")).unwrap(), inputs);
     assert_eq!(project.files().len(), before.len() + 1);

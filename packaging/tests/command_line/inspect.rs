@@ -54,9 +54,9 @@ fn run_inspect_and_the_fmu_report_the_scheme_and_its_reason() {
         assert!(text.contains(&format!("  scheme        {reason}")), "{file}: {text}");
     }
     let described = project.succeed(&["inspect", "x.fmu"]);
-    assert!(described.contains("Time-stepping scheme; at the start the default with fixed steps"), "{described}");
+    assert!(described.contains("Time-stepping scheme; the start value is the default with fixed steps"), "{described}");
     fs::write(project.path("scene.toml"), SCENE.replace("[time]", "[time]\nscheme = \"modal-exact\"")).unwrap();
-    assert!(project.succeed(&["inspect", "scene.toml"]).contains("  scheme        modal-exact, named in the scene"));
+    assert!(project.succeed(&["inspect", "scene.toml"]).contains("  scheme        modal-exact, set in the scene"));
 }
 
 #[test]

@@ -78,7 +78,7 @@ fn what_a_scene_does_not_use_of_a_rom_stays_out_of_the_package() {
     let json = project.succeed(&["inspect", "used/small_fmi3.fmu", "--json"]);
     let inspected: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(inspected["scene"]["roms"][0]["spin"]["largest_speed"], 200.0);
-    assert_eq!(inspected["scene"]["features"][0], "spin of `rotor`: growth");
+    assert_eq!(inspected["scene"]["features"][0], "spin effects of `rotor`: growth");
     assert!(used.len() > plain.len());
 }
 
@@ -145,7 +145,7 @@ fn failed_packages_leave_nothing() {
     let missing = project.fail(&["package", "scene.toml", "--library", "none.so"], 1);
     assert!(missing.contains("none.so"), "{missing}");
     let text = project.fail(&["package", "scene.toml", "--library", "scene.toml"], 1);
-    assert!(text.contains("not a whole 64-bit shared library"), "{text}");
+    assert!(text.contains("not a complete 64-bit shared library"), "{text}");
     fs::write(project.path("scene.toml"), SCENE.replace("gap = 1e-3", "gap = -1e-3")).unwrap();
     let gap = project.fail(&["package", "scene.toml", "--library", "library.so"], 1);
     assert!(gap.contains("gap"), "{gap}");

@@ -22,7 +22,7 @@ fn reduction_replaces_a_rom_only_by_force() {
         "reduce rotor37 --mesh 1x1x1 -o new.rom.safetensors --vtk scene.toml",
     ] {
         let error = project.fail(&line.split(' ').collect::<Vec<_>>(), 1);
-        assert!(error.contains("is there already") && error.contains("--force"), "{line}: {error}");
+        assert!(error.contains("already exists") && error.contains("--force"), "{line}: {error}");
     }
     fs::remove_file(project.path("rotor37.rom.safetensors")).unwrap();
     assert_eq!(fs::read(project.path("blade.rom.safetensors")).unwrap(), before);

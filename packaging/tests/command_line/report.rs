@@ -42,7 +42,7 @@ fn a_report_is_complete_offline_and_small() {
     for wanted in [
         "mode 4:",
         "estimated error of the displacements: steps 0.15 %",
-        "Beside the paper's model and method",
+        "Comparison with the paper's model and method",
         "clearance (µm)",
         "normal force (N)",
         "friction force (N)",
@@ -56,7 +56,7 @@ fn a_report_is_complete_offline_and_small() {
         "bit for bit",
         "href=\"results.csv\"",
         "tiprub study error builtin:rotor37",
-        "computing per simulated second",
+        "computing time per simulated second",
         "class=\"narrow\"",
     ] {
         assert!(html.contains(wanted), "{wanted}");

@@ -56,7 +56,7 @@ fn the_summary_of_a_run_tells_its_extremes() {
     assert!((there.1 - largest(total.clone())).abs() <= 1e-9 * there.1, "{there:?}");
     let told = text.split("over the run:").nth(1).unwrap();
     assert!(told.contains(&format!(" N at t = {at} s")) && told.contains("smallest clearance: "), "{text}");
-    assert!(told.contains("most contact nodes touching at a communication point: "), "{text}");
+    assert!(told.contains("largest number of contact nodes touching at a communication point: "), "{text}");
 }
 
 /// Five lines before all else, the same with and without `--all`, and then where the rest is.
@@ -134,9 +134,13 @@ fn inputs_over_time_are_followed_without_delay() {
     assert!(least(&away) > least(&plain.1) + 1e-3, "{} {}", least(&away), least(&plain.1));
     for (inputs, more, told) in [
         ("time,sped\n0,1\n", &[][..], "inputs.csv, `sped`: no such variable. Did you mean `speed`?"),
-        ("time,torque\n0,1\n", &[], "inputs.csv, `torque`: it cannot change in a run"),
+        ("time,torque\n0,1\n", &[], "inputs.csv, `torque`: it cannot change during a run"),
         ("time,speed\n0,100\n0.01,1e9\n", &[], "variable `speed`: its derivative"),
-        ("time,speed\n0,100\n", &["--set", "speed=50"], "--set speed: the file of inputs has a column of it"),
+        (
+            "time,speed\n0,100\n",
+            &["--set", "speed=50"],
+            "--set speed: the file of --inputs also has a column for this variable",
+        ),
     ] {
         fs::write(project.path("inputs.csv"), inputs).unwrap();
         let output = project.run(&[&["run", "scene.toml", "--quiet", "--inputs", "inputs.csv"], more].concat());

@@ -107,7 +107,7 @@ fn a_mesh_of_gmsh_becomes_a_running_scene_as_the_guide_tells() {
     project.write("blade.toml", scene());
     let run = project.succeed("run blade.toml --csv rub.csv");
     assert_eq!(run["communication_steps"], 500);
-    assert!(run["scheme"].as_str().unwrap().starts_with("galerkin, the default on rigid surfaces"), "{run:#}");
+    assert!(run["scheme"].as_str().unwrap().starts_with("galerkin, the default for rigid surfaces"), "{run:#}");
     let csv = fs::read_to_string(project.root.path().join("rub.csv")).unwrap();
     let names: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
     let column = names.iter().position(|name| *name == "clearance_minimum").unwrap();
@@ -264,7 +264,7 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
         (2, "reduce blade bar.inp --material steel --units mm-t-s --contact-set TIP".into(), &["--clamp-set", "ROOT (8)", "none"]),
         (1, "reduce blade bar.inp --material steel --units mm-t-s --contact-set TIPS --clamp-set ROOT".into(), &["`TIPS`", "TIP (8)"]),
         (1, "reduce blade bar.inp --material steel --units mm-t-s --contact-set ROOT --clamp-set ROOT".into(), &["ROOT", "clamped"]),
-        (1, format!("reduce blade bar.inp {bar} --material steel --contact-nodes 40"), &["40 of a set of", "Give a number"]),
+        (1, format!("reduce blade bar.inp {bar} --material steel --contact-nodes 40"), &["40 requested from a set of", "Give a number"]),
         (1, format!("reduce blade bar.inp {bar} --material steel --contact-nodes 2 --contact-names a,b,c"), &["3 names for 2"]),
         (1, format!("reduce blade bar.inp {bar} --material steel --modes 5000"), &["5000", "fewer modes"]),
         (2, format!("reduce blade bar.inp {bar} --material steel --young 1e11 --poisson 0.3 --density 1e3"), &["--material", "cannot be used with", "--young"]),
@@ -277,7 +277,7 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
         (2, format!("reduce blade --stiffness bar.sti --mass bar.mas {bar}"), &["--nodes", "mesh file"]),
         (2, format!("reduce blade bar.inp {bar} --stiffness bar.sti --mass bar.mas --material steel"), &["cannot be used with", "--stiffness"]),
         (1, format!("reduce blade bar.inp {bar} --stiffness k.mtx --mass bar.mas"), &["k.mtx", "3 rows", "96"]),
-        (1, format!("reduce blade bar.inp {bar} --stiffness bar.mas --mass bar.sti --dofs bar.dof"), &["exchanged"]),
+        (1, format!("reduce blade bar.inp {bar} --stiffness bar.mas --mass bar.sti --dofs bar.dof"), &["swapped"]),
         (2, "reduce sector sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --material steel --units mm-t-s".into(), &["--cyclic-high"]),
         (1, "reduce sector sector.msh --contact-set TIP --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 13 --material steel --units mm-t-s".into(), &["cyclic faces", "number of sectors"]),
         (1, "reduce sector sector.msh --contact-set LOW --clamp-set BORE --cyclic-low LOW --cyclic-high HIGH --sectors 12 --material steel --units mm-t-s".into(), &["LOW", "faces"]),
@@ -346,7 +346,7 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
     let between = project.rom("between.rom.safetensors").contact_nodes[14].position;
     assert!((between[1] - TAU / 13.0).abs() < 1e-12 && (between[2] - 0.038).abs() < 1e-12, "{between:?}");
     for (line, code, words) in [
-        (file.replace("12x2", "12x14"), 1, ["12 x 14 points are more than", "fewer rings"]),
+        (file.replace("12x2", "12x14"), 1, ["too coarse to move 12 x 14 points", "fewer rings"]),
         (format!("{file} --sectors 12"), 2, ["unexpected argument", "--sectors"]),
     ] {
         let text = project.fail(&line, code);
@@ -384,8 +384,8 @@ fn conducts_heat_in_a_casing_mesh_of_the_user() {
     assert_eq!(numbers(&found["model"]), numbers(&own_facts));
     for (line, code, words) in [
         (own.replace("--material steel", ""), 2, ["material of FILE", "--conductivity"]),
-        (own.replace("INNER", "OUTER"), 1, ["none of 144 outer faces looks towards the z axis", "--contact-set"]),
-        (own.replace("--contact-set INNER", "--axis x"), 1, ["no full ring about the z axis", "--axis"]),
+        (own.replace("INNER", "OUTER"), 1, ["none of the 144 outer faces is directed", "--contact-set"]),
+        (own.replace("--contact-set INNER", "--axis x"), 1, ["not a full ring about the z axis", "--axis"]),
         (format!("{own} --mesh 24x1x6"), 2, ["cannot be used with", "--mesh"]),
     ] {
         let text = project.fail(&line, code);
@@ -413,9 +413,9 @@ fn accepts_contact_node_numbers_and_rejects_wrong_tips_and_axes() {
         "reduce blade blade_hex8.inp --sectors 36 --units mm-t-s --material steel --modes 4 --contact-nodes 3 --force";
     let swapped = format!("{line} --contact-set ROOT --clamp-set TIP");
     let refused = project.fail(&swapped, 1);
-    assert!(refused.contains("tip and root") && refused.contains("--accept-implausible"), "{refused}");
+    assert!(refused.contains("the tip, the root") && refused.contains("--accept-implausible"), "{refused}");
     let meant = project.succeed(&format!("{swapped} --accept-implausible"));
-    assert!(meant["warnings"].to_string().contains("tip and root"), "{}", meant["warnings"]);
+    assert!(meant["warnings"].to_string().contains("the tip, the root"), "{}", meant["warnings"]);
     let turned =
         format!("{line} --contact-set TIP --clamp-set ROOT --axis x --sectors 400").replacen("--sectors 36 ", "", 1);
     assert!(project.fail(&turned, 1).contains("axis"));

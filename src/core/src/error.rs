@@ -17,14 +17,14 @@ pub enum Error {
     },
     /// A value reference that the table does not hold.
     #[error(
-        "value reference {reference} does not exist in this FMU. Take it from modelDescription.xml of the same FMU"
+        "value reference {reference} does not exist in this FMU. Use a value reference of its modelDescription.xml"
     )]
     UnknownReference {
         /// The reference as given.
         reference: u32,
     },
     /// The scheme would be unstable, or the contact problem not solvable, with these settings.
-    #[error("refused: {problem}. {remedy}")]
+    #[error("{problem}. {remedy}")]
     Unstable {
         /// Which limit is exceeded, with numbers.
         problem: String,

@@ -99,7 +99,7 @@ impl Persist for f64 {
         if value.is_infinite() {
             reader.infinite += 1;
         } else if !(value.abs() <= reader.largest || reader.largest.is_infinite()) {
-            reader.refuse("it holds a number that no state holds");
+            reader.refuse("a number is out of range");
         }
     }
 }
@@ -113,7 +113,7 @@ impl Persist for u64 {
     }
     fn check(&self, reader: &mut StateReader) {
         if Self::from_le_bytes(reader.take()) > MOST_COUNTED {
-            reader.refuse("it holds a count beyond all counting");
+            reader.refuse("a counter is out of range");
         }
     }
 }
@@ -141,7 +141,7 @@ impl Persist for bool {
     fn check(&self, reader: &mut StateReader) {
         let [byte] = reader.take();
         if byte > 1 {
-            reader.refuse("it holds a flag that is neither set nor cleared");
+            reader.refuse("a flag is neither 0 nor 1");
         }
     }
 }

@@ -6,7 +6,8 @@ use crate::warning::{Topic, Warning};
 use crate::{Error, Rom, shown};
 
 /// Remedy for a rejected value that is meant.
-pub const IF_MEANT: &str = "If you mean it, set `accept_implausible = true` in the scene (--accept-implausible)";
+pub const IF_MEANT: &str =
+    "If the value is correct, set `accept_implausible = true` in the scene (--accept-implausible)";
 
 /// A value that is rarely meant.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,10 +61,10 @@ pub fn of_speed(rom: &Rom, speed: f64, name: impl FnOnce() -> String) -> Option<
     (rom.frame == DisplacementFrame::Cylindrical && fastest > TIP_SPEED).then(|| {
         let speed_shown = shown(speed);
         let problem = format!(
-            "at speed {speed_shown} rad/s the tips move at {fastest:.0} m/s; above {TIP_SPEED} m/s every rotor bursts"
+            "at speed {speed_shown} rad/s the tips move at {fastest:.0} m/s, but rotors burst above {TIP_SPEED} m/s"
         );
         let radians = speed * std::f64::consts::PI / 30.0;
-        Slip::new(name(), problem, format!("Is the speed in rpm? {speed_shown} rpm are {radians:.6} rad/s."))
+        Slip::new(name(), problem, format!("Is the speed in rpm? {speed_shown} rpm is {radians:.6} rad/s."))
     })
 }
 
@@ -76,8 +77,8 @@ pub fn fastest(rom: &Rom) -> f64 {
 pub fn of_velocity(name: &str, velocity: [f64; 3]) -> Option<Slip> {
     let size = velocity.iter().map(|component| component * component).sum::<f64>().sqrt();
     (size > FLIGHT).then(|| {
-        let problem = format!("the free structure starts at {size:.0} m/s, faster than {FLIGHT} m/s");
-        Slip::new(format!("`velocity` of {name}"), problem, "Is its velocity in m/s?")
+        let problem = format!("the free structure starts at {size:.0} m/s, above the plausible limit of {FLIGHT} m/s");
+        Slip::new(format!("`velocity` of {name}"), problem, "Is the velocity in m/s?")
     })
 }
 
@@ -106,10 +107,10 @@ fn named(rom: &Rom) -> String {
 
 fn of_size(rom: &Rom) -> Option<Slip> {
     let [low, high] = radii(rom);
-    let what = if rom.frame == DisplacementFrame::Cylindrical { "are at a radius of" } else { "are spread over" };
+    let what = if rom.frame == DisplacementFrame::Cylindrical { "are at a radius of" } else { "extend over" };
     if high > RADII[1] {
         let problem = format!("its contact nodes {what} {} m", shown(high));
-        return Some(Slip::new(named(rom), problem, "Are its lengths in millimetres? A ROM is in m, kg and s."));
+        return Some(Slip::new(named(rom), problem, "Are its lengths in millimetres? ROMs use m, kg and s."));
     }
     (low < RADII[0]).then(|| {
         let problem = format!("contact nodes are at a radius of {} m", shown(low));
@@ -123,7 +124,7 @@ fn of_frequencies(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> 
     let lowest = elastic.fold(f64::INFINITY, f64::min) / std::f64::consts::TAU;
     (lowest.is_finite() && !(FREQUENCIES[0]..=FREQUENCIES[1]).contains(&lowest)).then(|| {
         let problem = format!("its lowest natural frequency is {lowest:.3e} Hz");
-        Slip::new(named(rom), problem, "Are units (m, kg, s), material and clamped nodes correct?")
+        Slip::new(named(rom), problem, "Are the units (m, kg, s), the material and the clamped nodes correct?")
     })
 }
 
@@ -140,11 +141,11 @@ fn of_sectors(rom: &Rom) -> Option<Slip> {
     let how = if high - low > PITCHES * pitch {
         format!("its contact nodes span {:.4} rad, {:.1} times", high - low, (high - low) / pitch)
     } else if crosses_neighbour(&line, pitch) {
-        "the line through its contact nodes crosses that of the next sector,".to_owned()
+        "the line through its contact nodes crosses that of the next sector at".to_owned()
     } else {
         return None;
     };
-    let problem = format!("{how} the {pitch:.4} rad of one of {} sectors", rom.sectors);
+    let problem = format!("{how} the sector angle of {pitch:.4} rad ({} sectors)", rom.sectors);
     let question = "Are the number of sectors, the axis of rotation and the contact nodes correct?";
     Some(Slip::new(named(rom), problem, question))
 }

@@ -97,7 +97,8 @@ pub fn within(field: &str, value: f64, low: f64, high: f64) -> Result<()> {
         return Ok(());
     }
     let kind = if value.is_finite() { "value" } else { "finite value" };
-    Err(Error::invalid(field, shown(value), format!("Give a {kind} between {} and {}", shown(low), shown(high))))
+    let remedy = format!("Give a {kind} between {} and {}", shown(low), shown(high));
+    Err(Error::invalid(field, format!("{} is out of range", shown(value)), remedy))
 }
 
 /// Refuse a number that is not finite, or larger than `most` in size.

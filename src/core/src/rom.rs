@@ -263,25 +263,25 @@ impl Rom {
         if order == 0 || self.mass.ncols() != order {
             return Err(Error::invalid(
                 "ROM array `mass`",
-                format!("shape {:?} is not square or empty", self.mass.shape()),
+                format!("shape {:?} is empty or not square", self.mass.shape()),
                 remedy,
             ));
         }
         if self.stiffness.shape() != (order, order) {
             return Err(Error::invalid(
                 "ROM array `stiffness`",
-                format!("shape {:?} does not match `mass` {order} x {order}", self.stiffness.shape()),
+                format!("shape {:?} does not match `mass` ({order} x {order})", self.stiffness.shape()),
                 remedy,
             ));
         }
         if self.contact_nodes.is_empty() {
-            return Err(Error::invalid("ROM array `contact_positions`", "no contact node", remedy));
+            return Err(Error::invalid("ROM array `contact_positions`", "no contact nodes", remedy));
         }
         if self.contact_map.shape() != (3 * self.contact_nodes.len(), order) {
             return Err(Error::invalid(
                 "ROM array `contact_map`",
                 format!(
-                    "shape {:?} is not 3 x {} nodes by {order} coordinates",
+                    "shape {:?} found, 3 x {} nodes by {order} coordinates expected",
                     self.contact_map.shape(),
                     self.contact_nodes.len()
                 ),
@@ -294,14 +294,14 @@ impl Rom {
         if self.sectors > MAX_SECTORS {
             return Err(Error::invalid(
                 "ROM metadata `sectors`",
-                format!("{} sectors, more than {MAX_SECTORS}", self.sectors),
+                format!("{} sectors exceed the limit of {MAX_SECTORS}", self.sectors),
                 remedy,
             ));
         }
         if !(0.0..1.0).contains(&self.damping_ratio) {
             return Err(Error::invalid(
                 "ROM metadata `damping_ratio`",
-                format!("{} is not in 0 ≤ ξ < 1", shown(self.damping_ratio)),
+                format!("{} is outside 0 ≤ ξ < 1", shown(self.damping_ratio)),
                 remedy,
             ));
         }
@@ -336,14 +336,14 @@ impl Rom {
         for (name, matrix, sign) in matrices {
             let what = format!("ROM array `{name}`");
             if matrix.shape() != (order, order) || matrix.iter().any(|value| !value.is_finite()) {
-                let problem = format!("shape {:?}, {order} x {order} finite values expected", matrix.shape());
+                let problem = format!("shape {:?} found, {order} x {order} finite values expected", matrix.shape());
                 return Err(Error::invalid(what, problem, remedy));
             }
             entries(name, matrix, ranges::MATRIX, remedy)?;
             let asymmetry = (matrix - matrix.transpose() * sign).amax();
             if asymmetry > 1e-8 * matrix.amax() {
                 let kind = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
-                let problem = format!("not {kind}: off by {asymmetry:.3e} at largest entry {:.3e}", matrix.amax());
+                let problem = format!("not {kind}: deviation {asymmetry:.3e}, largest entry {:.3e}", matrix.amax());
                 return Err(Error::invalid(what, problem, remedy));
             }
         }
@@ -351,14 +351,14 @@ impl Rom {
             [("centrifugal_load", &spin.centrifugal_load), ("centrifugal_load_speed4", &spin.centrifugal_load_speed4)];
         for (name, load) in loads {
             if load.len() != order || load.iter().any(|value| !value.is_finite()) {
-                let problem = format!("{} values, {order} finite ones expected", load.len());
+                let problem = format!("{} values found, {order} finite values expected", load.len());
                 return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             }
             load.iter()
                 .try_for_each(|value| ranges::at_most(&format!("ROM array `{name}`"), *value, ranges::MATRIX))?;
         }
         if !(spin.largest_speed.is_finite() && spin.largest_speed > 0.0) {
-            let problem = format!("{} rad/s is not a finite speed > 0", shown(spin.largest_speed));
+            let problem = format!("{} rad/s is not a finite positive speed", shown(spin.largest_speed));
             return Err(Error::invalid("ROM metadata `largest_speed`", problem, remedy));
         }
         ranges::at_most("ROM metadata `largest_speed`", spin.largest_speed, ranges::SPEED)
@@ -368,7 +368,7 @@ impl Rom {
         let Some(thermal) = &self.extras.thermal else { return Ok(()) };
         let expected = (self.order(), thermal.patches.len());
         if thermal.loads.shape() != expected || expected.1 == 0 || thermal.loads.iter().any(|v| !v.is_finite()) {
-            let problem = format!("shape {:?}, {expected:?} finite values expected", thermal.loads.shape());
+            let problem = format!("shape {:?} found, {expected:?} finite values expected", thermal.loads.shape());
             return Err(Error::invalid("ROM array `thermal_loads`", problem, remedy));
         }
         entries("thermal_loads", &thermal.loads, ranges::THERMAL_LOAD, remedy)?;
@@ -380,7 +380,10 @@ impl Rom {
             if !(finite && ordered) {
                 return Err(Error::invalid(
                     format!("ROM array `thermal_patches`, patch {}", index + 1),
-                    format!("angles {:?} rad and axial positions {:?} m are no patch", patch.angle, patch.axial),
+                    format!(
+                        "angles {:?} rad and axial positions {:?} m do not define a patch",
+                        patch.angle, patch.axial
+                    ),
                     remedy,
                 ));
             }
@@ -397,7 +400,7 @@ impl Rom {
             if asymmetry > 1e-8 * matrix.amax() {
                 return Err(Error::invalid(
                     format!("ROM array `{name}`"),
-                    format!("not symmetric: largest |A - Aᵀ| is {asymmetry:.3e} at largest |A| {:.3e}", matrix.amax()),
+                    format!("not symmetric: deviation {asymmetry:.3e}, largest entry {:.3e}", matrix.amax()),
                     remedy,
                 ));
             }
@@ -414,7 +417,7 @@ fn entries(name: &str, matrix: &DMatrix<f64>, most: f64, remedy: &str) -> Result
     let Some(index) = matrix.iter().position(|value| value.is_nan() || value.abs() > most) else { return Ok(()) };
     let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), matrix[index]);
     let problem = if value.is_finite() {
-        format!("entry {} at ({row}, {column}) is beyond ±{}", shown(value), shown(most))
+        format!("entry {} at ({row}, {column}) is outside ±{}", shown(value), shown(most))
     } else {
         format!("non-finite entry at ({row}, {column})")
     };

@@ -315,7 +315,7 @@ fn check_count(variables: &[Variable]) -> Result<()> {
     Err(Error::invalid(
         "scene",
         format!(
-            "its variables have {count} values, more than the {} that are possible; `{}` alone has {}",
+            "the variables have {count} values, which exceeds the limit of {}; `{}` alone has {}",
             ranges::VALUES,
             largest.name,
             largest.len()
@@ -338,7 +338,7 @@ impl VariableTable {
             if variable.reference != expected || repeated {
                 return Err(Error::invalid(
                     format!("variable `{}`", variable.name),
-                    format!("reference {} where {expected} follows, or name used twice", variable.reference),
+                    format!("reference {} instead of {expected}, or duplicate name", variable.reference),
                     "Give consecutive references and unique names",
                 ));
             }

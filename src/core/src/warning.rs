@@ -56,88 +56,104 @@ macro_rules! topics {
 
 topics! {
     Flutter "flutter"
-        "Sliding contact that stays closed feeds vibration, which grows. A note where contact opens before that matters."
-        "Less friction or more damping, or nothing where it is a note.";
+        "Sliding contact that stays closed makes vibration grow. This is a note if contact opens before the growth \
+         matters."
+        "Use less friction or more damping. A note needs no action.";
     LockUp "lock-up"
-        "Friction bends the tip into the casing and no force holds it (self-locking). Clearances and energies mean nothing once it happens."
-        "Less friction than µ*, a casing that gives way, or a coating.";
+        "Friction turns the tip into the casing faster than it yields, so the contact force grows without limit \
+         (self-locking). Clearances and energies are meaningless once this happens."
+        "Use friction below µ*, a flexible casing, or a coating.";
     CuttingGrowth "cutting-growth"
-        "While all contact nodes of a blade cut fresh coating, vibration grows by the equations."
-        "A larger `normal_ratio`, a smaller `specific_energy` or more damping.";
+        "While all contact nodes of a blade cut fresh coating, vibration is physically unstable and grows."
+        "Use a larger `normal_ratio`, a smaller `specific_energy` or more damping.";
     StepGrowth "step-growth"
-        "The fixed step itself adds growth to sliding contact, by more than 1 % of what contact displaces."
-        "Adaptive steps (`scheme = \"galerkin\"`), or a smaller `time.step`.";
+        "The fixed step itself makes sliding contact grow, by more than 1 % of the displacements that contact causes."
+        "Use adaptive steps (`scheme = \"galerkin\"`) or a smaller `time.step`.";
     GrowthUnchecked "growth-unchecked"
-        "The model has too many modes to check whether sliding contact grows."
-        "Check a ROM with fewer modes, or halve the step and compare.";
+        "The model has too many modes for the check of growth in sliding contact."
+        "Check a ROM with fewer modes, or halve the step and compare the results.";
     OtherSense "other-sense"
-        "The rotor turns the other way than at the start, and growth of contact that slides that way was not checked."
-        "Start once with a speed of that sign.";
+        "The direction of rotation is opposite to that at the start, and growth of contact that slides in this \
+         direction was not checked."
+        "Start one run with a speed of this sign.";
     UnresolvedModes "unresolved-modes"
-        "The fixed step is too long for the highest modes. Their free motion stays exact, contact forces on them do not."
-        "A smaller `time.step`, or adaptive steps.";
+        "The fixed step is too long for the highest modes. Their free motion stays exact, but their response to \
+         contact forces does not."
+        "Use a smaller `time.step` or adaptive steps.";
     UnresolvedFlexibility "unresolved-flexibility"
-        "The fixed step passes over much of the flexibility that contact sees: errors of some per cent."
-        "A smaller `time.step`, or adaptive steps.";
+        "The fixed step does not resolve much of the flexibility of the contact nodes, which causes errors of a few \
+         per cent."
+        "Use a smaller `time.step` or adaptive steps.";
     MasslessEnergy "massless-energy"
-        "`massless-boundary` with this step may add energy where contact opens and closes."
-        "A smaller `time.step`, damping from 1e-3 on, or adaptive steps.";
+        "`massless-boundary` with this step may add energy when contact opens and closes."
+        "Use a smaller `time.step`, a damping ratio of at least 1e-3, or adaptive steps.";
     MasslessBlades "massless-blades"
-        "`massless-boundary` is shown stable for some blades in contact at a time, not for all."
-        "A smaller `time.step`, or adaptive steps.";
+        "`massless-boundary` is proven stable for a limited number of blades in contact at the same time, not for \
+         all blades."
+        "Use a smaller `time.step` or adaptive steps.";
     CasingSolvability "casing-solvability"
-        "With this friction the casing's part of the contact problem is not positive semidefinite: a step may have no unique solution."
-        "Less friction; such a step ends the run with a message.";
+        "With this friction coefficient, the casing's part of the contact problem is not positive semidefinite, so a \
+         step may have no unique solution."
+        "Use less friction. A step without a unique solution ends the run with a message.";
     FlightSolvability "flight-solvability"
-        "On the flight of a free body the contact problem cannot be shown to have one solution."
-        "Less friction or the solver `coulomb`; a step without a solution ends the run.";
+        "For the contacts along the path of a free body, the contact problem cannot be proven to have a unique \
+         solution."
+        "Use less friction or the solver `coulomb`. A step without a solution ends the run.";
     CoarseExcitation "coarse-excitation"
-        "The excitation turns far in one fixed step, and central differences make its resonance too large."
-        "The scheme `modal-exact`, or a smaller `time.step`.";
+        "The phase of the excitation changes too much in one fixed step, and central differences overestimate the \
+         resonance."
+        "Use the scheme `modal-exact` or a smaller `time.step`.";
     Sticking "sticking"
         "Tips slide more slowly than they vibrate, and the sliding law does not model sticking."
-        "The solver `coulomb`, or a higher speed.";
+        "Use the solver `coulomb` or a higher speed.";
     StiffnessAtRest "stiffness-at-rest"
-        "The rotor turns faster than a fifth of its first natural frequency, and the scene gives it the stiffness of rest."
-        "`spin = { stiffening = true, growth = true }` with a ROM that has spin matrices, or nothing where gap and stiffness are those at speed.";
+        "The rotor turns faster than a fifth of its first natural frequency, but the scene uses its stiffness at rest."
+        "Set `spin = { stiffening = true, growth = true }` with a ROM that has spin matrices. No action is needed if \
+         the scene already has the gap and the stiffness at speed.";
     RigidContact "rigid-contact"
-        "Modes that follow contact immediately leave some directions of the contact nodes rigid: contact that needs them loses energy."
-        "A ROM of the kind free-interface, or fewer contact nodes or patches.";
+        "The quasi-static modes have no flexibility in some directions of the contact nodes, and contact in these \
+         directions loses energy."
+        "Use a free-interface ROM, or fewer contact nodes or patches.";
     ToleranceLimit "tolerance-limit"
-        "The tolerance is below what the shortest adaptive steps can keep."
-        "A smaller `time.step` or communication step, or a larger tolerance.";
+        "The tolerance is smaller than the error of the shortest adaptive steps."
+        "Use a smaller `time.step` or communication step, or a larger tolerance.";
     ToleranceMissed "tolerance-missed"
-        "Some of the shortest adaptive steps were accepted although they missed the tolerance."
-        "A smaller `time.step`, or a larger tolerance.";
+        "Some adaptive steps of the minimum length were accepted although they missed the tolerance."
+        "Use a smaller `time.step` or a larger tolerance.";
     FilmPulls "film-pulls"
-        "The solver `film` pulls at a contact node instead of pushing: forces of single nodes are wrong by about as much."
-        "The solver `lcp`.";
+        "The solver `film` pulls at a contact node instead of pushing. The forces of single nodes are wrong by about \
+         the same amount."
+        "Use the solver `lcp`.";
     FilmInside "film-inside"
-        "The solver `film` leaves a contact node inside the surface: by 5 % of its clearance or more, and of a free body by 20 % of a thousandth of its extent."
-        "The solver `lcp`.";
+        "The solver `film` leaves a contact node inside the surface, by at least 5 % of its clearance (for a free \
+         body, by at least 20 % of a thousandth of its extent)."
+        "Use the solver `lcp`.";
     CurvatureWork "curvature-work"
-        "Normals that turn within internal steps have added as much energy as inputs or the shaft did: their net work may be wrong in its sign."
-        "A smaller `time.step`, or adaptive steps.";
+        "Normals that rotate within internal steps have added as much energy as the inputs or the shaft, so even the \
+         sign of the net work may be wrong."
+        "Use a smaller `time.step` or adaptive steps.";
     ThermalStep "thermal-step"
-        "The communication step of a heat conduction unit is shorter than the diffusion time of an element: surface temperatures rise too slowly."
-        "A longer communication step with the mean of the heat, or thinner elements.";
+        "The communication step of a heat conduction unit is shorter than the diffusion time of an element, so \
+         surface temperatures rise too slowly."
+        "Use a longer communication step with the mean heat, or thinner elements.";
     LargeDisplacement "large-displacement"
-        "A contact node moves so far around the axis that linear gaps miss 5 % of the clearance."
-        "Check loads and clearance; at 100 % the run ends.";
+        "A contact node moves so far around the axis that linear gaps have an error of at least 5 % of the clearance."
+        "Check the loads and the clearance. At 100 % the run ends.";
     Implausible "implausible"
-        "A number that is rarely meant was accepted because the scene says so (`accept_implausible = true`)."
-        "Check it; without the key it is an error.";
+        "An implausible value was accepted because the scene sets `accept_implausible = true`."
+        "Check the value. Without the key it is an error.";
     NoFrictionPower "no-friction-power"
         "Friction power per patch was requested, but no contact has friction."
-        "Set `contact.friction`, or leave the patches out.";
+        "Set `contact.friction`, or leave out the patches.";
     CommunicationStep "communication-step"
         "The communication step is longer than the run."
-        "A shorter communication step.";
+        "Use a shorter communication step.";
     InputLines "input-lines"
-        "Lines of the file of inputs are closer than the communication step: only values at communication points count."
-        "A shorter communication step.";
+        "Lines of the input file are closer together than the communication step, and only values at communication \
+         points count."
+        "Use a shorter communication step.";
     RomAccuracy "rom-accuracy"
-        "Modes of a ROM deviate from the full model by more than good models do."
+        "Modes of a ROM deviate from the full model by more than is usual for a good ROM."
         "Keep more modes.";
 }
 
@@ -150,7 +166,8 @@ impl Topic {
         let found = Self::ALL.iter().copied().find(|topic| topic.id() == id);
         found.ok_or_else(|| {
             let all: Vec<&str> = Self::ALL.iter().map(|topic| topic.id()).collect();
-            Error::invalid(what, format!("no warning has the identifier {id:?}"), format!("Use {}", all.join(", ")))
+            let remedy = format!("Use one of: {}", all.join(", "));
+            Error::invalid(what, format!("no warning has the identifier {id:?}"), remedy)
         })
     }
 }

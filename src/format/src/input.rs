@@ -27,7 +27,7 @@ pub fn read_file(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open_file(path)?;
     let length = file.metadata()?.len();
     let too_large =
-        || io::Error::new(ErrorKind::FileTooLarge, format!("it has more than the {most} bytes that are read"));
+        || io::Error::new(ErrorKind::FileTooLarge, format!("it exceeds the limit of {most} bytes"));
     if length > most {
         return Err(too_large());
     }

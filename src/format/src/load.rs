@@ -32,8 +32,8 @@ impl RomBytes {
         if self.0 <= LARGEST_ROMS {
             return Ok(());
         }
-        let problem = format!("with this file the ROM files of the scene exceed the limit of {LARGEST_ROMS} bytes");
-        Err(Error::file(path, problem, "Use fewer structures, or smaller ROMs"))
+        let problem = format!("this file brings the ROM files of the scene above the limit of {LARGEST_ROMS} bytes");
+        Err(Error::file(path, problem, "Use fewer structures or smaller ROMs"))
     }
 }
 
@@ -49,8 +49,8 @@ pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, Stri
         Some(name) => builtin_rom(path, index, name, builtin(name)),
         None => {
             let remedy = format!(
-                "structure[{}].rom in {} names this file, relative to the scene file; correct the name, or write the \
-                 file with `tiprub reduce`",
+                "Correct structure[{}].rom in {} (a path relative to the scene file), or create the file with `tiprub \
+                 reduce`",
                 index + 1,
                 path.display()
             );
@@ -87,12 +87,12 @@ fn builtin_rom(scene: &Path, index: usize, name: &str, answer: Option<Result<Rom
             refuse(format!("the built-in model `{name}` is not usable: {error}"), "Report this to the developers")
         }),
         Some(Err(problem)) => Err(refuse(
-            format!("the built-in model `{name}` could not be made: {problem}"),
-            "Give a ROM file instead, or remove the cause named",
+            format!("the built-in model `{name}` could not be generated: {problem}"),
+            "Use a ROM file instead, or fix the reported problem",
         )),
         None => Err(refuse(
             format!("there is no built-in model `{name}`"),
-            "Give the name of a ROM file, or that of a built-in model such as `builtin:rotor37`",
+            "Give a ROM file or a built-in model such as `builtin:rotor37`",
         )),
     }
 }
@@ -109,5 +109,5 @@ fn read_text(path: &Path, remedy: &str) -> Result<String> {
 pub(crate) fn text_error(path: &Path, error: &std::string::FromUtf8Error) -> Error {
     let offset = error.utf8_error().valid_up_to();
     let line = error.as_bytes()[..offset].iter().filter(|byte| **byte == b'\n').count() + 1;
-    Error::file(path, format!("not UTF-8 text in line {line} (byte {offset})"), "Save the file as UTF-8")
+    Error::file(path, format!("invalid UTF-8 in line {line} (byte {offset})"), "Save the file as UTF-8")
 }

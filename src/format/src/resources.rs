@@ -25,7 +25,7 @@ const ARRAYS_END: &str = ".safetensors";
 pub(crate) const RESOURCES_FORMAT_VERSION: u32 = 1;
 
 pub(crate) const INTACT: &str =
-    "The FMU is damaged or was changed: import it again, or write it again with `tiprub package`";
+    "Import the FMU again or recreate it with `tiprub package`; this copy is damaged or was modified";
 
 /// Resources of an FMU instance.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +88,7 @@ pub(crate) fn check_directory(directory: &Path) -> Result<()> {
     if directory.is_dir() {
         return Ok(());
     }
-    Err(Error::file(directory, "no such directory (the FMU's resources are expected here)", INTACT))
+    Err(Error::file(directory, "directory not found (the FMU's resources are expected here)", INTACT))
 }
 
 /// The ROMs of a scene as an FMU holds them: without what this scene does not use.
@@ -204,8 +204,8 @@ fn parse_package(path: &Path, text: &str) -> Result<PackageFile> {
     let version = table.get("format_version").and_then(toml::Value::as_integer);
     if version != Some(i64::from(RESOURCES_FORMAT_VERSION)) {
         let found = version.map_or("none".to_owned(), |version| version.to_string());
-        let problem = format!("format_version {found} found, {RESOURCES_FORMAT_VERSION} expected");
-        return Err(Error::file(path, problem, "Write the FMU again with `tiprub package` of the same release"));
+        let problem = format!("found format_version {found}, expected {RESOURCES_FORMAT_VERSION}");
+        return Err(Error::file(path, problem, "Recreate the FMU with `tiprub package` of the same release"));
     }
     table.try_into().map_err(|error: toml::de::Error| Error::file(path, error.message(), INTACT))
 }

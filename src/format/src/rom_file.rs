@@ -15,7 +15,7 @@ mod rub_errors;
 use crate::rom_layout::{ARRAYS, METADATA, NUMBER, ROM_FORMAT, ROM_FORMAT_VERSION, units_text};
 use crate::{Error, Result, suggestion};
 
-const WRITE_AGAIN: &str = "Write the ROM again; the ROM file chapter of the user guide lists arrays and metadata";
+const WRITE_AGAIN: &str = "Write the ROM again; the ROM file chapter of the user guide lists the arrays and metadata";
 
 /// An array of the file: shape and values in row-major order.
 pub(crate) struct Array {
@@ -76,7 +76,7 @@ impl RomReader<'_> {
         if let Some(unknown) = metadata.keys().find(|key| !known.contains(&key.as_str())) {
             return Err(self.error(
                 format!("metadata `{unknown}`"),
-                "no such entry in a ROM file",
+                "unknown metadata entry",
                 suggestion::remedy(unknown, &known),
             ));
         }
@@ -89,13 +89,13 @@ impl RomReader<'_> {
             let listed = known.contains(&name.as_str()) && !name.contains(NUMBER);
             if !listed && harmonics::parts(&name).is_none() {
                 let remedy = suggestion::remedy(&name, &known);
-                return Err(self.error(format!("array `{name}`"), "no such array in a ROM file", remedy));
+                return Err(self.error(format!("array `{name}`"), "unknown array", remedy));
             }
             if view.dtype() != Dtype::F64 {
                 return Err(self.error(
                     format!("array `{name}`"),
-                    format!("data type {:?} found, F64 expected", view.dtype()),
-                    "Convert it to 64-bit floating point before saving, in NumPy with `.astype(numpy.float64)`",
+                    format!("found data type {:?}, expected F64", view.dtype()),
+                    "Convert it to 64-bit floating point before saving; in NumPy, use `.astype(numpy.float64)`",
                 ));
             }
             let (words, _) = view.data().as_chunks::<8>();
@@ -107,15 +107,15 @@ impl RomReader<'_> {
 
     fn container_error(&self, error: &SafeTensorError, bytes: &[u8]) -> Error {
         let problem = match error {
-            SafeTensorError::HeaderTooSmall => format!("{} bytes only, too short for a header", bytes.len()),
+            SafeTensorError::HeaderTooSmall => format!("only {} bytes, too short for a header", bytes.len()),
             SafeTensorError::HeaderTooLarge | SafeTensorError::InvalidHeaderLength => {
                 format!(
-                    "header length does not fit the file of {} bytes, or exceeds {LARGEST_HEADER} bytes",
+                    "header length does not match the file size of {} bytes or exceeds {LARGEST_HEADER} bytes",
                     bytes.len()
                 )
             }
             SafeTensorError::MetadataIncompleteBuffer => {
-                format!("the header promises another length than the {} bytes found: truncated or damaged", bytes.len())
+                format!("header does not match the {} bytes found: the file is truncated or damaged", bytes.len())
             }
             other => format!("damaged header ({other})"),
         };
@@ -127,16 +127,17 @@ impl RomReader<'_> {
         if format != Some(ROM_FORMAT) {
             return Err(self.error(
                 "metadata `format`",
-                format!("{} found, \"{ROM_FORMAT}\" expected: not a tiprub ROM file", quoted(format)),
-                "Give a file written by `tiprub reduce`, or add the metadata named in the ROM file chapter",
+                format!("found {}, expected \"{ROM_FORMAT}\": not a tiprub ROM file", quoted(format)),
+                "Use a file written by `tiprub reduce`, or add the metadata listed in the ROM file chapter of the user \
+                 guide",
             ));
         }
         let version = metadata.get("format_version").map(String::as_str);
         if version != Some(ROM_FORMAT_VERSION) {
             return Err(self.error(
                 "metadata `format_version`",
-                format!("{} found, \"{ROM_FORMAT_VERSION}\" expected", quoted(version)),
-                "Use the tiprub release that wrote the file, or write the ROM again with this one",
+                format!("found {}, expected \"{ROM_FORMAT_VERSION}\"", quoted(version)),
+                "Use the tiprub release that wrote the file, or write the ROM again with this release",
             ));
         }
         Ok(())
@@ -149,7 +150,7 @@ impl RomReader<'_> {
         let nodes = positions.shape[0];
         self.shape("mass", mass, &[order, order], "square")?;
         let stiffness = self.required(arrays, "stiffness", 2)?;
-        self.shape("stiffness", stiffness, &[order, order], "that of `mass`")?;
+        self.shape("stiffness", stiffness, &[order, order], "same shape as `mass`")?;
         self.shape("contact_positions", positions, &[nodes, 3], "three coordinates per node")?;
         let map = self.required(arrays, "contact_map", 3)?;
         let reason = "nodes as in `contact_positions`, 3 components, coordinates as in `mass`";
@@ -190,11 +191,11 @@ impl RomReader<'_> {
         let what = format!("array `{name}`");
         let Some(array) = arrays.get(name) else {
             let held = arrays.keys().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ");
-            let problem = format!("missing; the file holds {}", if held.is_empty() { "no array" } else { &held });
+            let problem = format!("missing; the file contains {}", if held.is_empty() { "no arrays" } else { &held });
             return Err(self.error(what, problem, format!("Add it with shape {layout}")));
         };
         if array.shape.len() != dimensions {
-            return Err(self.error(what, format!("shape {:?} found, {layout} expected", array.shape), WRITE_AGAIN));
+            return Err(self.error(what, format!("found shape {:?}, expected {layout}", array.shape), WRITE_AGAIN));
         }
         Ok(array)
     }
@@ -203,7 +204,7 @@ impl RomReader<'_> {
         if array.shape == expected {
             return Ok(());
         }
-        let problem = format!("shape {:?} found, {expected:?} expected ({reason})", array.shape);
+        let problem = format!("found shape {:?}, expected {expected:?} ({reason})", array.shape);
         Err(self.error(format!("array `{name}`"), problem, WRITE_AGAIN))
     }
 
@@ -238,8 +239,8 @@ impl RomReader<'_> {
         let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
         if names.len() != nodes {
             let positions = key.replace("names", "positions");
-            let problem = format!("{} names found, {nodes} expected (as in `{positions}`)", names.len());
-            return Err(self.error(what, problem, "Give one name each, separated by commas"));
+            let problem = format!("found {} names, expected {nodes} (as in `{positions}`)", names.len());
+            return Err(self.error(what, problem, "Give one name per point, separated by commas"));
         }
         let mut known = HashSet::with_capacity(names.len());
         for name in &names {
@@ -249,7 +250,7 @@ impl RomReader<'_> {
                 return Err(self.error(what, format!("{name:?} cannot be part of a variable name"), remedy));
             }
             if !known.insert(name.as_str()) {
-                return Err(self.error(what, format!("{name:?} appears twice"), "Give each its own name"));
+                return Err(self.error(what, format!("{name:?} appears twice"), "Use unique names"));
             }
         }
         Ok(names)
@@ -260,7 +261,7 @@ impl RomReader<'_> {
         self.shape(name, array, &[array.values.len()], "one value per mode")?;
         if let Some(index) = array.values.iter().position(|value| !value.is_finite()) {
             let problem = format!("entry {index} is {}", array.values[index]);
-            return Err(self.error(format!("array `{name}`"), problem, "Leave the array out where a value is unknown"));
+            return Err(self.error(format!("array `{name}`"), problem, "Omit the array if a value is unknown"));
         }
         Ok(array.values.clone())
     }
@@ -277,7 +278,8 @@ impl RomReader<'_> {
         let text = self.entry(metadata, key)?;
         text.trim().parse().map_err(|_| {
             let layout = METADATA.iter().find(|entry| entry.name == key).map_or("", |entry| entry.description);
-            self.error(format!("metadata `{key}`"), format!("{text:?} is not such a number"), layout)
+            let remedy = format!("Expected here: {layout}");
+            self.error(format!("metadata `{key}`"), format!("{text:?} is not a valid number"), remedy)
         })
     }
 
@@ -287,7 +289,7 @@ impl RomReader<'_> {
             "cartesian" => Ok(DisplacementFrame::Cartesian),
             other => Err(self.error(
                 "metadata `frame`",
-                format!("{other:?} is not a frame"),
+                format!("unknown frame {other:?}"),
                 suggestion::remedy(other, &["cylindrical", "cartesian"]),
             )),
         }
@@ -301,8 +303,8 @@ impl RomReader<'_> {
         }
         Err(self.error(
             "metadata `checksum`",
-            format!("\"{stated}\" stated, \"{found}\" found: the content was damaged or changed after writing"),
-            "Copy the file again; where it was changed on purpose, remove the entry `checksum` from the metadata",
+            format!("stated \"{stated}\", computed \"{found}\": the content was damaged or changed after writing"),
+            "Copy the file again; if you changed it on purpose, remove the entry `checksum` from the metadata",
         ))
     }
 }

@@ -68,7 +68,7 @@ pub const ARRAYS: [ArrayLayout; 34] = [
         "[nodes]",
         "1",
         false,
-        "Slope dr/dz of the tip contour at each contact node; zero where left out.",
+        "Slope dr/dz of the tip contour at each contact node; zero if omitted.",
     ),
     array("full_frequencies", "[modes]", "Hz", false, "Natural frequencies of the full model, ascending."),
     array("reduced_frequencies", "[modes]", "Hz", false, "Natural frequencies of the reduced model, ascending."),
@@ -79,8 +79,8 @@ pub const ARRAYS: [ArrayLayout; 34] = [
         "[n, n]",
         "kg",
         false,
-        "Stiffness per square of the speed: centrifugal stiffening and spin softening, symmetric. Spin arrays come all \
-         together, with `largest_speed`.",
+        "Stiffness per square of the speed: centrifugal stiffening and spin softening, symmetric. A file has all spin \
+         arrays and `largest_speed`, or none of them.",
     ),
     array("stiffness_speed4", "[n, n]", "kg s^2", false, "Stiffness per fourth power of the speed, symmetric."),
     array("coriolis", "[n, n]", "kg", false, "G of the Coriolis force 2ΩG q': skew-symmetric."),
@@ -90,40 +90,39 @@ pub const ARRAYS: [ArrayLayout; 34] = [
         "[n]",
         "kg m s^2",
         false,
-        "What the growth of the stiffened structure adds to it, per fourth power of the speed; without stiffening it is \
-         left out.",
+        "Additional centrifugal force on the stretched structure per fourth power of the speed; ignored without \
+         stiffening.",
     ),
     array(
         "thermal_loads",
         "[n, patches]",
         "N/K",
         false,
-        "Force on the reduced coordinates per kelvin of each patch above the reference. It comes with \
-         `thermal_patches`.",
+        "Force on the reduced coordinates per kelvin of each patch above the reference. Requires `thermal_patches`.",
     ),
     array(
         "thermal_patches",
         "[patches, 4]",
         "rad, rad, m, m",
         false,
-        "Where each patch is: angle from and to, axial position from and to.",
+        "Extent of each patch: start and end angle, start and end axial position.",
     ),
     array(
         "mass_<n>",
         "[m, m, 2]",
         "kg",
         false,
-        "Reduced mass matrix of nodal diameter n = 1, 2, ... up to half of `sectors`: Hermitian, positive definite; the \
-         last index is 0 for the real part and 1 for the imaginary part. `m` may differ from one n to the next. \
-         `mass`, `stiffness` and `contact_map` are then those of n = 0.",
+        "Reduced mass matrix of nodal diameter n = 1, 2, ... up to half of `sectors`: Hermitian, positive definite; \
+         the last index is 0 for the real part and 1 for the imaginary part. `m` may differ between nodal diameters. \
+         `mass`, `stiffness` and `contact_map` then belong to n = 0.",
     ),
     array(
         "stiffness_<n>",
         "[m, m, 2]",
         "N/m",
         false,
-        "Reduced stiffness matrix of nodal diameter n: Hermitian, positive semidefinite. The three arrays of a nodal \
-         diameter come together, and for all n or for none.",
+        "Reduced stiffness matrix of nodal diameter n: Hermitian, positive semidefinite. A file has all three arrays \
+         for every n, or none of them.",
     ),
     array(
         "contact_map_<n>",
@@ -144,14 +143,14 @@ pub const ARRAYS: [ArrayLayout; 34] = [
         "[nodes]",
         "m^2",
         false,
-        "Area that each contact patch stands for, the integral of its weight over the tip; 0 for a node.",
+        "Area of each contact patch: the integral of its weight function over the tip; 0 for a contact node.",
     ),
     array(
         "contact_lengths",
         "[nodes]",
         "m",
         false,
-        "Length along the chord that each contact patch stands for; 0 for a node.",
+        "Length of each contact patch along the chord; 0 for a contact node.",
     ),
     array(
         "flexibility_deviation",
@@ -165,83 +164,87 @@ pub const ARRAYS: [ArrayLayout; 34] = [
         "[frequencies]",
         "Hz",
         false,
-        "Frequencies of the forced responses that were compared with those of the full model, ascending.",
+        "Frequencies at which the forced response was compared with that of the full model, ascending.",
     ),
     array(
         "response_deviation",
         "[frequencies]",
         "%",
         false,
-        "Deviation of the forced response at the contact nodes from that of the full model, at each of them.",
+        "Deviation of the forced response at the contact nodes from that of the full model, at each of \
+         `response_frequencies`.",
     ),
     array(
         "watched_map",
         "[points, 3, n]",
         "m per unit coordinate",
         false,
-        "Displacement components of points that are looked at and touch nothing; with `watched_positions` and \
-         `watched_names`, not with coupled sectors.",
+        "Displacement components of each watched point (a point without contact) caused by each reduced coordinate. \
+         Requires `watched_positions` and `watched_names`; not supported with coupled sectors.",
     ),
     array(
         "watched_positions",
         "[points, 3]",
         "m, rad, m (cylindrical) or m (cartesian)",
         false,
-        "Undeformed positions of these points, as for contact nodes.",
+        "Undeformed positions of the watched points, in the same form as `contact_positions`.",
     ),
     array(
         "stress_map",
         "[places, 6, n]",
         "Pa per unit coordinate",
         false,
-        "Stresses at chosen places, in the directions of a contact node there: 11, 22, 33, 12, 23, 31. With `stress_positions` and \
-         `stress_names`, not with coupled sectors.",
+        "Stress components 11, 22, 33, 12, 23, 31 at chosen places, in the directions of a contact node at the same \
+         place. Requires `stress_positions` and `stress_names`; not supported with coupled sectors.",
     ),
     array(
         "stress_positions",
         "[places, 3]",
         "m, rad, m (cylindrical) or m (cartesian)",
         false,
-        "Undeformed positions of these places, as for contact nodes.",
+        "Undeformed positions of these places, in the same form as `contact_positions`.",
     ),
     array(
         "stress_thermal",
         "[places, 6, patches]",
         "Pa/K",
         false,
-        "Static stress of the full structure at these places per kelvin of each patch, without contact: D(Bu - alpha) of its \
-         displacements u under the thermal load. With `stress_map` and `thermal_loads`; a scene that asks for the stress of a heated \
-         rotor needs it.",
+        "Static stress of the full structure at these places per kelvin of each patch, without contact: D(Bu - alpha) \
+         with the displacements u under the thermal load. Requires `stress_map` and `thermal_loads`; needed by scenes \
+         that output the stress of a heated rotor.",
     ),
     array(
         "stress_centrifugal",
         "[places, 6]",
         "Pa s^2",
         false,
-        "Static stress of the full structure at these places per square of the speed, without contact and stiffening. With `stress_map` and \
-         `centrifugal_load`; a scene that asks for the stress of a rotor with growth needs it.",
+        "Static stress of the full structure at these places per square of the speed, without contact and stiffening. \
+         Requires `stress_map` and `centrifugal_load`; needed by scenes that output the stress of a rotor with \
+         centrifugal growth.",
     ),
     array(
         "support_stiffness",
         "[6, n]",
         "N or N m per unit coordinate",
         false,
-        "Force of the support on the structure along fixed x, y, z and its moment about x, y, z through the origin, caused by each \
-         reduced coordinate: the rows of the full stiffness at the held nodes. With `support_mass`; sectors = 1.",
+        "Force of the support on the structure along fixed x, y, z and its moment about x, y, z through the origin, \
+         caused by each reduced coordinate: the rows of the full stiffness matrix at the held nodes. Requires \
+         `support_mass` and sectors = 1.",
     ),
     array(
         "support_mass",
         "[6, n]",
         "kg or kg m",
         false,
-        "The same caused by the acceleration of each reduced coordinate: the rows of the full mass at the held nodes.",
+        "Force and moment of the support caused by the acceleration of each reduced coordinate: the rows of the full \
+         mass matrix at the held nodes.",
     ),
     array(
         "support_thermal",
         "[6, patches]",
         "N/K or N m/K",
         false,
-        "Thermal load of each patch on the held nodes, which the support takes up; zero where left out.",
+        "Thermal load of each patch on the held nodes, carried by the support; zero if omitted.",
     ),
 ];
 
@@ -270,12 +273,12 @@ pub const METADATA: [MetadataLayout; 18] = [
     entry("format", None, "Always `tiprub-rom`."),
     entry("format_version", None, "Always `1`."),
     entry("name", None, "Name of the structure."),
-    entry("origin", Some(""), "Where the model came from: mesh, material, reduction; free text."),
+    entry("origin", Some(""), "Source of the model: mesh, material, reduction; free text."),
     entry(
         "sectors",
         None,
-        "Number of identical sectors around the axis, at least 1 and at most 10000; 1 is a single structure. They are \
-         uncoupled, unless there are arrays for nodal diameters above 0.",
+        "Number of identical sectors around the axis, 1 to 10000; 1 means a single structure. The sectors are \
+         uncoupled unless the file has arrays for nodal diameters above 0.",
     ),
     entry("frame", None, "`cylindrical` or `cartesian`: directions of positions and displacements."),
     entry("damping_ratio", Some("0"), "Modal damping ratio, from 0 to below 1; a scene may override it."),
@@ -283,38 +286,39 @@ pub const METADATA: [MetadataLayout; 18] = [
     entry(
         "largest_speed",
         Some(""),
-        "Largest speed (rad/s) that the spin arrays are valid for; needed with them and not allowed without.",
+        "Largest speed (rad/s) for which the spin arrays are valid; required with them and not allowed without them.",
     ),
     entry(
         "contact_grid",
         Some(""),
         "`around,along`, for example `72,5`: the contact nodes form a grid on a closed ring that can carry a surface. \
-         Node along·around + i is the i-th of its ring, rings in order of growing z, angles growing by 2π/around. \
-         `around,along,open`: they form a grid with four free edges, frame `cartesian`; node along·around + i is the i-th \
-         of its row.",
+         Node k·around + i is the i-th node of ring k; rings are in order of increasing z, and angles increase by \
+         2π/around. `around,along,open`: the contact nodes form a grid with four free edges (frame `cartesian`); node \
+         k·around + i is the i-th node of row k.",
     ),
     entry("watched_names", Some(""), "Names of the watched points, separated by commas."),
     entry("stress_names", Some(""), "Names of the places with stress, separated by commas."),
     entry(
         "basis",
         Some("craig-bampton"),
-        "`craig-bampton`, modes with the contact nodes held, or `free-interface`, modes of the structure as it is supported.",
+        "`craig-bampton`: modes with the contact nodes held; `free-interface`: modes of the supported structure with \
+         the contact nodes free.",
     ),
     entry(
         "contact_rows",
         Some("1"),
-        "Rows of contact patches across the thickness of the tip: patch row·(nodes/rows) + i is the i-th along the chord of its row, rows from \
-         side to side.",
+        "Number of rows of contact patches across the thickness of the tip. Patch row·(nodes/rows) + i is the i-th \
+         patch along the chord in its row; rows run from one side of the tip to the other.",
     ),
     entry(
         "rub_errors",
         Some(""),
-        "What the reduction leaves of a rub, as far as it is known: `modes=0.01,patches=0.02,rows=0.1,mesh=0.03`, relative errors of the \
-         displacements of the tip.",
+        "Known discretisation errors in a rub: relative errors of the tip displacements, for example \
+         `modes=0.01,patches=0.02,rows=0.1,mesh=0.03`.",
     ),
-    entry("rub_errors_found_on", Some(""), "The scene that these were found on, in words."),
-    entry("units", Some(""), "Text for the reader of the file: one line per array."),
-    entry("checksum", Some(""), "SHA-256 of the content, checked where present; leave it out when writing by hand."),
+    entry("rub_errors_found_on", Some(""), "Description of the scene on which `rub_errors` were determined."),
+    entry("units", Some(""), "Shapes and units as text for human readers: one line per array."),
+    entry("checksum", Some(""), "SHA-256 of the content, checked if present; omit it if you write the file yourself."),
 ];
 
 /// Arrays of one nodal diameter above 0, and what stands for its number in their names.

@@ -122,14 +122,15 @@ pub(crate) fn diagnose(document: &Document, error: &toml::de::Error) -> Error {
         return missing(document, place, name);
     }
     let Some(place) = place else {
-        return document.error(error.span(), "scene", message.to_owned(), "See the scene file chapter".into());
+        let remedy = "See the scene file chapter of the user guide".into();
+        return document.error(error.span(), "scene", message.to_owned(), remedy);
     };
     if let Some(name) = quoted(message, "unknown field") {
         return unknown_key(document, &place, name, &accepted(message));
     }
     if let Some(name) = quoted(message, "unknown variant") {
         let remedy = suggestion::remedy(name, &accepted(message));
-        return document.error(Some(place.span), &place.path, format!("\"{name}\" is not one of its values"), remedy);
+        return document.error(Some(place.span), &place.path, format!("\"{name}\" is not an accepted value"), remedy);
     }
     wrong_value(document, place, message)
 }
@@ -167,12 +168,12 @@ fn wrong_value(document: &Document, place: TomlNode, message: &str) -> Error {
         _ => place,
     };
     let problem = match (found, expected) {
-        (Some(found), Some(expected)) => format!("{found} found, {} expected", plain(expected)),
+        (Some(found), Some(expected)) => format!("found {found}, expected {}", plain(expected)),
         _ => message.to_owned(),
     };
     let requirement = requirement(&place.fields);
     let remedy = if requirement.is_empty() {
-        "See the scene file chapter".into()
+        "See the scene file chapter of the user guide".into()
     } else {
         format!("Expected here: {requirement}")
     };
@@ -186,20 +187,20 @@ pub(crate) fn check_brackets(document: &Document) -> Result<(), Error> {
         let name: &str = key.get_ref();
         let all_tables = |list: &DeArray| list.iter().all(|element| element.get_ref().is_table());
         let problem = if REPEATED_TABLES.contains(&name) && !value.get_ref().as_array().is_some_and(all_tables) {
-            "a list of tables expected"
+            "expected a list of tables"
         } else if SINGLE_TABLES.contains(&name) && !value.get_ref().is_table() {
-            "a single table expected"
+            "expected a single table"
         } else {
             continue;
         };
-        let problem = format!("{} found, {problem}", value.get_ref().type_str());
+        let problem = format!("found {}, {problem}", value.get_ref().type_str());
         return Err(document.error(Some(key.span()), name, problem, format!("Write {}", header(name))));
     }
     let example =
         |place: &TomlNode| INNER_TABLES.iter().find(|(table, _)| place.fields == *table).map(|(_, text)| *text);
     match document.places().into_iter().find(|place| example(place).is_some() && !place.value.is_table()) {
         Some(place) => {
-            let problem = format!("{} found, a table expected", place.value.type_str());
+            let problem = format!("found {}, expected a table", place.value.type_str());
             let remedy = format!("Write it as {}", example(&place).unwrap_or_default());
             Err(document.error(Some(place.span), &place.path, problem, remedy))
         }
@@ -246,7 +247,7 @@ pub(crate) fn requirement(fields: &str) -> String {
 fn plain(expected: &str) -> &str {
     match expected {
         "f64" => "a number",
-        "u32" | "usize" => "a whole number, not negative",
+        "u32" | "usize" => "a non-negative whole number",
         "a sequence" => "a list",
         "a boolean" => "true or false",
         other => other,

@@ -55,7 +55,7 @@ fn with_document<T, E: From<Error>>(
         position: error.span().map(|span| position(text, span.start)),
         what: "TOML syntax".into(),
         problem: error.message().to_owned(),
-        remedy: "Correct the file at this place; values that are words need quotation marks, and each key its own line"
+        remedy: "Correct the file at this position; text values need quotation marks, and each key needs its own line"
             .into(),
     })?;
     work(&Document { text, origin, root: root.get_ref() })
@@ -71,7 +71,7 @@ fn parse(document: &Document) -> Result<SceneSettings> {
     }
     settings.validate().map_err(|error| match error {
         tiprub_core::Error::Invalid { what, problem, remedy } => document.refusal(&what, problem, remedy),
-        other => document.refusal("scene", other.to_string(), "Change the settings named".into()),
+        other => document.refusal("scene", other.to_string(), "Change the settings named above".into()),
     })?;
     Ok(settings)
 }
@@ -87,8 +87,9 @@ fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document
         return Ok(());
     }
     let why = scheme_reason.as_ref().map_or(String::new(), |reason| format!(" ({reason})"));
-    let problem = format!("missing: the scheme is `{}`{why}, which has fixed steps", scheme.name());
-    let galerkin = if scheme_reason.is_some() { "" } else { ", or use scheme = \"galerkin\", which needs none" };
+    let problem = format!("missing: the scheme `{}`{why} uses fixed steps", scheme.name());
+    let galerkin =
+        if scheme_reason.is_some() { "" } else { ", or use scheme = \"galerkin\", which chooses its own steps" };
     Err(document.refusal(
         STEP,
         problem,

@@ -20,7 +20,7 @@ fn normalised(name: &str) -> String {
 /// `Did you mean `x`? Accepted here: `x`, `y`, `z`` (the question only where a name is close).
 pub(crate) fn remedy(given: &str, accepted: &[&str]) -> String {
     if accepted.is_empty() {
-        return "No more keys are accepted here".to_owned();
+        return "No further keys are accepted here".to_owned();
     }
     let list = accepted.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     match closest(given, accepted.iter().copied()) {
@@ -42,6 +42,6 @@ mod tests {
         assert_eq!(closest("viscosity", names), None);
         assert_eq!(closest("x", []), None);
         assert_eq!(remedy("viscosity", &["gap"]), "Accepted here: `gap`");
-        assert_eq!(remedy("viscosity", &[]), "No more keys are accepted here");
+        assert_eq!(remedy("viscosity", &[]), "No further keys are accepted here");
     }
 }

@@ -100,15 +100,15 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<ConductionModel> {
     for (key, expected) in [("format", FORMAT), ("format_version", VERSION)] {
         let found = metadata.get(key).map_or("nothing", String::as_str);
         if found != expected {
-            return Err(refuse(format!("metadata `{key}`"), format!("{found:?} found, {expected:?} expected")));
+            return Err(refuse(format!("metadata `{key}`"), format!("found {found:?}, expected {expected:?}")));
         }
     }
     let mut arrays = Arrays::new();
     for (name, view) in SafeTensors::deserialize(bytes).map_err(damaged)?.tensors() {
         let problem = if view.dtype() != Dtype::F64 {
-            Some(format!("data type {:?} found, F64 expected", view.dtype()))
+            Some(format!("found data type {:?}, expected F64", view.dtype()))
         } else {
-            (view.shape().len() != 2).then(|| format!("{} dimensions found, 2 expected", view.shape().len()))
+            (view.shape().len() != 2).then(|| format!("found {} dimensions, expected 2", view.shape().len()))
         };
         if let Some(problem) = problem {
             return Err(refuse(format!("array `{name}`"), problem));
@@ -117,7 +117,7 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<ConductionModel> {
         arrays.insert(name, Array { shape: view.shape().to_vec(), values });
     }
     if metadata.get("checksum") != Some(&checksum(&arrays, &metadata)) {
-        return Err(refuse("metadata `checksum`".into(), "it does not fit the content: the file was changed".into()));
+        return Err(refuse("metadata `checksum`".into(), "it does not match the content: the file was changed".into()));
     }
     let array = |name: &str| {
         let found = arrays.get(name).ok_or_else(|| refuse(format!("array `{name}`"), "missing".into()))?;
@@ -127,11 +127,11 @@ pub fn read_thermal(bytes: &[u8], origin: &str) -> Result<ConductionModel> {
         |key: &str| metadata.get(key).cloned().ok_or_else(|| refuse(format!("metadata `{key}`"), "missing".into()));
     let number = |key: &str| {
         let text = entry(key)?;
-        text.parse().map_err(|_| refuse(format!("metadata `{key}`"), format!("{text:?} is no number")))
+        text.parse().map_err(|_| refuse(format!("metadata `{key}`"), format!("{text:?} is not a number")))
     };
     let edges = array("patches")?;
     if edges.ncols() != 4 {
-        return Err(refuse("array `patches`".into(), format!("{} columns found, 4 expected", edges.ncols())));
+        return Err(refuse("array `patches`".into(), format!("found {} columns, expected 4", edges.ncols())));
     }
     let patch = |row: usize| {
         let [first, last, low, high] = [0, 1, 2, 3].map(|column| edges[(row, column)]);

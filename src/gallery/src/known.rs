@@ -54,8 +54,9 @@ fn rows() -> [KnownModel; 5] {
     [
         KnownModel {
             options: format!("{stage:?}"),
-            found_on: "first 9.5 ms of the rub of the stage with friction 0.15: nodes on a mesh with 0.7 times the elements, the mesh with \
-                       five patches; later nodes leave far more",
+            found_on: "first 9.5 ms of the rub of the stage with friction 0.15; error of the nodes found on a mesh \
+                       with 0.7 times the elements, error of the mesh found with five patches; later, the error of \
+                       the nodes is far larger",
             errors: [None, Some(0.102), None, Some(0.0068)],
         },
         KnownModel {
@@ -63,7 +64,8 @@ fn rows() -> [KnownModel; 5] {
                 "{:?}",
                 StageOptions { tip: TipContact::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..stage }
             ),
-            found_on: "first 9.4 ms of the rub of the stage with friction 0.05, modes on a mesh with 0.7 times the elements",
+            found_on: "first 9.4 ms of the rub of the stage with friction 0.05; error of the modes found on a mesh \
+                       with 0.7 times the elements",
             errors: [Some(0.0014), None, None, Some(0.0084)],
         },
         KnownModel {
@@ -78,7 +80,8 @@ fn rows() -> [KnownModel; 5] {
         },
         KnownModel {
             options: format!("{paper:?}"),
-            found_on: "light rub of rotor 37 with friction 0.15, one revolution, three nodes against nine patches",
+            found_on: "light rub of rotor 37 with friction 0.15, one revolution, three nodes compared with nine \
+                       patches",
             errors: [Some(0.047), Some(0.34), None, None],
         },
     ]

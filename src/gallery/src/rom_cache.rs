@@ -79,12 +79,14 @@ impl RomCache {
         match read(&path, &key) {
             Ok(rom) => {
                 console.print_progress(format_args!(
-                    "Model {name} as made before, from {} (--no-cache makes it anew)",
+                    "Using the cached model {name} from {} (use --no-cache to reduce it again)",
                     path.display()
                 ));
                 return Ok(rom);
             }
-            Err(Some(problem)) => console.print_progress(format_args!("{}: {problem}; making it anew", path.display())),
+            Err(Some(problem)) => {
+                console.print_progress(format_args!("{}: {problem}; reducing the model again", path.display()));
+            }
             Err(None) => {}
         }
         let rom = make()?;
@@ -130,10 +132,10 @@ fn read(path: &Path, key: &str) -> Result<Rom, Option<String>> {
     };
     // A pipe would be waited for without end.
     if !fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(Some("is no file".to_owned()));
+        return Err(Some("is not a file".to_owned()));
     }
     let bytes = tiprub_format::read_file(path, LARGEST).map_err(unreadable)?;
-    let damaged = || Some("is not what was kept".to_owned());
+    let damaged = || Some("is damaged".to_owned());
     let end = bytes.iter().position(|byte| *byte == b'\n').ok_or_else(damaged)?;
     let (first, rom) = (&bytes[..end], &bytes[end + 1..]);
     if first != format!("{MARK} {LAYOUT} {key} {}", digest(rom)).as_bytes() {
@@ -285,7 +287,7 @@ mod tests {
             done.send((refused, taken)).is_ok()
         });
         let (refused, made) = answer.recv_timeout(std::time::Duration::from_secs(20)).expect("an answer");
-        assert_eq!((refused.as_deref(), made), (Some("is no file"), Ok(rom(1.0))));
+        assert_eq!((refused.as_deref(), made), (Some("is not a file"), Ok(rom(1.0))));
     }
 
     #[test]

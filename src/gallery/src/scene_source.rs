@@ -120,7 +120,7 @@ fn source(argument: &OsStr) -> Result<SceneSource<'_>> {
     };
     match other {
         Some(problem) => {
-            let remedy = "Give a scene file (TOML); `tiprub inspect` shows what is in this one";
+            let remedy = "Give a scene file (TOML); use `tiprub inspect` to see the contents of this file";
             Err(Failure::usage(path.display(), problem, remedy))
         }
         None => Ok(SceneSource::File(path)),
@@ -130,7 +130,7 @@ fn source(argument: &OsStr) -> Result<SceneSource<'_>> {
 /// An embedded scene with embedded models from `reduce`.
 fn builtin_scene(name: &str, text: &str, reduce: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
     tiprub_format::read_scene(text, name, |_, structure| {
-        let model = builtin_model(structure).and_then(reduce).unwrap_or_else(|| Err("not known".into()));
+        let model = builtin_model(structure).and_then(reduce).unwrap_or_else(|| Err("unknown built-in model".into()));
         model.map_err(|problem| Failure::new(&structure.rom, problem, ""))
     })
 }

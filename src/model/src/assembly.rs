@@ -59,7 +59,7 @@ pub(crate) fn for_each_block(pattern: &Pattern, nodes: &[usize], mut visit: impl
         let start = pattern.starts[3 * column];
         let rows = &pattern.rows[start..pattern.starts[3 * column + 1]];
         for (a, &row) in nodes.iter().enumerate() {
-            let place = rows.binary_search(&(3 * row)).expect("the pattern holds every element's pairs");
+            let place = rows.binary_search(&(3 * row)).expect("the sparsity pattern contains all element pairs");
             visit(a, b, core::array::from_fn(|j| pattern.starts[3 * column + j] + place));
         }
     }
@@ -86,7 +86,7 @@ pub fn assemble_with(
     mesh.validate()?;
     material.validate()?;
     if mesh.elements.is_empty() {
-        return Err(Error::invalid("mesh", "it has no element", "Give a mesh with solid elements"));
+        return Err(Error::invalid("mesh", "it has no elements", "Give a mesh with solid elements"));
     }
     let neighbours = neighbours(mesh);
     let pattern = Arc::new(pattern(&neighbours));

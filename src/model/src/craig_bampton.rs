@@ -72,15 +72,15 @@ pub fn craig_bampton_with(
     if modes > interior.len() {
         return Err(Error::invalid(
             "number of fixed-interface modes",
-            format!("{modes} asked, but only {} degrees of freedom are not interface", interior.len()),
-            "Ask for fewer modes or refine the mesh",
+            format!("{modes} requested, but there are only {} interior degrees of freedom", interior.len()),
+            "Request fewer modes or refine the mesh",
         ));
     }
     let (inner_stiffness, inner_mass) = principal_pair(stiffness, mass, &interior);
     let factor = positive_factor(
         &inner_stiffness,
         &inner_mass,
-        "K_ii (stiffness with the interface held)",
+        "K_ii (stiffness with the interface fixed)",
         "Clamp the structure, or choose at least three contact nodes that are not on one line",
     )?;
     let searched = if inner.whole_pairs { (modes + 1).min(interior.len()) } else { modes };
@@ -202,7 +202,7 @@ pub(crate) fn with_static_responses(
     let scale = projected.norm_max();
     let symmetric = Mat::from_fn(size, size, |i, j| 0.5 * (projected[(i, j)] + projected[(j, i)]) / scale);
     let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|_| {
-        Error::invalid("static responses", "their eigenvalue problem did not converge", "Check loads and material")
+        Error::invalid("static responses", "the eigenvalue problem did not converge", "Check the loads and material")
     })?;
     let eigenvalues = (0..size).map(|k| scale * eigen.S()[k]).collect();
     let mut shapes = Mat::zeros(basis.nrows(), size);
@@ -239,12 +239,12 @@ fn interior_dofs(order: usize, interface: &[usize]) -> Result<Vec<usize>> {
     let mut held = vec![false; order];
     for &dof in interface {
         if core::mem::replace(&mut held[dof], true) {
-            let remedy = "Name every contact node once";
+            let remedy = "List every contact node only once";
             return Err(Error::invalid("interface", format!("degree of freedom {dof} appears twice"), remedy));
         }
     }
     if interface.is_empty() {
-        return Err(Error::invalid("interface", "it is empty", "Name at least one contact node"));
+        return Err(Error::invalid("interface", "it is empty", "Give at least one contact node"));
     }
     Ok((0..order).filter(|&dof| !held[dof]).collect())
 }

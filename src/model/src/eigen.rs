@@ -216,8 +216,8 @@ pub fn lowest_modes(
     if count > order {
         return Err(Error::invalid(
             "number of modes",
-            format!("{count} modes asked of {order} free degrees of freedom"),
-            "Ask for fewer modes or refine the mesh",
+            format!("{count} modes requested, but there are only {order} free degrees of freedom"),
+            "Request fewer modes or refine the mesh",
         ));
     }
     if count == 0 {

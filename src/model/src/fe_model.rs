@@ -49,8 +49,8 @@ impl FeModel {
     /// [`Error::Invalid`] for a model without a mesh of one material; those of [`lumped_masses`].
     pub fn lumped(mut self) -> Result<Self> {
         let Some((mesh, material)) = &self.mesh else {
-            let problem = "the model has no mesh of one material, from which masses are shared out";
-            return Err(Error::invalid("lumped mass", problem, "Keep the mass matrix that comes with the model"));
+            let problem = "the model has no mesh with a single material";
+            return Err(Error::invalid("lumped mass", problem, "Use the mass matrix of the model"));
         };
         let masses = lumped_masses(mesh, material.density)?;
         self.mass.set_diagonal(|dof| masses[dof / 3]);
@@ -69,11 +69,11 @@ impl FeModel {
         if let (Some((_, nodes)), None) = (alike.next(), alike.next()) {
             return Ok(nodes);
         }
-        let problem = "the model has no such set";
+        let problem = "the model has no set of this name";
         let remedy = if self.sets.is_empty() {
-            "It has none: name groups of nodes, elements or faces where it is meshed".to_owned()
+            "Define groups of nodes, elements or faces in the mesh generator: the model has no sets".to_owned()
         } else {
-            format!("It has: {}", crate::mesh::set_counts(&self.sets))
+            format!("Choose one of: {}", crate::mesh::set_counts(&self.sets))
         };
         Err(Error::invalid(format!("node set `{name}`"), problem, remedy))
     }

@@ -72,7 +72,7 @@ pub(crate) fn reduce_free_body(
     let checks = without_rigid_motions(compare(&full, &model.mass, &reduced, &modes.squares, &modes.shapes));
     report(listener, ReductionStage::Checks, 1, 1);
     let order = modes.squares.len();
-    let exact = if count == inner { ", all of them" } else { "" };
+    let exact = if count == inner { " (all)" } else { "" };
     let kept = match kind {
         ReductionKind::FixedInterface => {
             format!("Craig-Bampton with {} and {count} fixed-interface modes{exact}", interface(contact))
@@ -83,7 +83,7 @@ pub(crate) fn reduce_free_body(
     };
     let rom = Rom {
         name: options.name.clone(),
-        origin: format!("{}, free to fly; {kept}", description(&model, 0)),
+        origin: format!("{}, free body; {kept}", description(&model, 0)),
         sectors: 1,
         frame: DisplacementFrame::Cartesian,
         mass: DMatrix::identity(order, order),

@@ -40,23 +40,23 @@ pub fn free_interface(
 ) -> Result<CraigBampton> {
     let (order, boundary) = (stiffness.order(), contact.ncols());
     if boundary == 0 {
-        return Err(Error::invalid("contact nodes", "there are none", "Name at least one contact node or patch"));
+        return Err(Error::invalid("contact nodes", "none given", "Give at least one contact node or patch"));
     }
     if modes + boundary > order {
         return Err(Error::invalid(
             "number of modes",
             format!(
-                "{modes} asked, but only {} are left beside {boundary} contact coordinates",
+                "{modes} requested, but only {} are possible besides {boundary} contact coordinates",
                 order.saturating_sub(boundary)
             ),
-            "Ask for fewer modes or refine the mesh",
+            "Request fewer modes or refine the mesh",
         ));
     }
     let factor = positive_factor(
         stiffness,
         mass,
         "K (stiffness of the supported structure)",
-        "The structure can move as a rigid body: clamp at least three nodes that are not on one line",
+        "Clamp at least three nodes that are not on one line, to prevent rigid-body motion",
     )?;
     let found = lowest_modes(mass, &factor, 0.0, modes, ReductionStage::FullModes, listener)?;
     report(listener, ReductionStage::ConstraintModes, 0, 1);
@@ -108,8 +108,8 @@ fn check_residual(flexibility: &DMatrix<f64>, seen: &DMatrix<f64>, squares: &[f6
     if share <= 1.0 - LEAST_RESIDUAL {
         return Ok(());
     }
-    let problem = format!("{} modes leave no flexibility to the static responses in some direction", squares.len());
-    Err(Error::invalid("number of modes", problem, "Ask for fewer modes, or refine the mesh"))
+    let problem = format!("with {} modes, some static response has no residual flexibility", squares.len());
+    Err(Error::invalid("number of modes", problem, "Request fewer modes or refine the mesh"))
 }
 
 fn dependent() -> Error {

@@ -301,14 +301,14 @@ impl<'a> InnerSurface<'a> {
             pieces.into_iter().filter(|piece| piece.axial()[0] < to && piece.axial()[1] > from).collect();
         if there.is_empty() {
             let problem = match (named.is_empty(), inner.is_empty()) {
-                (true, _) => "no outer face of the mesh has all of its corners in the set".to_owned(),
+                (true, _) => "no outer face of the mesh has all of its corner nodes in the set".to_owned(),
                 (_, true) => {
-                    format!("none of {} outer faces looks towards the z axis, within 45 degrees", named.len())
+                    format!("none of the {} outer faces is directed towards the z axis within 45 degrees", named.len())
                 }
-                _ => format!("no face that looks towards the axis lies between z = {from:.6} m and {to:.6} m"),
+                _ => format!("no face directed towards the axis lies between z = {from:.6} m and {to:.6} m"),
             };
             let remedy =
-                "Name the set of all nodes of the inner surface (--contact-set), and check --axis and axial positions";
+                "Give the set of all nodes of the inner surface (--contact-set), and check --axis and axial positions";
             return Err(Error::invalid(WHAT, problem, remedy));
         }
         // Walls of holes look towards the axis in part; only a named set is meant as a whole.
@@ -325,8 +325,9 @@ impl<'a> InnerSurface<'a> {
                 format!("z = {low:.6} m to {high:.6} m at radius {radius:.6} m")
             });
             let problem =
-                format!("{} surfaces that are not connected: {}", there.len(), shown.collect::<Vec<_>>().join("; "));
-            let remedy = "Name the nodes of the one that blades face (--contact-set), or axial positions (--contact-axial) within one of them";
+                format!("there are {} separate surfaces: {}", there.len(), shown.collect::<Vec<_>>().join("; "));
+            let remedy = "Give the set of nodes on the surface that faces the blades (--contact-set), or axial \
+                          positions within one surface (--contact-axial)";
             return Err(Error::invalid(WHAT, problem, remedy));
         }
         let surface = there.swap_remove(0);
@@ -374,11 +375,11 @@ impl<'a> InnerSurface<'a> {
             let distance =
                 nearest.map_or_else(|| "far away".to_owned(), |(_, (_, _, miss))| format!("{miss:.2e} m away"));
             let problem = format!(
-                "it is {distance} from the grid point at {degrees:.3}° and z = {axial:.6} m, beyond the tolerance of {tolerance:.2e} m; it \
-                 reaches from z = {low:.6} m to {high:.6} m"
+                "it is {distance} from the grid point at {degrees:.3}° and z = {axial:.6} m, more than the tolerance \
+                 of {tolerance:.2e} m; it extends from z = {low:.6} m to {high:.6} m"
             );
             let remedy =
-                "Give axial positions within it (--contact-axial), or a set that holds all of it (--contact-set)";
+                "Give axial positions on the surface (--contact-axial), or a set of all its nodes (--contact-set)";
             return Err(Error::invalid(WHAT, problem, remedy));
         };
         let nodes = &self.mesh.elements[face.element].nodes;
@@ -400,7 +401,7 @@ impl<'a> InnerSurface<'a> {
             let remedy = "Mesh the full ring, merge coincident nodes where its parts meet, and check --axis";
             return Err(Error::invalid(
                 WHAT,
-                format!("it is no full ring about the z axis: {}", self.opening(&borders)),
+                format!("it is not a full ring about the z axis: {}", self.opening(&borders)),
                 remedy,
             ));
         }
@@ -413,11 +414,11 @@ impl<'a> InnerSurface<'a> {
             let [x, y] = [0, 1].map(|i| hole.nodes.iter().map(|&node| self.mesh.nodes[node][i]).sum::<f64>());
             let degrees = y.atan2(x).to_degrees().rem_euclid(360.0);
             let problem = format!(
-                "it has a gap at {degrees:.3}°, z = {low:.6} m to {high:.6} m, with {} nodes around it",
+                "it has a hole at {degrees:.3}°, z = {low:.6} m to {high:.6} m, with {} nodes on its edge",
                 hole.nodes.len()
             );
-            let remedy = "Close it in the model, merge coincident nodes, add its faces to the set, or give axial positions beside it \
-                          (--contact-axial)";
+            let remedy = "Close the hole in the model, merge coincident nodes, add the missing faces to the set, or \
+                          give axial positions beside the hole (--contact-axial)";
             return Err(Error::invalid(WHAT, problem, remedy));
         }
         // Of both ends: gaps between them do not move it.
@@ -426,12 +427,13 @@ impl<'a> InnerSurface<'a> {
         let radius = self.radius();
         if x.hypot(y) > OFF_AXIS * radius {
             let problem = format!(
-                "its centre is at x = {x:.6} m, y = {y:.6} m, its mean radius {radius:.6} m: it is no ring about the z axis"
+                "it is not centred on the z axis: its centre is at x = {x:.6} m, y = {y:.6} m, with a mean radius of \
+                 {radius:.6} m"
             );
             return Err(Error::invalid(
                 WHAT,
                 problem,
-                "Move the model so that its axis is that of the engine, or check --axis",
+                "Move the model onto the axis of the engine, or check --axis",
             ));
         }
         Ok(())
@@ -460,7 +462,7 @@ impl<'a> InnerSurface<'a> {
         let degrees = covered.iter().filter(|covered| **covered).count() as f64 / 10.0;
         if degrees < 360.0 {
             let open = (0..3600).find(|&bin| !covered[bin] && covered[(bin + 3599) % 3600]).unwrap_or(0) as f64 / 10.0;
-            return format!("its faces cover {degrees:.1}° of 360°, and none is at {open:.1}°");
+            return format!("its faces cover {degrees:.1}° of 360°, with no face at {open:.1}°");
         }
         let [low, high] = self.axial();
         let middle = borders.iter().flat_map(|border| &border.nodes).min_by(|a, b| {
@@ -468,7 +470,7 @@ impl<'a> InnerSurface<'a> {
             off(**a).total_cmp(&off(**b))
         });
         middle.map_or_else(
-            || "it has no border".to_owned(),
+            || "it has no edge".to_owned(),
             |&node| {
                 let [x, y, z] = self.mesh.nodes[node];
                 let degrees = y.atan2(x).to_degrees().rem_euclid(360.0);

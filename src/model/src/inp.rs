@@ -43,8 +43,8 @@ pub fn calculix_cyclic_input(
 ) -> Result<String> {
     let CyclicSymmetry { faces, sectors, nodal_diameters } = *symmetry;
     if let Some(n) = nodal_diameters.iter().find(|&&n| 2 * n > sectors) {
-        let problem = format!("{n} with {sectors} sectors");
-        return Err(Error::invalid("nodal diameter", problem, "Half the number of sectors is the largest one"));
+        let problem = format!("{n} is too large for {sectors} sectors");
+        return Err(Error::invalid("nodal diameter", problem, "Give at most half the number of sectors"));
     }
     let mut text = model(mesh, material, clamped)?;
     let clamped = clamped.map_or(Ok(&[][..]), |set| mesh.set(set))?;

@@ -64,8 +64,8 @@ impl Material {
         let fail = |property: &str, value: f64, range: &str| {
             Err(Error::invalid(
                 format!("material `{}`, {property}", self.name),
-                format!("{} is outside {range}", shown(value)),
-                "Give SI units: Pa, kg/m³ and 1/K",
+                format!("{} does not satisfy {range}", shown(value)),
+                "Use SI units: Pa, kg/m³ and 1/K",
             ))
         };
         if !positive(self.young_modulus) {

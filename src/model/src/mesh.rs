@@ -39,8 +39,8 @@ impl Mesh {
             let names: Vec<_> = self.sets.keys().map(String::as_str).collect();
             Error::invalid(
                 format!("node set `{name}`"),
-                "the mesh has no such set",
-                format!("It has: {}", names.join(", ")),
+                "the mesh has no set of this name",
+                format!("Choose one of: {}", names.join(", ")),
             )
         })
     }
@@ -58,13 +58,13 @@ impl Mesh {
         for (index, element) in self.elements.iter().enumerate() {
             let what = || format!("element {} ({})", index + 1, element.kind.calculix_name());
             if element.nodes.len() != element.kind.node_count() {
-                let problem = format!("{} nodes where {} are needed", element.nodes.len(), element.kind.node_count());
-                return Err(Error::invalid(what(), problem, "Correct the element's line"));
+                let problem = format!("it has {} nodes instead of {}", element.nodes.len(), element.kind.node_count());
+                return Err(Error::invalid(what(), problem, "Correct the element"));
             }
             for &node in &element.nodes {
                 let Some(flag) = used.get_mut(node) else {
-                    let problem = format!("node {} does not exist; there are {}", node + 1, self.nodes.len());
-                    return Err(Error::invalid(what(), problem, "Correct the element's line"));
+                    let problem = format!("node {} does not exist; the mesh has {} nodes", node + 1, self.nodes.len());
+                    return Err(Error::invalid(what(), problem, "Correct the element"));
                 };
                 *flag = true;
             }
@@ -75,7 +75,7 @@ impl Mesh {
         }
         for (name, nodes) in &self.sets {
             if let Some(&node) = nodes.iter().find(|&&node| node >= self.nodes.len()) {
-                let problem = format!("node {} does not exist; there are {}", node + 1, self.nodes.len());
+                let problem = format!("node {} does not exist; the mesh has {} nodes", node + 1, self.nodes.len());
                 return Err(Error::invalid(format!("node set `{name}`"), problem, "Correct the set"));
             }
         }

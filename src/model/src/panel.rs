@@ -41,14 +41,14 @@ impl PanelGrid {
 
     fn check(&self, model: &FeModel) -> Result<()> {
         let refuse = |problem: String| {
-            let remedy = "Name each node of at least four rows of four once, row by row";
+            let remedy = "List every node once, row by row, with at least four rows of four nodes";
             Err(Error::invalid("contact grid", problem, remedy))
         };
         if self.around < 2 || self.along() < 2 || self.around * self.along() != self.nodes.len() {
-            return refuse(format!("{} nodes are no rows of {}", self.nodes.len(), self.around));
+            return refuse(format!("{} nodes cannot be divided into rows of {}", self.nodes.len(), self.around));
         }
         if let Some(node) = self.nodes.iter().find(|node| **node >= model.nodes.len()) {
-            return refuse(format!("node {} does not exist; there are {}", node + 1, model.nodes.len()));
+            return refuse(format!("node {} does not exist; the model has {} nodes", node + 1, model.nodes.len()));
         }
         let mut sorted = self.nodes.clone();
         sorted.sort_unstable();
@@ -153,8 +153,8 @@ fn with_grid_responses(
     let dofs: Vec<usize> = dofs.iter().copied().flatten().collect();
     let count = options.static_responses;
     if count > dofs.len() {
-        let problem = format!("{count} asked, but only {} components of grid nodes can move", dofs.len());
-        return Err(Error::invalid("number of static responses", problem, "Ask for fewer"));
+        let problem = format!("{count} requested, but only {} displacements of grid nodes are free", dofs.len());
+        return Err(Error::invalid("number of static responses", problem, "Request fewer"));
     }
     if count == 0 {
         return Ok(kept);
@@ -170,8 +170,8 @@ fn with_grid_responses(
     // The projected problem finds the modes again; of those, what was iterated for is the better.
     basis.eigenvalues[..squares.len()].copy_from_slice(&squares);
     basis.eigenvalues.iter().is_sorted().then_some(basis).ok_or_else(|| {
-        let remedy = "Ask for some modes more or fewer";
-        Error::invalid("static responses", "they mix with the modes", remedy)
+        let remedy = "Request a few more or fewer modes";
+        Error::invalid("static responses", "their frequencies overlap with those of the modes", remedy)
     })
 }
 
@@ -199,7 +199,7 @@ fn principal_forces(
     let symmetric = Mat::from_fn(dofs.len(), dofs.len(), |i, j| 0.5 * (lacking[(i, j)] + lacking[(j, i)]));
     let scale = symmetric.norm_max();
     let eigen = (symmetric * faer::Scale(1.0 / scale)).self_adjoint_eigen(Side::Lower).map_err(|_| {
-        Error::invalid("flexibility of the contact grid", "its eigenvalue problem did not converge", "Check the mesh")
+        Error::invalid("flexibility of the contact grid", "the eigenvalue problem did not converge", "Check the mesh")
     })?;
     Ok(Mat::from_fn(dofs.len(), count, |i, k| eigen.U()[(i, dofs.len() - 1 - k)]))
 }

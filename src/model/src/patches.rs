@@ -70,11 +70,12 @@ pub fn tip_patches(
     let stations = places.stations();
     if count == 0 || count > stations {
         let problem =
-            format!("{count} is outside 1..={stations}, the places along the chord that the set has nodes at");
-        return Err(Error::invalid("number of contact patches", problem, "Ask for another number, or refine the tip"));
+            format!("{count} is outside 1..={stations}, limited by the node positions of the set along the chord");
+        return Err(Error::invalid("number of contact patches", problem, "Choose another number or refine the tip"));
     }
     if rows == 0 || count * rows > set.len() {
-        let problem = format!("{rows} rows of {count} are none, or more than the {} nodes of the tip", set.len());
+        let nodes = set.len();
+        let problem = format!("{rows} rows of {count} patches are not possible with the {nodes} nodes of the tip");
         return Err(rows_refused(problem));
     }
     let outline = Outline::new(mesh, &faces, &places);
@@ -90,7 +91,7 @@ pub fn tip_patches(
     };
     let weights = weights(mesh, (set, faces), count * rows, products)?;
     if rows > 1 && !independent(&weights) {
-        let problem = format!("{rows} rows of {count} follow from each other by the nodes that the tip has across");
+        let problem = format!("{rows} rows of {count} patches are too many for the nodes across the tip");
         return Err(rows_refused(problem));
     }
     let patches = weights.into_iter().enumerate();
@@ -108,7 +109,7 @@ pub fn row_name(along: &str, row: usize, rows: usize) -> String {
 }
 
 fn rows_refused(problem: String) -> Error {
-    Error::invalid("rows of contact patches", problem, "Ask for fewer rows, or refine the tip across its thickness")
+    Error::invalid("rows of contact patches", problem, "Use fewer rows or refine the tip across its thickness")
 }
 
 /// Duals of hat functions in hat functions: row l of ∫ h_l (∫ h h)⁻¹.
@@ -164,11 +165,11 @@ pub fn face_patches(
         let stations = 1 + places.windows(2).filter(|pair| pair[1] - pair[0] > SAME_PLACE * (high - low)).count();
         if !(1..=stations).contains(&counts[axis]) {
             let problem =
-                format!("{} in one direction, in which the face has nodes at {stations} places", counts[axis]);
+                format!("{} in a direction in which the face has {stations} node positions", counts[axis]);
             return Err(Error::invalid(
                 "number of contact patches",
                 problem,
-                "Ask for another number, or refine the face",
+                "Choose another number or refine the face",
             ));
         }
     }
@@ -228,8 +229,8 @@ fn weights(
     match weights.iter().position(|weights| weights.iter().sum::<f64>() <= 0.0) {
         None => Ok(weights),
         Some(empty) => {
-            let problem = format!("number {} of {count} has no face under it", empty + 1);
-            Err(Error::invalid("contact patches", problem, "Ask for fewer, or refine the tip"))
+            let problem = format!("patch {} of {count} covers no face", empty + 1);
+            Err(Error::invalid("contact patches", problem, "Use fewer patches or refine the tip"))
         }
     }
 }
@@ -350,7 +351,7 @@ fn faces_within<'a>(mesh: &'a Mesh, set: &[usize]) -> Result<ElementFaces<'a>> {
     outer.sort_by(|a, b| a.0.cmp(&b.0));
     if outer.is_empty() {
         let problem = "no outer face of an element has all of its nodes in the contact set";
-        let remedy = "Give all nodes of the tip's faces, or ask for contact nodes";
+        let remedy = "Give all nodes of the tip faces, or use contact nodes";
         return Err(Error::invalid("contact patches", problem, remedy));
     }
     Ok(outer.into_iter().map(|(_, (_, element, corners))| (element, corners)).collect())

@@ -217,8 +217,8 @@ fn check_speed(speed: f64) -> Result<()> {
     if speed.is_finite() && speed > 0.0 {
         return Ok(());
     }
-    let problem = format!("{} rad/s is not a finite speed > 0", shown(speed));
-    Err(Error::invalid("largest speed", problem, "Give the largest speed that is to be computed"))
+    let problem = format!("{} rad/s is not positive and finite", shown(speed));
+    Err(Error::invalid("largest speed", problem, "Give the largest speed of the simulation"))
 }
 
 fn spinning_states(
@@ -229,8 +229,8 @@ fn spinning_states(
     listener: Listener<'_>,
 ) -> Result<SpinningStates> {
     let Some((mesh, material)) = &model.mesh else {
-        let problem = "the model has no mesh of one material, from which they are computed";
-        return Err(Error::invalid("effects of spin", problem, "Leave them out, or give a mesh file of one material"));
+        let problem = "the model has no mesh with a single material";
+        return Err(Error::invalid("effects of spin", problem, "Omit them, or give a mesh file with a single material"));
     };
     let assembled = Assembled { stiffness: model.stiffness.clone(), mass: model.mass.clone() };
     let body = Rotating::new(mesh, material, &assembled, free, stiffness)?;
@@ -280,7 +280,7 @@ pub fn full_modes(
         &shifted,
         mass,
         "K (stiffness of the supported structure)",
-        "The structure can move as a rigid body: clamp at least three nodes that are not on one line",
+        "Clamp at least three nodes that are not on one line, to prevent rigid-body motion",
     )?;
     let modes = lowest_modes(mass, &factor, shift, count.min(mass.order()), ReductionStage::FullModes, listener)?;
     Ok(FullModes { modes, shifted, factor, shift })
@@ -330,8 +330,8 @@ pub(crate) fn check_nodes(
     let touching = contact.iter().flat_map(ContactPoint::weights).map(|(node, _)| node);
     for node in clamped.iter().copied().chain(touching) {
         if node >= nodes.len() {
-            let problem = format!("node {} does not exist; there are {}", node + 1, nodes.len());
-            return Err(Error::invalid("clamped or contact nodes", problem, "Name nodes of the mesh"));
+            let problem = format!("node {} does not exist; the mesh has {} nodes", node + 1, nodes.len());
+            return Err(Error::invalid("clamped or contact nodes", problem, "Choose nodes of the mesh"));
         }
     }
     for (index, point) in contact.iter().enumerate() {
@@ -346,7 +346,7 @@ pub(crate) fn check_nodes(
         }
         let same = |other: &ContactPoint| other.patch.is_empty() && point.patch.is_empty() && other.node == point.node;
         if contact[..index].iter().any(|other| same(other) || other.name == point.name) {
-            return Err(Error::invalid(what(), "its node or name appears twice", "Name every contact node once"));
+            return Err(Error::invalid(what(), "its node or name appears twice", "List every contact node only once"));
         }
     }
     Ok(())

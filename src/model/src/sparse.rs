@@ -111,7 +111,7 @@ impl SparseMatrix {
     /// self + factor · other, for matrices of one pattern.
     #[must_use]
     pub fn plus_scaled(&self, factor: f64, other: &Self) -> Self {
-        assert_eq!(self.pattern, other.pattern, "the two matrices must share their pattern");
+        assert_eq!(self.pattern, other.pattern, "the two matrices must have the same sparsity pattern");
         let values = self.values.iter().zip(&other.values).map(|(a, b)| a + factor * b).collect();
         Self { pattern: Arc::clone(&self.pattern), values }
     }
@@ -143,7 +143,7 @@ impl SparseMatrix {
         for dof in 0..self.order() {
             let start = self.pattern.starts[dof];
             let rows = &self.pattern.rows[start..self.pattern.starts[dof + 1]];
-            self.values[start + rows.binary_search(&dof).expect("the pattern holds the diagonal")] = entry(dof);
+            self.values[start + rows.binary_search(&dof).expect("the pattern contains the diagonal")] = entry(dof);
         }
     }
 
@@ -194,7 +194,7 @@ impl SparseMatrix {
 
 /// Two matrices restricted to the same rows and columns; the result shares one pattern.
 pub fn principal_pair(first: &SparseMatrix, second: &SparseMatrix, keep: &[usize]) -> (SparseMatrix, SparseMatrix) {
-    assert_eq!(first.pattern, second.pattern, "the two matrices must share their pattern");
+    assert_eq!(first.pattern, second.pattern, "the two matrices must have the same sparsity pattern");
     let (pattern, entries) = first.pattern.principal(keep);
     let pattern = Arc::new(pattern);
     let pick = |matrix: &SparseMatrix| SparseMatrix {

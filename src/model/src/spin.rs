@@ -68,7 +68,7 @@ pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<
 /// [`Error::Invalid`] for a ROM without spin matrices, [`Error::NotPositiveDefinite`] for a mass matrix that is none.
 pub fn frequencies_at(rom: &Rom, speed: f64, coriolis: bool) -> Result<Vec<f64>> {
     let Some(spin) = &rom.extras.spin else {
-        let remedy = "Reduce it with `--spin` and the largest speed";
+        let remedy = "Reduce the model with `--spin` and the largest speed";
         return Err(Error::invalid(format!("ROM `{}`", rom.name), "it has no spin matrices", remedy));
     };
     let (squares, vectors) = dense_modes(&stiffness_at(&rom.stiffness, spin, speed), &rom.mass)?;

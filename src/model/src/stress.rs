@@ -110,14 +110,14 @@ fn all_places(
     asked: &StressPlaces,
 ) -> Result<Vec<(String, usize)>> {
     if asked.modes > modes.ncols() {
-        let problem = format!("{} asked, and {} modes of the full model are known", asked.modes, modes.ncols());
-        return Err(Error::invalid("places of largest stress", problem, "Ask for fewer"));
+        let problem = format!("{} requested, but only {} modes were computed", asked.modes, modes.ncols());
+        return Err(Error::invalid("places of largest stress", problem, "Request fewer"));
     }
     let mut places = asked.nodes.clone();
     for (name, node) in &places {
         if *node >= mesh.nodes.len() {
-            let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
-            return Err(Error::invalid(format!("place of stress `{name}`"), problem, "Name nodes of the mesh"));
+            let problem = format!("node {} does not exist; the mesh has {} nodes", node + 1, mesh.nodes.len());
+            return Err(Error::invalid(format!("place of stress `{name}`"), problem, "Choose nodes of the mesh"));
         }
     }
     for (mode, node) in largest((mesh, material), free, modes, asked.modes)?.into_iter().enumerate() {
@@ -128,7 +128,7 @@ fn all_places(
     let mut names: Vec<&str> = places.iter().map(|(name, _)| name.as_str()).collect();
     names.sort_unstable();
     if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Error::invalid(format!("place of stress `{}`", pair[0]), "it is there twice", "Name each once"));
+        return Err(Error::invalid(format!("place of stress `{}`", pair[0]), "it appears twice", "List each only once"));
     }
     Ok(places)
 }
@@ -194,11 +194,11 @@ pub(crate) fn recovered_stress(
         return Ok(None);
     }
     let Some((mesh, material)) = &model.mesh else {
-        let problem = "stress needs a mesh of one material, and the model has none";
+        let problem = "the model has no mesh with a single material";
         return Err(Error::invalid(
             "stress",
             problem,
-            "Leave out the places of stress, or use a mesh file of one material",
+            "Omit the places of stress, or use a mesh file with a single material",
         ));
     };
     let places = all_places((mesh, material), free, modes, &options.stress)?;

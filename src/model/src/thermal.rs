@@ -63,7 +63,7 @@ pub fn patch_of_elements(mesh: &Mesh, patches: &[ThermalPatch]) -> Result<Vec<Op
         if let (Some(first), Some(second)) = (first, inside.next()) {
             return Err(Error::invalid(
                 format!("thermal patches {} and {}", first + 1, second + 1),
-                format!("both hold element {}", number + 1),
+                format!("both contain element {}", number + 1),
                 "Give patches that do not overlap",
             ));
         }

@@ -151,7 +151,7 @@ fn check_fields(mesh: &Mesh, fields: &[NodalField]) -> Result<()> {
             return Err(Error::invalid(what(), problem, "Give one value per node of the mesh"));
         }
         if names.contains(&field.name) {
-            return Err(Error::invalid(what(), "its name appears twice", "Give every field a name of its own"));
+            return Err(Error::invalid(what(), "its name appears twice", "Give every field a unique name"));
         }
         names.push(field.name.clone());
     }

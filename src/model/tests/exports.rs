@@ -112,7 +112,7 @@ fn writes_a_sector_with_a_step_per_nodal_diameter() {
         assert!(text.contains(&format!("*FREQUENCY\n20\n*SELECT CYCLIC SYMMETRY MODES, NMIN={n}, NMAX={n}\n")));
     }
     assert_eq!(text.matches("*STEP").count(), 3);
-    assert!(cyclic(&[29]).unwrap_err().to_string().contains("29 with 56 sectors"));
+    assert!(cyclic(&[29]).unwrap_err().to_string().contains("29 is too large for 56 sectors"));
 }
 
 /// Bytes of a named array, the length before them checked.

@@ -75,7 +75,8 @@ fn warning_lines(warnings: &[Warning]) -> Vec<String> {
         |(index, warning): &(usize, &Warning)| !warnings[..*index].iter().any(|other| other.topic() == warning.topic());
     let lines = |(_, warning): (usize, &Warning)| {
         let alike = warnings.iter().filter(|other| other.topic() == warning.topic()).count();
-        let more = if alike > 1 { format!(" ({} more of this kind: --all)", alike - 1) } else { String::new() };
+        let more =
+            if alike > 1 { format!(" ({} more of this kind, shown by --all)", alike - 1) } else { String::new() };
         let [problem, remedy] = warning.lines();
         format!("{} [{}] {problem}\n    {remedy}{more}", warning.level().name(), warning.topic().id())
     };
@@ -243,7 +244,10 @@ mod tests {
         let flutter = Warning::new(Topic::Flutter, "contact grows", "Nothing to do").at_level(Severity::Note);
         let all = [slow("front"), flutter, slow("rear")];
         let lines = warning_lines(&all);
-        assert_eq!(lines[0], "warning [sticking] front: too slow\n    Turn faster (1 more of this kind: --all)");
+        assert_eq!(
+            lines[0],
+            "warning [sticking] front: too slow\n    Turn faster (1 more of this kind, shown by --all)"
+        );
         assert_eq!(lines[1], "note [flutter] contact grows\n    Nothing to do");
         assert_eq!(lines.len(), 2);
         let [texts, details] = warnings_json(&all);

@@ -30,10 +30,10 @@ pub fn extremes(recording: &Recording) -> Vec<Extreme> {
         Some(Extreme { name, text, unit, value, time })
     };
     let [total, one, least, most] = [
-        "largest normal force of all contact nodes together, mean over a communication step",
-        "largest normal force of one contact node in an internal step",
+        "largest total normal force of all contact nodes, mean over a communication step",
+        "largest normal force on a single contact node in an internal step",
         "smallest clearance",
-        "most contact nodes touching at a communication point",
+        "largest number of contact nodes touching at a communication point",
     ];
     let column = |name: &str| recording.column(name);
     let all = [
@@ -100,10 +100,10 @@ mod tests {
         let found = extremes(&recording(&names, &rows));
         let lines: Vec<String> = found.iter().map(Extreme::line).collect();
         // 4 N s in 0.5 s.
-        assert!(lines[0].ends_with("together, mean over a communication step: 8 N at t = 0.5 s"), "{lines:?}");
+        assert!(lines[0].ends_with("nodes, mean over a communication step: 8 N at t = 0.5 s"), "{lines:?}");
         assert!(lines[1].ends_with("internal step: 80 N at t = 1 s"), "{lines:?}");
         assert_eq!(lines[2], "smallest clearance: 0 m at t = 1 s");
-        assert_eq!(lines[3], "most contact nodes touching at a communication point: 5 at t = 1 s");
+        assert_eq!(lines[3], "largest number of contact nodes touching at a communication point: 5 at t = 1 s");
         assert_eq!(six_digits(1.234_567e-5), "1.23457e-5");
         assert_eq!(Extreme::json(&found)["most_contacts"], json!({ "value": 5.0, "time": 1.0 }));
     }

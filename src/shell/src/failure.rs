@@ -56,7 +56,7 @@ impl Failure {
             tiprub_core::Error::Invalid { what: field, problem, remedy } => {
                 Self::new(format!("{what}: {field}"), problem, remedy)
             }
-            tiprub_core::Error::Unstable { problem, remedy } => Self::new(what, format!("refused: {problem}"), remedy),
+            tiprub_core::Error::Unstable { problem, remedy } => Self::new(what, problem, remedy),
             other => Self::from_below(what, other),
         }
     }
@@ -66,11 +66,11 @@ impl Failure {
         let remedy = match error.kind() {
             std::io::ErrorKind::NotFound => "Check the path",
             std::io::ErrorKind::PermissionDenied if READING.contains(&doing) => "Check the permissions",
-            std::io::ErrorKind::PermissionDenied => "Check the permissions, or choose another place",
-            std::io::ErrorKind::StorageFull => "Free some space, or choose another place",
-            std::io::ErrorKind::InvalidInput => "Give a file",
-            std::io::ErrorKind::FileTooLarge => "Give the file that was meant",
-            std::io::ErrorKind::IsADirectory => "Name a file, not a directory",
+            std::io::ErrorKind::PermissionDenied => "Check the permissions, or choose another location",
+            std::io::ErrorKind::StorageFull => "Free some space, or choose another location",
+            std::io::ErrorKind::InvalidInput => "Give a regular file",
+            std::io::ErrorKind::FileTooLarge => "Check that this is the intended file",
+            std::io::ErrorKind::IsADirectory => "Give a file, not a directory",
             _ => "Check the path and the disk",
         };
         Self::new(path.display(), format!("{doing}: {error}"), remedy)
@@ -140,7 +140,7 @@ mod tests {
         let denied = std::io::Error::from(std::io::ErrorKind::PermissionDenied);
         let remedy = |doing| Failure::file(Path::new("a.so"), doing, &denied).remedy;
         assert_eq!(remedy("cannot be read"), "Check the permissions");
-        assert!(remedy("cannot be written").contains("another place"));
+        assert!(remedy("cannot be written").contains("another location"));
     }
 
     #[test]

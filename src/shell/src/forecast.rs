@@ -109,7 +109,7 @@ impl Forecast {
     pub fn new(console: &Console, title: &str, ledger: WorkPlan) -> Self {
         let seconds = ledger.remaining();
         if seconds >= LONG {
-            console.print_progress(format_args!("{title}: about {}, a first estimate", duration(seconds)));
+            console.print_progress(format_args!("{title}: about {} (first estimate)", duration(seconds)));
         }
         let (last, line) = (Instant::now(), (0.0, Instant::now()));
         let task = console.task(title, Some(PARTS));

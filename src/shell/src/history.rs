@@ -46,28 +46,29 @@ impl InputHistory {
         let refused =
             |place: String, problem: String, remedy: &str| Failure::new(format!("{name}{place}"), problem, remedy);
         let whole = |problem: String, remedy: &str| refused(String::new(), problem, remedy);
-        let header = "Its first line holds the names: time,NAME,NAME,...";
+        let header = "Start the file with a header line: time,NAME,NAME,...";
         // Spreadsheets write a mark before the first name.
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
         let names = reader.headers().map_err(|error| whole(error.to_string(), header))?;
         let names: Vec<String> = names.iter().map(str::to_owned).collect();
         if names.first().map(String::as_str) != Some("time") || names.len() < 2 {
-            return Err(whole(format!("its first line is {}", beginning(&names.join(","))), header));
+            return Err(whole(format!("its first line {} is not a header", beginning(&names.join(","))), header));
         }
         let mut known = HashSet::with_capacity(names.len());
         if let Some(twice) = names.iter().find(|name| !known.insert(name.as_str())) {
-            return Err(whole(format!("`{twice}` is there twice"), "Give each variable one column"));
+            return Err(whole(format!("column `{twice}` appears twice"), "Give each variable only one column"));
         }
         let (mut times, mut values) = (Vec::<f64>::new(), Vec::new());
         for record in reader.records() {
-            let uneven = "Give every line as many values as there are names";
+            let uneven = "Give one value per column in every line";
             let record = record.map_err(|error| whole(error.to_string(), uneven))?;
             let line = record.position().map_or(0, csv::Position::line);
             for (column, text) in record.iter().enumerate() {
                 let value = text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
                     let place = format!(", line {line}, `{}`", names[column]);
-                    refused(place, format!("{text:?} is no finite number"), "Give numbers with a decimal point")
+                    let problem = format!("{text:?} is not a finite number");
+                    refused(place, problem, "Give finite numbers with a decimal point")
                 })?;
                 if column > 0 {
                     values.push(value);
@@ -75,13 +76,14 @@ impl InputHistory {
                 }
                 if let Some(last) = times.last().filter(|last| **last >= value) {
                     let problem = format!("the time {value} s is not after {last} s");
-                    return Err(refused(format!(", line {line}"), problem, "Sort the lines by time, each time once"));
+                    let remedy = "Sort the lines by time and give each time only once";
+                    return Err(refused(format!(", line {line}"), problem, remedy));
                 }
                 times.push(value);
             }
         }
         if times.is_empty() {
-            return Err(whole("it has no values".to_owned(), "Give at least one line of values"));
+            return Err(whole("it contains no values".to_owned(), "Add at least one line of values"));
         }
         Ok(Self { name: name.to_owned(), names: names[1..].to_vec(), times, values })
     }
@@ -115,7 +117,7 @@ impl InputHistory {
         for name in &self.names {
             let found = known.get(name).copied();
             let Some((row, reference)) = found.filter(|(row, _)| is_drivable(row)) else {
-                let problem = if found.is_some() { "it cannot change in a run" } else { "no such variable" };
+                let problem = if found.is_some() { "it cannot change during a run" } else { "no such variable" };
                 let all = rows.iter().filter(|row| is_drivable(row));
                 let names: Vec<&str> = all.map(|row| row.name.as_str()).collect();
                 let remedy = native::suggestion(name, &names);
@@ -142,7 +144,8 @@ impl InputHistory {
             return Vec::new();
         }
         let problem = format!(
-            "{}: lines are {shortest:.3e} s apart, but only values at communication points count, every {step:.3e} s",
+            "{}: some lines are only {shortest:.3e} s apart, but values are read only at communication points, every \
+             {step:.3e} s",
             self.name
         );
         vec![Warning::new(Topic::InputLines, problem, "Use a shorter communication step (--step)")]
@@ -269,22 +272,22 @@ mod tests {
         let history = parsed(&format!("time{names}\n0{}\n", ",1".repeat(100_000))).unwrap();
         assert!(history.holds("n99999"));
         let failure = parsed(&format!("time{names},n7\n")).unwrap_err().to_string();
-        assert!(failure.contains("`n7` is there twice"), "{failure}");
+        assert!(failure.contains("column `n7` appears twice"), "{failure}");
         let failure = parsed(&format!("t{names}\n")).unwrap_err().to_string();
-        assert!(failure.contains("its first line is \"t,n0,n1,") && failure.len() < 300, "{failure}");
+        assert!(failure.contains("its first line \"t,n0,n1,") && failure.len() < 300, "{failure}");
         assert!(clock.elapsed().as_secs() < 3, "{:?}", clock.elapsed());
     }
 
     #[test]
     fn what_is_wrong_is_told_with_its_line() {
         for (text, told) in [
-            ("", "its first line is \"\""),
-            ("t,a\n0,1\n", "its first line is \"t,a\""),
-            ("time\n0\n", "its first line is \"time\""),
-            ("time,a,a\n0,1,2\n", "`a` is there twice"),
-            ("time,a\n", "it has no values"),
-            ("time,a\n0,1\n1,x\n", "inputs.csv, line 3, `a`: \"x\" is no finite number"),
-            ("time,a\n0,1\n1,NaN\n", "line 3, `a`: \"NaN\" is no finite number"),
+            ("", "its first line \"\" is not a header"),
+            ("t,a\n0,1\n", "its first line \"t,a\" is not a header"),
+            ("time\n0\n", "its first line \"time\" is not a header"),
+            ("time,a,a\n0,1,2\n", "column `a` appears twice"),
+            ("time,a\n", "it contains no values"),
+            ("time,a\n0,1\n1,x\n", "inputs.csv, line 3, `a`: \"x\" is not a finite number"),
+            ("time,a\n0,1\n1,NaN\n", "line 3, `a`: \"NaN\" is not a finite number"),
             ("time,a\n0,1\n0,2\n", "line 3: the time 0 s is not after 0 s"),
             ("time,a\n0,1\n1\n", "1 fields"),
         ] {

@@ -50,8 +50,9 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
     let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
     for (variable, value) in given.settings {
         if given.history.is_some_and(|history| history.holds(variable)) {
-            let problem = "the file of inputs has a column of it";
-            return Err(Failure::usage(format!("--set {variable}"), problem, "Give one of the two"));
+            let problem = "the file of --inputs also has a column for this variable";
+            let remedy = "Set the variable with either --set or --inputs";
+            return Err(Failure::usage(format!("--set {variable}"), problem, remedy));
         }
         set(&mut simulation, variable, value)?;
     }
@@ -147,7 +148,7 @@ pub fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
                 let items = enumeration.items.iter().map(|(item, _)| *item).collect::<Vec<_>>();
                 let item = items.iter().zip(1..).find(|(item, _)| **item == text).map(|(_, value)| value);
                 let unknown =
-                    || Failure::usage(&option, "no such choice", format!("Choose one of {}", items.join(", ")));
+                    || Failure::usage(&option, "unknown value", format!("Choose one of {}", items.join(", ")));
                 simulation.set_integer(reference, item.or_else(|| text.parse().ok()).ok_or_else(unknown)?)
             }
         };
@@ -162,11 +163,13 @@ fn texts<'a>(name: &str, text: &'a str, dimension: Option<usize>) -> Result<Vec<
     let list = text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
     match (list.map(|list| list.split(',').map(str::trim).collect::<Vec<_>>()), dimension) {
         (None, dimension) => Ok(vec![text; dimension.unwrap_or(1)]),
-        (Some(_), None) => refused("takes one value, not a list".into(), "Give the value without brackets".into()),
+        (Some(_), None) => {
+            refused("is a scalar and takes one value, not a list".into(), "Give the value without brackets".into())
+        }
         (Some(values), Some(count)) if values.len() == count => Ok(values),
         (Some(values), Some(count)) => refused(
-            format!("{} values are given to an array of {count}", values.len()),
-            format!("Give {count} values, or one without brackets for all elements"),
+            format!("{} values are given for an array of {count} elements", values.len()),
+            format!("Give {count} values, or a single value without brackets for all elements"),
         ),
     }
 }
@@ -216,7 +219,7 @@ pub(crate) fn suggestion(name: &str, candidates: &[&str]) -> String {
     match scored.max_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((score, candidate)) if score > 0.8 => format!("Did you mean `{candidate}`?"),
         _ if candidates.len() > MOST_LISTED => format!(
-            "Inputs and parameters are: {}, and {} more; `tiprub inspect` lists those of an FMU",
+            "Inputs and parameters are: {}, and {} more; use `tiprub inspect` to list those of an FMU",
             candidates[..MOST_LISTED].join(", "),
             candidates.len() - MOST_LISTED
         ),

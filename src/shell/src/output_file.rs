@@ -34,7 +34,7 @@ pub fn try_directory(path: &Path) -> Result<()> {
     let named = path.ancestors().filter(|ancestor| !ancestor.as_os_str().is_empty());
     let missing: Vec<&Path> = named.take_while(|ancestor| !ancestor.exists()).collect();
     let trial = create_directory(path).and_then(|()| {
-        PendingFile::new(path).map(drop).map_err(|error| Failure::file(path, "cannot write there", &error))
+        PendingFile::new(path).map(drop).map_err(|error| Failure::file(path, "cannot write to this directory", &error))
     });
     for made in missing {
         // Those that were not made are not there.
@@ -75,7 +75,7 @@ enum OutputTarget {
 
 fn place(target: &Path) -> Result<OutputTarget> {
     let path = destination(target).map_err(|error| Failure::file(target, "cannot be written", &error))?;
-    let is_directory = || Failure::new(target.display(), "is a directory", "Name a file");
+    let is_directory = || Failure::new(target.display(), "is a directory", "Give a file name");
     match fs::metadata(&path) {
         Ok(metadata) if metadata.is_dir() => Err(is_directory()),
         Ok(metadata) if metadata.is_file() => Ok(OutputTarget::File(path)),
@@ -103,7 +103,7 @@ pub fn destination(target: &Path) -> io::Result<PathBuf> {
             _ => return Ok(path),
         }
     }
-    Err(io::Error::other("symbolic links lead in a circle"))
+    Err(io::Error::other("the symbolic links form a loop"))
 }
 
 /// A file in the making.
@@ -198,7 +198,7 @@ pub fn begin(target: &Path) -> Result<PendingFile> {
         OutputTarget::File(path) => keep_permissions(&draft.file, path).map(|()| draft),
         OutputTarget::Stream => Ok(draft),
     });
-    draft.map_err(|error| Failure::file(target, "cannot write there", &error))
+    draft.map_err(|error| Failure::file(target, "cannot be created", &error))
 }
 
 /// A file that replaces another is no more open to others than that one.
@@ -217,7 +217,7 @@ pub fn persist(draft: PendingFile, target: &Path) -> Result<()> {
     let OutputTarget::File(path) = place(target)? else { return copy_into_stream(draft, target) };
     let named = draft.name(&parent(&path));
     let renamed = named.and_then(|named| named.persist(path).map_err(|error| error.error));
-    renamed.map_err(|error| Failure::file(target, "cannot be put in place", &error))
+    renamed.map_err(|error| Failure::file(target, "cannot be renamed from its temporary file", &error))
 }
 
 fn copy_into_stream(draft: PendingFile, target: &Path) -> Result<()> {
@@ -238,7 +238,7 @@ fn open_stream(target: &Path) -> io::Result<File> {
             if asked.is_err_and(|error| error.raw_os_error() == Some(libc::ENXIO)) {
                 let name = crate::console::printable(&target.display().to_string()).into_owned();
                 // A closed stderr must not stop the work.
-                let _ = writeln!(io::stderr(), "{name} is a pipe that nobody reads: waiting for its reader");
+                let _ = writeln!(io::stderr(), "{name} is a pipe without a reader: waiting for one");
             }
         }
     }
@@ -266,9 +266,9 @@ pub fn refuse_to_replace(target: &Path, bytes: impl AsRef<[u8]>, remedy: &str) -
     }
     match fs::read(target) {
         Ok(present) if present == bytes.as_ref() => Ok(()),
-        Ok(_) => Err(Failure::new(target.display(), "is there already and differs from what would be written", remedy)),
+        Ok(_) => Err(Failure::new(target.display(), "already exists and differs from the new content", remedy)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(Failure::file(target, "cannot be compared with what would be written", &error)),
+        Err(error) => Err(Failure::file(target, "cannot be compared with the new content", &error)),
     }
 }
 

@@ -55,7 +55,7 @@ pub fn apart(inputs: &[NamedFile], outputs: &[NamedFile]) -> Result<()> {
         let Some(place) = identity(&output.path) else { continue };
         if let Some((role, path, _)) = known.iter().find(|(.., other)| *other == place) {
             let what = format!("{} {}", output.role, output.path.display());
-            return Err(Failure::usage(what, format!("is the same file as {role}{path}"), "Give a file of its own"));
+            return Err(Failure::usage(what, format!("is the same file as {role}{path}"), "Give a different file"));
         }
         known.push((&output.role, format!(" {}", output.path.display()), place));
     }

@@ -52,10 +52,10 @@ impl Recording {
         let bytes = 8.0 * rows as f64 * (names.len() + 1) as f64;
         let refuse = || {
             let size =
-                format!("{rows} communication points of {} outputs would take {:.1} GB", names.len(), 1e-9 * bytes);
+                format!("{rows} communication points with {} outputs would need {:.1} GB", names.len(), 1e-9 * bytes);
             let remedy =
                 "Choose a longer communication step (--step), an earlier stop (--stop), or fewer outputs in the scene";
-            Failure::usage("table of results", size, remedy)
+            Failure::usage("result table", size, remedy)
         };
         if bytes > MOST_BYTES {
             return Err(refuse());
@@ -99,13 +99,13 @@ impl Recording {
             return Err(Failure::new(
                 "comparison of two runs",
                 format!(
-                    "{} columns x {} rows against {} x {}, or different variable names",
+                    "they differ in size ({} columns x {} rows and {} x {}) or in variable names",
                     self.names.len(),
                     self.rows(),
                     other.names.len(),
                     other.rows()
                 ),
-                "Both runs must come from the same scene and the same communication points",
+                "Compare runs of the same scene with the same communication points",
             ));
         }
         let mut agreement = RecordingDifference {

@@ -40,7 +40,7 @@ impl Schedule {
         if !(ranges::SHORTEST_STEP..=ranges::TIME).contains(&step) {
             return Err(Failure::usage(
                 name(step_option, "--step", "experiment.communication_step"),
-                format!("{} s is no length of a step, which is 1e-12 s to 1e9 s", shown(step)),
+                format!("{} s is outside the range from 1e-12 s to 1e9 s", shown(step)),
                 "Give the communication step H in seconds, for example 1e-5",
             ));
         }
@@ -48,8 +48,12 @@ impl Schedule {
         if steps > MOST_STEPS {
             return Err(Failure::usage(
                 name(step_option, "--step", "experiment.communication_step"),
-                format!("{steps:.3e} communication points between {} s and {} s", shown(start), shown(stop)),
-                format!("Choose a longer step, so that there are at most {MOST_STEPS:.0e}"),
+                format!(
+                    "{steps:.3e} communication points between {} s and {} s are too many",
+                    shown(start),
+                    shown(stop)
+                ),
+                format!("Choose a longer step that gives at most {MOST_STEPS:.0e} points"),
             ));
         }
         Ok(Self { start, stop, step, count: count_steps(steps) })

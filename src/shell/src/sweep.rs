@@ -51,7 +51,7 @@ pub fn sweep<T: Sync, R: Send>(
         drop(sender);
         (1..).zip(receiver.iter()).for_each(|(done, ())| progress(done));
     });
-    let lost = || Failure::new("sweep", "a thread ended early", "Report this to the developers");
+    let lost = || Failure::new("sweep", "a worker thread ended unexpectedly", "Report this to the developers");
     let results = results.into_inner().map_err(|_| lost())?;
     if let Some(Err(failure)) = results.iter().flatten().find(|result| result.is_err()) {
         return Err(failure.clone());

@@ -10,16 +10,16 @@ use tiprub_shell::console::Console;
 /// Options of all studies.
 #[derive(Debug, Args)]
 pub struct StudyCommon {
-    /// Directory for everything the study writes; created if missing [default: study-STUDY].
+    /// Output directory of the study; created if missing [default: study-STUDY].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Few and short runs: seconds instead of minutes, for a first look.
+    /// Run a quick form of the study with few, short runs: seconds instead of minutes.
     #[arg(long)]
     pub quick: bool,
     /// Changes to the scene.
     #[command(flatten)]
     pub options: SceneOptions,
-    /// Where built-in models are kept.
+    /// Cache of built-in models.
     #[command(flatten)]
     pub cache: CacheArguments,
 }
@@ -30,18 +30,19 @@ pub struct MapArguments {
     /// Scene file (TOML), or a built-in scene.
     #[arg(value_name = "SCENE", default_value = "builtin:rotor37")]
     pub scene: String,
-    /// Angular velocities (rad/s): first, last and count [default: 141 from 0.8 to 1.5 times the one where twice the casing's
-    /// lowest engine order meets the first mode, where the model holds].
+    /// Angular velocities (rad/s): first, last and count [default: 141 values from 0.8 to 1.5 times the speed at which
+    /// twice the lowest engine order of the casing meets the first mode, up to the largest speed of the model].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
     pub speeds: Option<Speeds>,
-    /// Runs at the same time [default: one per processor].
+    /// Number of parallel runs [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
-    /// Revolutions whose motion is transformed; the bins of the spectra are the N-th part of the rotational frequency
-    /// apart [default: 64].
+    /// Revolutions in the window of the Fourier transform; the frequency resolution is 1/N of the rotational frequency
+    /// [default: 64].
     #[arg(long, value_name = "N")]
     pub revolutions: Option<std::num::NonZero<usize>>,
-    /// Revolutions that pass before [default: the casing's ramp and five decay times of the first mode, 20 to 400].
+    /// Start-up revolutions before the window [default: the casing's ramp plus five decay times of the first mode, 20 to
+    /// 400].
     #[arg(long, value_name = "N", value_parser = transient)]
     pub transient: Option<usize>,
     /// Start value of an input or parameter, such as friction_coefficient=0 or gap_offset=1e-5; may be repeated.
@@ -58,8 +59,8 @@ pub struct ErrorArguments {
     /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
-    /// Time from the start of the experiment over which errors are measured (s), at most until almost identical
-    /// runs diverge [default: 400 communication steps beyond the first contact].
+    /// Window in which errors are measured, from the start of the experiment (s); it ends earlier if nearly identical
+    /// runs diverge [default: until 400 communication steps after the first contact].
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     pub window: Option<f64>,
     /// Start value of an input or parameter; may be repeated.
@@ -76,16 +77,19 @@ pub struct StabilityArguments {
     /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
-    /// Friction coefficients: first, last and count [default: 11 from 0 to 1, or to twice the scene's].
+    /// Friction coefficients: first, last and count [default: 11 values from 0 to 1, or to twice that of the scene if
+    /// larger].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = frictions, allow_hyphen_values = true)]
     pub friction: Option<NumberRange>,
-    /// Speeds (rad/s): first, last and count; negative ones turn backwards [default: -1, 0.5, 1 and 1.5 times the scene's].
+    /// Speeds (rad/s): first, last and count; negative speeds turn backwards [default: -1, 0.5, 1 and 1.5 times that of
+    /// the scene].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = range, allow_hyphen_values = true)]
     pub speeds: Option<NumberRange>,
-    /// Internal steps (s): first, last and count, evenly on a logarithmic scale [default: 9 from 1/16 to 16 times the scene's].
+    /// Internal steps (s): first, last and count, logarithmically spaced [default: 9 values from 1/16 to 16 times that of
+    /// the scene].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = steps, allow_hyphen_values = true)]
     pub steps: Option<NumberRange>,
-    /// Checks at the same time [default: one per processor].
+    /// Number of parallel checks [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Start value of an input or parameter; may be repeated.
@@ -102,17 +106,17 @@ pub struct ConvergenceArguments {
     /// Scene file (TOML), or a built-in scene such as `builtin:rotor37`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
-    /// Also write the ROM of the touching structure with the errors that were found; `tiprub run` and `tiprub inspect` print them.
+    /// Also write the ROM of the master with the errors that were found; `tiprub run` and `tiprub inspect` print them.
     #[arg(long, value_name = "FILE")]
     pub into: Option<PathBuf>,
-    /// Replace that file if it exists.
+    /// Overwrite the file of --into if it exists.
     #[arg(long, requires = "into")]
     pub force: bool,
-    /// Time from the start of the experiment that is compared (s), at most until almost identical runs diverge [default: 400
-    /// communication steps beyond the first contact].
+    /// Window in which runs are compared, from the start of the experiment (s); it ends earlier if nearly identical
+    /// runs diverge [default: until 400 communication steps after the first contact].
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     pub window: Option<f64>,
-    /// Runs at the same time [default: one per processor].
+    /// Number of parallel runs [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Start value of an input or parameter; may be repeated.
@@ -165,19 +169,21 @@ const MOST_ANSWERS: usize = 200;
 
 fn range(text: &str) -> Result<NumberRange, String> {
     counted(text, MOST_ANSWERS).ok_or_else(|| {
-        "give two growing numbers and a count from 2 to 200 as FROM:TO:COUNT, for example -1700:1700:5".into()
+        "give two increasing numbers and a count from 2 to 200 as FROM:TO:COUNT, for example -1700:1700:5".into()
     })
 }
 
 fn frictions(text: &str) -> Result<NumberRange, String> {
     counted(text, MOST_ANSWERS).filter(|range| range.from >= 0.0).ok_or_else(|| {
-        "give growing friction coefficients from 0 on and a count from 2 to 200 as FROM:TO:COUNT, for example 0:0.5:11".into()
+        "give increasing friction coefficients (0 or more) and a count from 2 to 200 as FROM:TO:COUNT, for example \
+         0:0.5:11"
+            .into()
     })
 }
 
 fn steps(text: &str) -> Result<NumberRange, String> {
     counted(text, MOST_ANSWERS).filter(|range| range.from > 0.0).ok_or_else(|| {
-        "give growing positive steps in s and a count from 2 to 200 as FROM:TO:COUNT, for example 1e-7:1e-5:9".into()
+        "give increasing positive steps in s and a count from 2 to 200 as FROM:TO:COUNT, for example 1e-7:1e-5:9".into()
     })
 }
 
@@ -187,10 +193,10 @@ pub type Speeds = NumberRange;
 /// Changes of the command line to a scene.
 #[derive(Debug, Clone, Default, Args)]
 pub struct SceneOptions {
-    /// Suppress warnings with this identifier, such as `flutter`; may be repeated. In an FMU they are not logged.
+    /// Suppress warnings with this identifier, such as `flutter`; may be repeated. An FMU does not log them.
     #[arg(long, value_name = "ID", value_parser = topic)]
     pub silence: Vec<String>,
-    /// Accept values that are rarely meant (tips faster than 1500 m/s, lengths in millimetres) with a warning.
+    /// Accept implausible values (tips faster than 1500 m/s, lengths that look like millimetres) with a warning.
     #[arg(long)]
     pub accept_implausible: bool,
 }
@@ -216,8 +222,8 @@ fn topic(text: &str) -> Result<String, String> {
 /// Whether built-in models are kept from one command to the next.
 #[derive(Debug, Clone, Default, Args)]
 pub struct CacheArguments {
-    /// Reduce built-in models again, without the cache. By default they are cached in the directory that the environment
-    /// variable TIPRUB_CACHE names, or in `tiprub` in the user's cache directory.
+    /// Reduce built-in models again instead of using the cache. By default they are cached in the directory that the
+    /// environment variable TIPRUB_CACHE names, or in `tiprub` in the user's cache directory.
     #[arg(long)]
     pub no_cache: bool,
 }
@@ -254,7 +260,9 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// The problem with the text.
 pub fn speeds(text: &str) -> Result<Speeds, String> {
     counted(text, 1000).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
-        "give growing positive angular velocities in rad/s and a count from 2 to 1000 as FROM:TO:COUNT, for example 400:1600:25".into()
+        "give increasing positive angular velocities in rad/s and a count from 2 to 1000 as FROM:TO:COUNT, for example \
+         400:1600:25"
+            .into()
     })
 }
 

@@ -68,16 +68,16 @@ impl Estimate {
     /// Estimates the error of a direction that was run, with the scene's own level first or last.
     fn of(direction: &'static str, refined: &Refined) -> Self {
         if let Some(why) = refined.runs.iter().find_map(|run| run.as_ref().err()) {
-            return Self::unknown(direction, format!("another run is refused: {why}"));
+            return Self::unknown(direction, format!("a run with another setting was rejected: {why}"));
         }
         let changes = refined.changes();
-        let [.., before, last] = &changes[..] else { return Self::unknown(direction, "there are no other levels") };
+        let [.., before, last] = &changes[..] else { return Self::unknown(direction, "there are too few other levels") };
         let bounds = LATER.iter().find(|(name, _)| *name == direction).map_or(LATER[0].1, |(_, bounds)| *bounds);
         let left = before[0].zip(last[0]).and_then(|(before, last)| Some((before, last, ratio(before, last, bounds)?)));
         let Some((before, last, ratio)) = left else {
             return Self::unknown(
                 direction,
-                "the displacements change from one level to the next about as much as before",
+                "the changes of the displacements do not shrink from level to level",
             );
         };
         let own_first = refined.direction.levels.first().is_some_and(|level| level.own);
@@ -146,9 +146,9 @@ pub fn of_rom(rom: &Rom) -> Vec<Estimate> {
     if rom.checks.rub_errors.as_ref().is_none_or(RubErrors::is_empty) {
         return Vec::new();
     }
-    let steps = Estimate::unknown("steps", "they are of a run, not of a ROM: `tiprub run --estimate` tells");
+    let steps = Estimate::unknown("steps", "it depends on the run, not on the ROM: use `tiprub run --estimate`");
     let others = ["modes", "patches", "rows", "mesh"].map(|direction| {
-        Estimate::unknown(direction, "nobody has found it: `tiprub study convergence --into` does").or_of(rom)
+        Estimate::unknown(direction, "not stored in the ROM: use `tiprub study convergence --into`").or_of(rom)
     });
     [steps].into_iter().chain(others).collect()
 }
@@ -191,7 +191,7 @@ fn modes(scene: &Scene, division: u32) -> std::result::Result<RefinementDirectio
     let rom = &scene.roms[master];
     let own = Truncation::of(rom).modes(rom);
     if own < 8 {
-        return Err(format!("{own} modes have no half and no quarter"));
+        return Err(format!("{own} modes are too few, at least 8 are needed"));
     }
     let mut levels = Vec::new();
     for modes in [own / 4, own / 2] {
@@ -218,15 +218,13 @@ pub(crate) fn rows(scene: &Scene, division: u32) -> std::result::Result<Refineme
     let master = crate::master(scene);
     let rom = &scene.roms[master];
     if rom.contact_nodes.iter().any(|patch| patch.area <= 0.0) {
-        return Err("contact is at nodes, which say nothing of the sides of the tip".into());
+        return Err("the ROM has contact nodes, which do not resolve the thickness of the tip".into());
     }
     let own = rom.rows();
     if own < 3 {
-        let all =
-            if own == 1 { "one row of patches, over the whole thickness, does" } else { "two rows of patches do" };
         return Err(format!(
-            "{all} not tell what more would change: a ROM with --contact-rows 3 does, and `tiprub study convergence` where it can \
-             reduce again"
+            "the estimate needs three rows of patches, and the ROM has {own}: reduce it with --contact-rows 3, or use \
+             `tiprub study convergence` if the ROM can be reduced again"
         ));
     }
     let mut levels = Vec::new();
@@ -273,7 +271,8 @@ pub fn estimates(
     }
     found.push(Estimate::unknown(
         "mesh",
-        "a ROM does not tell of other meshes: `tiprub study convergence SCENE --into ROM` finds it and writes it there",
+        "it cannot be estimated from a single mesh: `tiprub study convergence SCENE --into ROM` determines it and \
+         stores it in the ROM",
     ));
     let rom = &scene.roms[crate::master(scene)];
     Ok(found.into_iter().map(|estimate| estimate.or_of(rom)).collect())
@@ -332,8 +331,8 @@ mod tests {
         let told = super::errors_text(&of_rom(&rom));
         assert!(
             told.contains(
-                "steps unknown, modes unknown, rows of patches across the thickness unknown; from the ROM, for a light rub: \
-                 patches along the chord 2.00 %, mesh 5.00 %"
+                "steps unknown, modes unknown, rows of patches across the thickness unknown; from the ROM, for a light \
+                 rub: patches along the chord 2.00 %, mesh 5.00 %"
             ),
             "{told}"
         );

@@ -33,7 +33,8 @@ pub fn one_rotor(settings: &SceneSettings) -> Result<()> {
     match settings.contacts.iter().find(|contact| contact.master != *first) {
         Some(other) => {
             let other = &other.master;
-            Err(several(settings, format!("`{first}` and `{other}` both touch, and this study varies one structure")))
+            let problem = format!("`{first}` and `{other}` are both masters, and this study varies only one structure");
+            Err(several(settings, problem))
         }
         None => Ok(()),
     }
@@ -49,12 +50,12 @@ pub fn one_rotor_and_friction(settings: &SceneSettings) -> Result<()> {
     if settings.contacts.iter().all(|contact| contact.friction.to_bits() == first) {
         return Ok(());
     }
-    Err(several(settings, "its contacts differ in friction, and this study is of one coefficient".to_owned()))
+    Err(several(settings, "the contacts differ in friction, and this study varies only one coefficient".to_owned()))
 }
 
 fn several(settings: &SceneSettings, problem: String) -> Failure {
     let remedy =
-        "Give a scene with one of the rotors or pairs; `tiprub study error` and `tiprub run` take all together";
+        "Give a scene with only one rotor or pair; `tiprub study error` and `tiprub run` support several";
     Failure::usage(format!("scene `{}`", settings.name), problem, remedy)
 }
 
@@ -208,7 +209,7 @@ impl Study {
         for (name, value) in &self.facts {
             text.push_str(&format!("  {name:<width$}  {value}\n"));
         }
-        text.push_str("\nwhat the figures should show, and whether they do:\n");
+        text.push_str("\nexpected results, and whether they were found:\n");
         for statement in &self.statements {
             text.push_str(&format!("  {:<4}{}\n      {}\n", statement.verdict(), statement.expected, statement.found));
         }

@@ -42,7 +42,7 @@ fn page(study: &Study) -> String {
          <header><h1>{title}</h1><p>{}</p></header>\n",
         escape(&study.summary)
     );
-    page.push_str("<section><h2>What the figures should show</h2><table><thead><tr><th>expected</th><th>so?</th><th>found</th></tr></thead><tbody>");
+    page.push_str("<section><h2>Expected results</h2><table><thead><tr><th>expected</th><th>confirmed</th><th>found</th></tr></thead><tbody>");
     for statement in &study.statements {
         let _ = write!(
             page,
@@ -62,7 +62,7 @@ fn page(study: &Study) -> String {
             figure.name
         );
     }
-    page.push_str("</section>\n<section><h2>What was studied</h2><table><tbody>");
+    page.push_str("</section>\n<section><h2>Facts</h2><table><tbody>");
     for (name, value) in &study.facts {
         let _ = write!(page, "<tr><th>{}</th><td>{}</td></tr>", escape(name), escape(value));
     }

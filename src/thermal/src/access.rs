@@ -53,7 +53,7 @@ impl ThermalSimulation {
             return Ok((variable, element));
         }
         let problem = format!("is of type {:?}, not {wanted}", variable.kind);
-        let remedy = "Call the function of the variable's type in modelDescription.xml";
+        let remedy = "Call the function for the variable's type in modelDescription.xml";
         Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy))
     }
 
@@ -85,8 +85,8 @@ impl ThermalSimulation {
         let (item, element, variable) = self.settable(reference)?;
         let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
         if !(low..=high).contains(&value) {
-            let problem = format!("{} is outside {} to {}", shown(value), shown(low), shown(high));
-            let remedy = "Give a value within min and max";
+            let problem = format!("{} is outside the range {} to {}", shown(value), shown(low), shown(high));
+            let remedy = "Give a value between min and max";
             return Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy));
         }
         let state = &mut self.state;
@@ -113,7 +113,7 @@ impl ThermalSimulation {
         {
             let items = choices.items.iter().enumerate().map(|(index, (name, _))| format!("{} = {name}", index + 1));
             let remedy = format!("Use one of: {}", items.collect::<Vec<_>>().join(", "));
-            let problem = format!("{value} is no item of {}", choices.name);
+            let problem = format!("{value} is not an item of {}", choices.name);
             return Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy));
         }
         match item {
@@ -151,17 +151,18 @@ impl ThermalSimulation {
         let what = format!("derivative of `{}`", variable.name);
         let item = self.item(variable);
         if order != 1 {
-            return Err(Error::invalid(what, format!("order {order}"), "Inputs are linear in time: give order 1"));
+            let problem = format!("order {order} is not supported");
+            return Err(Error::invalid(what, problem, "Give order 1: inputs are linear in time"));
         }
         if !value.is_finite() {
-            return Err(Error::invalid(what, shown(value), "Give a finite number"));
+            return Err(Error::invalid(what, format!("{} is not finite", shown(value)), "Give a finite number"));
         }
         match item {
             Item::Heat => self.state.heat[element].set_slope(value),
             Item::Film(index) => self.state.films[index].set_slope(value),
             Item::Factor(_) if value == 0.0 => {}
             _ => {
-                let problem = "only heat and the temperatures of gas and air may run over a step";
+                let problem = "only heat and the gas and air temperatures can vary within a step";
                 return Err(Error::invalid(what, problem, "Set its value at communication points"));
             }
         }
@@ -177,11 +178,12 @@ impl ThermalSimulation {
         let (variable, element) = self.table.locate(reference)?;
         let what = format!("derivative of `{}`", variable.name);
         if variable.causality != Causality::Output || variable.kind != DataType::Real {
-            let remedy = "Ask for derivatives of continuous real outputs only";
+            let remedy = "Request derivatives of continuous real outputs only";
             return Err(Error::invalid(what, "the variable is not a continuous real output", remedy));
         }
         if order != 1 {
-            return Err(Error::invalid(what, format!("order {order}"), "Only derivatives of order 1 are provided"));
+            let problem = format!("order {order} is not supported");
+            return Err(Error::invalid(what, problem, "Request derivatives of order 1 only"));
         }
         Ok(self.rate(self.item(variable), element))
     }

@@ -66,10 +66,10 @@ impl ConductionModel {
     pub fn validate(&self) -> Result<()> {
         let (order, patches) = (self.order(), self.patches.len());
         if order == 0 || order > LARGEST_ORDER {
-            return refuse("conduction", format!("{order} coordinates are outside 1 to {LARGEST_ORDER}"));
+            return refuse("conduction", format!("{order} coordinates, but only 1 to {LARGEST_ORDER} are supported"));
         }
         if patches == 0 || patches > ranges::PATCHES {
-            return refuse("patches", format!("{patches} are outside 1 to {}", ranges::PATCHES));
+            return refuse("patches", format!("{patches} patches, but only 1 to {} are supported", ranges::PATCHES));
         }
         if !(self.heat_capacity.is_finite() && self.heat_capacity > 0.0) {
             return refuse("heat_capacity", format!("{} J/K is not positive", shown(self.heat_capacity)));
@@ -87,14 +87,14 @@ impl ConductionModel {
             ("places", &self.places, (self.places.nrows(), order)),
         ] {
             if array.shape() != shape {
-                return refuse(name, format!("shape {:?} found, {shape:?} expected", array.shape()));
+                return refuse(name, format!("found shape {:?}, expected {shape:?}", array.shape()));
             }
             if let Some(wrong) = array.iter().find(|value| value.is_nan() || value.abs() > ranges::MATRIX) {
-                return refuse(name, format!("it holds {wrong}"));
+                return refuse(name, format!("it contains {wrong}"));
             }
         }
         if self.places.nrows() == 0 {
-            return refuse("places", "there is none".into());
+            return refuse("places", "the array is empty".into());
         }
         self.validate_physics()
     }
@@ -120,12 +120,15 @@ impl ConductionModel {
         if self.conduction.row(0).amax() > 0.0 || self.conduction.column(0).amax() > 0.0 {
             return refuse(
                 "conduction",
-                "its first row and column are not zero: a uniform temperature would not last".into(),
+                "its first row and column are not zero: a uniform temperature would not be steady".into(),
             );
         }
         let share = 1.0 / self.heat_capacity.sqrt();
         if self.heat_loads.row(0).iter().any(|load| (load - share).abs() > ROUNDING * share) {
-            return refuse("heat_loads", "a watt does not heat the whole by a watt (first row)".into());
+            return refuse(
+                "heat_loads",
+                "heat is not conserved: 1 W into a patch does not heat the whole model by 1 W (first row)".into(),
+            );
         }
         let uniform = [&self.patch_means, &self.wetted_means, &self.places];
         if uniform
@@ -133,7 +136,10 @@ impl ConductionModel {
             .flat_map(|rows| rows.column(0).iter().copied().collect::<Vec<_>>())
             .any(|value| (value - share).abs() > ROUNDING * share)
         {
-            return refuse("patch_means", "a uniform temperature is not its own mean (first column)".into());
+            return refuse(
+                "patch_means",
+                "the mean of a uniform temperature differs from that temperature (first column)".into(),
+            );
         }
         Ok(())
     }

@@ -149,7 +149,7 @@ impl ThermalSimulation {
         if slowest <= UNCOOLED * fastest {
             return Err(Error::invalid(
                 "initial_state = steady",
-                "nothing cools the casing to speak of: convection factors times film coefficients are 0, or too small for a number",
+                "the casing has no significant cooling: convection factors times film coefficients are 0 or too small",
                 "Set larger convection factors, or start with a uniform temperature",
             ));
         }
@@ -226,15 +226,17 @@ impl ThermalSimulation {
         let off = (current_time - time).abs();
         if off.is_nan() || off > TIME_TOLERANCE * step_size {
             let problem = format!("{} s, but the simulation is at {} s", shown(current_time), shown(time));
-            return Err(Error::invalid("start of the communication step", problem, "Step on from there"));
+            let remedy = "Start the step at the current time of the simulation";
+            return Err(Error::invalid("start of the communication step", problem, remedy));
         }
         let heat = self.state.heat.iter().map(|course| (course, &HEAT, false));
         let films = self.state.films.iter().map(|course| (course, &TEMPERATURES, true));
         for (course, range, ramp) in heat.chain(films) {
             let [_, end] = course.over(step_size, ramp);
             if !range.contains(&end) {
-                let problem = format!("its derivative leads to {} by the end of the step", shown(end));
-                let remedy = "Set its value or its derivative anew";
+                let problem =
+                    format!("its derivative leads to {} at the end of the step, which is out of range", shown(end));
+                let remedy = "Set a new value or derivative";
                 return Err(Error::invalid("input", problem, remedy));
             }
         }
@@ -249,15 +251,15 @@ impl ThermalSimulation {
     /// The warning of a communication step that ends before heat has passed an element.
     fn unresolved(&self, step_size: f64) -> Warning {
         let problem = format!(
-            "{}: the communication step of {} s is shorter than the {:.3} s in which heat passes an element of the heated surface \
-             (the square of its depth over the diffusivity), so that `surface_temperature` rises too slowly after `casing_heat` has \
-             changed; `casing_temperature` (means over the volume) and heat are not affected",
+            "{}: the communication step of {} s is shorter than the {:.3} s that heat needs to diffuse through an \
+             element of the heated surface (depth squared over diffusivity), so `surface_temperature` rises too slowly \
+             after a change of `casing_heat`; `casing_temperature` (volume means) and heat are not affected",
             self.model.name,
             shown(step_size),
             self.model.element_time
         );
-        let remedy = "Use longer communication steps with the mean of the heat, or thinner elements: with twice as many elements through the \
-                      thickness (`tiprub thermal --mesh`) steps may be a quarter as long";
+        let remedy = "Use longer communication steps with the mean heat, or thinner elements: twice as many elements \
+                      through the thickness (`tiprub thermal --mesh`) allow steps a quarter as long";
         Warning::new(Topic::ThermalStep, problem, remedy)
     }
 
@@ -272,7 +274,7 @@ impl ThermalSimulation {
     /// None was begun; the state is not finite any more.
     pub fn advance(&mut self) -> Result<StepProgress> {
         let Some([end, length]) = self.under_way.take() else {
-            return Err(Error::invalid("step", "none was begun", "Begin a step first"));
+            return Err(Error::invalid("step", "no step was begun", "Begin a step first"));
         };
         self.change_factors();
         let ramp = self.state.interpolation == 1;
@@ -295,7 +297,7 @@ impl ThermalSimulation {
         self.compute_outputs();
         if let Some(wrong) = self.values.iter().position(|value| !value.is_finite()) {
             self.state.phase = FAILED;
-            let remedy = format!("Value reference {wrong} was the first: look at heat and convection factors");
+            let remedy = format!("Check heat and convection factors; value reference {wrong} became non-finite first");
             return Err(Error::NonFinite { last_good_time: end - length, time: end, remedy });
         }
         Ok(StepProgress { time: end, finished: true })

@@ -129,7 +129,7 @@ impl ThermalSimulation {
         let factors =
             state.factors.iter().chain(&state.factors_used).all(|factor| crate::table::FACTORS.contains(factor));
         if reader.infinite() > 0 || state.phase > FAILED || !items || !factors || state.last_length < 0.0 {
-            return damaged("it holds values that no state holds");
+            return damaged("it contains invalid values");
         }
         self.adopt(state);
         Ok(())
@@ -140,7 +140,7 @@ impl ThermalSimulation {
         if found == expected {
             return Ok(());
         }
-        Err(Error::State { problem: format!("it has {found} bytes where this model needs {expected}") })
+        Err(Error::State { problem: format!("it has {found} bytes, but this model needs {expected}") })
     }
 }
 

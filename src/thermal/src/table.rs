@@ -31,10 +31,10 @@ static SECOND: VariableUnit =
 
 static INITIAL_STATES: Enumeration = Enumeration {
     name: "InitialState",
-    description: "Temperatures at the start",
+    description: "Initial temperatures",
     items: &[
-        ("uniform", "Everywhere initial_temperature"),
-        ("steady", "Those that the inputs at the start would lead to in the end"),
+        ("uniform", "initial_temperature everywhere"),
+        ("steady", "Steady-state temperatures for the start values of the inputs"),
     ],
 };
 
@@ -42,8 +42,8 @@ static INTERPOLATIONS: Enumeration = Enumeration {
     name: "InputInterpolation",
     description: "Temperatures of gas and air between communication points",
     items: &[
-        ("ramp", "From the value reached to the one set, which is reached at the end of the step"),
-        ("hold", "The value set acts at once"),
+        ("ramp", "Linear from the current value to the value set, which is reached at the end of the step"),
+        ("hold", "The value set applies immediately"),
     ],
 };
 
@@ -160,7 +160,8 @@ pub(crate) fn build(model: &ConductionModel) -> Result<(VariableTable, Vec<Item>
 }
 
 fn inputs(table: &mut ThermalTableBuilder, patches: usize) {
-    let text = "Heat into each patch, spread over its heated surface; held over the step, or linear with a derivative";
+    let text = "Heat flow into each patch, spread over its heated surface; constant over the step, or linear if a \
+                derivative is set";
     let heat = table.input(Item::Heat, "casing_heat", Some(&WATT), 0.0, text);
     (heat.dimension, heat.start, heat.nominal) =
         (Some(patches), Some(StartValue::Real(vec![0.0; patches])), Some(100.0));
@@ -174,24 +175,25 @@ fn inputs(table: &mut ThermalTableBuilder, patches: usize) {
         limit(film, &TEMPERATURES);
     }
     for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
-        let text = format!("Factor on the film coefficient of the {what}; held over the step, 0 is none");
+        let text =
+            format!("Factor on the film coefficient of the {what}; constant over the step, 0 means no convection");
         let factor = table.input(Item::Factor(index), &format!("{name}_convection_factor"), None, 1.0, &text);
         limit(factor, &FACTORS);
     }
 }
 
 fn parameters(table: &mut ThermalTableBuilder, model: &ConductionModel) {
-    let text = "Temperature at the start above the reference, where the start is uniform";
+    let text = "Initial temperature above the reference for a uniform start";
     let initial = table.input(Item::InitialTemperature, "initial_temperature", Some(&KELVIN), 0.0, text);
     (initial.causality, initial.variability) = (Causality::Parameter, Variability::Fixed);
     limit(initial, &TEMPERATURES);
-    table.choice(Item::InitialState, "initial_state", &INITIAL_STATES, "Temperatures at the start");
+    table.choice(Item::InitialState, "initial_state", &INITIAL_STATES, "Initial temperatures");
     let text = "Temperatures of gas and air between communication points";
     table.choice(Item::Interpolation, "input_interpolation", &INTERPOLATIONS, text);
     let name = table.push(Item::Constant, "model_name", None, "Name of the model");
     (name.kind, name.start) = (DataType::String, Some(StartValue::String(model.name.clone())));
     (name.causality, name.variability) = (Causality::Local, Variability::Constant);
-    table.constant("heat_capacity", &CAPACITY, model.heat_capacity, "Heat capacity of the whole");
+    table.constant("heat_capacity", &CAPACITY, model.heat_capacity, "Total heat capacity");
     let text = "Film coefficient times area of the gas inside, at a factor of 1";
     table.constant("gas_conductance", &CONDUCTANCE, model.gas_conductance(), text);
     let text = "Film coefficient times area of the air outside, at a factor of 1";
@@ -204,18 +206,18 @@ fn temperatures(table: &mut ThermalTableBuilder, patches: usize) {
     };
     let mut row = 0;
     for (name, text) in [
-        ("casing_temperature", "Mean temperature of each patch above the reference, over its volume"),
+        ("casing_temperature", "Mean temperature of the volume of each patch above the reference"),
         ("surface_temperature", "Mean temperature of the heated surface of each patch above the reference"),
     ] {
         kelvin(table, Item::Rows(row), name, text);
         table.variables.last_mut().expect("just pushed").dimension = Some(patches);
         row += patches;
     }
-    kelvin(table, Item::Rows(row), "temperature_mean", "Mean temperature above the reference, over the volume");
-    let text = "Largest temperature of the heated surface above the reference, of the corners of its elements";
+    kelvin(table, Item::Rows(row), "temperature_mean", "Mean temperature of the whole volume above the reference");
+    let text = "Largest temperature of the heated surface above the reference, at the corners of its elements";
     kelvin(table, Item::Hottest, "temperature_max", text);
     for (index, (name, what)) in [("gas", "gas inside"), ("ambient", "air outside")].into_iter().enumerate() {
-        let text = format!("Mean temperature of the surface in the {what} above the reference");
+        let text = format!("Mean temperature above the reference of the surface in contact with the {what}");
         kelvin(table, Item::Rows(row + 1 + index), &format!("{name}_surface_temperature"), &text);
     }
 }
@@ -234,10 +236,10 @@ fn heat(table: &mut ThermalTableBuilder) {
         let text = format!("Heat {what} since the start");
         table.output(Item::Total(index), &format!("{name}_heat"), &JOULE, Span::Total, &text);
     }
-    let text = "Heat stored less heat stored at the start and all heat that came since: rounding";
+    let text = "Heat stored minus heat stored at the start and all heat supplied since; zero except for rounding";
     table.output(Item::Residual, "energy_residual", &JOULE, Span::Total, text);
-    let text =
-        "The same as a share of the heat at the start and all exchanged since, each communication step by its size";
+    let text = "Ratio of energy_residual to the initial heat plus the sum of the absolute heat exchanged in each \
+                communication step";
     let residual = table.push(Item::RelativeResidual, "energy_residual_relative", None, text);
     residual.span = Span::Total;
 }

@@ -57,8 +57,8 @@ impl ThermalSimulation {
     ) -> Result<()> {
         let length = self.state.last_length;
         if length <= 0.0 {
-            let remedy = "Ask after a step";
-            return Err(Error::invalid("derivatives", "no communication step was done", remedy));
+            let remedy = "Request derivatives after a communication step";
+            return Err(Error::invalid("derivatives", "no communication step has been done yet", remedy));
         }
         let mut heat = vec![0.0; self.model.patches.len()];
         let mut films = [0.0; 2];
@@ -73,7 +73,7 @@ impl ThermalSimulation {
                 _ => {
                     return Err(refused(
                         variable,
-                        "it is no heat and no temperature of gas or air, which act linearly",
+                        "only heat and the gas and air temperatures act linearly",
                     ));
                 }
             }
@@ -88,7 +88,7 @@ impl ThermalSimulation {
                 Item::Total(index) => change.heats[index],
                 Item::Power(film) => change.heats[1 + film] / length,
                 Item::Residual | Item::RelativeResidual => 0.0,
-                _ => return Err(refused(variable, "it is no output")),
+                _ => return Err(refused(variable, "it is not an output")),
             };
         }
         Ok(())
@@ -117,5 +117,5 @@ impl ThermalSimulation {
 }
 
 fn refused(variable: &Variable, problem: &str) -> Error {
-    Error::invalid(format!("derivative with `{}`", variable.name), problem, "Leave it out")
+    Error::invalid(format!("derivative with `{}`", variable.name), problem, "Remove it from the request")
 }

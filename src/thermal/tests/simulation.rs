@@ -353,7 +353,7 @@ fn steady_starts_stay_and_need_cooling() {
     set(&mut simulation, "gas_convection_factor", 0.0);
     set(&mut simulation, "ambient_convection_factor", 0.0);
     let error = simulation.initialise(0.0).unwrap_err().to_string();
-    assert!(error.contains("nothing cools the casing") && error.contains("uniform"), "{error}");
+    assert!(error.contains("no significant cooling") && error.contains("uniform"), "{error}");
 }
 
 /// Without any film heat stays: what is supplied is stored.

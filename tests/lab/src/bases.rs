@@ -121,7 +121,7 @@ fn scene(rom: Rom) -> Result<Scene> {
 
 fn marched(scene: &Scene, division: u32, samples: usize) -> Result<RunSummary> {
     let scene = with(scene, Scheme::ModalExact, division);
-    march(&scene, &[], division, samples).map_err(|why| Failure::new("the light rub", why, ""))
+    march(&scene, &[], division, samples).map_err(|why| Failure::new("light rub", why, ""))
 }
 
 fn with(scene: &Scene, scheme: Scheme, division: u32) -> Scene {
@@ -188,7 +188,7 @@ fn model(
     console: &Console,
 ) -> Result<BasisModel> {
     let rom = basis.rom(size, modes, console)?;
-    let failed = |error: tiprub_core::Error| Failure::from_below("a reduced blade", error);
+    let failed = |error: tiprub_core::Error| Failure::from_below("reduced blade", error);
     let limits = SingleStructure::new(&rom, rom.damping_ratio, 0.0).map_err(failed)?.step_limits(None);
     let worst = |values: &[f64]| values.iter().fold(0.0, |most: f64, value| most.max(value.abs())) / 100.0;
     let (flexibility, response) = (worst(&rom.checks.flexibility_deviation), worst(&rom.checks.response_deviation));
@@ -213,14 +213,15 @@ fn cheapest(all: &[BasisModel], basis: BasisChoice, error: f64) -> Option<Timed>
 
 fn table(all: &[BasisModel], frequency: f64) -> String {
     let mut text = format!(
-        "| contact, basis | modes | flexibility | response to {:.1} kHz | rub | rub, massless | rub, against patches | largest step: central \
-         differences | modal-exact | massless-boundary | µs per step |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "| contact, basis | modes | flexibility error | response error up to {:.1} kHz | rub error | rub error, \
+         massless-boundary | rub error against patches | largest step: central-difference | modal-exact | \
+         massless-boundary | µs per step |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
         1e-3 * frequency
     );
     for one in all {
         let limit = |name: &str| {
             let found = one.limits.iter().find(|(scheme, _)| *scheme == name).and_then(|(_, limit)| *limit);
-            found.map_or("refused".to_owned(), |limit| format!("{:.2} µs", 1e6 * limit))
+            found.map_or("rejected".to_owned(), |limit| format!("{:.2} µs", 1e6 * limit))
         };
         text.push_str(&format!(
             "| {} | {} | {:.0e} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {} | {} | {} | {:.0} |\n",
@@ -242,7 +243,9 @@ fn table(all: &[BasisModel], frequency: f64) -> String {
 
 fn cost_table(all: &[BasisModel], bases: &[BasisChoice]) -> String {
     let mut text = String::from(
-        "| contact, basis | error | cheapest: modes, scheme, step | ms per simulated ms | of the first row of this error |\n|---|---|---|---|---|\n",
+        "| contact, basis | error | lowest cost: modes, scheme, step | ms per simulated ms | relative to the first row \
+         of \
+         this error |\n|---|---|---|---|---|\n",
     );
     for error in EQUAL {
         let first = cheapest(all, bases[0], error);
@@ -265,9 +268,10 @@ fn figure(all: &[BasisModel], bases: &[BasisChoice]) -> Result<StudyFigure> {
     let of = |basis: BasisChoice| all.iter().filter(move |one| one.basis == basis);
     let line = |basis: &BasisChoice| of(*basis).map(|one| (one.modes as f64, one.same.log10())).collect();
     let series = bases.iter().map(|basis| Series::line(basis.name(), line(basis))).collect();
-    let plot = Plot { marked: true, ..Plot::new("modes", "log10 of the error of displacements", series) };
+    let plot = Plot { marked: true, ..Plot::new("modes", "log10 of the displacement error", series) };
     let mut sheet =
-        Sheet::new(["basis", "modes", "flexibility", "response", "rub", "rub, massless", "rub, against patches"]);
+        Sheet::new(["basis", "modes", "flexibility", "response", "rub", "rub, massless-boundary",
+            "rub, against patches"]);
     for (index, basis) in bases.iter().enumerate() {
         let row = |one: &BasisModel| {
             vec![index as f64, one.modes as f64, one.flexibility, one.response, one.same, one.massless, one.patches]
@@ -276,7 +280,8 @@ fn figure(all: &[BasisModel], bases: &[BasisChoice]) -> Result<StudyFigure> {
     }
     Ok(StudyFigure {
         name: "modes",
-        caption: "A light rub against the same contact with most modes.".into(),
+        caption:
+            "Displacement error of a light rub, relative to the model with the same contact and the most modes.".into(),
         picture: Picture::plot(&plot)?,
         sheet,
     })
@@ -306,20 +311,23 @@ fn statements(all: &[BasisModel], bases: &[BasisChoice], covered: usize) -> Vec<
         .collect();
     vec![
         Statement::tested(
-            "Static flexibility at the contact is exact, whatever is kept: to 1e-6",
+            "The static flexibility at the contact is exact to 1e-6 with any number of modes",
             flexibility < 1e-6,
             format!("largest deviation {flexibility:.0e}"),
         ),
         Statement::tested(
             format!(
-                "From {covered} modes on free-interface modes have a smaller error of the forced response than as many held ones"
+                "With {covered} or more modes, free-interface modes have a smaller forced-response error than the same \
+                 number of fixed-interface modes"
             ),
             pairs().filter(|(held, _)| held.modes >= covered).all(|(held, free)| free.response < held.response),
             told(&|one| one.response),
         ),
-        Statement::tested("Of a light rub too, with most modes of either", smaller, told(&|one| one.same)),
+        Statement::tested("With the most modes, free-interface modes also have a smaller error in a light rub", smaller,
+            told(&|one| one.same)),
         Statement::tested(
-            "Without inertia at the contact (massless-boundary) free-interface modes have a smaller error, with most modes",
+            "With the most modes and no inertia at the contact (massless-boundary), free-interface modes have a \
+             smaller error",
             bases.chunks(2).all(|pair| match (last(pair[0]), last(pair[1])) {
                 (Some(held), Some(free)) => free.massless < held.massless,
                 _ => false,
@@ -350,7 +358,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let size = if arguments.quick { &QUICK } else { &FULL };
     let quiet = Console::new(true, false);
     let bases = BasisChoice::all(size.patches);
-    let task = console.task("Reducing and rubbing", Some((bases.len() * size.modes.len() + 2) as u64));
+    let task = console.task("Reducing and running models", Some((bases.len() * size.modes.len() + 2) as u64));
     let truths = [bases[0].truth(size, &quiet)?, bases[3].truth(size, &quiet)?];
     let mut all = Vec::new();
     for (index, basis) in bases.iter().enumerate() {
@@ -365,10 +373,11 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let tables = [table(&all, frequency), cost_table(&all, &bases)].join("\n");
     Ok(Study {
         name: "bases",
-        title: "What a blade is reduced to".into(),
+        title: "Reduction basis of a blade".into(),
         summary: format!(
-            "Rotor 37 with contact at nodes or patches, and with modes of the held or the free interface. Errors are against {} free-interface \
-             modes and steps of {:e} s, of displacements of leading edge, mid-chord and trailing edge over a light rub.",
+            "Rotor 37 with contact nodes or patches, reduced with fixed-interface or free-interface modes. Errors are \
+             those of the displacements of leading edge, mid-chord and trailing edge in a light rub, relative to {} \
+             free-interface modes and steps of {:e} s.",
             size.true_modes,
             INTERVAL / f64::from(TRUE_DIVISION)
         ),
@@ -380,6 +389,6 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         statements: statements(&all, &bases, size.covered),
         figures: vec![figure(&all, &bases)?],
         results: results(&all),
-        files: vec![("bases.md".into(), "the tables of the guide".into(), tables.into_bytes())],
+        files: vec![("bases.md".into(), "tables for the guide".into(), tables.into_bytes())],
     })
 }

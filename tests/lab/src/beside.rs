@@ -38,7 +38,7 @@ struct SideBySideRun {
 
 fn refused(what: impl Into<String>, why: &str) -> Failure {
     let remedy =
-        "Take it out of the scene, or compare with `tiprub study error`, whose witnesses are schemes of the product";
+        "Remove it from the scene, or use `tiprub study error`, which compares the schemes of tiprub with each other";
     Failure::new(what.into(), why.to_owned(), remedy)
 }
 
@@ -50,29 +50,30 @@ pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
     let settings = &scene.settings;
     let ([rotor], [surface], [contact]) = (&settings.structures[..], &settings.surfaces[..], &settings.contacts[..])
     else {
-        return Err(refused("structure, surface, contact", "the witness knows one of each"));
+        return Err(refused("structure, surface, contact", "the independent solver supports one of each"));
     };
     let rom = &scene.roms[0];
     let unknown = [
         ("rom", rom.extras.harmonics.is_empty(), "coupled sectors"),
-        ("spin", rotor.spin == SpinSettings::default(), "effects of spin"),
-        ("whirl", !rotor.whirl && !rotor.axial_shift, "a shaft that moves"),
+        ("spin", rotor.spin == SpinSettings::default(), "spin effects"),
+        ("whirl", !rotor.whirl && !rotor.axial_shift, "a moving shaft"),
         ("load", rotor.load.is_none() && !rotor.thermal, "loads"),
-        ("surface.structure", surface.structure.is_none(), "surfaces that a structure carries"),
+        ("surface.structure", surface.structure.is_none(), "surfaces of a structure"),
         ("surface.spline", surface.spline.is_none(), "surfaces through data points"),
         ("contact.coating", contact.coating.is_none(), "coatings"),
-        ("contact.nodes", contact.nodes.is_none(), "some of the contact nodes"),
-        ("contact.solver", contact.solver != Solver::Coulomb, "sticking"),
+        ("contact.nodes", contact.nodes.is_none(), "a selection of contact nodes"),
+        ("contact.solver", contact.solver != Solver::Coulomb, "sticking friction"),
     ];
     if let Some((what, _, why)) = unknown.iter().find(|(_, known, _)| !known) {
-        return Err(refused(*what, &format!("the witness does not know {why}")));
+        return Err(refused(*what, &format!("the independent solver does not support {why}")));
     }
     let (bumps, phase) = match surface.shape {
         Shape::Circular {} => ([0.0, 1.0, 0.0], 0.0),
         Shape::TwoLobe { depth, width, phase } => {
             ([2.0 * contact.nominal_gap() * depth, width, surface.ramp_time], phase)
         }
-        _ => return Err(refused("surface.shape", "the witness knows round casings and two bumps")),
+        _ => return Err(refused("surface.shape",
+            "the independent solver supports only circular casings and two bumps")),
     };
     let meridional = f64::from(u8::from(contact.meridian == Meridian::Contour));
     let tips = rom.contact_nodes.iter().map(|node| RubTip {
@@ -96,7 +97,7 @@ pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
             bumps,
         },
     };
-    BladeScene::new(blades).ok_or_else(|| refused("rom", "its mass is not positive definite"))
+    BladeScene::new(blades).ok_or_else(|| refused("rom", "the mass matrix is not positive definite"))
 }
 
 /// The product over `samples` communication steps, its internal step divided by `division`.
@@ -174,18 +175,20 @@ pub(crate) fn study(arguments: &BesideArguments, console: &Console) -> Result<St
     let samples =
         (1..=most).take_while(|sample| f64::from(*sample) * interval <= experiment.stop * (1.0 + 1e-9)).count();
     let samples = u32::try_from(samples).unwrap_or(most).max(1);
-    let failed = |what: &str, why: String| Failure::new(what.to_owned(), why, "Choose a step that the scene runs with");
-    let own = product(&scene, 1, samples).map_err(|error| failed("the product", error.to_string()))?;
+    let failed = |what: &str, why: String| Failure::new(what.to_owned(), why,
+        "Choose a step with which the scene runs");
+    let own = product(&scene, 1, samples).map_err(|error| failed("simulation", error.to_string()))?;
     let half =
-        product(&scene, 2, samples).map_err(|error| failed("the product with half its step", error.to_string()))?;
+        product(&scene, 2, samples).map_err(|error| failed("simulation with half the step", error.to_string()))?;
     let longest = scene.settings.time.step.min(LONGEST);
     let mut witnesses = Vec::new();
-    let task = console.task("witness", Some(SHARES.len() as u64));
+    let task = console.task("Independent solver", Some(SHARES.len() as u64));
     for (done, share) in (0..).zip(SHARES) {
         task.at(done);
         let step = longest / f64::from(share);
         witnesses
-            .push((step, witness(&blades, interval, step, samples).map_err(|error| failed("the witness", error))?));
+            .push((step, witness(&blades, interval, step, samples).map_err(|error| failed("independent solver",
+                error))?));
     }
     Ok(report(&scene, (&own, &half), &witnesses, interval))
 }
@@ -208,28 +211,31 @@ fn report(
     let with_mass = matches!(scene.settings.time.scheme, Scheme::CentralDifference | Scheme::ModalExact);
     let allowed = [0, 1].map(|which| MARGIN * (halved[which] + own_halved[which]) + 1e-12);
     let found = format!(
-        "{:.1e} of displacements, {:.1e} of the impulse; halved steps change the product by {:.1e}, {:.1e} and the witness by {:.1e}, {:.1e}",
+        "displacements differ by {:.1e}, the impulse by {:.1e}; halving the step changes tiprub by {:.1e}, {:.1e} and \
+         the independent solver by {:.1e}, {:.1e}",
         between[0], between[1], own_halved[0], own_halved[1], halved[0], halved[1]
     );
-    let expected = format!("product and witness are apart by at most {MARGIN} times what halving their steps changes");
+    let expected = format!("tiprub and the independent solver differ by at most {MARGIN} times the change due to \
+                            halving their steps");
     let meets = match with_mass {
         true => Statement::tested(expected, between[0] <= allowed[0] && between[1] <= allowed[1], found),
         false => Statement::remark(
-            "the witness gives mass to contact nodes, this scheme does not: they meet up to that",
+            "the independent solver has mass at the contact nodes and this scheme has none, so they agree only up to \
+             this difference",
             found,
         ),
     };
     let touches = finest.impulses.iter().any(|impulse| *impulse > 0.0);
-    let mut sheet = Sheet::new(["step (s)", "displacements apart from the product", "impulse apart"]);
+    let mut sheet = Sheet::new(["step (s)", "displacement difference from tiprub", "impulse difference"]);
     for (step, witness) in witnesses {
         let [displacements, impulse] = distances(half, witness);
         sheet.rows.push(vec![*step, displacements, impulse]);
     }
     Study {
         name: "beside",
-        title: format!("{} beside an independent stepper", scene.settings.name),
-        summary: "The product at its own step and at half of it, and the time stepping of Moreau and Jean with geometry, modes and contact \
-                  problem of its own, at three steps."
+        title: format!("{} compared with an independent solver", scene.settings.name),
+        summary: "tiprub with the step of the scene and half of it, compared with Moreau-Jean time stepping with \
+                  independent geometry, modes and contact solution at three steps."
             .into(),
         facts: vec![
             ("communication steps".into(), own.impulses.len().to_string()),
@@ -237,7 +243,7 @@ fn report(
         ],
         statements: vec![
             meets,
-            Statement::tested("something touches", touches, format!("{:.4e} N·s", finest.impulses.iter().sum::<f64>())),
+            Statement::tested("there is contact", touches, format!("{:.4e} N·s", finest.impulses.iter().sum::<f64>())),
         ],
         results: json!({
             "displacements": between[0], "impulse": between[1], "witness_halved": halved, "product_halved": own_halved,
@@ -254,9 +260,9 @@ fn figure((product, witness): (&SideBySideRun, &SideBySideRun), interval: f64, s
     };
     let plot = Plot::new(
         "time (ms)",
-        "normal forces (N)",
-        vec![Series::line("product", series(product)), Series::line("witness", series(witness))],
+        "total normal force (N)",
+        vec![Series::line("tiprub", series(product)), Series::line("independent solver", series(witness))],
     );
-    let caption = "All normal forces together, means over communication steps.".to_owned();
+    let caption = "Sum of all normal forces, averaged over communication steps.".to_owned();
     Some(StudyFigure { name: "forces", caption, picture: Picture::plot(&plot).ok()?, sheet })
 }

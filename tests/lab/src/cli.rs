@@ -41,16 +41,18 @@ pub struct LabCli {
 /// Studies by name.
 #[derive(Debug, Subcommand)]
 pub enum LabCommand {
-    /// Error against run time of every method on built-in scenes and standard problems, beside independent methods.
+    /// Error against run time of every method on built-in scenes and standard problems, compared with independent
+    /// methods.
     Error(LabErrorArguments),
     /// Stiff and extreme cases: each must end with a correct result or with an error that gives the reason.
     #[command(
-        after_help = "Every case runs in a separate process with a time limit. DIR then holds index.html, stability.csv, \
+        after_help = "Every case runs in a separate process with a time limit. DIR receives index.html, stability.csv, \
                       stability.md and results.json."
     )]
     Stability(LabStabilityArguments),
-    /// Small extreme random scenes: checks of energy, losses, penetration, saved states, and the bits of the FMU.
-    #[command(after_help = "A seed determines its scene. Run a single one with `lab random --only SEED`.")]
+    /// Small extreme random scenes: checks of energy, losses, penetration, saved states, and bitwise agreement with the
+    /// FMU.
+    #[command(after_help = "The seed determines the scene. Run a single scene with `lab random --only SEED`.")]
     Random(RandomArguments),
     /// Frequency deviation and residual criterion of the reduced disk against the number of component modes.
     Convergence(StudyCommon),
@@ -58,36 +60,41 @@ pub enum LabCommand {
     Modes(ModesArguments),
     /// Blades against an oval casing, rigid and flexible, over a range of speeds.
     Stage(LabStageArguments),
-    /// The cube between two rings: the product against independent methods on the full model.
+    /// The cube between two rings: tiprub compared with independent methods on the full model.
     Cube(LabCubeArguments),
-    /// Forces and moments on both sides of contacts, torque against the work of the shaft, and the ledger, over all features.
+    /// Balance of forces and moments in contacts, of torque and shaft work, and of energy, for all features.
     Conjugacy(StudyCommon),
-    /// Effect of the communication step on a whirling shaft and on other moving inputs: ramped, with derivatives, and held.
+    /// Effect of the communication step on whirl and other moving inputs: ramped, with derivatives, and held.
     Inputs(StudyCommon),
-    /// A rub and a shaft in its bearings, stepped by turns: once, by iterations, by Newton's method with derivatives over the step.
+    /// Co-simulation of a rub and a shaft in bearings: one exchange per step, fixed-point iteration, or Newton's
+    /// method.
     Coupling(StudyCommon),
-    /// Estimated errors of steps, modes, patches and the mesh against rubs that are refined in each direction.
+    /// Estimated errors of steps, modes, patches and mesh, compared with refined runs.
     Estimates(EstimatesArguments),
-    /// Refinement of rubs of rotor 37 and of the stage: patches, mesh, modes, steps; limits, and the errors of the built-in models.
+    /// Convergence of rubs of rotor 37 and the stage with patches, mesh, modes and steps; errors of the built-in
+    /// models.
     Refinement(RefinementArguments),
-    /// Modes with the contact held or free, contact at nodes or patches: error, largest steps and cost against the number of modes.
+    /// Fixed-interface or free-interface modes, contact nodes or patches: error, largest steps and cost against the
+    /// number of modes.
     Bases(StudyCommon),
-    /// Any scene of blades without coupling in a rigid casing beside a stepper that shares only the matrices with the product.
+    /// Any scene with uncoupled blades in a rigid casing, compared with an independent solver that shares only the
+    /// matrices.
     Beside(BesideArguments),
-    /// Errors of steps by a tolerance on random rubs, energy over very many switches, random contact problems.
+    /// Errors of adaptive steps in random rubs, energy over very many contact changes, random contact problems.
     Scatter(StudyCommon),
-    /// Reduced blades against a full finite-element model with steps and contact of its own, without any reduction.
+    /// Reduced blades compared with a full finite-element model that has independent time integration and contact.
     Witness(StudyCommon),
-    /// Stress that reduced blades recover in a rub, against that of the full finite-element model, by the number of modes.
+    /// Recovered stress of reduced blades in a rub, compared with the full finite-element model, for several numbers of
+    /// modes.
     Stress(StudyCommon),
-    /// One blade in a coating that closes on it: lobes of the wear beside what the blade vibrates per revolution.
+    /// One blade in a coated casing that closes: wear lobes compared with blade vibrations per revolution.
     Wear(StudyCommon),
 }
 
 /// Arguments of `lab estimates`.
 #[derive(Debug, Args)]
 pub struct EstimatesArguments {
-    /// Only what the mesh leaves: minutes instead of an hour.
+    /// Run only the mesh error: takes minutes instead of an hour.
     #[arg(long)]
     pub mesh_only: bool,
     /// Options of all studies.
@@ -98,7 +105,7 @@ pub struct EstimatesArguments {
 /// Arguments of `lab cube`.
 #[derive(Debug, Args)]
 pub struct LabCubeArguments {
-    /// Only the faces of the cube as patches: a minute.
+    /// Run only the cube with contact patches: takes a minute.
     #[arg(long)]
     pub patches_only: bool,
     /// Options of all studies.
@@ -120,13 +127,13 @@ pub struct BesideArguments {
 /// Arguments of `lab refinement`.
 #[derive(Debug, Args)]
 pub struct RefinementArguments {
-    /// Only this scene, such as rotor37-light or stage-smooth; may be given several times.
+    /// Run only this scene, such as rotor37-light or stage-smooth; may be given several times.
     #[arg(long = "scene", value_name = "SCENE")]
     pub scenes: Vec<String>,
-    /// Only this direction; may be given several times.
+    /// Refine only in this direction; may be given several times.
     #[arg(long = "direction", value_name = "DIRECTION", value_parser = ["step", "modes", "modes-2", "nodes", "rows", "mesh"])]
     pub directions: Vec<String>,
-    /// Runs at the same time [default: one per processor].
+    /// Number of parallel runs [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Options of all studies.
@@ -137,11 +144,11 @@ pub struct RefinementArguments {
 /// Arguments of `lab error`.
 #[derive(Debug, Args)]
 pub struct LabErrorArguments {
-    /// Only this scene; may be given several times.
+    /// Run only this scene; may be given several times.
     #[arg(long = "scene", value_name = "SCENE", value_enum)]
     pub scenes: Vec<ErrorScene>,
-    /// Write tables and pictures into this directory of the guide too: the folder docs of the sources. With `--scene`, only the rows of these
-    /// scenes.
+    /// Also write tables and figures into this directory of the guide (docs in the sources). With `--scene`, only the
+    /// rows of these scenes are updated.
     #[arg(long, value_name = "DIR")]
     pub guide: Option<PathBuf>,
     /// Options of all studies.
@@ -156,27 +163,27 @@ pub enum ErrorScene {
     Carpenter,
     /// The bouncing bar.
     BouncingBar,
-    /// A block on a belt that sticks and slides.
+    /// A block that sticks and slides on a belt.
     Belt,
     /// The cube between two rings.
     Cube,
-    /// Rotor 37 with the default model, touching lightly.
+    /// Rotor 37 with the default model, light rub.
     #[value(name = "rotor37-light")]
     Rotor37Light,
-    /// Rotor 37 with the default model, rubbing by the whole gap.
+    /// Rotor 37 with the default model, heavy rub: interference equal to the gap.
     #[value(name = "rotor37-heavy")]
     Rotor37Heavy,
     /// Rotor 37 in an elastic casing.
     FlexibleCasing,
     /// The stage: coupled blades in an elastic casing.
     Stage,
-    /// The paper's model of rotor 37, touching lightly.
+    /// The paper's model of rotor 37, light rub.
     #[value(name = "rotor37-paper-light")]
     Rotor37PaperLight,
-    /// The paper's model of rotor 37, rubbing by the whole gap.
+    /// The paper's model of rotor 37, heavy rub: interference equal to the gap.
     #[value(name = "rotor37-paper-heavy")]
     Rotor37PaperHeavy,
-    /// The stage on a coarse mesh, beside an independent solver.
+    /// The stage on a coarse mesh, compared with an independent solver.
     StageCoarse,
 }
 
@@ -200,7 +207,8 @@ impl ErrorScene {
 /// Arguments of `lab modes`.
 #[derive(Debug, Args)]
 pub struct ModesArguments {
-    /// Speed of the engine orders (rad/s) [default: where an oval casing meets the first mode of nodal diameter 2].
+    /// Speed for the engine orders (rad/s) [default: the critical speed of an oval casing, for the first mode of nodal
+    /// diameter 2].
     #[arg(long, value_name = "SPEED", value_parser = positive, allow_negative_numbers = true)]
     pub speed: Option<f64>,
     /// Options of all studies.
@@ -211,11 +219,11 @@ pub struct ModesArguments {
 /// Arguments of `lab stage`.
 #[derive(Debug, Args)]
 pub struct LabStageArguments {
-    /// Angular velocities (rad/s), from, to and how many [default: 0.5 to 1.5 times the one where an oval casing meets the
-    /// first mode of nodal diameter 2].
+    /// Angular velocities (rad/s): first, last and number [default: 0.5 to 1.5 times the critical speed of an oval
+    /// casing, for the first mode of nodal diameter 2].
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = speeds)]
     pub speeds: Option<Speeds>,
-    /// Runs at the same time [default: one per processor].
+    /// Number of parallel runs [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
     /// Options of all studies.
@@ -226,22 +234,22 @@ pub struct LabStageArguments {
 /// Arguments of `lab stability`.
 #[derive(Debug, Args)]
 pub struct LabStabilityArguments {
-    /// Directory for the table; made if missing.
+    /// Directory for the table; created if missing.
     #[arg(long, value_name = "DIR", default_value = "stability")]
     pub out: PathBuf,
-    /// Fewer and shorter cases: a minute.
+    /// Fewer and shorter cases: takes a minute.
     #[arg(long)]
     pub quick: bool,
-    /// Only cases whose name begins so.
+    /// Run only cases whose name begins with NAME.
     #[arg(long, value_name = "NAME")]
     pub case: Option<String>,
-    /// Cases at the same time [default: one per processor].
+    /// Number of parallel cases [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
-    /// FMU library for the cases that import FMUs, instead of the one found or built.
+    /// FMU library for the cases that import FMUs [default: the library that is found or built].
     #[arg(long, value_name = "FILE")]
     pub library: Option<PathBuf>,
-    /// Run one case in this process and print what happened.
+    /// Run one case in this process and print its result.
     #[arg(long, value_name = "NAME", hide = true)]
     pub child: Option<String>,
 }
@@ -252,22 +260,22 @@ pub struct RandomArguments {
     /// Number of scenes.
     #[arg(long, value_name = "N", default_value_t = 300)]
     pub scenes: usize,
-    /// Seed of the run, from which the seeds of its scenes follow.
+    /// Seed of the run, which determines the seeds of its scenes.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
-    /// Only the scene with this seed, and everything about it.
+    /// Run only the scene with this seed, and print its full result.
     #[arg(long, value_name = "SEED", conflicts_with_all = ["scenes", "seed"])]
     pub only: Option<u64>,
-    /// Compare each scene, or every N-th one, with the FMU library of both versions; 0 compares none.
+    /// Compare every N-th scene with the FMU library (FMI 2.0 and 3.0); 0 compares none.
     #[arg(long, value_name = "N", default_value_t = 4)]
     pub fmu: usize,
-    /// Directory for wrong scenes, as scene and ROM files, and for the table as JSON.
+    /// Directory for failed scenes (scene and ROM files) and for the table (JSON).
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Scenes at the same time [default: one per processor].
+    /// Number of parallel scenes [default: one per processor].
     #[arg(long, value_name = "N")]
     pub threads: Option<std::num::NonZero<usize>>,
-    /// FMU library, instead of the one found or built.
+    /// FMU library [default: the library that is found or built].
     #[arg(long, value_name = "FILE")]
     pub library: Option<PathBuf>,
 }

@@ -92,7 +92,7 @@ impl Criterion {
             name: self.name,
             caption: format!(
                 "{} of the {MODES} lowest modes of the disk against the number of component modes in the reduced model. \
-                 Values above {} % are cut off, as in the paper's figure; the numbers are whole.",
+                 Values above {} % are clipped, as in the paper's figure; the data file has the full values.",
                 self.title, self.shown
             ),
             picture: Picture::waterfall(&self.waterfall(rows)),
@@ -104,12 +104,14 @@ impl Criterion {
         let last = rows.last().map_or(f64::NAN, |row| self.worst(row));
         let found = match self.enough(rows) {
             Some(row) => format!(
-                "below from {} per nodal diameter on ({} component modes of the disk); at most {last:.2e} % with all of them",
+                "reached with {} or more per nodal diameter ({} component modes of the disk); at most {last:.2e} % \
+                 with all of them",
                 row.modes, row.total_modes
             ),
-            None => format!("still {last:.3} % with the most component modes"),
+            None => format!("still {last:.3} % with the largest number of component modes"),
         };
-        let expected = format!("each of the {MODES} lowest modes below {} % with enough component modes", self.limit);
+        let expected = format!("each of the {MODES} lowest modes is below {} % with enough component modes",
+            self.limit);
         Statement::tested(format!("{}: {expected}", self.title), self.enough(rows).is_some(), found)
     }
 }
@@ -128,7 +130,7 @@ fn worst_figure(rows: &[ConvergenceRow]) -> Result<StudyFigure> {
     let plot = Plot {
         logarithmic: true,
         height: 320,
-        ..Plot::new("component modes per nodal diameter (-)", "largest over the modes (%)", series)
+        ..Plot::new("component modes per nodal diameter (-)", "maximum over the modes (%)", series)
     };
     let mut sheet = Sheet::new([
         "component modes per nodal diameter",
@@ -141,7 +143,7 @@ fn worst_figure(rows: &[ConvergenceRow]) -> Result<StudyFigure> {
     }
     Ok(StudyFigure {
         name: "worst",
-        caption: format!("The largest value over the {MODES} lowest modes of the disk, with the limits."),
+        caption: format!("Maximum over the {MODES} lowest modes of the disk, with the limits."),
         picture: Picture::plot(&plot)?,
         sheet,
     })
@@ -166,12 +168,12 @@ fn pairs(rows: &[ConvergenceRow], order: &[usize], sectors: usize) -> Statement 
     }
     Statement::tested(
         format!(
-            "Values appear by pairs because of the cyclic symmetry, but for the modes of nodal diameter 0{}",
+            "Values occur in pairs because of the cyclic symmetry, except for the modes of nodal diameter 0{}",
             if sectors.is_multiple_of(2) { format!(" and {}", sectors / 2) } else { String::new() }
         ),
         values.len() == MODES && order.len() >= MODES && wrong == 0,
         format!(
-            "{wrong} of {} modes against it; alone are {}, of nodal diameters {}",
+            "{wrong} of {} modes violate this; {} modes are single, of nodal diameters {}",
             values.len(),
             alone.len(),
             alone.join(", ")
@@ -209,11 +211,11 @@ fn monotone(rows: &[ConvergenceRow]) -> Statement {
     let lowest = values.copied().fold(f64::INFINITY, f64::min);
     Statement::tested(
         format!(
-            "Frequencies come down towards those of the full model as component modes are added: none rises and none falls below, by \
-             more than {ROUNDING:e} %"
+            "Frequencies decrease towards those of the full model as component modes are added: none rises or falls \
+             below the full model by more than {ROUNDING:e} %"
         ),
         rows.len() > 1 && worst < ROUNDING && lowest > -ROUNDING,
-        format!("largest rise from one number to the next {worst:.1e} %, lowest deviation {lowest:.1e} %"),
+        format!("largest rise between successive numbers of modes {worst:.1e} %, lowest deviation {lowest:.1e} %"),
     )
 }
 
@@ -229,11 +231,11 @@ pub(crate) fn study(reduction: &CyclicReduction, seconds: f64, quick: bool) -> R
     let lowest = disk_order(&reduction.nodal_diameters, rom.sectors);
     statements.extend([pairs(rows, &lowest, rom.sectors), monotone(rows)]);
     statements.push(Statement::remark(
-        "The paper has RCC < 1 % for its 56 lowest modes from 56 component modes of the disk on",
+        "In the paper, RCC < 1 % for the 56 lowest modes with 56 or more component modes of the disk",
         match CRITERIA[1].enough(rows) {
             Some(row) => format!(
-                "here from {} on. Geometry, mesh and choice of contact nodes of the paper's industrial disk are not published: \
-                 the numbers can be compared in their order only",
+                "here with {} or more. Geometry, mesh and contact nodes of the paper's industrial disk are not \
+                 published, so only the order of magnitude can be compared",
                 row.total_modes
             ),
             None => "not reached here".into(),
@@ -245,7 +247,8 @@ pub(crate) fn study(reduction: &CyclicReduction, seconds: f64, quick: bool) -> R
         name: "convergence",
         title: "Convergence of the reduced bladed disk".into(),
         summary: format!(
-            "Craig-Bampton models of {} with growing numbers of component modes, against the full finite-element model.{}",
+            "Craig-Bampton models of {} with increasing numbers of component modes, compared with the full \
+             finite-element model.{}",
             rom.name,
             if quick { " Quick form: a coarse mesh, for a first look only." } else { "" }
         ),

@@ -248,7 +248,7 @@ fn runs(scene: &Scene, shaft: Shaft, console: &Console) -> Result<CouplingRuns> 
         .map_err(|error| Failure::from_core(format!("lab coupling, {}", shaft.name), error))?;
     let mut all = Vec::new();
     let task = console.task(
-        &format!("Stepping a rub and a shaft ({})", shaft.name),
+        &format!("Coupling a rub and a shaft ({})", shaft.name),
         Some((CouplingMethod::ALL.len() * STEPS.len()) as u64),
     );
     for way in CouplingMethod::ALL {
@@ -273,7 +273,8 @@ impl CouplingRuns {
 
 fn table(runs: &[CouplingRuns]) -> String {
     let mut text = String::from(
-        "| shaft | way | H (s) | error / clearance | steps of the rub per H | derivatives per H | not solved | time (s) |\n\
+        "| shaft | method | H (s) | error / clearance | rub steps per H | derivatives per H | not converged | time (s) \
+         |\n\
          |---|---|---|---|---|---|---|---|\n",
     );
     for runs in runs {
@@ -304,7 +305,7 @@ fn figure(runs: &CouplingRuns, name: &'static str) -> Result<StudyFigure> {
         ..Plot::new("log10 of the communication step (s)", "error / clearance", series.into())
     };
     let mut sheet =
-        Sheet::new(["way", "H (s)", "error / clearance", "steps of the rub per H", "derivatives per H", "time (s)"]);
+        Sheet::new(["method", "H (s)", "error / clearance", "rub steps per H", "derivatives per H", "time (s)"]);
     for (way, step, found) in &runs.all {
         let number = CouplingMethod::ALL.iter().position(|one| one == way).unwrap_or(0);
         if let Some((found, error)) = found {
@@ -313,7 +314,7 @@ fn figure(runs: &CouplingRuns, name: &'static str) -> Result<StudyFigure> {
     }
     Ok(StudyFigure {
         name,
-        caption: format!("Shaft {}: largest distance from the orbit of H = {FINE:e} s.", runs.shaft.name),
+        caption: format!("Shaft {}: largest deviation from the orbit with H = {FINE:e} s.", runs.shaft.name),
         picture: Picture::plot(&plot)?,
         sheet,
     })
@@ -334,9 +335,9 @@ fn statements(runs: &CouplingRuns) -> Vec<Statement> {
         (
             unsolved,
             if failed > 0 {
-                format!("{failed} runs failed, {unsolved} steps not solved")
+                format!("{failed} runs failed, {unsolved} steps not converged")
             } else {
-                format!("{unsolved} steps not solved")
+                format!("{unsolved} steps not converged")
             },
         )
     };
@@ -348,13 +349,14 @@ fn statements(runs: &CouplingRuns) -> Vec<Statement> {
         [CouplingMethod::FixedPoint, CouplingMethod::Newton, CouplingMethod::Differences].map(unsolved);
     vec![
         Statement::tested(
-            format!("{name}: Newton's method with derivatives over the step solves 99 of 100 steps, and no run fails"),
+            format!("{name}: Newton's method with derivatives over the step converges in 99 of 100 steps, and no run \
+                     fails"),
             100 * newton.0 <= steps_of_all() && !newton.1.contains("failed"),
             format!("{}; fixed point: {}; differences of 1 µm: {}", newton.1, fixed.1, differences.1),
         ),
         Statement::tested(
             format!(
-                "{name}: it takes at most a tenth more steps of the rub than differences do, derivatives counted as steps"
+                "{name}: it takes at most 10 % more rub steps than finite differences, counting derivatives as steps"
             ),
             steps(CouplingMethod::Newton) <= 1.1 * steps(CouplingMethod::Differences),
             format!(
@@ -376,11 +378,12 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let figures = all.iter().zip(["heavy", "without-mass"]).map(|(runs, name)| figure(runs, name));
     Ok(Study {
         name: "coupling",
-        title: "A rub and a shaft".into(),
+        title: "Coupling of a rub and a shaft".into(),
         summary: format!(
-            "Rotor 37 whirls in its casing on a shaft with unbalance, modelled beside it by the midpoint rule. Both step by turns, in four \
-             ways. Errors are those of the orbit, from one of H = {FINE:e} s, solved.{}",
-            if arguments.quick { " Quick form: blades of three modes." } else { "" }
+            "Rotor 37 whirls in its casing on a shaft with unbalance, which a separate model integrates with the \
+             midpoint rule. The two models are coupled by four methods. Errors are those of the orbit, relative to the \
+             converged orbit with H = {FINE:e} s.{}",
+            if arguments.quick { " Quick form: blades with three modes." } else { "" }
         ),
         facts: SHAFTS
             .iter()
@@ -392,7 +395,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         statements: all.iter().flat_map(statements).collect(),
         figures: figures.collect::<Result<_>>()?,
         results: results(&all),
-        files: vec![("coupling.md".into(), "the table of the guide".into(), table(&all).into_bytes())],
+        files: vec![("coupling.md".into(), "table for the guide".into(), table(&all).into_bytes())],
     })
 }
 

@@ -67,7 +67,7 @@ const TRUE_DIVISION: u32 = 64;
 const FACTOR: f64 = 3.0;
 /// Errors below this are as good as none: 1e-4 of displacements is beyond what anybody asks of a rub.
 const NONE: f64 = 1e-4;
-const DIRECTIONS: [&str; 5] = ["steps", "modes", "patches", "mesh, from one coarser", "mesh, from two coarser"];
+const DIRECTIONS: [&str; 5] = ["steps", "modes", "patches", "mesh (one coarser mesh)", "mesh (two coarser meshes)"];
 /// Number of directions that the product estimates from the scene alone.
 const OF_SCENE: usize = 3;
 
@@ -195,9 +195,10 @@ fn statement(all: &[Compared], direction: usize) -> Statement {
     let within = |(a, b): &&(f64, f64)| a.max(*b).max(NONE) <= FACTOR * a.min(*b).max(NONE);
     let right = given.iter().filter(within).count();
     Statement::tested(
-        format!("{}: nine of ten estimates are within a factor of {FACTOR}", DIRECTIONS[direction]),
+        format!("{}: nine of ten estimates agree with the true error within a factor of {FACTOR}",
+            DIRECTIONS[direction]),
         !given.is_empty() && 10 * right >= 9 * given.len(),
-        format!("{right} of {}; {} are unknown", given.len(), compared.count() - given.len()),
+        format!("{right} of {}; {} rubs have no estimate", given.len(), compared.count() - given.len()),
     )
 }
 
@@ -217,7 +218,8 @@ fn groups(rubs: &[EstimatedRub], all: &[Compared], direction: usize) -> Vec<Stat
         Statement::remark(
             format!("{}, group {number}", DIRECTIONS[direction]),
             format!(
-                "true error {least:.2} to {most:.2} %, estimate over truth {low:.2} to {high:.2}, {right} of {} within a factor of {FACTOR}, {} unknown",
+                "true error {least:.2} to {most:.2} %, estimate / true error {low:.2} to {high:.2}, {right} of {} \
+                 within a factor of {FACTOR}, {} without estimate",
                 given.len(),
                 truths.len() - given.len()
             ),
@@ -234,14 +236,15 @@ fn figure(all: &[Compared]) -> Result<StudyFigure> {
         Series::line(*name, points.collect())
     });
     let plot = Plot { marked: true, ..Plot::new("log10 of the true error", "log10 of the estimate", series.collect()) };
-    let mut sheet = Sheet::new(["scene", "direction (0 steps, 1 modes, 2 patches, 3 and 4 mesh)", "estimate", "truth"]);
+    let mut sheet = Sheet::new(["scene", "direction (0 steps, 1 modes, 2 patches, 3 and 4 mesh)", "estimate",
+        "true error"]);
     for one in all {
         let [estimate, truth] = [one.estimate, one.truth].map(|value| value.unwrap_or(f64::NAN));
         sheet.rows.push(vec![one.scene as f64, one.direction as f64, estimate, truth]);
     }
     Ok(StudyFigure {
         name: "estimates",
-        caption: "Estimated against true relative error of the displacements of watched points.".into(),
+        caption: "Estimated against true relative error of the displacements of the watched points.".into(),
         picture: Picture::plot(&plot)?,
         sheet,
     })
@@ -257,7 +260,7 @@ pub(crate) fn study(arguments: &EstimatesArguments, console: &Console) -> Result
     let length = if arguments.quick { QUICK_LENGTH } else { LENGTH };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a thousand")]
     let samples = (length / INTERVAL).round() as usize;
-    let task = console.task("Estimates against the truth", Some(rubs.len() as u64));
+    let task = console.task("Estimates against true errors", Some(rubs.len() as u64));
     let indices: Vec<usize> = (0..rubs.len()).collect();
     let progress = |done: usize| {
         task.at(done as u64);
@@ -272,16 +275,17 @@ pub(crate) fn study(arguments: &EstimatesArguments, console: &Console) -> Result
     let row = |one: &Compared| json!({ "scene": rubs[one.scene].name, "direction": DIRECTIONS[one.direction], "estimate": one.estimate, "truth": one.truth });
     Ok(Study {
         name: "estimates",
-        title: "Estimates against the truth".into(),
+        title: "Estimates against true errors".into(),
         summary: format!(
-            "Rubs of rotor 37, {PATCHES} patches on coarse meshes, in two groups: one that the estimates were made with, one that they were not. \
-             Each is estimated from coarser runs of itself, and run again with {} times shorter steps, with {TRUE_MODES} modes, with \
-             {TRUE_PATCHES} patches, and on a mesh of half the edges.",
+            "Rubs of rotor 37 with {PATCHES} patches on coarse meshes, in two groups, one of which was used to develop \
+             the estimates. Each error is estimated from coarser runs; the true error follows \
+             from runs with steps {} times shorter, with {TRUE_MODES} modes, with {TRUE_PATCHES} patches, and on a \
+             mesh with half the element size.",
             TRUE_DIVISION / DIVISION
         ),
         facts: vec![
             ("scenes".into(), rubs.len().to_string()),
-            ("length of each run".into(), format!("{length} s")),
+            ("duration of each run".into(), format!("{length} s")),
             ("internal step".into(), format!("{:e} s", INTERVAL / f64::from(DIVISION))),
         ],
         statements: (0..DIRECTIONS.len())

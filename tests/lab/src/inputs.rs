@@ -166,7 +166,7 @@ impl InputCase {
         if way == InputMethod::Hold {
             scene.settings.time.input_interpolation = InputInterpolation::Hold;
         }
-        let place = || format!("study inputs, {} by {step} s ({})", self.title, way.name());
+        let place = || format!("lab inputs, {} with H = {step} s ({})", self.title, way.name());
         self.march(&scene, way, step, length).map_err(|error| Failure::from_core(place(), error))
     }
 
@@ -229,7 +229,8 @@ struct InputRuns {
 
 fn table(courses: &[InputCase], runs: &[InputRuns]) -> String {
     let mut text = String::from(
-        "| input | given | H (s) | peak node force (N) | of the fine run | peak torque (N m) | mean torque (N m) |\n\
+        "| input | method | H (s) | peak node force (N) | relative to the fine run | peak torque (N m) | mean torque \
+         (N m) |\n\
          |---|---|---|---|---|---|---|\n",
     );
     for (course, runs) in courses.iter().zip(runs) {
@@ -263,7 +264,8 @@ fn figure(course: &InputCase, runs: &InputRuns) -> Result<StudyFigure> {
         ..Plot::new("log10 of the communication step (s)", "peak node force (N)", series.collect())
     };
     let mut sheet =
-        Sheet::new(["way (0 ramp, 1 derivatives, 2 hold)", "H (s)", "force (N)", "torque (N.m)", "mean torque (N.m)"]);
+        Sheet::new(["method (0 ramp, 1 derivatives, 2 hold)", "H (s)", "force (N)", "torque (N.m)",
+            "mean torque (N.m)"]);
     for (way, found) in (0_u8..).zip(&runs.by_way) {
         for (step, one) in STEPS.iter().zip(found) {
             sheet.rows.push(vec![f64::from(way), *step, one.force, one.torque, one.mean]);
@@ -272,7 +274,7 @@ fn figure(course: &InputCase, runs: &InputRuns) -> Result<StudyFigure> {
     Ok(StudyFigure {
         name: course.name,
         caption: format!(
-            "Largest normal force of a node while {} moves, against the communication step.",
+            "Largest normal force of a node while {} changes, against the communication step.",
             course.title
         ),
         picture: Picture::plot(&plot)?,
@@ -287,13 +289,13 @@ fn statements(course: &InputCase, runs: &InputRuns) -> [Statement; 2] {
     [
         Statement::tested(
             format!(
-                "{title}: with values alone the largest force stays within {MILD} times that of the fine run, whatever H is"
+                "{title}: with values only, the largest force is at most {MILD} times that of the fine run, for every H"
             ),
             ramp <= MILD,
-            format!("{ramp:.2} times; held {hold:.2} times"),
+            format!("{ramp:.2} times; {hold:.2} times with hold"),
         ),
         Statement::tested(
-            format!("{title}: with derivatives too"),
+            format!("{title}: the same holds with derivatives"),
             derivatives <= MILD,
             format!("{derivatives:.2} times"),
         ),
@@ -326,21 +328,24 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         name: "inputs",
         title: "Inputs between communication points".into(),
         summary: format!(
-            "Inputs that move or load something, given at communication points as values, as values with derivatives, and \
-             as values that are held. The fine run has derivatives and a communication step of {:e} s, the internal step.{}",
+            "Inputs that move or load a structure, set at communication points as values, as values with derivatives, \
+             and as values that are held. The fine run uses derivatives and a communication step of {:e} s, which \
+             equals the internal step.{}",
             STEPS[0],
-            if arguments.quick { " Quick form: blades of three modes and an elastic ring without a mesh." } else { "" }
+            if arguments.quick { " Quick form: blades with three modes, an elastic ring without a mesh." } else { ""
+                }
         ),
         facts: vec![
-            ("length of each run".into(), format!("{length} s")),
+            ("duration of each run".into(), format!("{length} s")),
             ("internal step".into(), format!("{:e} s", STEPS[0])),
-            ("whirl".into(), format!("circle of {} m at {} rad/s, grown in {} s", WHIRL.0, WHIRL.1, WHIRL.2)),
-            ("torque".into(), format!("peak of the means over {PART:e} s")),
+            ("whirl".into(), format!("circle with a radius of {} m at {} rad/s, reached in {} s", WHIRL.0, WHIRL.1,
+                WHIRL.2)),
+            ("torque".into(), format!("peak of the averages over {PART:e} s")),
         ],
         statements: pairs().flat_map(|(course, runs)| statements(course, runs)).collect(),
         figures: pairs().map(|(course, runs)| figure(course, runs)).collect::<Result<_>>()?,
         results: results(&courses, &runs),
-        files: vec![("inputs.md".into(), "the table of the guide".into(), table(&courses, &runs).into_bytes())],
+        files: vec![("inputs.md".into(), "table for the guide".into(), table(&courses, &runs).into_bytes())],
     })
 }
 

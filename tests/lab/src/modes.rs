@@ -66,8 +66,8 @@ fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<St
         "full model (Hz)",
         "reduced model (Hz)",
         "nearest engine order",
-        "its frequency (Hz)",
-        "speed at which it meets the mode (rad/s)",
+        "engine-order frequency (Hz)",
+        "resonance speed (rad/s)",
     ]);
     for diameter in diameters {
         for ((full, reduced), mode) in diameter.full_frequencies.iter().zip(&diameter.reduced_frequencies).zip(1_u32..)
@@ -88,10 +88,10 @@ fn diagram(diameters: &[NodalDiameter], sectors: usize, speed: f64) -> Result<St
     Ok(StudyFigure {
         name: "interference",
         caption: format!(
-            "Natural frequencies at rest against nodal diameter, first {drawn} at each, and the engine orders at {speed:.1} \
-             rad/s. What stands still and has k waves around shakes the blades at k times the speed, in the nodal diameter k; \
-             beyond half the number of sectors the line is folded back. A mode on the line is resonant. The frequencies are \
-             those of the disk turning without centrifugal and gyroscopic effects, in its own frame."
+            "First {drawn} natural frequencies at rest against nodal diameter, and the engine orders at {speed:.1} \
+             rad/s. A stationary disturbance with k waves around the circumference excites the blades at k times the \
+             speed, in nodal diameter k; beyond half the number of sectors the line is folded back. A mode on the line \
+             is resonant. The frequencies are those in the rotating frame, without centrifugal and gyroscopic effects."
         ),
         picture: Picture::plot(&plot)?,
         sheet,
@@ -126,8 +126,8 @@ fn shapes(mesh: &Mesh, diameters: &[NodalDiameter]) -> StudyFigure {
     StudyFigure {
         name: "shapes",
         caption:
-            "Mode shapes of one sector at the moment of its largest displacement; the next sector does the same with a \
-                  phase of 2πn/N. Colour is the magnitude of displacement. The file holds the first picture."
+            "Mode shapes of one sector at the instant of its largest displacement; the next sector moves equally with \
+             a phase of 2πn/N. The colour shows the magnitude of the displacement. The file contains the first picture."
                 .into(),
         picture: Picture { svg: single, html },
         sheet,
@@ -159,7 +159,8 @@ fn flat_families(diameters: &[NodalDiameter]) -> Statement {
     let spread = 100.0 * (high / low - 1.0);
     Statement::tested(
         format!(
-            "In the upper half of the nodal diameters the first frequency is flat, within {FLAT_SPREAD} %, as that of blades on a stiff disk"
+            "In the upper half of the nodal diameters, the first frequency is constant within {FLAT_SPREAD} %, as for \
+             blades on a stiff disk"
         ),
         half.len() > 1 && spread < FLAT_SPREAD,
         format!(
@@ -177,14 +178,14 @@ fn disk_stiffens(diameters: &[NodalDiameter]) -> Statement {
     let [zero, low, high] = [first.first(), first.get(1), first.last()].map(|one| one.copied().unwrap_or(f64::NAN));
     Statement::tested(
         format!(
-            "From nodal diameter 1 on the lowest frequency rises with it (falls from none to the next by {} %), from the disk's \
-             flexibility to the blades'",
+            "From nodal diameter 1 upwards, the lowest frequency rises with the nodal diameter (no fall reaches {} %) \
+             from disk-dominated to blade-dominated modes",
             100.0 * FLAT
         ),
         fall < FLAT && high > low,
         format!(
-            "{low:.1} Hz at nodal diameter 1, {high:.1} Hz at {}; largest fall from one to the next {:.1e} %. At nodal diameter 0 the \
-             disk bends as an umbrella: {zero:.1} Hz",
+            "{low:.1} Hz at nodal diameter 1, {high:.1} Hz at {}; largest fall between successive nodal diameters \
+             {:.1e} %. Umbrella mode of the disk at nodal diameter 0: {zero:.1} Hz",
             first.len().saturating_sub(1),
             100.0 * fall
         ),
@@ -233,8 +234,8 @@ pub(crate) fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>
     let mut statements = vec![flat_families(diameters), disk_stiffens(diameters), resonances(&diagram.sheet)];
     if let Some(critical) = critical {
         statements.push(Statement::remark(
-            "An oval casing (engine order 2) meets the first mode of nodal diameter 2",
-            format!("at {critical:.1} rad/s ({:.0} rpm)", critical * 30.0 / std::f64::consts::PI),
+            "Critical speed of an oval casing (engine order 2, first mode of nodal diameter 2)",
+            format!("{critical:.1} rad/s ({:.0} rpm)", critical * 30.0 / std::f64::consts::PI),
         ));
     }
     let families =
@@ -253,7 +254,7 @@ pub(crate) fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>
             ("sectors".into(), sectors.to_string()),
             ("nodes and elements of one sector".into(), format!("{}, {}", mesh.nodes.len(), mesh.elements.len())),
             (
-                "speed of the engine orders".into(),
+                "speed for the engine orders".into(),
                 format!("{speed:.2} rad/s ({:.0} rpm)", speed * 30.0 / std::f64::consts::PI),
             ),
         ],
@@ -264,7 +265,7 @@ pub(crate) fn study(reduction: &CyclicReduction, mesh: &Mesh, speed: Option<f64>
             "frequencies_hz": diameters.iter().map(families).collect::<Vec<_>>(),
         }),
         figures: vec![diagram, shapes(mesh, diameters)],
-        files: vec![("shapes.vtu".into(), "the mode shapes of one sector, for ParaView".into(), vtk(mesh, diameters)?)],
+        files: vec![("shapes.vtu".into(), "mode shapes of one sector for ParaView".into(), vtk(mesh, diameters)?)],
     })
 }
 

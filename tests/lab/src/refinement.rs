@@ -98,7 +98,7 @@ fn standards() -> Result<Vec<Standard>> {
 impl Standard {
     fn scene(&self, cache: &RomCache, console: &Console) -> Result<Scene> {
         let rom = |(index, structure): (usize, &tiprub_core::settings::StructureSettings)| -> Result<Rom> {
-            let missing = || Failure::new(&structure.rom, "no such model", "");
+            let missing = || Failure::new(&structure.rom, "unknown built-in model", "");
             let name = tiprub_format::builtin_model(structure).ok_or_else(missing)?;
             let found = match self.other.filter(|_| index == 0) {
                 Some((tip, mesh)) => {
@@ -154,7 +154,7 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
     }
     if cases.is_empty() {
         let names = standards()?.into_iter().map(|standard| standard.name).collect::<Vec<_>>().join(", ");
-        return Err(Failure::usage("--scene", "no such scene", format!("Give some of {names}")));
+        return Err(Failure::usage("--scene", "unknown scene", format!("Choose from {names}")));
     }
     let mut figures = pictures(&cases)?;
     if let Some(last) = figures.last_mut() {
@@ -164,9 +164,9 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
     }
     Ok(Study {
         name: "refinement",
-        title: "What refining the standard scenes changes".into(),
-        summary: "Patches, mesh, modes and steps of rubs of rotor 37 and of the stage are refined one at a time; the errors are those against the \
-                  limit that the three finest levels show."
+        title: "Convergence of the standard scenes".into(),
+        summary: "Patches, mesh, modes and steps of rubs of rotor 37 and of the stage are refined one at a time. \
+                  Errors are relative to the limit extrapolated from the three finest levels."
             .into(),
         facts: tiprub_study::machine::facts(),
         statements: cases.iter().flat_map(statements).collect(),
@@ -175,13 +175,14 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
             "scene": case.name, "seconds": case.seconds,
             "found": case.found.as_ref().ok().map(page::results), "refused": case.found.as_ref().err(),
         })).collect::<Vec<_>>()),
-        files: vec![("tables.md".into(), "all tables as Markdown".into(), markdown(&cases).into_bytes())],
+        files: vec![("tables.md".into(), "all tables in Markdown".into(), markdown(&cases).into_bytes())],
     })
 }
 
 fn statements(case: &RefinementCase) -> Vec<Statement> {
     match &case.found {
-        Err(why) => vec![Statement::remark(&case.title, format!("does not run, after {:.0} s: {why}", case.seconds))],
+        Err(why) => vec![Statement::remark(&case.title, format!("does not run (ended after {:.0} s): {why}",
+            case.seconds))],
         Ok(found) => {
             let all = page::statements(found).into_iter();
             all.map(|one| Statement { expected: format!("{}: {}", case.title, one.expected), ..one }).collect()
@@ -245,7 +246,7 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
                 row.extend([format!("{:.5e}", quantities[energy - 1]), error(energy)]);
             }
             Err(why) => row.extend(
-                std::iter::once(format!("refused: {}", first_words(why))).chain(["", "", "", ""].map(String::from)),
+                std::iter::once(format!("rejected: {}", first_words(why))).chain(["", "", "", ""].map(String::from)),
             ),
         }
         row
@@ -254,10 +255,10 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
     let finest = refined.ran().last().map(|(_, run)| run.quantities());
     let limit = |index: usize| match limits[index].zip(finest) {
         Some((limit, finest)) => format!("{:.5e}", finest[index] + limit.rest),
-        None => "not to be read".into(),
+        None => "undetermined".into(),
     };
     let order = |limit: Option<ConvergedLimit>| {
-        limit.map_or("not to be read".into(), |limit| format!("order {:.1}", limit.order))
+        limit.map_or("undetermined".into(), |limit| format!("order {:.1}", limit.order))
     };
     let short = |limit: Option<ConvergedLimit>| limit.map_or("-".into(), |limit| format!("order {:.1}", limit.order));
     let last = vec![
@@ -274,14 +275,13 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
 
 /// The beginning of a reason: it stands whole in the statements.
 fn first_words(why: &str) -> String {
-    let why = why.trim_start_matches("refused: ");
     why.split_whitespace().take(18).collect::<Vec<_>>().join(" ")
 }
 
 fn tables(case: &RefinementCase) -> Vec<Table> {
     let Ok(found) = &case.found else { return Vec::new() };
     let caption =
-        format!("{}: {}, {:.2} ms, {:.0} s for all", case.title, found.method, 1e3 * found.window.0, case.seconds);
+        format!("{}: {}, {:.2} ms, {:.0} s for all runs", case.title, found.method, 1e3 * found.window.0, case.seconds);
     let directions = found.refined.iter().filter(|refined| refined.direction.levels.len() > 1);
     let mut headings = HEADINGS;
     headings[5] = if found.refined.iter().any(|refined| energy(refined) == 2) {
@@ -295,7 +295,7 @@ fn tables(case: &RefinementCase) -> Vec<Table> {
 /// Error of the scene as it stands: a row per scene, a column per direction.
 fn summary(cases: &[RefinementCase]) -> Table {
     let mut table = Table::new(
-        "Error of the scene as it stands, of the displacements (relative L2)",
+        "Error of the displacements of the unrefined scene (relative L2)",
         ["scene", "steps", "modes", "patches", "rows", "mesh"],
     );
     for case in cases {
@@ -316,7 +316,7 @@ fn markdown(cases: &[RefinementCase]) -> String {
 }
 
 /// Quantities in the pictures of a direction, in the order of their names.
-const DRAWN: [&str; 3] = ["displacements (L2)", "impulse", "friction work (strain energy, µ = 0)"];
+const DRAWN: [&str; 3] = ["displacements (L2)", "impulse", "friction work (strain energy if µ = 0)"];
 /// Family, direction, label of its values, names of the pictures.
 const PICTURES: [(&str, &str, &str, [&str; 3]); 10] = [
     (
@@ -335,7 +335,7 @@ const PICTURES: [(&str, &str, &str, [&str; 3]); 10] = [
     (
         FAMILIES[0],
         refine::STEP,
-        "tolerance (of the clearance)",
+        "tolerance (relative to the clearance)",
         ["refinement-step", "refinement-step-impulse", "refinement-step-work"],
     ),
     (
@@ -359,7 +359,7 @@ const PICTURES: [(&str, &str, &str, [&str; 3]); 10] = [
     (
         FAMILIES[1],
         "modes",
-        "families of modes of the disk (-)",
+        "mode families of the disk (-)",
         ["refinement-stage-modes", "refinement-stage-modes-impulse", "refinement-stage-modes-work"],
     ),
     (
@@ -406,7 +406,7 @@ fn picture(
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         sheet.rows.extend(points.iter().map(|(value, error)| vec![f64::from(scene), *value, *error]));
         let read = refined.own_errors().is_some_and(|errors| errors[index].is_some());
-        let how = if read { "" } else { " (to the finest)" };
+        let how = if read { "" } else { " (relative to the finest level)" };
         series.push(Series::line(format!("{}{how}", case.title), points));
     }
     if sheet.rows.is_empty() {
@@ -420,7 +420,8 @@ fn picture(
         ..Plot::new(label, format!("error of {quantity}"), series)
     };
     let caption =
-        format!("Error of {quantity} against the limit, over {label}; scenes from 0 in the order of the legend.");
+        format!("Error of {quantity} relative to the limit, against {label}. Scenes are numbered from 0 in the order \
+                 of the legend.");
     Ok(Some(StudyFigure { name, caption, picture: Picture::plot(&plot)?, sheet }))
 }
 

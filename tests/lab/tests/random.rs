@@ -64,5 +64,5 @@ fn cutting_that_feeds_tips_ends_a_run_by_name() {
     let out = directory.path().join("out");
     let found = random(&["--only", "12103802028229366479", "--fmu", "0", "--out", out.to_str().unwrap()], 0);
     let message = found["message"].as_str().unwrap_or_default();
-    assert!(message.contains("forces of cutting have put") && message.contains("go back"), "{found}");
+    assert!(message.contains("cutting forces have added") && message.contains("move backwards"), "{found}");
 }

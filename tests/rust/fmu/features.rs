@@ -33,16 +33,16 @@ fn an_array_input_is_set_whole_or_not_at_all() {
     slave.expect(slave.set_reals(&[array], &START));
     let (nan, infinity) = (f64::NAN, f64::INFINITY);
     for (references, values, reason) in [
-        (vec![array], vec![1.0; 3], "stand for 4 values"),
-        (vec![array], vec![1.0; 5], "stand for 4 values"),
-        (vec![array], vec![], "stand for 4 values"),
-        (vec![array, speed], vec![1.0; 4], "stand for 5 values"),
-        (vec![array, array], vec![1.0; 4], "stand for 8 values"),
+        (vec![array], vec![1.0; 3], "cover 4 values"),
+        (vec![array], vec![1.0; 5], "cover 4 values"),
+        (vec![array], vec![], "cover 4 values"),
+        (vec![array, speed], vec![1.0; 4], "cover 5 values"),
+        (vec![array, array], vec![1.0; 4], "cover 8 values"),
         (vec![array + 1], vec![1.0; 4], "lies inside the array"),
         (vec![array], vec![1.0, 1.0, nan, 1.0], "casing_temperature[3]"),
         (vec![array], vec![1.0, infinity, 1.0, 1.0], "not finite"),
         (vec![array], vec![1.0, 1.0, 1.0, 3000.1], "casing_temperature[4]"),
-        (vec![array], vec![-3000.1, 1.0, 1.0, 1.0], "outside -3000 to 3000"),
+        (vec![array], vec![-3000.1, 1.0, 1.0, 1.0], "outside the range -3000 to 3000"),
         (vec![speed, array], vec![200.0, 1.0, 1.0, 1.0, nan], "casing_temperature[4]"),
         (vec![array, speed], vec![1.0, 1.0, 1.0, 1.0, nan], "speed"),
     ] {
@@ -76,7 +76,7 @@ fn elements_are_scalars_in_fmi2_and_where_fmi3_is_packaged_so() {
     three.expect(three.set_reals(&references, &START));
     refused(two.set_reals(&references[1..3], &[1.0, f64::NAN]), &two.log(), "casing_temperature[3]");
     refused(three.set_reals(&references[1..3], &[1.0, f64::NAN]), &three.log(), "casing_temperature[3]");
-    refused(three.set_reals(&[array], &START), &three.log(), "stand for 1 values");
+    refused(three.set_reals(&[array], &START), &three.log(), "cover 1 values");
     assert_eq!(two.reals(&references), START);
     assert_eq!(three.reals(&references, PATCHES), START);
     two.expect(two.set_reals(&references[2..3], &[11.0]));

@@ -122,7 +122,7 @@ fn an_intermediate_update_cannot_pull_the_rug() {
         assert_eq!(notes.len(), 5 * 8, "five internal steps of eight forbidden calls");
         assert!(notes.iter().all(|status| *status == f64::from(ERROR)), "{notes:?}");
         let log = slave.log();
-        assert!(log.contains("a step is under way, the instance is not freed"), "{log}");
+        assert!(log.contains("the instance is not freed because a step is in progress"), "{log}");
         assert!(log.contains("not a continuous input"), "{log}");
         // A request that was not allowed is answered with Warning, one to return at NaN is not fulfilled.
         assert_eq!((answer.status, answer.early), (i32::from(!early_return), false), "{log}");

@@ -25,8 +25,8 @@ fn instantiation_of_fmi2_refuses_and_says_why() {
         (fmi2::Fmi2Arguments { kind: 0, ..good.clone() }, "fmuType = 0"),
         (fmi2::Fmi2Arguments { kind: -7, ..good.clone() }, "fmuType = -7"),
         (fmi2::Fmi2Arguments { token: None, ..good.clone() }, "fmuGUID is NULL"),
-        (fmi2::Fmi2Arguments { token: text("{wrong}"), ..good.clone() }, "\"{wrong}\" does not belong"),
-        (fmi2::Fmi2Arguments { token: text(""), ..good.clone() }, "does not belong"),
+        (fmi2::Fmi2Arguments { token: text("{wrong}"), ..good.clone() }, "\"{wrong}\" does not match"),
+        (fmi2::Fmi2Arguments { token: text(""), ..good.clone() }, "does not match"),
         (fmi2::Fmi2Arguments { location: None, ..good.clone() }, "fmuResourceLocation is NULL"),
         (fmi2::Fmi2Arguments { location: text(""), ..good.clone() }, "fmuResourceLocation is empty"),
         (fmi2::Fmi2Arguments { location: text("http://example.org/r"), ..good.clone() }, "not a file: URI"),
@@ -64,7 +64,7 @@ fn instantiation_of_fmi3_refuses_and_says_why() {
     let cases3 = [
         (fmi3::Fmi3Arguments { name: None, ..good.clone() }, "instanceName is NULL"),
         (fmi3::Fmi3Arguments { name: text(" \t"), ..good.clone() }, "instanceName is empty"),
-        (fmi3::Fmi3Arguments { token: text("{wrong}"), ..good.clone() }, "does not belong"),
+        (fmi3::Fmi3Arguments { token: text("{wrong}"), ..good.clone() }, "does not match"),
         (fmi3::Fmi3Arguments { path: None, ..good.clone() }, "resourcePath is NULL"),
         (fmi3::Fmi3Arguments { path: text(""), ..good.clone() }, "resourcePath is empty"),
         (fmi3::Fmi3Arguments { path: text("resources"), ..good.clone() }, "not absolute"),
@@ -72,7 +72,7 @@ fn instantiation_of_fmi3_refuses_and_says_why() {
         (fmi3::Fmi3Arguments { intermediate: vec![99_999], ..good.clone() }, "99999"),
         (
             fmi3::Fmi3Arguments { intermediate: vec![reference("gap_offset")], ..good.clone() },
-            "neither input nor output",
+            "neither an input nor an output",
         ),
     ];
     for (arguments, reason) in cases3 {
@@ -191,7 +191,7 @@ fn arguments_of_get_and_set() {
         refused(status, &log, "argument value is NULL");
         for count in [usize::MAX, usize::MAX / 8, 1 << 40, 1 << 20] {
             let (status, log) = get(speed.as_ptr(), count, out.as_mut_ptr());
-            refused(status, &log, "more than this FMU can mean");
+            refused(status, &log, "exceed the limit of this FMU");
         }
         let (status, log) = get(speed.as_ptr().byte_add(1), 1, out.as_mut_ptr());
         refused(status, &log, "not aligned");
@@ -210,7 +210,7 @@ fn arguments_of_get_and_set() {
         for (second, value, reason) in [
             (friction, f64::NAN, "friction_coefficient"),
             (friction, f64::INFINITY, "not finite"),
-            (friction, -0.1, "outside 0 to"),
+            (friction, -0.1, "outside the range 0 to"),
             (0, 1.0, "time"),
             (output, 1.0, "cannot be set"),
         ] {
@@ -243,12 +243,12 @@ fn arrays_of_fmi3() {
     assert_eq!(slave.reals(&[array], 3).len(), 3, "one reference, three values");
     assert_eq!(slave.reals(&[0, array, 1], 5).len(), 5);
     for (references, count, reason) in [
-        (vec![array], 1, "stand for 3 values"),
-        (vec![array], 4, "stand for 3 values"),
-        (vec![array, array], 3, "stand for 6 values"),
+        (vec![array], 1, "cover 3 values"),
+        (vec![array], 4, "cover 3 values"),
+        (vec![array, array], 3, "cover 6 values"),
         (vec![array + 1], 3, "lies inside the array"),
-        (vec![1], 0, "stand for 1 values"),
-        (vec![], 2, "stand for 0 values"),
+        (vec![1], 0, "cover 1 values"),
+        (vec![], 2, "cover 0 values"),
         (vec![1], usize::MAX, "nValues"),
     ] {
         let mut values = [0.0; 8];
@@ -296,7 +296,7 @@ fn texts_enumerations_and_booleans() {
         assert_eq!(long, 2);
         for value in [0_i64, 5, -1, i64::MAX] {
             let status = (api3.fmi3SetInt64)(three.handle, &raw const scheme, 1, &raw const value, 1);
-            refused(status, &three.log(), "no item of Scheme");
+            refused(status, &three.log(), "not an item of Scheme");
         }
         for value in [0, 5, i32::MIN] {
             let status = (api2.fmi2SetInteger)(two.handle, &raw const scheme, 1, &raw const value);
@@ -351,7 +351,7 @@ fn steps_at_wrong_times_and_of_wrong_sizes() {
         for kind in [0, 1, -5, 99] {
             assert_eq!((api.fmi2GetStatus)(slave.handle, kind, &raw mut boolean), DISCARD);
             assert_eq!((api.fmi2GetRealStatus)(slave.handle, kind, &raw mut real), DISCARD);
-            assert!(slave.log().contains("has no information"));
+            assert!(slave.log().contains("is not available"));
         }
         refused((api.fmi2GetRealStatus)(slave.handle, 2, std::ptr::null_mut()), &slave.log(), "argument value is NULL");
     }

@@ -21,7 +21,7 @@ fn abuse() {
     let state = slave.save();
     assert_eq!(slave.step(1e-4, PANIC), ERROR, "Error, not Fatal");
     let log = slave.log();
-    assert!(log.contains("panic asked for by the test") && log.contains("stepping.rs:"), "{log}");
+    assert!(log.contains("panic requested by the panic test") && log.contains("stepping.rs:"), "{log}");
     let mut value = 0.0;
     // SAFETY: arrays of one element; the library must refuse all of this.
     unsafe {
@@ -32,7 +32,7 @@ fn abuse() {
     for status in [slave.step(1e-4, 1e-4), slave.reset(), slave.restore(state), slave.terminate(), slave.enter()] {
         assert_eq!(status, ERROR);
     }
-    assert!(slave.log().contains("out of order after an internal error"));
+    assert!(slave.log().contains("unusable after an internal error"));
     drop(slave);
     other.expect(other.step(0.0, 1e-4));
 

@@ -77,7 +77,7 @@ fn save_in_contact_run_restore_run_gives_the_same_bits() {
         slave.expect((api.fmi2FreeFMUstate)(slave.handle, &raw mut again));
     }
     assert_eq!(slave.restore(state), ERROR, "a freed state");
-    assert!(slave.log().contains("no saved state of this instance"));
+    assert!(slave.log().contains("not a saved state of this instance"));
 }
 
 /// Only does something when the test below runs this binary again.
@@ -199,7 +199,7 @@ fn wrong_damaged_and_foreign_states_are_refused() {
     let other = fmi3::Fmi3TestSlave::new(&api3, &arrays);
     let foreign = other.serialise(other.save());
     assert_eq!(foreign.len(), bytes.len());
-    refused(&foreign, "belongs to token");
+    refused(&foreign, "belongs to the FMU with token");
     let before = slave.serialise(slave.save());
     for state in [std::ptr::null_mut(), other.save(), (&raw const bytes).cast_mut().cast()] {
         assert_eq!(slave.restore(state), ERROR);

@@ -91,7 +91,7 @@ pub(crate) mod state {
 
     fn required(state: StateHandle) -> Result<StateHandle> {
         if state.is_null() {
-            return Err(Refusal::error("argument FMUstate is NULL. Pass a state that was got from this instance"));
+            return Err(Refusal::error("argument FMUstate is NULL. Pass a state that was saved by this instance"));
         }
         Ok(state)
     }

@@ -94,8 +94,12 @@ pub(crate) fn instantiate(request: Instantiation<'_>) -> InstanceHandle {
             Dialect::Fmi3 => ("instantiationToken", "resourcePath"),
         };
         let token = request.token.required(token)?;
-        let unlocated =
-            || format!("{location} is NULL, but this FMU reads its model from there. Pass the unpacked resources");
+        let unlocated = || {
+            format!(
+                "{location} is NULL, but this FMU reads its model from there. Pass the location of the unpacked \
+                 resources"
+            )
+        };
         let location = request.location.read(location)?.ok_or_else(|| Refusal::error(unlocated()))?;
         let directory = (request.locate)(location).map_err(Refusal::error)?;
         let slave = Slave::new(request.dialect, &directory, token, request.load)?;
@@ -134,7 +138,7 @@ pub(crate) fn release(handle: InstanceHandle, rule: &CallRule) {
         Err(TryLockError::WouldBlock) => true,
     };
     if under_way {
-        let message = "a step is under way, the instance is not freed. Free it after the step has returned";
+        let message = "the instance is not freed because a step is in progress. Free it after the step has returned";
         return instance.log.emit(FmiStatus::Error, &format!("{}: {message}", rule.name));
     }
     // SAFETY: the handle came from `Box::into_raw` in `instantiate`, and by the contract of both standards this is the last
@@ -145,7 +149,7 @@ pub(crate) fn release(handle: InstanceHandle, rule: &CallRule) {
 }
 
 fn other_version(instance: &Instance) -> String {
-    format!("the instance was made by the functions of {:?}. Call the functions of that version", instance.dialect)
+    format!("the instance was created by the functions of {:?}. Call the functions of that version", instance.dialect)
 }
 
 /// The guard: every call on an instance goes through here. It checks the instance, that it is not faulted, that the call
@@ -161,9 +165,9 @@ pub(crate) fn enter<T>(
         let _floats = StandardFloats::enter();
         let mut slave = instance.slave.try_lock().map_err(|error| {
             Refusal::error(match error {
-                TryLockError::Poisoned(_) => "the instance is out of order after an internal error. Free it",
+                TryLockError::Poisoned(_) => "the instance is unusable after an internal error. Free it",
                 TryLockError::WouldBlock => {
-                    "another call on this instance is under way. Use an instance from one thread"
+                    "another call on this instance is in progress. Use an instance from one thread only"
                 }
             })
         })?;
@@ -210,6 +214,8 @@ pub(crate) fn guard(
 /// Answer of a function whose capability this FMU does not have.
 pub(crate) fn unsupported(handle: InstanceHandle, name: &'static str, capability: &str) -> FmiStatus {
     guard(handle, &order::unsupported(name), |_| {
-        Err(Refusal::error(format!("this FMU has no {capability}, as its modelDescription.xml says. Do not call it")))
+        Err(Refusal::error(format!(
+            "this FMU has no {capability} (see its modelDescription.xml). Do not call this function"
+        )))
     })
 }

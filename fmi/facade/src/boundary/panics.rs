@@ -39,7 +39,7 @@ pub(super) fn describe(payload: &(dyn Any + Send)) -> String {
     let (bytes, length, line) = PLACE.get();
     let file = String::from_utf8_lossy(&bytes[..length]).into_owned();
     format!(
-        "internal error: {text} (at {file}:{line}). The instance cannot be used any more: free it, and report this message \
-         with the model to the developers"
+        "internal error: {text} (at {file}:{line}). Free the instance, which is no longer usable, and report this \
+         message with the model to the developers"
     )
 }

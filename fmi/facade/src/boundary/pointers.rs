@@ -34,15 +34,15 @@ pub(crate) struct ArrayArgument<T> {
 fn check<T>(pointer: *const T, count: usize, name: &str) -> Result<()> {
     if pointer.is_null() {
         return Err(Refusal::error(format!(
-            "argument {name} is NULL with {count} elements. Pass an array of that length"
+            "argument {name} is NULL, but its length is given as {count}. Pass an array of that length"
         )));
     }
     if !pointer.is_aligned() {
-        return Err(Refusal::error(format!("argument {name} is not aligned for its type. Pass a proper array")));
+        return Err(Refusal::error(format!("argument {name} is not aligned for its type. Pass an aligned array")));
     }
     if count > isize::MAX.unsigned_abs() / size_of::<T>().max(1) {
         return Err(Refusal::error(format!(
-            "argument {name}: {count} elements do not fit into memory. Pass the real count"
+            "argument {name}: {count} elements do not fit into memory. Pass the actual count"
         )));
     }
     Ok(())
@@ -59,7 +59,7 @@ impl<T> In<T> {
         }
         if count > limit {
             return Err(Refusal::error(format!(
-                "{count} elements of {name} are more than this FMU can mean. Pass the real count"
+                "{count} elements of {name} exceed the limit of this FMU. Pass the actual count"
             )));
         }
         check(self.0, count, name)?;
@@ -146,6 +146,6 @@ impl TextArgument {
     /// # Errors
     /// NULL or not UTF-8.
     pub(crate) fn required(&self, name: &str) -> Result<&str> {
-        self.read(name)?.ok_or_else(|| Refusal::error(format!("argument {name} is NULL. Pass a text")))
+        self.read(name)?.ok_or_else(|| Refusal::error(format!("argument {name} is NULL. Pass a string")))
     }
 }

@@ -67,8 +67,8 @@ fn status<T: Copy>(kind: i32, value: &Out<T>, answer: Option<T>) -> Result<FmiSt
     let window = value.single("value")?;
     let nothing = || {
         Refusal::discard(format!(
-            "status kind {kind} has no information: steps of this FMU are never pending. Ask fmi2GetRealStatus for \
-             fmi2LastSuccessfulTime (2), or fmi2GetBooleanStatus for fmi2Terminated (3)"
+            "status kind {kind} is not available: steps of this FMU are never pending. Call fmi2GetRealStatus with \
+             fmi2LastSuccessfulTime (2), or fmi2GetBooleanStatus with fmi2Terminated (3)"
         ))
     };
     window.fill(&[answer.ok_or_else(nothing)?]);

@@ -65,7 +65,8 @@ pub fn instantiate_unit(
         name: CString::new(name).unwrap_or_default(),
     };
     if fmuType != CO_SIMULATION {
-        let reason = format!("fmuType = {fmuType}, but this FMU is for Co-Simulation only. Pass fmi2CoSimulation (1)");
+        let reason =
+            format!("fmuType = {fmuType}, but this FMU supports Co-Simulation only. Pass fmi2CoSimulation (1)");
         return refuse_instantiation(sink, function, &reason);
     }
     instantiate(Instantiation {

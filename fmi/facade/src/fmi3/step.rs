@@ -51,7 +51,7 @@ fn step(instance: InstanceHandle, current: f64, size: f64, missing: Option<&str>
     let (status, begun) = enter(instance, &order::DO_STEP, |slave, instance| {
         before = Some(slave.time());
         if let Some(name) = missing {
-            return Err(Refusal::error(format!("argument {name} is NULL. Pass a place for it")));
+            return Err(Refusal::error(format!("argument {name} is NULL. Pass a pointer to a variable for it")));
         }
         let partial = instance.callbacks.is_some_and(|callbacks| callbacks.early_return_allowed);
         let Some(callbacks @ Callbacks { update: Some(update), .. }) = instance.callbacks else {

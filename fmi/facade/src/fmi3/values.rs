@@ -84,7 +84,7 @@ fn no_variable(
         if references.is_empty() {
             Ok(FmiStatus::Ok)
         } else {
-            Err(Refusal::error(format!("no variable is a {type_name}")))
+            Err(Refusal::error(format!("no variable has the type {type_name}")))
         }
     })
 }

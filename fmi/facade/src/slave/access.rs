@@ -44,7 +44,7 @@ impl Value for f64 {
             Some(format!("{self} is not finite. Set a finite number"))
         } else if *self < min || *self > max {
             Some(format!(
-                "{}{unit} is outside {} to {}{unit}. Set a value within",
+                "{}{unit} is outside the range {} to {}{unit}. Set a value within this range",
                 shown(*self),
                 shown(min),
                 shown(max)
@@ -89,7 +89,7 @@ impl Value for i64 {
         item.is_none().then(|| {
             let items =
                 enumeration.items.iter().enumerate().map(|(index, (name, _))| format!("{} = {name}", index + 1));
-            format!("{self} is no item of {}. Items: {}", enumeration.name, items.collect::<Vec<_>>().join(", "))
+            format!("{self} is not an item of {}. Items: {}", enumeration.name, items.collect::<Vec<_>>().join(", "))
         })
     }
 
@@ -159,7 +159,7 @@ impl Slave {
             let expected = type_name(self.dialect, variable.kind);
             if expected != request.type_name {
                 return Err(Refusal::error(format!(
-                    "{} (value reference {reference}) is of type {expected}, not {}. Call the function of its type",
+                    "{} (value reference {reference}) is of type {expected}, not {}. Call the function for that type",
                     variable.element_name(index),
                     request.type_name
                 )));
@@ -170,7 +170,7 @@ impl Slave {
                 elements.extend((reference..).take(variable.len()));
             } else {
                 return Err(Refusal::error(format!(
-                    "value reference {reference} lies inside the array {}. Use {}, which stands for all its {} elements",
+                    "value reference {reference} lies inside the array {}. Use {}, which refers to all {} elements",
                     variable.name,
                     variable.reference,
                     variable.len()
@@ -181,7 +181,7 @@ impl Slave {
             return Ok(elements);
         }
         Err(Refusal::error(format!(
-            "nValues = {}, but the {} value references stand for {} values. Pass exactly one value per array element",
+            "nValues = {}, but the {} value references cover {} values. Pass exactly one value per array element",
             request.values,
             request.references.len(),
             elements.len()
@@ -274,7 +274,10 @@ impl Slave {
         let input = variable.causality == Causality::Input;
         match self.phase {
             InstancePhase::Stepping { .. } if !input && variable.variability != Variability::Tunable => {
-                Some("is a fixed parameter, and initialisation is over. Set it before, or reset the instance".into())
+                Some(
+                    "is a fixed parameter and cannot be set after initialisation. Set it earlier, or reset the instance"
+                        .into(),
+                )
             }
             InstancePhase::Updating { .. } if !input || variable.variability != Variability::Continuous => {
                 Some("is not a continuous input. Set it at a communication point".into())
@@ -339,11 +342,13 @@ impl Slave {
         let continuous = variable.kind == DataType::Real && variable.variability == Variability::Continuous;
         if variable.causality != causality || !continuous {
             let wanted = if causality == Causality::Input { "input" } else { "output" };
-            return Err(Refusal::error(format!("{what} is not a continuous {wanted} of real type. Leave it out")));
+            return Err(Refusal::error(format!(
+                "{what} is not a continuous {wanted} of real type. Remove it from the request"
+            )));
         }
         if order != 1 {
             return Err(Refusal::error(format!(
-                "{what}: derivative of order {order} asked for; this FMU has order 1 only. Pass order 1"
+                "{what}: derivatives of order {order} are not supported. Pass order 1"
             )));
         }
         Ok(what)

@@ -112,8 +112,8 @@ impl Slave {
             let accessible = [Causality::Input, Causality::Output, Causality::Independent];
             if !accessible.contains(&variable.causality) {
                 return Err(Refusal::error(format!(
-                    "requiredIntermediateVariables names {} (value reference {reference}), which is neither input nor \
-                     output. Leave it out",
+                    "requiredIntermediateVariables contains {} (value reference {reference}), which is neither an \
+                     input nor an output. Remove it",
                     variable.element_name(index)
                 )));
             }

@@ -116,7 +116,7 @@ impl Slave {
                 Dialect::Fmi3 => ("instantiationToken", "attribute instantiationToken"),
             };
             return Err(Refusal::error(format!(
-                "{name} \"{token}\" does not belong to the resources in {}, whose token is \"{}\". Pass the {file} of \
+                "{name} \"{token}\" does not match the resources in {}, whose token is \"{}\". Pass the {file} from \
                  modelDescription.xml of the same FMU, and unpack the FMU completely (this is {})",
                 resources.display(),
                 loaded.token,

@@ -37,7 +37,7 @@ impl CallRule {
         }
         let now = names(phase.state());
         Err(Refusal::error(if self.states == NOWHERE {
-            format!("not allowed in state {now}, nor in any other of this FMU")
+            format!("not allowed in state {now} or in any other state of this FMU")
         } else {
             format!("not allowed in state {now}. Allowed in: {}", names(self.states))
         }))

@@ -18,7 +18,7 @@ pub(crate) type SnapshotHandle = *const SavedState;
 
 fn damaged(problem: impl std::fmt::Display) -> Refusal {
     Refusal::error(format!(
-        "the saved state cannot be used: {problem}. Use a state saved by this very FMU, with all its bytes unchanged"
+        "the saved state cannot be used: {problem}. Use an unmodified state that was saved by this FMU"
     ))
 }
 
@@ -66,7 +66,7 @@ fn decode_phase(reader: &mut SnapshotReader<'_>) -> Result<InstancePhase> {
     let [tag, has_stop, unused @ ..] = reader.array::<4>()?;
     let [time, stop] = [f64::from_le_bytes(reader.array()?), f64::from_le_bytes(reader.array()?)];
     if has_stop > 1 || unused != [0; 2] || !time.is_finite() || !stop.is_finite() {
-        return Err(damaged("its times or flags are none"));
+        return Err(damaged("its times or flags are invalid"));
     }
     let stop = (has_stop == 1).then_some(stop);
     let experiment = ExperimentTimes { start: time, stop };
@@ -76,7 +76,7 @@ fn decode_phase(reader: &mut SnapshotReader<'_>) -> Result<InstancePhase> {
         2 => Ok(InstancePhase::Stepping { stop }),
         3 => Ok(InstancePhase::Failed { last_good: time }),
         4 => Ok(InstancePhase::Terminated { time }),
-        _ => Err(damaged("it names a phase that does not exist")),
+        _ => Err(damaged("its phase is unknown")),
     }
 }
 
@@ -104,8 +104,8 @@ impl Slave {
         let found = self.snapshots.iter().position(|snapshot| std::ptr::eq(&raw const **snapshot, handle));
         found.ok_or_else(|| {
             Refusal::error(
-                "FMUstate is no saved state of this instance: it was freed, or comes from elsewhere. To hand a state to \
-                 another instance, serialise and deserialise it",
+                "FMUstate is not a saved state of this instance: it was freed or belongs to another instance. To pass \
+                 a state to another instance, serialise and deserialise it",
             )
         })
     }
@@ -182,23 +182,26 @@ impl Slave {
     fn decode<'a>(&self, bytes: &'a [u8]) -> Result<(InstancePhase, &'a [u8])> {
         let mut reader = SnapshotReader(bytes);
         if reader.take(MAGIC.len())? != MAGIC {
-            return Err(damaged("its first bytes are not those of a tiprub state"));
+            return Err(damaged("it is not a tiprub state"));
         }
         let version = u32::from_le_bytes(reader.array()?);
         if version != VERSION {
-            return Err(damaged(format!("it has format version {version}, this FMU reads {VERSION}")));
+            return Err(damaged(format!("it has format version {version}, but this FMU reads version {VERSION}")));
         }
         let length = usize::try_from(u32::from_le_bytes(reader.array()?)).map_err(damaged)?;
         let token = String::from_utf8_lossy(reader.take(length)?);
         if token != self.token.as_str() {
-            return Err(damaged(format!("it belongs to token \"{token}\", this FMU is \"{}\"", self.token)));
+            return Err(damaged(format!(
+                "it belongs to the FMU with token \"{token}\", but this FMU has token \"{}\"",
+                self.token
+            )));
         }
         if bytes.len() != self.serialised_size() {
             return Err(damaged(format!("it has {} bytes instead of {}", bytes.len(), self.serialised_size())));
         }
         let (content, tail) = bytes.split_at(bytes.len() - CHECKSUM);
         if checksum(content).to_le_bytes() != tail {
-            return Err(damaged("its checksum does not fit its content"));
+            return Err(damaged("its checksum does not match its content"));
         }
         let phase = decode_phase(&mut reader)?;
         let state = reader.length()?;

@@ -23,15 +23,15 @@ impl Slave {
     /// Wrong time, bad step size, a step beyond the stop time, too many internal steps; the state is as before.
     pub(crate) fn begin_step(&mut self, current_time: f64, step_size: f64, partial: bool) -> Result<()> {
         let InstancePhase::Stepping { stop } = self.phase else {
-            return Err(Refusal::error("no step can begin in this phase"));
+            return Err(Refusal::error("a step cannot begin in this phase"));
         };
         if let Some(stop) = stop {
             let end = current_time + step_size;
             let allowance = STOP_TOLERANCE * step_size + STOP_ROUNDING * stop.abs();
             if end - stop > allowance {
                 return Err(Refusal::error(format!(
-                    "the step from t = {} s by {} s ends at {} s, beyond the stop time {} s given at initialisation. Step \
-                     less far, or initialise without a stop time",
+                    "the step from t = {} s with size {} s ends at {} s, after the stop time {} s given at \
+                     initialisation. Use a smaller step, or initialise without a stop time",
                     shown_time(current_time),
                     shown(step_size),
                     shown_time(end),
@@ -42,7 +42,7 @@ impl Slave {
         self.unit.begin_step(current_time, step_size, partial)?;
         self.collect_notes();
         #[cfg(feature = "test-panic")]
-        assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic asked for by the test of panics");
+        assert!(step_size.to_bits() != PANIC_STEP_SIZE.to_bits(), "panic requested by the panic test");
         self.phase = InstancePhase::Updating { stop, reached: self.unit.time(), fresh: false };
         Ok(())
     }
@@ -55,7 +55,7 @@ impl Slave {
     pub(crate) fn advance(&mut self) -> Result<StepProgress> {
         let last_good = self.unit.time();
         let InstancePhase::Updating { stop, .. } = self.phase else {
-            return Err(Refusal::error("no step is under way"));
+            return Err(Refusal::error("no step is in progress"));
         };
         let progress = match self.unit.advance() {
             Ok(progress) => progress,

@@ -59,7 +59,7 @@ fn sets_with_a_part_of_tip_or_root_are_asked_about() {
     let other = (1..).find(|number| !sets.contains(number)).unwrap();
     let more = mesh.replace("*NSET, NSET=TIP\n", &format!("*NSET, NSET=TIP\n{other},\n"));
     let larger = warnings(&project, &more, both);
-    assert!(larger.contains("TIP has 34 nodes, of which 33 are all of the outermost faces"), "{larger}");
+    assert!(larger.contains("TIP has 34 nodes, but only 33 are on the outermost faces"), "{larger}");
     // Single contact nodes are meant as they are.
     let nodes = warnings(&project, &without_a_line(&mesh, "TIP"), &format!("{both} --contact-nodes 3"));
     assert!(nodes.contains("contact at 3 nodes"), "{nodes}");
@@ -73,6 +73,6 @@ fn a_blade_for_the_other_sense_of_rotation_is_asked_about() {
     assert!(!right.contains("locks up"), "{right}");
     let wrong = warnings(&project, &turned_over(&mesh), "--clamp-set HUB");
     let parts =
-        ["when the rotor turns towards +θ", "staggered for a rotor that turns the other way", "is ahead", "negative"];
+        ["when the rotor turns towards +θ", "staggered for the opposite sense of rotation", " leads", "negative"];
     assert!(parts.iter().all(|part| wrong.contains(part)), "{wrong}");
 }

@@ -98,7 +98,7 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     let run = project.succeed("run scene.toml --stop 0.003 --estimate");
     assert!(run["last"]["friction_loss"].as_f64().unwrap() > 100.0, "{run:#}");
     let why = run["estimated_errors"]["rows"]["unknown"].as_str().unwrap();
-    assert!(why.contains("two rows of patches do not tell") && why.contains("--contact-rows 3"), "{why}");
+    assert!(why.contains("the ROM has 2:") && why.contains("--contact-rows 3"), "{why}");
     let coating = "\n[contact.coating]\nthickness = 2e-3\nmodulus = 1e9\nyield_stress = 5e6\nhardening = 1e8\ncells_around = 720\ncells_along = 5\n";
     project.write(
         "coated.toml",
@@ -108,17 +108,17 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
             .replace("8.0e-5", "5.0e-7"),
     );
     let told = project.fail("run coated.toml --stop 0.001", 1);
-    assert!(told.contains("contact[1].coating: excludes a ROM whose contact patches are in rows"), "{told}");
+    assert!(told.contains("contact[1].coating: excludes a ROM with several rows of contact patches"), "{told}");
     for (line, told, code) in [
         ("reduce rotor37 --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
         ("reduce stage --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
-        (format!("{by_number} --contact-rows 2 -o no.rom"), "Say how many patches along the chord", 2),
+        (format!("{by_number} --contact-rows 2 -o no.rom"), "Give the number of patches along the chord", 2),
         (
             format!("{common} --contact-patches 4 --contact-rows 14 -o no.rom"),
-            "14 rows of 4 are none, or more than the",
+            "14 rows of 4 patches are not possible with the",
             1,
         ),
-        ("reduce rotor37 --mesh 6x1x4 --contact-patches 4 --contact-rows 0".to_owned(), "0 rows of 4 are none", 1),
+        ("reduce rotor37 --mesh 6x1x4 --contact-patches 4 --contact-rows 0".to_owned(), "0 rows of 4 patches", 1),
     ] {
         assert!(project.fail(&line, code).contains(told), "{line}: {}", project.fail(&line, code));
     }
@@ -166,8 +166,8 @@ fn the_tip_of_a_mesh_is_found_and_told() {
             assert!(project.rom("found.rom.safetensors") == project.rom("named.rom.safetensors"), "{file} {numbers}");
         }
         let told = String::from_utf8(project.run(&format!("{line} -o text.rom.safetensors")).stdout).unwrap();
-        let patches = format!("contact patches           {count} from the tip that was found");
-        let wanted = ["tip found", "faces, ", "chord 0.032", &patches];
+        let patches = format!("contact patches           {count} from the detected tip");
+        let wanted = ["detected tip", "faces, ", "chord 0.032", &patches];
         assert!(wanted.iter().all(|part| told.contains(part)), "{told}");
     }
 }
@@ -188,7 +188,7 @@ fn contact_at_points_of_a_fine_tip_is_warned_of() {
         ("blade_hex20.inp --contact-nodes 7", None),
         ("blade_hex20.inp --contact-patches 3 --kind craig-bampton", None),
         ("blade_hex20.inp --contact-patches 7", None),
-        ("blade_hex20.inp --contact-patches 9", Some("9 contact patches along about 6 edges of elements")),
+        ("blade_hex20.inp --contact-patches 9", Some("9 contact patches along about 6 element edges")),
         ("blade_tet10.msh --contact-set TIP --contact-patches 12", Some("12 contact patches along about")),
         ("blade_hex20.inp --contact-patches 7 --contact-rows 3", None),
         ("blade_hex20.inp --contact-patches 7 --contact-rows 4", Some("4 rows of contact patches across 2 elements")),
@@ -204,7 +204,7 @@ fn contact_at_points_of_a_fine_tip_is_warned_of() {
             format!("reduce rotor37 --mesh 6x1x4 --modes 6 --contact-patches {patches} --force -o r.rom.safetensors");
         project.succeed(&line)["warnings"].to_string()
     };
-    assert!(own(9).contains("9 contact patches along about 6 edges"), "{}", own(9));
+    assert!(own(9).contains("9 contact patches along about 6 element edges"), "{}", own(9));
     assert!(!own(7).contains("contact patches"), "{}", own(7));
 }
 
@@ -248,7 +248,7 @@ fn a_second_surface_as_far_out_is_told_of() {
     let found = reduce(0.0);
     let warnings = found["warnings"].to_string();
     assert!(
-        warnings.contains("beside the tip that was found, 12 faces that are not connected with it are as far out"),
+        warnings.contains("besides the detected tip, 12 faces that are not connected to it are as far out"),
         "{warnings}"
     );
     assert_eq!(found["model"]["tip"]["faces"], 12, "{found:#}");
@@ -256,9 +256,9 @@ fn a_second_surface_as_far_out_is_told_of() {
     assert!(!inside["warnings"].to_string().contains("as far out"), "{inside:#}");
     let guide = guide();
     for told in [
-        "beside the tip that was found, 12 faces that are not connected with it are as far out",
-        "contact at a single node of a tip about 6 edges of elements long",
-        "9 contact patches along about 6 edges of elements",
+        "besides the detected tip, 12 faces that are not connected to it are as far out",
+        "contact at a single node of a tip about 6 element edges long",
+        "9 contact patches along about 6 element edges",
     ] {
         assert!(guide.contains(told), "{told}");
     }

@@ -128,7 +128,7 @@ impl ModalModel {
             return Err(Error::invalid(
                 "damping_ratio",
                 format!("{} is not in 0 ≤ ξ < 1", shown(damping_ratio)),
-                "Give the modal damping ratio as a fraction of critical, for example 0.005",
+                "Give the modal damping ratio as a fraction of critical damping, for example 0.005",
             ));
         }
         let (eigenvalues, shapes) = real_modes(&rom.mass, stiffness, "")?;
@@ -284,7 +284,7 @@ fn modal_already(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f
 fn generalised_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, suffix: &str) -> Result<(Vec<f64>, DMatrix<f64>)> {
     let Some(cholesky) = mass.clone().cholesky() else {
         let what = format!("ROM array `mass{suffix}`");
-        return Err(Error::invalid(what, "not positive definite", "Write the ROM again"));
+        return Err(Error::invalid(what, "not positive definite", "Regenerate the ROM"));
     };
     let lower = cholesky.l();
     let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
@@ -314,14 +314,18 @@ pub(super) fn check_semidefinite(smallest: f64, largest: f64, suffix: &str) -> R
     if !(smallest.is_finite() && largest.is_finite()) {
         return Err(Error::invalid(
             format!("ROM arrays `mass{suffix}` and `stiffness{suffix}`"),
-            "no finite frequencies: their entries are too large, or too many orders of magnitude apart",
-            "Check the units, and write the ROM again",
+            "the natural frequencies are not finite: the entries are too large or differ by too many orders of \
+             magnitude",
+            "Check the units and regenerate the ROM",
         ));
     }
     Err(Error::invalid(
         format!("ROM array `stiffness{suffix}`"),
-        format!("not positive semidefinite: eigenvalue {smallest:.3e} rad²/s² at largest {largest:.3e}"),
-        "Write the ROM again",
+        format!(
+            "not positive semidefinite: the lowest eigenvalue is {smallest:.3e} rad²/s², the largest {largest:.3e} \
+             rad²/s²"
+        ),
+        "Regenerate the ROM",
     ))
 }
 

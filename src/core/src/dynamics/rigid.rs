@@ -86,10 +86,10 @@ fn held(rom: &Rom, model: &ModalModel) -> Error {
     Error::invalid(
         format!("ROM `{}`", rom.name),
         format!(
-            "the structure is held: its stiffness does not leave the three translations of its contact nodes free (lowest \
-             frequency {hertz:.3e} Hz)"
+            "the structure is constrained: it does not have three translational rigid-body modes (lowest frequency \
+             {hertz:.3e} Hz)"
         ),
-        "Reduce the structure without supports, its rigid modes kept, or give it another motion",
+        "Reduce the structure without supports and keep its rigid-body modes, or set another `motion` for it",
     )
 }
 

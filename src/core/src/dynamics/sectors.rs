@@ -47,7 +47,10 @@ impl Sectors {
         match model {
             SectorModel::Uncoupled(model, sectors) => Self::Uncoupled(ModalBank::with_options(model, sectors, options)),
             SectorModel::Coupled(model) => {
-                assert!(options.frequency_factors.is_empty() && options.coupling.is_none(), "refused beforehand");
+                assert!(
+                    options.frequency_factors.is_empty() && options.coupling.is_none(),
+                    "coupled sectors support neither mistuning nor spin coupling"
+                );
                 Self::Coupled(CyclicBank::new(model, options.loads).excited(options.excitation))
             }
         }

@@ -40,7 +40,7 @@ impl TimeBasis {
             1 => [0.0, 1.0, 0.0, 0.0],
             2 => [0.0, 0.5, 1.0, 0.0],
             3 => [0.0, 0.5 - 0.1 * 5.0_f64.sqrt(), 0.5 + 0.1 * 5.0_f64.sqrt(), 1.0],
-            _ => panic!("degree {degree}"),
+            _ => panic!("unsupported degree {degree}"),
         };
         let count = degree + 1;
         let mut monomials = [[0.0; POINTS]; POINTS];

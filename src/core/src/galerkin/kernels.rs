@@ -28,7 +28,7 @@ impl<const N: usize> Combine<'_, N> {
         let mut sums = [[[0.0; PADDED]; K]; N];
         for place in 0..self.columns.len() {
             let entries = self.table[self.columns[place] * self.stride + from..].as_chunks::<PADDED>().0;
-            let entries: &[[f64; PADDED]; K] = entries.first_chunk().expect("columns are as long as told");
+            let entries: &[[f64; PADDED]; K] = entries.first_chunk().expect("every column holds K registers");
             for k in 0..K {
                 for a in 0..N {
                     let coefficient = self.coefficients[a][place];

@@ -279,7 +279,7 @@ fn periodic_spline(values: &[f64]) -> Result<Vec<[f64; 2]>> {
     if count < 4 || values.iter().any(|value| !value.is_finite()) {
         return Err(Error::invalid(
             "surface.shape.radius_change",
-            format!("{count} values; at least 4 finite ones are needed"),
+            format!("{count} values; at least 4 are required, and all must be finite"),
             "Give the radius change (m) at equally spaced angles around the circumference",
         ));
     }

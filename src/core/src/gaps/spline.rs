@@ -277,7 +277,7 @@ impl Persist for ClosestPoint {
         let mut place = *self;
         place.restore(reader);
         if !(place.s.is_finite() && place.t.is_finite()) {
-            reader.refuse("a contact node is nowhere on its surface");
+            reader.refuse("the surface position of a contact node is not finite");
         }
     }
 }

@@ -133,7 +133,7 @@ impl ContactSolver {
     /// # Panics
     /// When `size` exceeds the capacity.
     pub fn set_size(&mut self, size: usize) {
-        assert!(size <= self.capacity(), "{size} contact nodes in a solver made for {}", self.capacity());
+        assert!(size <= self.capacity(), "{size} contact nodes exceed the solver capacity of {}", self.capacity());
         self.size = size;
         self.multipliers[size..].fill(0.0);
         self.active[size..].fill(false);

@@ -114,7 +114,7 @@ impl Coating {
             return Err(Error::invalid(
                 "contact.coating.cells_around, cells_along",
                 format!("{around} x {along} cells for {blades} blades"),
-                "Give at least two cells around per blade and one along",
+                "Give at least two cells per blade around the circumference and one along the axis",
             ));
         }
         let width = (extent[1] - extent[0]) / number(along);
@@ -134,10 +134,10 @@ impl Coating {
             return Err(Error::invalid(
                 "contact.coating.contact_width",
                 format!(
-                    "the tip is as wide as {} cells, of {around} that {blades} blades share",
+                    "the tip covers {} cells, but the {blades} blades share only {around}",
                     shown((row.covers * 1e3).round() / 1e3)
                 ),
-                "Give more cells around, or a width of the tip around the circumference (m) below the pitch of the blades",
+                "Use more cells around the circumference, or a `contact_width` (m) below the blade pitch",
             ));
         }
         Ok(Self {
@@ -299,7 +299,7 @@ impl Persist for Coating {
             let mut strain = 0.0_f64;
             strain.restore(&mut bytes);
             if strain < 0.0 {
-                reader.refuse("its coating is thicker than new");
+                reader.refuse("the coating is thicker than when new");
             }
         }
         self.cutting.iter().for_each(|cutting| cutting.check(reader, self.plastic.len()));
@@ -313,8 +313,8 @@ fn sorted(BladeTip { axial, radii, extent, .. }: &BladeTip) -> Result<Vec<usize>
     let mut order: Vec<usize> = (0..axial.len()).collect();
     order.sort_by(|a, b| axial[*a].total_cmp(&axial[*b]));
     if !(length.is_finite() && length > 0.0) || radii.len() != axial.len() {
-        let problem = format!("{} contact nodes per blade over {} m along the axis", axial.len(), shown(length));
-        return refuse(problem, "A coating needs a ROM with contact nodes at two or more axial positions");
+        let problem = format!("{} contact nodes per blade over an axial length of {} m", axial.len(), shown(length));
+        return refuse(problem, "Use a ROM with contact nodes at two or more axial positions");
     }
     match order.windows(2).find(|pair| axial[pair[1]] - axial[pair[0]] <= SAME_PLACE * length) {
         None => Ok(order),

@@ -108,7 +108,7 @@ impl CoulombSolver {
     /// # Panics
     /// When `size` exceeds the capacity.
     pub fn solve(&mut self, size: usize) -> SolverOutcome {
-        assert!(size <= self.capacity, "{size} contacts in a solver made for {}", self.capacity);
+        assert!(size <= self.capacity, "{size} contacts exceed the solver capacity of {}", self.capacity);
         self.problem.size = size;
         self.newton.factorisations = 0;
         let order = 3 * size;

@@ -56,7 +56,7 @@ impl Rom {
         }
         if harmonics.len() != self.largest_nodal_diameter() {
             let problem = format!(
-                "{} harmonics above 0, {} expected for {} sectors",
+                "{} harmonics above 0, but {} are required for {} sectors",
                 harmonics.len(),
                 self.largest_nodal_diameter(),
                 self.sectors
@@ -81,7 +81,7 @@ impl Rom {
         ];
         for (name, matrix, expected) in arrays {
             if order == 0 || matrix.shape() != expected {
-                return refuse(name, format!("shape {:?}, {expected:?} expected", matrix.shape()));
+                return refuse(name, format!("shape {:?} found, {expected:?} expected", matrix.shape()));
             }
             if let Some(index) = matrix.iter().position(|value| !(value.re.is_finite() && value.im.is_finite())) {
                 let (row, column) = (index % matrix.nrows(), index / matrix.nrows());
@@ -90,14 +90,16 @@ impl Rom {
             let largest = largest_entry(matrix);
             let most = if name == "contact_map" { ranges::MAP } else { ranges::MATRIX };
             if largest > most {
-                return refuse(name, format!("an entry of size {} is beyond {}", shown(largest), shown(most)));
+                return refuse(name, format!("an entry of magnitude {} exceeds {}", shown(largest), shown(most)));
             }
             // With half a turn of phase from sector to sector nothing can travel.
             let imaginary = matrix.iter().fold(0.0, |most: f64, value| most.max(value.im.abs()));
             if 2 * nodal_diameter == self.sectors && imaginary > 1e-8 * largest {
                 return refuse(
                     name,
-                    format!("imaginary part {imaginary:.3e}; half as many diameters as sectors are real"),
+                    format!(
+                        "imaginary part {imaginary:.3e}, but arrays of the nodal diameter sectors/2 must be real"
+                    ),
                 );
             }
         }
@@ -105,7 +107,7 @@ impl Rom {
             let asymmetry = largest_entry(&(matrix - matrix.adjoint()));
             let largest = largest_entry(matrix);
             if asymmetry > 1e-8 * largest {
-                return refuse(name, format!("not Hermitian: off by {asymmetry:.3e} at largest entry {largest:.3e}"));
+                return refuse(name, format!("not Hermitian: deviation {asymmetry:.3e}, largest entry {largest:.3e}"));
             }
         }
         if cholesky(&harmonic.mass).is_none() {

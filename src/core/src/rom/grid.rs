@@ -19,8 +19,9 @@ impl Rom {
         if rows >= 2 && nodes.is_multiple_of(rows) && patches && self.extras.grid.is_none() {
             return Ok(());
         }
-        let what = if patches { "patches" } else { "contact nodes, not patches with areas" };
-        let problem = format!("{rows} rows of {nodes} {what}; two or more of equally many patches are rows");
+        let what = if patches { "patches" } else { "contact nodes without areas" };
+        let problem =
+            format!("{rows} rows of {nodes} {what}; at least two rows with the same number of patches are required");
         Err(Error::invalid("ROM metadata `contact_rows`", problem, remedy))
     }
 
@@ -33,11 +34,12 @@ impl Rom {
         if !fits || grid.around < least_around || grid.along < least_along {
             let ContactGrid { around, along, .. } = grid;
             return refuse(format!(
-                "{around} around x {along} along, at least {least_around} x {least_along} of {nodes} nodes"
+                "{around} around x {along} along does not match {nodes} nodes, or is less than \
+                 {least_around} x {least_along}"
             ));
         }
         if self.sectors != 1 {
-            return refuse("a contact grid needs one sector".to_owned());
+            return refuse("a contact grid needs a ROM with one sector".to_owned());
         }
         match (grid.closed, self.frame) {
             (true, DisplacementFrame::Cylindrical) => closed_ring(grid, &self.contact_nodes),
@@ -68,11 +70,11 @@ fn closed_ring(grid: ContactGrid, nodes: &[ContactNode]) -> Result<()> {
             let turns = (node.position[1] - first - step * i as f64) / std::f64::consts::TAU;
             let off = (turns - turns.round()).abs() * std::f64::consts::TAU;
             if off > 1e-3 * step || (node.position[2] - axial).abs() > 1e-3 * step * node.position[0] {
-                return refuse(format!("node {} of ring {} is not at its place of the grid", i + 1, along + 1));
+                return refuse(format!("node {} of ring {} is not at its grid position", i + 1, along + 1));
             }
         }
         if along > 0 && axial <= nodes[(along - 1) * grid.around].position[2] {
-            return refuse(format!("ring {} does not lie beyond ring {along} in z", along + 1));
+            return refuse(format!("ring {} is not at a larger z than ring {along}", along + 1));
         }
     }
     Ok(())
@@ -92,7 +94,7 @@ fn open_grid(grid: ContactGrid, nodes: &[ContactNode]) -> Result<()> {
         None => Ok(()),
         Some([a, b]) => {
             let (a, b) = (&nodes[*a].name, &nodes[*b].name);
-            refuse(format!("the neighbouring nodes `{a}` and `{b}` are at the same place"))
+            refuse(format!("the neighbouring nodes `{a}` and `{b}` coincide"))
         }
     }
 }

@@ -33,14 +33,15 @@ impl Rom {
             ("support_thermal", &support.thermal, patches, ranges::THERMAL_LOAD),
         ] {
             if matrix.shape() != (SUPPORT_ROWS, columns) {
-                let problem = format!("shape {:?}, {SUPPORT_ROWS} x {columns} expected", matrix.shape());
+                let problem = format!("shape {:?} found, {SUPPORT_ROWS} x {columns} expected", matrix.shape());
                 return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             }
             entries(name, matrix, most, remedy)?;
         }
         if self.sectors != 1 {
-            let problem = format!("given with {} sectors", self.sectors);
-            return Err(Error::invalid("ROM array `support_stiffness`", problem, "It belongs to a single structure"));
+            let problem = format!("not supported for a ROM with {} sectors", self.sectors);
+            let remedy = "Remove it, or use a ROM with one sector";
+            return Err(Error::invalid("ROM array `support_stiffness`", problem, remedy));
         }
         Ok(())
     }

@@ -40,12 +40,13 @@ impl Rom {
         ] {
             let Some(array) = array else { continue };
             let (Some(stress), Some(columns)) = (&extras.stress, columns) else {
-                let problem = format!("given without `stress_map` and `{load}`");
-                return Err(Error::invalid(format!("ROM array `{name}`"), problem, "Add these arrays, or remove it"));
+                let problem = format!("requires `stress_map` and `{load}`");
+                let remedy = "Add these arrays, or remove this one";
+                return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             };
             let expected = (STRESSES * stress.points.len(), columns);
             if array.shape() != expected {
-                let problem = format!("shape {:?}, {expected:?} expected", array.shape());
+                let problem = format!("shape {:?} found, {expected:?} expected", array.shape());
                 return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
             }
             entries(name, array, ranges::STRESS_MAP, remedy)?;
@@ -65,12 +66,13 @@ impl Rom {
         let name = format!("{of}_map");
         let expected = (components * watched.points.len(), self.order());
         if watched.points.is_empty() || watched.map.shape() != expected {
-            let problem = format!("shape {:?}, {expected:?} and at least one point expected", watched.map.shape());
+            let found = watched.map.shape();
+            let problem = format!("shape {found:?} found, {expected:?} with at least one point expected");
             return Err(Error::invalid(format!("ROM array `{name}`"), problem, remedy));
         }
         if self.is_cyclic() {
-            let problem = "given with coupled sectors, whose nodal diameters above 0 it says nothing of";
-            return Err(Error::invalid(format!("ROM array `{name}`"), problem, "Leave these points out"));
+            let problem = "not supported for coupled sectors, because it has no data for nodal diameters above 0";
+            return Err(Error::invalid(format!("ROM array `{name}`"), problem, "Remove these points"));
         }
         entries(&name, &watched.map, largest, remedy)?;
         let what = |index: usize| format!("ROM array `{of}_positions`, point {}", index + 1);

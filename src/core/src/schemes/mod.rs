@@ -74,9 +74,9 @@ pub(crate) static SCHEMES: Enumeration = Enumeration {
     description: "Time-stepping scheme",
     items: &[
         ("central-difference", "Explicit central differences (eq. 9), stable for omega h < 2"),
-        ("modal-exact", "Exact in free flight and under constant force"),
-        ("massless-boundary", "Highest modes quasi-static; the others take contact forces one step later"),
-        ("galerkin", "Continuous Galerkin in time, steps of each sector by a tolerance; highest modes quasi-static"),
+        ("modal-exact", "Exact for free motion and under constant force"),
+        ("massless-boundary", "Highest modes quasi-static; contact forces act on the other modes one step later"),
+        ("galerkin", "Continuous Galerkin in time with adaptive steps for each sector; highest modes quasi-static"),
     ],
 };
 

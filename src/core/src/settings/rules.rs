@@ -44,7 +44,7 @@ const fn excludes(
 }
 
 const FREE: RelatedFeature = ("a free master", |at| at.is_free());
-const ALL_FREE: RelatedFeature = ("a scene of free masters only", |at| at.contacts().all(|at| at.is_free()));
+const ALL_FREE: RelatedFeature = ("a scene with free masters only", |at| at.contacts().all(|at| at.is_free()));
 const COUPLED: RelatedFeature = ("a ROM whose sectors are coupled by harmonics", |at| at.rom().is_cyclic());
 
 /// Rules of structures, surfaces and contacts.
@@ -58,104 +58,104 @@ static PARTS: &[FeatureRule] = &[
     needs(
         &[LOAD],
         ("`motion = \"still\"`", |at| at.structure().motion == BodyMotion::Still),
-        "only a structure that stands still has a load on its contact grid",
+        "only a stationary structure can have a load on its contact grid",
         "Remove the line, or set motion = \"still\"",
     ),
     excludes(
         &[THERMAL],
         ("`motion = \"free\"`", |at| at.structure().motion == BodyMotion::Free),
-        "what flies has no inputs",
+        "a free structure has no inputs",
         "Remove the line",
     ),
     needs(
         &[SOFTENING],
         ("`structure.thermal`", |at| at.structure().thermal),
-        "without a temperature nothing softens",
+        "softening depends on the temperature of the structure",
         "Set thermal = true, or remove the line",
     ),
     needs(
         &[VELOCITY],
         ("`motion = \"free\"`", |at| at.structure().motion == BodyMotion::Free),
-        "only a free structure starts with one",
+        "only a free structure has an initial velocity",
         "Remove the line, or set motion = \"free\"",
     ),
     needs(
         &[CARRIED],
         ("a structure with `motion = \"still\"`", |at| at.carrier().is_some_and(|own| own.motion == BodyMotion::Still)),
-        "a surface stands still",
-        "Name a structure that stands still, or remove the line for a rigid surface",
+        "only a stationary structure can carry a surface",
+        "Name a stationary structure, or remove the line for a rigid surface",
     ),
     excludes(
         &[CARRIED],
         ("a structure that is the master of a contact", |at| at.carrier_touches()),
-        "contact nodes and control points of one structure together are not made for",
-        "Let it be the master of both contacts, with surfaces on what it meets",
+        "a structure cannot be the master of one contact and carry the surface of another",
+        "Make it the master of both contacts, and put the surfaces on the structures that it meets",
     ),
     needs(
         &[RIGID],
         FREE,
-        "the surface around a rotor is rigid without `structure`",
-        "Remove the line, and `structure` for a rigid surface",
+        "a surface around a rotor is rigid if it has no `structure`",
+        "Remove the line; for a rigid surface, also remove `structure`",
     ),
     excludes(
         &[SHAPE, MOVING, RAMP_TIME, PATCHES, CLOSURE],
         FREE,
-        "only a surface around an axis has it, and this one is the open contact grid of a structure",
+        "only a surface around an axis can have it, and the surface of a free master is an open contact grid",
         "Remove the line",
     ),
     excludes(
         &[GAP, SECTOR_GAPS, MERIDIAN, COATING, HEAT],
         FREE,
-        "its gaps and normals follow from the positions in both ROMs",
+        "the gaps and normals of a free master follow from the positions in both ROMs",
         "Remove the line",
     ),
     needs(
         &[FREE_MASTER],
         ("`surface.structure`", |at| at.surface().structure.is_some()),
-        "it needs to know where its surface is",
-        "Give the surface a `structure` that stands still; `rigid = true` leaves out its deformation",
+        "the position of its surface comes from the ROM of a structure",
+        "Give the surface a stationary `structure`; set `rigid = true` to ignore its deformation",
     ),
     needs(
         &[ONE_OF_SEVERAL],
         ("`contact.nodes`", |at| at.contact().nodes.is_some()),
-        "without it one contact claims all its contact nodes",
-        "Give every contact `nodes`: what the names of its contact nodes start with",
+        "otherwise each contact would use all contact nodes of the structure",
+        "Set `nodes` in every contact to the prefix of the names of its contact nodes",
     ),
     excludes(
         &[MERIDIAN],
         ("a surface spline", |at| at.surface().spline.is_some() || at.carrier().is_some()),
-        "its normal follows from the closest point",
+        "a surface spline takes the normal at the closest point",
         "Remove the line",
     ),
     needs(
         &[HEAT],
         ("`contact.friction` above 0", |at| at.contact().friction > 0.0),
-        "without friction there is no heat to share",
+        "without friction there is no heat to distribute",
         "Give the contact a friction coefficient (friction > 0), or remove the line",
     ),
     excludes(
         &[COATING],
-        ("contacts solved together with another pair's", |at| at.is_coupled()),
-        "pairs of one structure, or of surfaces on one flexible structure, push each other",
-        "Leave out the coating, or give the pair a structure and a surface of its own",
+        ("a contact that is solved together with another one", |at| at.is_coupled()),
+        "contacts of one structure, or of surfaces on one flexible structure, act on each other",
+        "Remove the coating, or use a separate structure and a separate surface for this contact",
     ),
     excludes(
         &[MODULUS, YIELD, HARDENING],
         ("`contact.coating.cutting`", |at| at.is_cut()),
-        "what is cut off does not yield",
-        "Remove the line, or `cutting` for the plastic law",
+        "this key belongs to the plastic law, and the coating is cut",
+        "Remove the line, or remove `cutting` to use the plastic law",
     ),
     excludes(
         &[CONTACT_WIDTH],
         ("`contact.coating.cutting`", |at| at.is_cut()),
-        "a tip cuts with its edge, whatever its width",
-        "Remove the line, or `cutting` for the plastic law",
+        "the cutting force does not depend on the width of the tip",
+        "Remove the line, or remove `cutting` to use the plastic law",
     ),
     needs(
         &[SOLVER],
-        ("that of contact[1]", |at| at.contact().solver == at.settings.contacts[0].solver),
-        "a scene has one solver",
-        "Give all pairs the same solver",
+        ("the solver of contact[1]", |at| at.contact().solver == at.settings.contacts[0].solver),
+        "all contacts of a scene use the same solver",
+        "Give all contacts the same solver",
     ),
 ];
 
@@ -164,21 +164,21 @@ static VARIABLES: &[FeatureRule] = &[
     needs(
         &[WEAR, WEAR_PROFILE],
         ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
-        "nothing else wears",
+        "only coatings wear",
         "Add a `coating` to the contact, or remove the line",
     ),
     needs(
         &[STRESS, MODES, TIPS],
         ("`outputs.watched_sectors`", |at| !at.outputs().watched_sectors.is_empty()),
-        "it is told of watched sectors",
-        "Watch a sector, or remove the line",
+        "it is reported for watched sectors only",
+        "Add a sector to `watched_sectors`, or remove the line",
     ),
     needs(
         &[DISPLACEMENT],
         ("`surface.structure` of a surface around an axis", |at| {
             at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
         }),
-        "it is radial: a rigid surface does not deform, and an open one has no axis",
+        "the output is a radial displacement: a rigid surface does not deform, and an open surface has no axis",
         "Give the surface around a rotor a `structure`, or remove the line",
     ),
     needs(
@@ -186,13 +186,13 @@ static VARIABLES: &[FeatureRule] = &[
         ("`surface.structure` of a surface around an axis", |at| {
             at.contacts().any(|at| at.carrier().is_some() && !at.is_free())
         }),
-        "what is rigid has no support of its own: its reaction is the contact force",
+        "a rigid surface has no separate support: its reaction is the contact force",
         "Give the surface around a rotor a `structure`, or remove the line",
     ),
     excludes(
         &[MODES, TIPS, CASING_FORCES],
         ALL_FREE,
-        "it is told of rotors and of what stands around them",
+        "it is reported for rotors and their casings only",
         "Remove the line",
     ),
     excludes(
@@ -208,35 +208,35 @@ static VARIABLES: &[FeatureRule] = &[
 static METHODS: &[FeatureRule] = &[
     needs(
         &[COULOMB],
-        ("a scene packaged with it, or with rotors of uncoupled sectors, rigid surfaces and friction", |at| {
+        ("a scene packaged with it, or one with friction, rigid surfaces and rotors of uncoupled sectors", |at| {
             at.may_stick()
         }),
-        "larger problems are prepared only where the scene says so",
+        "larger problems are prepared only if the scene selects this solver",
         "Package the scene with contact.solver = \"coulomb\"",
     ),
     excludes(
         &[FILM, COULOMB],
         ("a coating", |at| at.contacts().any(|at| at.is_coated())),
-        "its rods yield within the complementarity problem",
+        "a coating yields within the linear complementarity problem, which only `lcp` solves",
         "Use solver = \"lcp\", or remove the coating",
     ),
     excludes(
         &[MASSLESS],
         ("a free master", |at| at.contacts().any(|at| at.is_free())),
-        "it is not made for structures that fly",
+        "this scheme does not support free structures",
         "Use \"modal-exact\" or \"central-difference\"",
     ),
     excludes(
         &[MASSLESS],
         ("`structure.spin.coriolis`", |at| at.settings.structures.iter().any(|own| own.spin.coriolis)),
-        "quasi-static modes have no velocity for the Coriolis force",
-        "Use \"modal-exact\", or leave the Coriolis force out",
+        "its quasi-static modes have no velocity, on which the Coriolis force depends",
+        "Use \"modal-exact\", or leave out the Coriolis force",
     ),
     excludes(
         &[GALERKIN],
         ("`structure.spin`", |at| at.settings.structures.iter().any(|own| own.spin != SpinSettings::default())),
-        "its tables are those of modes that keep their stiffness and are loaded by contact alone",
-        "Use \"modal-exact\", or leave the effects of spin out",
+        "its step tables assume that modes keep their stiffness and are loaded by contact alone",
+        "Use \"modal-exact\", or leave out the effects of spin",
     ),
     excludes(
         &[GALERKIN],
@@ -244,57 +244,59 @@ static METHODS: &[FeatureRule] = &[
             let loaded = |own: &StructureSettings| own.thermal && own.motion == BodyMotion::Rotating;
             at.settings.structures.iter().any(|own| loaded(own) || own.excitation.is_some())
         }),
-        "its tables are those of blades that are loaded by contact alone",
-        "Use \"modal-exact\", or leave the loads on the blades out",
+        "its step tables assume that blades are loaded by contact alone",
+        "Use \"modal-exact\", or leave out the loads on the blades",
     ),
     excludes(
         &[GALERKIN],
         ("`contact.coating`", |at| at.contacts().any(|at| at.is_coated())),
-        "it seeks forces for gaps that close, and a coating takes force while they do",
+        "it computes the forces that keep gaps from closing further, but a coating is compressed under force",
         "Use \"modal-exact\", or remove the coating",
     ),
     excludes(
         &[MASSLESS],
         ("`contact.coating.cutting`", |at| at.contacts().any(|at| at.is_cut())),
-        "the way that is cut is that of the step in which the force acts, and its forces act a step later",
-        "Use \"modal-exact\" or \"central-difference\", or the plastic law",
+        "the cutting force depends on the sliding distance of the same step, but forces of this scheme act one step \
+         later",
+        "Use \"modal-exact\" or \"central-difference\", or remove `cutting` to use the plastic law",
     ),
     excludes(
         &[GALERKIN],
         ("`outputs.support_reaction`", |at| at.outputs().support_reaction),
-        "it keeps no means of what the casing does within a step",
+        "it does not average the motion of the casing over a step",
         "Use \"modal-exact\", or remove the output",
     ),
     excludes(
         &[GALERKIN],
         ("`contact.solver = \"film\"`", |at| at.solver == Solver::Film),
-        "it solves the complementarity of contact",
+        "it needs a solver that enforces complementarity of gap and force",
         "Use solver = \"lcp\", or \"coulomb\"",
     ),
     excludes(
         &[MASSLESS],
         ("`contact.solver = \"film\"`", |at| at.solver == Solver::Film),
-        "film looks once for penetration, and without inertia a node that it leaves inside the surface stays there",
+        "`film` checks for penetration only once per step, and a massless node that it leaves inside the surface \
+         stays there",
         "Use solver = \"lcp\", or another scheme",
     ),
     needs(
         &[GALERKIN],
-        ("a clearance above 0 of what does not fly", |at| {
+        ("a clearance above 0 in every contact of a rotor", |at| {
             at.contacts().all(|at| at.is_free() || at.contact().nominal_gap() > 0.0)
         }),
-        "its tolerance is a share of the clearance",
+        "its tolerance is a fraction of the clearance",
         "Give the contact a `gap`, or use \"modal-exact\"",
     ),
     needs(
         &[QUASI_STATIC],
         ("more than three modes per contact node", |at| at.has_modes_left()),
-        "it makes the highest modes quasi-static, three per contact node, and else none is left",
+        "it makes the highest modes quasi-static, three per contact node, and at least one other mode must remain",
         "Use more modes or fewer contact nodes, or \"modal-exact\"",
     ),
     excludes(
         &[MASSLESS],
         ("several surfaces on one flexible structure", |at| at.contacts().any(|at| at.shares_carrier())),
-        "the largest step is not known there",
+        "the largest stable step is unknown in this case",
         "Use \"modal-exact\" or \"central-difference\", or rigid surfaces",
     ),
 ];
@@ -303,8 +305,8 @@ static METHODS: &[FeatureRule] = &[
 static PRESETS: &[FeatureRule] = &[excludes(
     &[OTHER_SCHEME, OTHER_SOLVER],
     ("`preset = \"paper\"`", |at| at.settings.preset == Preset::Paper),
-    "the preset is the method of the paper whole",
-    "Remove the line, or the preset",
+    "the preset fixes the scheme and the solver of the paper",
+    "Remove the line or the preset",
 )];
 
 /// Rules of ROMs.
@@ -312,46 +314,52 @@ static ROMS: &[FeatureRule] = &[
     needs(
         &[ROM_AROUND],
         ("`frame = cylindrical`", |at| at.rom().frame == DisplacementFrame::Cylindrical),
-        "surfaces around an axis meet displacements along (r, θ, z)",
+        "contact around an axis is computed from displacements along (r, θ, z)",
         "Write the ROM with frame = cylindrical",
     ),
     needs(
         &[ROM_FREE],
         ("`frame = cartesian`", |at| at.rom().frame == DisplacementFrame::Cartesian),
-        "a free master and what it meets are described along x, y, z",
+        "contact of a free master is computed from displacements along x, y, z",
         "Write the ROM with frame = cartesian",
     ),
     needs(
         &[ROM_FREE],
         ("`sectors = 1`", |at| at.rom().sectors == 1 && !at.rom().is_cyclic()),
-        "a free master and what it meets are single structures",
-        "Use sectors = 1",
+        "a free master and the structures that it meets have a single sector",
+        "Use a ROM with sectors = 1",
     ),
     needs(
         &[STIFFENING, GROWTH, CORIOLIS],
         ("spin matrices in the ROM", |at| at.rom().extras.spin.is_some()),
-        "they hold what the speed does to the structure",
-        "Reduce it with `tiprub reduce --spin`, or leave spin out",
+        "they describe the effect of the speed on the structure",
+        "Reduce it with `tiprub reduce --spin`, or remove the line",
     ),
     excludes(
         &[FACTORS, STIFFENING, CORIOLIS, SOFTENING],
         COUPLED,
-        "nodal diameters are modes of equal sectors, and the same at every speed and temperature",
-        "Leave it out, or use a ROM of uncoupled sectors (without harmonics)",
+        "the modes of nodal diameters assume identical sectors and do not depend on speed or temperature",
+        "Remove the line, or use a ROM of uncoupled sectors (without harmonics)",
     ),
-    excludes(&[INITIAL_SECTOR], COUPLED, "a blade of such a disk has no mode of its own", "Give a `nodal_diameter`"),
+    excludes(
+        &[INITIAL_SECTOR],
+        COUPLED,
+        "the blades of such a disk have no individual modes",
+        "Give a `nodal_diameter` instead",
+    ),
     needs(
         &[THERMAL],
         ("thermal loads in the ROM", |at| at.rom().extras.thermal.is_some()),
-        "they say how each patch expands the structure",
-        "Reduce it from a mesh of one material (a casing: with thermal patches), or leave thermal out",
+        "they describe the thermal expansion caused by each patch",
+        "Reduce it from a mesh of one material (a casing: with thermal patches), or remove the line",
     ),
     excludes(
         &[COATING],
-        ("a ROM whose contact patches are in rows across the thickness", |at| {
+        ("a ROM with several rows of contact patches across the thickness", |at| {
             at.master_rom().is_some_and(|rom| rom.rows() > 1)
         }),
-        "a row of cells is worn by what it sees between two patches along the axis, and patches of several rows would take turns",
+        "the penetration of a row of cells is interpolated between two patches along the axis, and patches of \
+         several rows would alternate",
         "Reduce it with one row of patches (without --contact-rows), or remove the coating",
     ),
     needs(
@@ -360,15 +368,16 @@ static ROMS: &[FeatureRule] = &[
             at.contact().coating.is_some_and(|coating| coating.contact_width.is_some())
                 || at.master_rom().is_some_and(Rom::has_patches)
         }),
-        "the force on a tip grows with the width that it presses, which contact nodes do not have",
-        "Give the thickness of the tip over the cosine of its stagger angle (m), or reduce the blade with --contact-patches",
+        "the force on a tip increases with the width of the contact, and contact nodes have no width",
+        "Set it to the tip thickness divided by the cosine of the stagger angle (m), or reduce the blade with \
+         --contact-patches",
     ),
     needs(
         &[STRESS],
-        ("places of stress in the ROM of a rotor", |at| {
+        ("stress points in the ROM of a rotor", |at| {
             at.contacts().any(|at| !at.is_free() && at.master_rom().is_some_and(|rom| rom.extras.stress.is_some()))
         }),
-        "stress comes from the finite elements that the ROM was reduced from",
+        "stress is computed from the finite-element model that the ROM was reduced from",
         "Reduce the blade with --stress-modes or --stress-set, or remove the line",
     ),
     needs(
@@ -376,49 +385,49 @@ static ROMS: &[FeatureRule] = &[
         ("static thermal stress in that ROM (array `stress_thermal`)", |at| {
             at.stressed(|own| own.thermal).all(|rom| rom.extras.stress_thermal.is_some())
         }),
-        "the expansion of a free blade causes no stress, and the reduced coordinates alone do not know that",
-        "Reduce the blade again, add the array, or remove `thermal` or the line",
+        "free thermal expansion causes no stress, which the reduced coordinates alone cannot represent",
+        "Reduce the blade again, add the array, or remove `thermal` or this line",
     ),
     needs(
         &[GROWN_STRESS],
         ("static centrifugal stress in that ROM (array `stress_centrifugal`)", |at| {
             at.stressed(|own| own.spin.growth).all(|rom| rom.extras.stress_centrifugal.is_some())
         }),
-        "few modes do not resolve the stress of a load that acts in the whole blade",
-        "Reduce the blade again, add the array, or remove `spin.growth` or the line",
+        "a few modes do not resolve the stress of a load that acts on the whole blade",
+        "Reduce the blade again, add the array, or remove `spin.growth` or this line",
     ),
     excludes(
         &[MODES],
         ("a rotor whose sectors are coupled by harmonics", |at| {
             at.contacts().any(|at| at.master_rom().is_some_and(Rom::is_cyclic))
         }),
-        "its modes are those of nodal diameters, not of a sector",
+        "its modes belong to nodal diameters, not to single sectors",
         "Use `nodal_diameters`, or remove the line",
     ),
     needs(
         &[SUPPORT],
-        ("rows of the support in the ROM of a casing", |at| {
+        ("support rows in the ROM of a casing", |at| {
             at.contacts().any(|at| !at.is_free() && at.carrier_rom().is_some_and(|rom| rom.extras.support.is_some()))
         }),
-        "they say what held nodes feel, of the finite elements that the ROM was reduced from",
-        "Reduce the casing again, held at some nodes, or remove the line",
+        "they give the reaction at the clamped nodes of the finite-element model that the ROM was reduced from",
+        "Reduce the casing again with clamped nodes, or remove the line",
     ),
     needs(
         &[LOAD],
         ("a contact grid in the ROM", |at| at.rom().extras.grid.is_some()),
-        "the load acts on its rings",
-        "Give a ROM with a contact grid, or leave the load out",
+        "the load acts on the rings of the grid",
+        "Use a ROM with a contact grid, or remove the load",
     ),
     excludes(
         &[CARRIED],
         ("a structure whose sectors are coupled by harmonics", |at| at.carrier_rom().is_some_and(Rom::is_cyclic)),
-        "the surface is laid through the contact grid of a structure that was reduced as a whole",
-        "Give a structure of its own (sectors = 1) to carry the surface",
+        "the surface interpolates the contact grid of a structure that was reduced as a whole",
+        "Use a separate structure with sectors = 1 to carry the surface",
     ),
     needs(
         &[CARRIED_AROUND],
         ("a contact grid in its ROM", |at| at.carrier_rom().is_some_and(|rom| rom.extras.grid.is_some())),
-        "the surface is laid through it",
+        "the surface interpolates this grid",
         "Reduce the casing with `tiprub reduce casing`, or add the metadata `contact_grid`",
     ),
     needs(
@@ -426,8 +435,8 @@ static ROMS: &[FeatureRule] = &[
         ("an open contact grid in its ROM", |at| {
             at.carrier_rom().and_then(|rom| rom.extras.grid).is_some_and(|grid| !grid.closed)
         }),
-        "the surface is laid through it",
-        "Add the metadata `contact_grid` for an open grid, its contact nodes row after row",
+        "the surface interpolates this grid",
+        "Add the metadata `contact_grid` for an open grid, with the contact nodes listed row by row",
     ),
 ];
 

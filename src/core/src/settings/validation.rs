@@ -29,7 +29,7 @@ impl SceneSettings {
             if !word(name) {
                 return Err(Error::invalid(
                     field,
-                    format!("`{name}` is not a plain name"),
+                    format!("`{name}` is not a valid name"),
                     "Use letters, digits and underscores, starting with a letter",
                 ));
             }
@@ -39,7 +39,7 @@ impl SceneSettings {
             return Err(Error::invalid(
                 "scene",
                 format!("{} structures and {} contacts", self.structures.len(), self.contacts.len()),
-                "A scene needs at least one [[structure]] and one [[contact]]",
+                "Give at least one [[structure]] and one [[contact]]",
             ));
         }
         for (index, structure) in self.structures.iter().enumerate() {
@@ -87,7 +87,7 @@ impl SceneSettings {
     fn validate_outputs(&self) -> Result<()> {
         let outputs = &self.outputs;
         if outputs.watched_sectors.contains(&0) {
-            return Err(Error::invalid("outputs.watched_sectors", "sector 0", "Sectors are counted from 1"));
+            return Err(Error::invalid("outputs.watched_sectors", "there is no sector 0", "Count sectors from 1"));
         }
         let mut seen = outputs.watched_sectors.clone();
         seen.sort_unstable();
@@ -125,7 +125,7 @@ impl SceneSettings {
                 return Err(Error::invalid(
                     format!("{kind}[{number}].name"),
                     format!("`{name}` is used by two structures or surfaces"),
-                    "Give each structure and surface a name of its own",
+                    "Give every structure and every surface a unique name",
                 ));
             }
         }
@@ -164,7 +164,7 @@ impl StructureSettings {
 
 /// Modes and sectors count from 1.
 fn counted(field: String, number: Option<usize>) -> Result<()> {
-    if number == Some(0) { Err(Error::invalid(field, "0", "They are counted from 1")) } else { Ok(()) }
+    if number == Some(0) { Err(Error::invalid(field, "0 is out of range", "Count from 1")) } else { Ok(()) }
 }
 
 impl ExcitationSettings {
@@ -174,12 +174,12 @@ impl ExcitationSettings {
         at_most(&format!("{at}.phase"), self.phase, ranges::ANGLE)?;
         counted(format!("{at}.mode"), self.mode)?;
         if self.node.is_some() != self.direction.is_some() {
-            let remedy = "Give `node` and `direction` together, or leave both out and give a `mode`";
-            return Err(Error::invalid(format!("{at}.node"), "without `direction`, or the other way round", remedy));
+            let remedy = "Give both, or leave out both and give a `mode`";
+            return Err(Error::invalid(format!("{at}.node"), "only one of `node` and `direction` is given", remedy));
         }
         if self.node.is_none() && self.mode.is_none() {
-            let remedy = "Give the `mode` that is loaded, or the `node` and the `direction` of a force, or all three";
-            return Err(Error::invalid(format!("{at}.mode"), "neither a mode nor a node is given", remedy));
+            let remedy = "Give the loaded `mode`, or the `node` and the `direction` of a force, or all three";
+            return Err(Error::invalid(format!("{at}.mode"), "neither `mode` nor `node` is given", remedy));
         }
         Ok(())
     }
@@ -190,8 +190,8 @@ impl InitialSettings {
         counted(format!("{at}.mode"), Some(self.mode))?;
         counted(format!("{at}.sector"), self.sector)?;
         if self.sector.is_some() && self.nodal_diameter.is_some() {
-            let remedy = "Give one of them; a further [[structure.initial]] adds to this one";
-            return Err(Error::invalid(format!("{at}.sector"), "beside `nodal_diameter`", remedy));
+            let remedy = "Give only one of them; a further [[structure.initial]] is added to this one";
+            return Err(Error::invalid(format!("{at}.sector"), "cannot be combined with `nodal_diameter`", remedy));
         }
         at_most(&format!("{at}.displacement"), self.displacement, ranges::POSITION)?;
         at_most(&format!("{at}.velocity"), self.velocity, ranges::VELOCITY)?;
@@ -241,7 +241,7 @@ impl SurfaceSettings {
                 at_most(&format!("{at}.shape.amplitude"), *amplitude, ranges::POSITION)?;
                 at_most(&format!("{at}.shape.phase"), *phase, ranges::ANGLE)?;
                 if *order == 0 {
-                    let remedy = "Use order ≥ 1, or gap and radius change for a uniform clearance";
+                    let remedy = "Use order ≥ 1; set a uniform clearance with the gap and the radius change";
                     return Err(Error::invalid(format!("{at}.shape.order"), "0 lobes", remedy));
                 }
                 within(&format!("{at}.shape.order"), f64::from(*order), 1.0, ranges::LOBES)
@@ -263,8 +263,8 @@ impl ContactSettings {
     /// The numbers, of a scene that has what they need; there is no gap before a master that `flies`.
     fn validate(&self, flies: bool, at: &str) -> Result<()> {
         if self.nodes.as_ref().is_some_and(String::is_empty) {
-            let remedy = "Give the beginning of the names, or remove the line for all nodes";
-            return Err(Error::invalid(format!("{at}.nodes"), "an empty text", remedy));
+            let remedy = "Give the prefix of the node names, or remove the line to use all nodes";
+            return Err(Error::invalid(format!("{at}.nodes"), "the text is empty", remedy));
         }
         within(&format!("{at}.friction"), self.friction, 0.0, ranges::FRICTION)?;
         if let Some(share) = self.heat_to_slave {
@@ -277,7 +277,8 @@ impl ContactSettings {
             return Ok(());
         }
         if self.gap == 0.0 && self.sector_gaps.is_empty() {
-            let remedy = "Add the radial tip clearance to [[contact]]: number, m (> 0, up to a tenth of the radius); only a free master has none";
+            let remedy = "Add the radial tip clearance to [[contact]]: number, m (> 0, up to a tenth of the radius); \
+                          only a free master has none";
             return Err(Error::invalid(format!("{at}.gap"), "missing or 0", remedy));
         }
         if self.gap != 0.0 || self.sector_gaps.is_empty() {
@@ -313,7 +314,7 @@ impl CoatingSettings {
 /// A clearance. Smaller than an atom it is as good as none, and right.
 fn gap(field: &str, value: f64) -> Result<()> {
     if !(value.is_finite() && value > 0.0) {
-        return Err(Error::invalid(field, format!("{} m", shown(value)), "Give a finite value > 0"));
+        return Err(Error::invalid(field, format!("{} m is out of range", shown(value)), "Give a finite value > 0"));
     }
     within(field, value, 0.0, ranges::POSITION)
 }
@@ -322,7 +323,8 @@ fn count(field: &str, value: usize, least: usize, most: usize) -> Result<()> {
     if (least..=most).contains(&value) {
         Ok(())
     } else {
-        Err(Error::invalid(field, format!("{value}"), format!("Give a whole number from {least} to {most}")))
+        let remedy = format!("Give a whole number from {least} to {most}");
+        Err(Error::invalid(field, format!("{value} is out of range"), remedy))
     }
 }
 
@@ -330,7 +332,7 @@ fn product(field: &str, what: &str, around: usize, along: usize, most: usize) ->
     if around.checked_mul(along).is_some_and(|total| total <= most) {
         Ok(())
     } else {
-        let problem = format!("{around} around x {along} along are more than {most} {what}");
-        Err(Error::invalid(field, problem, format!("Give at most {most} {what} in all")))
+        let problem = format!("{around} around x {along} along exceed the limit of {most} {what}");
+        Err(Error::invalid(field, problem, format!("Use at most {most} {what} in total")))
     }
 }

@@ -53,8 +53,8 @@ impl Simulation {
         }
         Err(Error::invalid(
             format!("variable `{}`", variable.name),
-            format!("is of type {:?}, not {wanted}", variable.kind),
-            "Call the function of the variable's type in modelDescription.xml",
+            format!("the type is {:?}, not {wanted}", variable.kind),
+            "Call the function for the variable's type in modelDescription.xml",
         ))
     }
 
@@ -63,7 +63,7 @@ impl Simulation {
         if !variable.is_settable() {
             return Err(Error::invalid(
                 format!("variable `{}`", variable.name),
-                format!("is {:?} and cannot be set", variable.causality),
+                format!("a variable with causality {:?} cannot be set", variable.causality),
                 "Set inputs and parameters only",
             ));
         }
@@ -71,7 +71,7 @@ impl Simulation {
         if fixed && self.phase != SimulationPhase::Created {
             return Err(Error::invalid(
                 format!("parameter `{}`", variable.name),
-                "is fixed and cannot be set after initialisation",
+                "a fixed parameter cannot be set after initialisation",
                 "Set it before initialisation ends, or reset the instance first",
             ));
         }
@@ -164,7 +164,7 @@ impl Simulation {
     pub fn set_string(&mut self, reference: u32, _value: &str) -> Result<()> {
         self.expect_kind(reference, "string", |kind| kind == DataType::String)?;
         let (_, name, _) = self.settable(reference)?;
-        Err(Error::invalid(format!("variable `{name}`"), "cannot be set", "Leave it as it is"))
+        Err(Error::invalid(format!("variable `{name}`"), "string variables cannot be set", "Remove the call"))
     }
 
     /// First time derivative of a continuous real input, valid from now until the input is set again: with the value it
@@ -244,11 +244,12 @@ impl Simulation {
             return Err(Error::invalid(
                 what,
                 "the variable is not a real input",
-                "Give derivatives of real inputs only",
+                "Set derivatives of real inputs only",
             ));
         }
         if order != 1 {
-            return Err(Error::invalid(what, format!("order {order}"), "Inputs are linear in time: give order 1"));
+            let problem = format!("order {order} is not supported");
+            return Err(Error::invalid(what, problem, "Use order 1, because inputs are linear in time"));
         }
         if !value.is_finite() {
             return Err(Error::invalid(what, shown(value), "Give a finite number"));
@@ -268,18 +269,19 @@ impl Simulation {
         let what = format!("derivative of `{}`", variable.name);
         let continuous = variable.causality == Causality::Output && variable.variability == Variability::Continuous;
         if !continuous || variable.kind != DataType::Real {
-            let remedy = "Ask for derivatives of continuous real outputs only";
+            let remedy = "Request derivatives of continuous real outputs only";
             return Err(Error::invalid(what, "the variable is not a continuous real output", remedy));
         }
         if order != 1 {
-            return Err(Error::invalid(what, format!("order {order}"), "Only derivatives of order 1 are provided"));
+            let problem = format!("order {order} is not supported");
+            return Err(Error::invalid(what, problem, "Use order 1"));
         }
         let derivative = self.derivative_of(variable, element, reference);
         if derivative.is_finite() {
             return Ok(derivative);
         }
-        let problem = "it changes by more than numbers can tell over the communication step";
-        Err(Error::invalid(what, problem, "Use longer communication steps, and look at loads and inputs"))
+        let problem = "the rate of change over the communication step overflows double precision";
+        Err(Error::invalid(what, problem, "Use longer communication steps, and check loads and inputs"))
     }
 }
 
@@ -293,6 +295,6 @@ pub(super) fn check_range(variable: &Variable, value: f64) -> Result<()> {
     } else {
         format!("{value} is not finite")
     };
-    let remedy = if value.is_finite() { "Give a value within min and max" } else { "Give a finite number" };
+    let remedy = if value.is_finite() { "Give a value between min and max" } else { "Give a finite number" };
     Err(Error::invalid(format!("variable `{}`", variable.name), problem, remedy))
 }

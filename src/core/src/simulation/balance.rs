@@ -29,8 +29,9 @@ impl Simulation {
         let Some((set, (who, work))) = found else { return };
         let curvature = self.system.ledgers()[set].curvature_work.value();
         let problem = format!(
-            "up to t = {} s normals that turn and surfaces that curve within internal steps have added {curvature:.3e} J that no input brings \
-             (curvature work){}, beside {work:.3e} J of net work of {who}: this net work may be wrong by as much, and in its sign",
+            "up to t = {} s, contact normals that rotate and surfaces that curve within internal steps have added \
+             {curvature:.3e} J of spurious energy (curvature work){}, compared with {work:.3e} J of net work of {who}: \
+             this net work may be wrong by the same amount and may have the wrong sign",
             shown_time(time),
             self.of_set(set)
         );
@@ -49,9 +50,9 @@ impl Simulation {
         self.phase = SimulationPhase::Failed;
         Err(Error::Unstable {
             problem: format!(
-                "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, where it was {:.4e} J at the start \
-                 and work less friction and damping supplied {:.4e} J: modes that the internal step of {:.3e} s does not resolve \
-                 have taken energy that is not there",
+                "at t = {} s (last good time {} s) the kinetic and strain energy{} is {:.4e} J, but it was {:.4e} J at \
+                 the start and work minus friction and damping losses supplied only {:.4e} J: modes that the internal \
+                 step of {:.3e} s does not resolve have gained spurious energy",
                 shown_time(time),
                 shown_time(self.time),
                 self.of_set(set),
@@ -90,24 +91,30 @@ impl Simulation {
         match loss {
             Loss::Friction => (
                 format!(
-                    "friction{of} has put {given:.3e} J into the vibration, of {exchanged:.3e} J exchanged, but it can only dissipate: tips vibrate \
-                     faster than they slide, and this law has no sticking"
+                    "friction{of} has added {given:.3e} J to the vibration, out of {exchanged:.3e} J exchanged, \
+                     although it can only dissipate: tips vibrate faster than they slide, and this friction law does \
+                     not model sticking"
                 ),
                 self.against_sliding(settings.scheme),
             ),
             Loss::Cutting => (
                 format!(
-                    "forces of cutting{of} have put {given:.3e} J into tips that go back, where nothing is cut, of {exchanged:.3e} J \
-                     exchanged: tips vibrate faster than they slide, and cutting knows no sticking"
+                    "cutting forces{of} have added {given:.3e} J to tips that move backwards, where nothing is cut, \
+                     out of {exchanged:.3e} J exchanged: tips vibrate faster than they slide, and the cutting law does \
+                     not model sticking"
                 ),
-                "Use a smaller internal step, a lower `specific_energy`, or a motion that keeps sliding".to_owned(),
+                "Use a smaller internal step, a lower `specific_energy`, or a motion in which the tips keep sliding"
+                    .to_owned(),
             ),
             Loss::Impact => (
                 format!(
-                    "impacts{of} have put {given:.3e} J into the vibration, of {exchanged:.3e} J of contact work, but they can only dissipate"
+                    "impacts{of} have added {given:.3e} J to the vibration, out of {exchanged:.3e} J of contact work, \
+                     although they can only dissipate"
                 ),
                 match (settings.solver, settings.scheme) {
-                    (Solver::Film, _) => "Use solver = \"lcp\": film leaves nodes inside the surface for a step",
+                    (Solver::Film, _) => {
+                        "Use solver = \"lcp\", because film leaves nodes inside the surface for one step"
+                    }
                     (_, Scheme::Galerkin) => "Use a smaller `tolerance`",
                     (_, Scheme::MasslessBoundary) => {
                         "Use a smaller internal step or more damping, or the scheme modal-exact"
@@ -129,7 +136,7 @@ impl Simulation {
             }
             Err(_) => "Use ",
         };
-        format!("{coulomb}less friction, or a motion that keeps sliding")
+        format!("{coulomb}less friction, or a motion in which the tips keep sliding")
     }
 }
 

@@ -127,7 +127,7 @@ impl Compiled {
             let node = rom.contact_nodes.iter().position(|node| node.name == *name);
             let names: Vec<&str> = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
             let unknown = || {
-                let problem = format!("`{name}` is no contact node of the ROM");
+                let problem = format!("`{name}` is not a contact node of the ROM");
                 Error::invalid(format!("{at}.node"), problem, format!("Use one of: {}", names.join(", ")))
             };
             Ok(3 * node.ok_or_else(unknown)? + direction as usize)
@@ -153,8 +153,8 @@ impl Compiled {
         if mode <= most {
             return Ok(());
         }
-        let problem = format!("mode {mode}, where `{}` has {most} that can be moved", self.body(body).0.name);
-        Err(Error::invalid(field, problem, "Use a lower mode, or a ROM with more of them"))
+        let problem = format!("mode {mode}, but `{}` has only {most} dynamic modes", self.body(body).0.name);
+        Err(Error::invalid(field, problem, "Use a lower mode, or a ROM with more modes"))
     }
 
     /// Checks lists of modes, sectors and nodal diameters, which need the ROM.
@@ -165,8 +165,8 @@ impl Compiled {
         for (number, (structure, rom)) in self.scene.settings.structures.iter().zip(&self.scene.roms).enumerate() {
             let (listed, most) = (structure.damping_ratios.len(), rom.order());
             if listed > most {
-                let problem = format!("{listed} values, where the ROM has {most} modes");
-                let remedy = "Give at most as many as modes, the lowest first";
+                let problem = format!("{listed} values, but the ROM has only {most} modes");
+                let remedy = "Give at most one value per mode, lowest mode first";
                 return Err(Error::invalid(format!("structure[{}].damping_ratios", number + 1), problem, remedy));
             }
         }
@@ -176,14 +176,14 @@ impl Compiled {
             let check = |(index, one): (usize, &InitialSettings)| {
                 let at = format!("structure[{}].initial[{}]", self.plan.bodies[body] + 1, index + 1);
                 self.check_mode(body, &format!("{at}.mode"), one.mode, self.fewest_modes(body, None))?;
-                let remedy = "Use one that the ROM has";
+                let remedy = "Use a value within the range of the ROM";
                 if let Some(sector) = one.sector.filter(|sector| *sector > rom.sectors) {
-                    let problem = format!("sector {sector} of {}", rom.sectors);
+                    let problem = format!("sector {sector}, but the ROM has only {} sectors", rom.sectors);
                     return Err(Error::invalid(format!("{at}.sector"), problem, remedy));
                 }
                 if let Some(n) = one.nodal_diameter.filter(|n| *n > rom.largest_nodal_diameter()) {
-                    let problem =
-                        format!("{n}, where {} sectors have up to {}", rom.sectors, rom.largest_nodal_diameter());
+                    let largest = rom.largest_nodal_diameter();
+                    let problem = format!("{n}, but {} sectors have nodal diameters 0 to {largest} only", rom.sectors);
                     return Err(Error::invalid(format!("{at}.nodal_diameter"), problem, remedy));
                 }
                 Ok(())
@@ -205,7 +205,7 @@ impl Compiled {
         Err(Error::invalid(
             format!("variable `{}rotor_temperature`", self.plan.body_prefix(&self.scene, body)),
             format!(
-                "{} K with softening {} 1/K leaves {} times the stiffness, outside {} … {}",
+                "{} K with softening {} 1/K multiplies the stiffness by {}, outside {} … {}",
                 shown(temperature),
                 shown(structure.softening),
                 shown(left),
@@ -332,7 +332,8 @@ impl Simulation {
         Err(Error::invalid(
             format!("parameter `{}excitation_order`", self.compiled.plan.body_prefix(&self.compiled.scene, body)),
             format!(
-                "the excitation of order {} turns by {angle:.3e} rad in one internal step of {step:.3e} s at t = {} s, beyond {}",
+                "the excitation of order {} rotates by {angle:.3e} rad in one internal step of {step:.3e} s at t = {} \
+                 s, more than the limit of {} rad",
                 shown(order),
                 shown_time(self.time),
                 shown(crate::ranges::EXCITED_ANGLE)

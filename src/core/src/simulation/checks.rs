@@ -9,9 +9,10 @@ use crate::warning::{Topic, Warning};
 use crate::{Error, Result, shown_time};
 
 /// Extension of a surface around an axis ([`crate::gaps::surface_spline::REACH`]), and the remedy for a node further out.
-pub const OUT_OF_REACH: &str = "a quarter of its axial extent, as far as it goes on along its tangents";
-pub const OUT_OF_REACH_REMEDY: &str = "Give a casing whose contact grid covers the blade tips wherever they go, or check axial \
-                                       shift, loads and speed";
+pub const OUT_OF_REACH: &str = "a quarter of the axial extent of the surface, the limit of its extrapolation along the \
+                                tangents";
+pub const OUT_OF_REACH_REMEDY: &str = "Use a casing whose contact grid covers the blade tips over their whole range of \
+                                       motion, or check axial shift, loads and speed";
 
 impl Compiled {
     /// Values of the ROMs and of the scene that are rarely meant.
@@ -55,9 +56,11 @@ impl Compiled {
         let settings = &self.scene.settings;
         let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
         let index = settings.surfaces.iter().position(|surface| surface.patches.is_some() && !rubs)?;
-        let problem =
-            format!("surface[{}].patches: no contact has friction, so no patch has friction power", index + 1);
-        Some(Warning::new(Topic::NoFrictionPower, problem, "Set `contact.friction`, or leave out the patches"))
+        let problem = format!(
+            "surface[{}].patches: no contact has friction, so the friction power of all patches is zero",
+            index + 1
+        );
+        Some(Warning::new(Topic::NoFrictionPower, problem, "Set `contact.friction`, or remove the patches"))
     }
 }
 
@@ -81,8 +84,8 @@ impl Simulation {
     pub(super) fn check_initial_state(&self) -> Result<()> {
         let Err(failure) = self.system.check_state() else { return Ok(()) };
         let blades = |structure: usize| match self.rotors.len() {
-            1 => "blades".to_owned(),
-            _ => format!("blades of {}", self.compiled.structure_name(structure)),
+            1 => "the blades".to_owned(),
+            _ => format!("the blades of {}", self.compiled.structure_name(structure)),
         };
         let (what, remedy) = match failure {
             StepFailure::CarrierImplausible { structure } => (
@@ -90,23 +93,23 @@ impl Simulation {
                     "the {} is displaced at the start by more than a tenth of the radius of the contact nodes",
                     self.compiled.carrier_name(structure)
                 ),
-                "Check the start values of its loads and temperatures; small displacements cannot describe this",
+                "Check the start values of its loads and temperatures; the model assumes small displacements",
             ),
             StepFailure::Curved(curved) => (
                 format!(
-                    "{} are displaced at the start so far around the axis that u²/2r, which linear gaps miss, is as large as the \
-                     clearance",
+                    "{} are displaced at the start so far around the axis that u²/2r, which linear gaps neglect, is as \
+                     large as the clearance",
                     blades(curved.structure)
                 ),
-                "Check the start value of the speed and the loads of the ROM; small displacements cannot describe this",
+                "Check the start value of the speed and the loads of the ROM; the model assumes small displacements",
             ),
             StepFailure::Implausible { structure, .. } => (
                 format!(
                     "{} are displaced at the start by more than a tenth of the radius of the contact nodes",
                     blades(structure)
                 ),
-                "Check the start value of the speed and the centrifugal loads of the ROM; small displacements cannot \
-                 describe this",
+                "Check the start value of the speed and the centrifugal loads of the ROM; the model assumes small \
+                 displacements",
             ),
             _ => (
                 "the displacements at the start are not finite".to_owned(),
@@ -144,14 +147,15 @@ impl Simulation {
         let refuse = |problem: String, remedy: &str| Err(Error::invalid("initial clearance", problem, remedy));
         let name = |index: usize| self.compiled.node_name(body, index / lanes);
         if let Some(lost) = gaps.iter().position(|gap| gap.is_nan()) {
-            let remedy = "Check start values of loads and temperatures, which may deform the surface beyond all bounds, and its \
-                          contact grid: it must not be folded, or flattened to a line";
-            return refuse(format!("{} finds no closest point of its surface", name(lost)), remedy);
+            let remedy = "Check the start values of loads and temperatures, which may deform the surface too much, and \
+                          check that its contact grid is neither folded nor collapsed to a line";
+            return refuse(format!("contact node {} has no closest point on its surface", name(lost)), remedy);
         }
         let own = self.system.pairs().iter().filter(|pair| pair.structure() == body);
         if let Some(index) = own.filter_map(|pair| pair.gap().out_of_reach()).next() {
             let problem = format!(
-                "{} of sector {} starts beyond the first or last ring of the casing's surface by more than {OUT_OF_REACH}",
+                "contact node {} of sector {} starts beyond the first or last ring of the casing surface by more than \
+                 {OUT_OF_REACH}",
                 name(index),
                 index % lanes + 1
             );
@@ -164,21 +168,23 @@ impl Simulation {
         }
         let (touching, node) = (gaps.iter().filter(|gap| **gap < 0.0).count(), name(deepest.0));
         if self.compiled.bodies[body].translations.is_some() {
-            let remedy = "Move one of the structures: gaps follow from the contact positions in the ROMs; check that S_t x S_s of \
-                          each contact grid points to the master";
-            let problem =
-                format!("{touching} contact nodes start inside the surfaces, deepest {:.3e} m at {node}", deepest.1);
+            let remedy = "Move one of the structures, because gaps follow from the contact positions in the ROMs; \
+                          check that S_t x S_s of each contact grid points to the master";
+            let problem = format!(
+                "{touching} contact nodes start inside the surfaces, with a maximum depth of {:.3e} m at {node}",
+                deepest.1
+            );
             return refuse(problem, remedy);
         }
         let problem = format!(
-            "{touching} contact nodes start inside the casing, deepest {:.3e} m at {node} of sector {}",
+            "{touching} contact nodes start inside the casing, with a maximum depth of {:.3e} m at {node} of sector {}",
             deepest.1,
             deepest.0 % lanes + 1
         );
         refuse(
             problem,
-            "Enlarge the gap, let the casing shape grow in with ramp_time (casing_ramp_time), start at another rotor angle, or give \
-             other start values to loads, temperatures and the inputs that move casing and shaft",
+            "Enlarge the gap, ramp up the casing shape with ramp_time (casing_ramp_time), start at another rotor \
+             angle, or change the start values of loads, temperatures and the inputs that move casing and shaft",
         )
     }
 }

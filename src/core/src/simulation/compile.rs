@@ -354,8 +354,8 @@ impl Compiled {
         if structure.load.is_some() && !(0.0..=f64::from(most)).contains(&order) {
             return Err(Error::invalid(
                 format!("parameter `{}casing_load_order`", prefix(self.carriers.len(), &structure.name)),
-                format!("{order} nodal diameters, where the contact grid of the casing resolves 0 to {most}"),
-                "Use fewer nodal diameters, or a casing with more contact nodes around",
+                format!("{order} nodal diameters, but the contact grid of the casing resolves only 0 to {most}"),
+                "Use fewer nodal diameters, or a casing with more contact nodes around the circumference",
             ));
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 0 and a u32")]
@@ -382,11 +382,11 @@ impl Compiled {
         Err(Error::invalid(
             format!("variable `{}speed`", self.plan.body_prefix(&self.scene, body)),
             format!(
-                "{} rad/s is beyond the {} rad/s that stiffening and growth were fitted for",
+                "{} rad/s is beyond the {} rad/s for which stiffening and growth were fitted",
                 shown(speed),
                 shown(spin.largest_speed)
             ),
-            "Reduce the structure again with a larger speed (`tiprub reduce --spin`), or leave spin out",
+            "Reduce the structure again with a larger speed (`tiprub reduce --spin`), or remove `spin`",
         ))
     }
 
@@ -458,13 +458,14 @@ impl Compiled {
             }
             let first = self.plan.pairs_of(body).next().map_or(0, |(pair, _)| pair);
             let (what, problem, remedy) = if parts.translations.is_some() {
-                ("contact.nodes", format!("{together} contact nodes of all pairs"), "Choose fewer, or a coarser mesh")
+                let problem = format!("{together} contact nodes in all pairs");
+                ("contact.nodes", problem, "Choose fewer nodes, or a coarser mesh")
             } else {
                 let what = if parts.disk.is_some() { "ROM metadata `sectors`" } else { "surface.structure" };
-                let problem = format!("{together} contact nodes of all sectors together, coupled");
+                let problem = format!("{together} coupled contact nodes in all sectors");
                 (what, problem, "Use fewer contact nodes or sectors, or uncoupled sectors on a rigid surface")
             };
-            let problem = format!("{problem}, of `{name}` and what it feels, more than {MOST_COUPLED}");
+            let problem = format!("{problem} of `{name}` and the structures coupled to it, more than {MOST_COUPLED}");
             return Err(self.of_pair(first, Error::invalid(what, problem, remedy)));
         }
         Ok(())
@@ -550,7 +551,7 @@ fn check_lengths(rom: &Rom, clearances: &[f64], surface: &CompiledShape) -> Resu
         if value > SMALL * smallest {
             return Err(Error::invalid(
                 what,
-                format!("{value:.3e} m is not small against the radius {smallest:.3e} m of the contact nodes"),
+                format!("{value:.3e} m is not small compared with the radius of {smallest:.3e} m of the contact nodes"),
                 "Give lengths in metres, well below a tenth of the radius",
             ));
         }

@@ -56,14 +56,16 @@ pub fn check_contour(rom: &Rom, nodes: &[usize], uses_slopes: bool) -> Result<()
 fn contradicted(rom: &Rom, [low, high]: [AxialStation; 2], rise: f64, straight: bool) -> Error {
     let [first, last] = [low, high].map(|place| &rom.contact_nodes[place.node].name);
     let remedy = if straight {
-        "Give dr/dz of the tip contour at each node, which is 0 where the array is left out, or set meridian = \"cylinder\" for the contact"
+        "Give dr/dz of the tip contour at each node, which is 0 if the array is missing, or set meridian = \
+         \"cylinder\" for the contact"
     } else {
-        "Give dr/dz of the tip contour at each node, with its sign along z; it is no angle"
+        "Give the slope dr/dz of the tip contour at each node, with its sign for increasing z, not an angle"
     };
     Error::invalid(
         format!("ROM `{}`, array `contact_meridional_slopes`", rom.name),
         format!(
-            "nodes `{first}` and `{last}` have the slopes {} and {}, where their positions rise by {} m per m along the axis",
+            "nodes `{first}` and `{last}` have the slopes {} and {}, but their positions rise by {} m per m along the \
+             axis",
             shown(low.slope),
             shown(high.slope),
             shown((rise * 1e4).round() / 1e4)

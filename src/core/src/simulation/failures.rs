@@ -34,7 +34,7 @@ impl Simulation {
                 structure,
                 self.compiled.structure_name(structure),
                 if self.is_marched() {
-                    "Use less friction, a larger `tolerance`, another longest step, or the solver coulomb"
+                    "Use less friction, a larger `tolerance`, another maximum internal step, or the solver coulomb"
                 } else {
                     "Use less friction, another internal step or the solver coulomb"
                 },
@@ -43,19 +43,19 @@ impl Simulation {
             StepFailure::NonFinite | StepFailure::Exhausted => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
                 format!(
-                    "a contact node of {} is displaced by more than a tenth of its radius, is as deep inside the casing, or meets a \
-                     flank of the casing shape steeper than 45°{}",
+                    "a contact node of {} is displaced by more than a tenth of its radius, is that deep inside the \
+                     casing, or meets a flank of the casing shape steeper than 45°{}",
                     self.sector_name(structure, sector),
                     self.instability(structure)
                 ),
-                "Check gap, casing shape, loads and inputs; small displacements cannot describe this".to_owned(),
+                "Check gap, casing shape, loads and inputs; the model assumes small displacements".to_owned(),
             ),
             StepFailure::CarrierImplausible { structure } => self.carrier_failure(structure),
             StepFailure::Curved(curved) => self.curved_failure(curved),
             StepFailure::OutOfReach { structure, node, sector } => (
                 format!(
-                    "contact node {} of {} has left the surface of the casing in z: it is beyond the first or last ring by more than \
-                     {OUT_OF_REACH}",
+                    "contact node {} of {} has left the casing surface in the axial direction: it is beyond the first \
+                     or last ring by more than {OUT_OF_REACH}",
                     self.compiled.node_name(structure, node),
                     self.sector_name(structure, sector)
                 ),
@@ -66,8 +66,8 @@ impl Simulation {
             }
             StepFailure::Unbalanced { set, work, exchanged } => (
                 format!(
-                    "contact forces{} have added {work:.3e} J that no input brings, of {exchanged:.3e} J exchanged: normals turn and \
-                     surfaces curve too far within an internal step (curvature work)",
+                    "contact forces{} have added {work:.3e} J of spurious energy, out of {exchanged:.3e} J exchanged: \
+                     contact normals rotate or surfaces curve too much within an internal step (curvature work)",
                     self.of_set(set)
                 ),
                 "Use a smaller internal step".to_owned(),
@@ -81,8 +81,8 @@ impl Simulation {
             }
             StepFailure::TooFast { structure } => (
                 format!(
-                    "contact nodes of {} move by more than a tenth of the extent of the contact nodes in one internal step, and \
-                     could pass a surface unseen",
+                    "contact nodes of {} move by more than a tenth of the extent of the contact nodes in one internal \
+                     step, and could pass through a surface undetected",
                     self.compiled.structure_name(structure)
                 ),
                 "Use a smaller internal step or a lower velocity".to_owned(),
@@ -92,7 +92,7 @@ impl Simulation {
                 structure,
                 &self.sector_name(structure, sector),
                 if self.is_marched() {
-                    "Use less friction, a larger `tolerance`, or another longest step"
+                    "Use less friction, a larger `tolerance`, or another maximum internal step"
                 } else {
                     "Use less friction or another internal step"
                 },
@@ -108,8 +108,8 @@ impl Simulation {
     ) -> (String, String) {
         (
             format!(
-                "the gap of contact node {} of {} has changed by {jump:.3e} m in two steps, where motion of node and casing \
-                 explains {explained:.3e} m: the work of this contact cannot be told",
+                "the gap of contact node {} of {} has changed by {jump:.3e} m in two steps, but the motion of node and \
+                 casing explains only {explained:.3e} m: the work of this contact cannot be determined",
                 self.compiled.node_name(structure, node),
                 self.sector_name(structure, sector)
             ),
@@ -122,12 +122,12 @@ impl Simulation {
     fn edge_texts(&self, structure: usize, node: usize) -> (String, String) {
         (
             format!(
-                "the contact node {} comes over the edge of a surface and is behind it already: what is at an edge is not \
-                 described, and pushing the node out would be an impact of arbitrary strength",
+                "contact node {} has passed the edge of a surface and is already behind it: contact at edges is not \
+                 modelled, and pushing the node out would be an impact of arbitrary strength",
                 self.compiled.node_name(structure, node)
             ),
-            "Extend the contact grid to where nodes may come, or move one of the structures; check that S_t x S_s of each \
-             contact grid points to the master"
+            "Extend the contact grid to cover the whole range of the nodes, or move one of the structures; check that \
+             S_t x S_s of each contact grid points to the master"
                 .to_owned(),
         )
     }
@@ -145,10 +145,10 @@ impl Simulation {
         }
         (
             format!(
-                "the contact problem of {name} has no solution: contact nodes are inside the surface that no motion of the modes \
-                 takes out all at once"
+                "the contact problem of {name} has no solution: no motion of the modes moves all penetrating contact \
+                 nodes out of the surface simultaneously"
             ),
-            "Use a ROM with more modes or fewer contact nodes, or let the surfaces leave it room".to_owned(),
+            "Use a ROM with more modes or fewer contact nodes, or place the surfaces further apart".to_owned(),
         )
     }
 
@@ -166,14 +166,14 @@ impl Simulation {
         let name = self.compiled.carrier_name(structure);
         (
             format!("the {name} is displaced by more than a tenth of the radius"),
-            "Check its loads and temperatures; small displacements cannot describe this".to_owned(),
+            "Check its loads and temperatures; the model assumes small displacements".to_owned(),
         )
     }
 
     fn curved_failure(&self, curved: Curved) -> (String, String) {
         let problem = format!(
-            "contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, which misses \
-             u²/2r = {:.2e} m, as much as the clearance of {:.2e} m{}",
+            "contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, and the \
+             neglected u²/2r = {:.2e} m is as large as the clearance of {:.2e} m{}",
             self.compiled.node_name(curved.structure, curved.node),
             self.sector_name(curved.structure, curved.sector),
             curved.moved,
@@ -181,7 +181,7 @@ impl Simulation {
             curved.clearance,
             self.instability(curved.structure)
         );
-        let remedy = "Check casing shape, friction, loads and inputs: small displacements cannot describe this";
+        let remedy = "Check casing shape, friction, loads and inputs; the model assumes small displacements";
         (problem, remedy.to_owned())
     }
 
@@ -217,13 +217,13 @@ impl Simulation {
 }
 
 const BESIDE_FLIGHT: &str =
-    "Check positions and velocity; small displacements beside rigid flight cannot describe this";
+    "Check positions and velocity; the model assumes small displacements relative to the rigid-body motion";
 
 /// Returns the problem and the remedy of a failure that means something else for a free body.
 fn free_failure(name: &str) -> (String, String) {
     let problem = format!(
-        "contact nodes of {name} have moved against each other, or into a surface, by more than a tenth of the extent of the \
-         contact nodes"
+        "contact nodes of {name} have moved relative to each other, or into a surface, by more than a tenth of the \
+         extent of the contact nodes"
     );
     (problem, BESIDE_FLIGHT.to_owned())
 }

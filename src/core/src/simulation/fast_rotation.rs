@@ -30,15 +30,16 @@ impl Compiled {
             return None;
         }
         let problem = format!(
-            "{} starts at speed {} rad/s, {ratio:.2} of its first natural frequency, with the stiffness of a rotor at rest. \
-             Centrifugal stiffening and growth can change contact forces by tens of per cent",
+            "{} starts at speed {} rad/s, {ratio:.2} of its first natural frequency, but has the stiffness of a rotor \
+             at rest. Centrifugal stiffening and growth can change contact forces by tens of per cent",
             self.rotor_name(body),
             shown(speed),
         );
         let remedy = if rom.extras.spin.is_some() {
-            "Set `spin = { stiffening = true, growth = true }` of the structure and `time.scheme = \"modal-exact\"`"
+            "Set `spin = { stiffening = true, growth = true }` for the structure and `time.scheme = \"modal-exact\"`"
         } else if self.bodies[body].disk.is_some() {
-            "Coupled sectors have no effects of spin: reduce matrices that were computed at speed, and silence this warning"
+            "Reduce matrices that were computed at speed and silence this warning, because coupled sectors do not \
+             support spin effects"
         } else {
             "Use a ROM with spin matrices (reduce --spin), `spin = { stiffening = true, growth = true }` and `time.scheme = \"modal-exact\"`"
         };

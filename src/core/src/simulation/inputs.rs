@@ -266,7 +266,7 @@ impl Simulation {
         let what = || format!("variable `{}`", variable.element_name(element));
         if input.slope != 0.0 && !(end.is_finite() && beyond <= SAME_STEP * low.abs().max(high.abs())) {
             let problem = format!(
-                "its derivative {} takes it to {} by t = {} s, outside {} … {}",
+                "with the derivative {} it reaches {} at t = {} s, outside {} … {}",
                 shown(input.slope),
                 shown(end),
                 shown(self.time + until),
@@ -283,16 +283,18 @@ impl Simulation {
         if at_once || (rate.is_finite() && turned <= std::f64::consts::PI) {
             return Ok(());
         }
-        let way = format!("goes from {} to {} by t = {} s", shown(reached), shown(end), shown(self.time + until));
+        let time = shown(self.time + until);
+        let way = format!("the value goes from {} to {} by t = {time} s", shown(reached), shown(end));
         Err(if turned > std::f64::consts::PI {
             Error::invalid(
                 what(),
-                format!("{way}, more than half a turn: an angle wrapped to one turn would be turned back all the way"),
-                "Give the angle without wrapping it; if so fast a turn is meant, give its derivative or shorter \
-                 communication steps",
+                format!("{way}, more than half a turn: a wrapped angle would rotate all the way back"),
+                "Give the angle without wrapping it; if such a fast rotation is intended, set its derivative or use \
+                 shorter communication steps",
             )
         } else {
-            Error::invalid(what(), format!("{way}, too fast for a number"), "Use smaller values or a longer step")
+            let problem = format!("{way}, and the rate overflows double precision");
+            Error::invalid(what(), problem, "Use smaller values or a longer communication step")
         })
     }
 }

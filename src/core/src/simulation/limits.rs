@@ -185,16 +185,16 @@ impl Compiled {
         let Error::Unstable { problem, mut remedy } = error else { return error };
         let preset = self.scene.settings.preset == Preset::Paper;
         if preset {
-            remedy = remedy.replace(stability::OTHER_SCHEME, ", or leave `preset` out, which fixes the scheme");
+            remedy = remedy.replace(stability::OTHER_SCHEME, ", or remove `preset`, which fixes the scheme");
         }
         let of_step = |text: &str| text.contains("`time.step`");
         let solver = self.scene.settings.contacts[0].solver;
         let adaptive = if solver == Solver::Film { Solver::Lcp } else { solver };
         if (of_step(&remedy) || of_step(&problem)) && self.scene.check_methods(Scheme::Galerkin, adaptive).is_ok() {
-            let without = if preset { "without `preset` " } else { "" };
-            let with = if solver == adaptive { "" } else { " with `contact.solver = \"lcp\"`" };
+            let without = if preset { "remove `preset`, " } else { "" };
+            let with = if solver == adaptive { "" } else { " and `contact.solver = \"lcp\"`" };
             let rest = remedy[..1].to_lowercase() + &remedy[1..];
-            remedy = format!("Use adaptive steps ({without}`time.scheme = \"galerkin\"`{with}), or {rest}");
+            remedy = format!("Use adaptive steps ({without}set `time.scheme = \"galerkin\"`{with}), or {rest}");
         }
         Error::Unstable { problem, remedy }
     }

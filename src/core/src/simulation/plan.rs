@@ -45,7 +45,7 @@ impl SteppingOrder {
     pub fn new(scene: &Scene) -> Result<Self> {
         let settings = &scene.settings;
         if scene.roms.len() != settings.structures.len() {
-            let problem = format!("{} structures with {} ROMs", settings.structures.len(), scene.roms.len());
+            let problem = format!("{} structures but {} ROMs", settings.structures.len(), scene.roms.len());
             return Err(Error::invalid("scene", problem, "Give one ROM per structure"));
         }
         scene.check_roms()?;
@@ -71,9 +71,9 @@ impl SteppingOrder {
             let nodes = nodes_of(contact, &scene.roms[master], index)?;
             if let Some((other, node)) = claimed(plan.pairs_of(body), &nodes) {
                 let name = &scene.roms[master].contact_nodes[node].name;
-                let problem = format!("claims the node `{name}`, which contact[{}] claims as well", other + 1);
+                let problem = format!("the node `{name}` already belongs to contact[{}]", other + 1);
                 let at = format!("contact[{}].nodes", index + 1);
-                return Err(Error::invalid(at, problem, "Give each contact node to one pair"));
+                return Err(Error::invalid(at, problem, "Assign each contact node to one pair only"));
             }
             plan.of_bodies[body].push(index);
             plan.pairs.push(PairPlan { surface, body, grid: under.filter(|_| open), carrier, nodes });
@@ -122,8 +122,8 @@ fn nodes_of(contact: &ContactSettings, rom: &Rom, index: usize) -> Result<Vec<us
     }
     let problem = format!("no contact node of ROM `{}` has a name that starts with {start:?}", rom.name);
     let remedy = rom.contact_nodes.first().map_or_else(
-        || "Give a ROM with contact nodes".to_owned(),
-        |first| format!("Use the beginning of names such as `{}`", first.name),
+        || "Use a ROM with contact nodes".to_owned(),
+        |first| format!("Use the beginning of a node name such as `{}`", first.name),
     );
     Err(Error::invalid(format!("contact[{}].nodes", index + 1), problem, remedy))
 }

@@ -51,8 +51,8 @@ impl Simulation {
                     self.told.inside[structure] = share;
                     let problem = self.left_inside(structure, node, share);
                     let then =
-                        if goes_on { String::new() } else { format!(". From {:.0} % on the run ends", 100.0 * INSIDE) };
-                    let problem = format!("up to t = {} s {problem}{then}", shown_time(time));
+                        if goes_on { String::new() } else { format!(". The run ends at {:.0} %", 100.0 * INSIDE) };
+                    let problem = format!("up to t = {} s, {problem}{then}", shown_time(time));
                     let remedy = self.against_pulling(structure);
                     self.note(Warning::new(Topic::FilmInside, problem, remedy));
                 }
@@ -64,8 +64,8 @@ impl Simulation {
             if share >= TOLD && !std::mem::replace(&mut self.told.pulls[structure], true) {
                 let problem = self.pulls(structure, node, share);
                 let then =
-                    if is_paper { String::new() } else { format!(". From {:.0} % on the run ends", 100.0 * REFUSED) };
-                let problem = format!("up to t = {} s {problem}{then}", shown_time(time));
+                    if is_paper { String::new() } else { format!(". The run ends at {:.0} %", 100.0 * REFUSED) };
+                let problem = format!("up to t = {} s, {problem}{then}", shown_time(time));
                 self.note(Warning::new(Topic::FilmPulls, problem, self.against_pulling(structure)));
             }
         }
@@ -75,8 +75,9 @@ impl Simulation {
     /// Describes a node at which `film` pulls.
     pub(super) fn pulls(&self, structure: usize, node: usize, share: f64) -> String {
         format!(
-            "film has pulled at contact node {} with {:.0} % of the impulse of the most loaded node: it checks penetration only once, and \
-             keeps nodes closed that others push away. Forces of single nodes are wrong by about as much",
+            "film has applied a tensile impulse at contact node {}, {:.0} % of the impulse of the most loaded node: it \
+             checks penetration only once, and keeps nodes closed that other nodes push away. The forces of individual \
+             nodes are wrong by about the same amount",
             self.compiled.node_name(structure, node),
             100.0 * share
         )
@@ -85,13 +86,13 @@ impl Simulation {
     /// Describes a node that `film` left inside a surface.
     pub(super) fn left_inside(&self, structure: usize, node: usize, share: f64) -> String {
         let (surface, length) = if self.is_free(structure) {
-            ("surface", "a thousandth of the extent of what touches")
+            ("surface", "a thousandth of the extent of the contact nodes")
         } else {
             ("casing", "its clearance")
         };
         format!(
-            "film has left contact node {} inside the {surface} by {:.2e} m, {} of {length}: it checks penetration only once, and \
-             forces on other nodes pushed this one in",
+            "film has left contact node {} inside the {surface} by {:.2e} m, {} of {length}: it checks penetration \
+             only once, and forces on other nodes have pushed this node in",
             self.compiled.node_name(structure, node),
             share * self.system.clearance_of(structure, node),
             if share < 10.0 { format!("{:.0} %", 100.0 * share) } else { format!("{share:.1e} times the size") }
@@ -108,14 +109,14 @@ impl Simulation {
         let settings = self.system.settings();
         let highest = self.compiled.bodies[structure].largest_frequency() * self.compiled.stiffest(structure);
         let lcp = if self.compiled.scene.settings.preset == Preset::Paper {
-            "To see complementary forces, leave `preset` out and use solver = \"lcp\""
+            "Remove `preset` and use solver = \"lcp\" to obtain complementary forces"
         } else {
             "Use solver = \"lcp\""
         };
         let resolved = 2.0 / highest;
         if settings.scheme == Scheme::ModalExact && self.system.step_size() > resolved {
             format!(
-                "{lcp}, or set `time.step` (in the FMU `internal_step_max`) below {resolved:.2e} s, where it pulls less"
+                "{lcp}, or set `time.step` (in the FMU `internal_step_max`) below {resolved:.2e} s to reduce the error"
             )
         } else {
             lcp.to_owned()

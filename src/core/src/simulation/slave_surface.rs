@@ -128,9 +128,10 @@ fn carried_grid(rom: &Rom, share: Share, contour: &TipContour) -> Result<DataGri
         return Err(Error::invalid(
             format!("ROM `{}`", rom.name),
             format!(
-                "its contact grid spans z = {low:.4e} to {high:.4e} m, the contact nodes {first:.4e} to {last:.4e} m"
+                "the contact grid spans z = {low:.4e} to {high:.4e} m, but the contact nodes of the blades span \
+                 {first:.4e} to {last:.4e} m"
             ),
-            "Give a casing that covers the blade tips",
+            "Use a casing that covers the blade tips",
         ));
     }
     let mut first_ring = 0;
@@ -221,8 +222,11 @@ fn check_radii(rom: &Rom, first: usize, points: &[[f64; 3]]) -> Result<()> {
         if (own - wanted).abs() > SAME_RADIUS * wanted {
             return Err(Error::invalid(
                 format!("ROM `{}`", rom.name),
-                format!("node `{}` has radius {own:.4e} m where tip contour and gap give {wanted:.4e} m", node.name),
-                "Give the casing of this rotor, in metres",
+                format!(
+                    "node `{}` has a radius of {own:.4e} m, but tip contour and gap require {wanted:.4e} m",
+                    node.name
+                ),
+                "Use the casing that belongs to this rotor, in metres",
             ));
         }
     }

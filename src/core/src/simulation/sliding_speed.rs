@@ -33,12 +33,12 @@ impl Simulation {
             let rotor = self.compiled.rotor_name(body);
             let cuts = self.compiled.cuts(body);
             let problem = format!(
-                "{rotor} starts at speed {} rad/s with {}: the sliding law does not model sticking, which happens below some \
-                 {slow:.1e} rad/s. A run in which friction puts energy in ends",
+                "{rotor} starts at speed {} rad/s with {}: the sliding law does not model sticking, which occurs below \
+                 about {slow:.1e} rad/s. The run ends if friction adds energy",
                 shown(speed.value),
-                if cuts { "a coating that is cut" } else { "friction" },
+                if cuts { "a coating that the blades cut" } else { "friction" },
             );
-            let remedy = "Trust results once the tips slide faster than they vibrate";
+            let remedy = "Trust the results only once the tips slide faster than they vibrate";
             let remedy = if cuts { remedy.to_owned() } else { format!("{remedy}, or use the solver coulomb") };
             self.warnings.push(Warning::new(Topic::Sticking, problem, remedy));
         }

@@ -34,7 +34,7 @@ impl Persist for SimulationPhase {
             1 => Self::Ready,
             2 => Self::Stepping,
             3 => Self::Failed,
-            _ => return reader.refuse("it names a phase that does not exist"),
+            _ => return reader.refuse("its phase is unknown"),
         };
     }
     fn check(&self, reader: &mut StateReader) {
@@ -99,20 +99,20 @@ impl Simulation {
         self.check_size(buffer.len())?;
         let (content, checksum) = buffer.split_at(buffer.len() - CHECKSUM_BYTES);
         if content[..MAGIC.len()] != MAGIC {
-            return damaged("it is not a state of this software");
+            return damaged("it was not saved by tiprub");
         }
         let mut reader = StateReader::new(&content[MAGIC.len()..]);
         let (mut version, mut scene) = (0_u64, 0_u64);
         version.restore(&mut reader);
         scene.restore(&mut reader);
         if version != VERSION {
-            return damaged(&format!("it has format version {version}, this library reads {VERSION}"));
+            return damaged(&format!("it has format version {version}, but this library reads version {VERSION}"));
         }
         if scene != self.compiled.fingerprint {
-            return damaged("it belongs to another scene or ROM");
+            return damaged("it belongs to a different scene or ROM");
         }
         if fingerprint(content, 0).to_le_bytes() != checksum {
-            return damaged("its checksum does not match: the bytes were changed");
+            return damaged("its checksum does not match, so the data was changed");
         }
         let lead = self.lead(reader.clone())?;
         self.follow(lead)?;
@@ -125,7 +125,7 @@ impl Simulation {
         if found == expected {
             return Ok(());
         }
-        Err(Error::State { problem: format!("it has {found} bytes where this scene needs {expected}") })
+        Err(Error::State { problem: format!("it has {found} bytes, but this scene needs {expected}") })
     }
 
     fn write(&self, writer: &mut StateWriter) {
@@ -197,7 +197,7 @@ impl Simulation {
         // Those of three kinds of gaps: now, a step earlier, and the lowest.
         let endless = self.system.infinite_gap_count(&window.all_lowest()).map(|lowest| lowest + endless);
         if runs && endless != Some(reader.infinite() - infinite) {
-            return damaged("it holds a number that is not finite");
+            return damaged("it contains a number that is not finite");
         }
         self.check_counts(&lead)?;
         self.check_values(&lead.values)?;
@@ -231,7 +231,7 @@ impl Simulation {
         if counted && within && divided {
             Ok(())
         } else {
-            damaged("its times and its counts of steps contradict each other")
+            damaged("its times and step counters contradict each other")
         }
     }
 
@@ -240,7 +240,7 @@ impl Simulation {
         for variable in self.table.variables() {
             let values = &values[variable.reference as usize..][..variable.len()];
             if let Some(value) = values.iter().find(|value| !is_possible(variable, **value)) {
-                return damaged(&format!("it gives `{}` the value {}", variable.name, shown(*value)));
+                return damaged(&format!("`{}` has the invalid value {}", variable.name, shown(*value)));
             }
         }
         Ok(())
@@ -256,7 +256,7 @@ impl Simulation {
             offsets.into_iter().all(|offset| angle.total(&rotor.speed, offset).is_finite())
         };
         if !rotors.all(counts) {
-            return damaged("its rotor has turned beyond all counting");
+            return damaged("the rotor angle is not finite");
         }
         for variable in self.table.variables().iter().filter(|variable| variable.causality == Causality::Input) {
             let (low, high) = (variable.min.unwrap_or(f64::MIN), variable.max.unwrap_or(f64::MAX));
@@ -265,7 +265,7 @@ impl Simulation {
                 let Some(input) = lead.inputs.get_mut(variable.quantity, variable.of, element) else { continue };
                 let beyond = |offset: f64| (low - input.at(offset)).max(input.at(offset) - high);
                 if !offsets.into_iter().all(|offset| input.at(offset).is_finite() && beyond(offset) <= rounding) {
-                    return damaged(&format!("it takes `{}` out of its range", variable.element_name(element)));
+                    return damaged(&format!("`{}` is outside its range", variable.element_name(element)));
                 }
             }
         }
@@ -285,7 +285,7 @@ impl Simulation {
         let references: Vec<[f64; 2]> = references.map(|(speed, temperature)| [*speed, *temperature]).collect();
         let outcome = match lead.phase {
             SimulationPhase::Ready | SimulationPhase::Stepping if !moves => {
-                damaged("an input moves something beyond all bounds")
+                damaged("an input causes a motion that is out of range")
             }
             SimulationPhase::Created => Ok(()),
             // Looked at when a step begins and when a speed is given, not at every internal step.

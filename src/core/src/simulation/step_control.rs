@@ -53,19 +53,19 @@ impl Simulation {
     /// A communication step of length `length` (s) takes too many internal steps.
     pub(super) fn exhausted(&self, length: f64, most: u64) -> Error {
         let (of_whom, other) = if self.is_marched() {
-            (" tried by all blades together", "a larger tolerance")
+            (" (trial steps of all blades together)", "a larger tolerance")
         } else {
             ("", "a larger internal_step_max")
         };
         Error::Exhausted {
             problem: format!(
-                "the communication step of {} s from t = {} s takes more internal steps{of_whom} than steps_at_most = {most}; it was \
-                 not done",
+                "the communication step of {} s from t = {} s needs more internal steps{of_whom} than steps_at_most = \
+                 {most}, so it was discarded",
                 shown(length),
                 shown_time(self.time)
             ),
             remedy: format!(
-                "Repeat it with a shorter communication step, a larger steps_at_most (0: any number) or {other}"
+                "Repeat it with a shorter communication step, a larger steps_at_most (0: no limit) or {other}"
             ),
         }
     }
@@ -83,8 +83,8 @@ impl Simulation {
         let left = LEFT * shortest(step);
         if parameters.scheme == Scheme::Galerkin && parameters.tolerance < left {
             let problem = format!(
-                "tolerance {}: steps of galerkin are at least {} s long, a thousandth of the longest, which leaves errors of some \
-                 {left:.0e} where contacts open and close, whatever the tolerance",
+                "the tolerance {} cannot be reached: galerkin steps are at least {} s long, a thousandth of the \
+                 longest step, which causes errors of about {left:.0e} where contacts open and close",
                 shown(parameters.tolerance),
                 shown(shortest(step)),
             );
@@ -100,8 +100,8 @@ impl Simulation {
             return;
         }
         let problem = format!(
-            "up to t = {} s {} of {} steps have missed the tolerance of {}: the shortest, {} s, a thousandth of the longest, were \
-             taken all the same",
+            "up to t = {} s, {} of {} steps have missed the tolerance of {}: the shortest steps of {} s, a thousandth \
+             of the longest, were accepted anyway",
             shown_time(time),
             effort.missed,
             effort.steps,
@@ -109,7 +109,7 @@ impl Simulation {
             shown(shortest(self.system.step_size())),
         );
         let remedy = format!(
-            "Use a smaller internal_step_max (time.step) than {} s or a larger tolerance; missed_steps counts those to come",
+            "Use an internal_step_max (time.step) below {} s or a larger tolerance; missed_steps counts all such steps",
             shown(self.value_of(Quantity::StepMax, 0))
         );
         self.note(Warning::new(Topic::ToleranceMissed, problem, remedy));

@@ -142,12 +142,13 @@ impl Simulation {
             return Err(Error::invalid(
                 "communicationStepSize",
                 format!(
-                    "{} s at t = {} s is below {} s, where rounding of positions is taken for motion",
+                    "{} s at t = {} s is below the minimum of {} s, where rounding errors of positions would count as \
+                     motion",
                     shown(step_size),
                     shown_time(self.time),
                     shown(ranges::SHORTEST_STEP)
                 ),
-                "Give a longer communication step; leave out what rounding leaves of a sum of steps",
+                "Use a longer communication step; skip remainders that are caused by rounding in a sum of steps",
             ));
         }
         // What rounding of the time leaves of the step.
@@ -156,7 +157,7 @@ impl Simulation {
             return Err(Error::invalid(
                 "communicationStepSize",
                 format!(
-                    "{} s does not change the time {} s by as much in double precision",
+                    "{} s cannot be added accurately to the time {} s in double precision",
                     shown(step_size),
                     shown_time(current_time)
                 ),
@@ -194,7 +195,7 @@ impl Simulation {
                 format!("contact[{}].coating.cells_around", pair + 1),
                 format!(
                     "the rotor turns {passed:.3e} rad in one internal step of {step:.3e} s at t = {} s, more than the \
-                     {stride:.3e} rad that its tips or the cells of the coating are wide: cells between would stay unworn",
+                     width of {stride:.3e} rad of its tips or coating cells: the cells in between would not wear",
                     shown_time(self.time)
                 ),
                 "Use fewer cells around, a lower speed or a smaller internal_step_max (time.step)",
@@ -206,7 +207,7 @@ impl Simulation {
         let (scene, plan) = (&self.compiled.scene, &self.compiled.plan);
         let (what, remedy) = if rotation != 0.0 && passed <= scale {
             let prefix = plan.pair_prefix(&scene.settings, pair);
-            (format!("variable `{prefix}casing_shape_rotation`"), "Turn the shape more slowly, or use")
+            (format!("variable `{prefix}casing_shape_rotation`"), "Rotate the shape more slowly, or use")
         } else {
             let prefix = plan.body_prefix(scene, plan.pairs[pair].body);
             (format!("variable `{prefix}speed`"), "Use a lower speed or")
@@ -214,11 +215,11 @@ impl Simulation {
         Err(Error::invalid(
             what,
             format!(
-                "the rotor turns {turned:.3e} rad in one internal step of {step:.3e} s at t = {} s, past features of the casing \
-                 shape {scale:.3e} rad wide",
+                "the rotor turns {turned:.3e} rad in one internal step of {step:.3e} s at t = {} s, and skips features \
+                 of the casing shape that are {scale:.3e} rad wide",
                 shown_time(self.time)
             ),
-            format!("{remedy} a smaller internal_step_max (time.step) than {:.3e} s", step * scale / turned),
+            format!("{remedy} an internal_step_max (time.step) below {:.3e} s", step * scale / turned),
         ))
     }
 
@@ -230,7 +231,8 @@ impl Simulation {
     /// done has left it ([`Simulation::is_stepping`]).
     pub fn advance(&mut self) -> Result<StepProgress> {
         if self.phase != SimulationPhase::Stepping {
-            return Err(Error::invalid("doStep", "no communication step is under way", "Begin a step first"));
+            let problem = "no communication step is in progress";
+            return Err(Error::invalid("doStep", problem, "Begin a communication step first"));
         }
         self.allow_steps()?;
         if self.partial && self.communication.done > 0 && self.communication.most > 0 {
@@ -333,8 +335,8 @@ impl Simulation {
             };
             self.told.curved[body] = true;
             let problem = format!(
-                "at t = {} s contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in displacements, \
-                 which misses u²/2r = {:.2e} m, {:.0} % of the clearance",
+                "at t = {} s, contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in \
+                 displacements, which neglects u²/2r = {:.2e} m, {:.0} % of the clearance",
                 shown_time(time),
                 self.compiled.node_name(most.structure, most.node),
                 self.sector_name(most.structure, most.sector),
@@ -343,7 +345,8 @@ impl Simulation {
                 100.0 * most.share()
             );
             let remedy =
-                "Check loads and clearance: this grows with the square of the displacement, and at 100 % the run ends";
+                "Check loads and clearance; the error grows with the square of the displacement, and the run ends at \
+                 100 %";
             self.note(Warning::new(Topic::LargeDisplacement, problem, remedy));
         }
     }
@@ -354,7 +357,8 @@ impl Simulation {
     /// No step under way, no internal step done yet, or a non-finite state.
     pub fn end_step_early(&mut self) -> Result<()> {
         if self.phase != SimulationPhase::Stepping || self.communication.done == 0 {
-            return Err(Error::invalid("early return", "no internal step is done", "Return after an internal step"));
+            let problem = "no internal step has been completed";
+            return Err(Error::invalid("early return", problem, "Return early only after an internal step"));
         }
         self.tangent.forget();
         let done = self.communication.done;

@@ -193,10 +193,10 @@ impl Simulation {
     fn march_again(&mut self, twin: &mut Self, inputs: &[u32], seed: &[f64], moved: f64) -> Result<()> {
         let lost = |error: Error| Error::Unstable {
             problem: format!(
-                "the communication step to t = {} s cannot be marched again: {error}",
+                "the communication step to t = {} s cannot be repeated: {error}",
                 shown_time(self.time)
             ),
-            remedy: "Do without derivatives over this step".to_owned(),
+            remedy: "Do not request derivatives over this step".to_owned(),
         };
         if self.tangent.follows {
             twin.restore_from(&self.tangent.start);
@@ -251,14 +251,14 @@ impl Simulation {
         let what = "derivative over the last step";
         if !self.is_differentiated() {
             let remedy = "Set the parameter step_derivatives to on before initialisation";
-            return Err(Error::invalid(what, "derivatives are off", remedy));
+            return Err(Error::invalid(what, "step derivatives are off", remedy));
         }
         if self.phase != SimulationPhase::Ready || !self.tangent.stands {
             return Err(Error::invalid(
                 what,
-                "there is no communication step that could be marched again: none is done, it was discarded, a state was restored after it, it \
-                 ended early, or something was set within it",
-                "Ask after a whole communication step, before a state is restored",
+                "there is no communication step to repeat: none has been completed, or the last one was discarded or \
+                 ended early, a state was restored after it, or a variable was set within it",
+                "Request derivatives after a complete communication step, before a state is restored",
             ));
         }
         for output in outputs {
@@ -266,9 +266,9 @@ impl Simulation {
         }
         for (input, seed) in inputs.iter().zip(seed) {
             let (variable, element) = self.table.locate(*input)?;
-            let what = || format!("derivative by `{}`", variable.element_name(element));
+            let what = || format!("derivative with respect to `{}`", variable.element_name(element));
             if variable.causality != Causality::Input || variable.kind != DataType::Real {
-                let remedy = "Ask for derivatives by real inputs only";
+                let remedy = "Request derivatives with respect to real inputs only";
                 return Err(Error::invalid(what(), "the variable is not a real input", remedy));
             }
             if !seed.is_finite() {
@@ -284,7 +284,7 @@ impl Simulation {
         if continuous && variable.kind == DataType::Real {
             return Ok(());
         }
-        let remedy = "Ask for derivatives of continuous real outputs only";
+        let remedy = "Request derivatives of continuous real outputs only";
         let what = format!("derivative of `{}`", variable.element_name(element));
         Err(Error::invalid(what, "the variable is not a continuous real output", remedy))
     }

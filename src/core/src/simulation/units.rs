@@ -49,20 +49,20 @@ pub static ENERGY: VariableUnit =
 
 pub static INPUT_INTERPOLATIONS: Enumeration = Enumeration {
     name: "InputInterpolation",
-    description: "Inputs between communication points",
+    description: "Interpolation of inputs between communication points",
     items: &[
-        ("ramp", "From the value reached to the one set, which is reached at the end of the step"),
-        ("hold", "The value set acts at once: a jump within one internal step"),
+        ("ramp", "Linear from the current value to the new value, reached at the end of the communication step"),
+        ("hold", "The new value acts immediately, as a jump within one internal step"),
     ],
 };
 
 /// Items of `step_derivatives`.
 pub static STEP_DERIVATIVES: Enumeration = Enumeration {
     name: "StepDerivatives",
-    description: "What functions for directional derivatives answer",
+    description: "Result of the functions for directional derivatives",
     items: &[
-        ("off", "Nothing: they are refused"),
-        ("on", "Derivatives of outputs at the end of the last communication step by inputs over it"),
+        ("off", "None: calls are rejected"),
+        ("on", "Derivatives of outputs at the end of the last communication step with respect to inputs over it"),
     ],
 };
 

@@ -112,8 +112,8 @@ impl MasslessCheck<'_> {
             return Err(Error::invalid(
                 "scheme massless-boundary",
                 format!(
-                    "closed contact raises the square of the highest frequency of the modes with inertia by a factor of \
-                     {stiffening:.3e}, so that nodes that bounce gain energy at any internal step"
+                    "closed contact raises the square of the highest frequency of the modes with inertia by a factor \
+                     of {stiffening:.3e}, so bouncing nodes gain energy with any internal step"
                 ),
                 "Use modal-exact, or a ROM with more modes or softer contact nodes",
             ));
@@ -141,7 +141,7 @@ impl MasslessCheck<'_> {
                 Error::invalid(
                     "scheme massless-boundary",
                     "the quasi-static modes have no flexibility along the normal of a contact node",
-                    "Use modal-exact, or a ROM with the contact nodes as interface of the reduction",
+                    "Use modal-exact, or a ROM with the contact nodes as the interface of the reduction",
                 )
             })
         };
@@ -179,8 +179,9 @@ pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
     let MasslessLimit { closed, usable } = limit;
     Error::Unstable {
         problem: format!(
-            "massless-boundary with an internal step of {step:.3e} s: closed contact on the residual flexibility of the contact nodes \
-             is stable below {closed:.6e} s only, and contact that opens and closes gains energy above {usable:.6e} s"
+            "the internal step of {step:.3e} s is too long for massless-boundary: closed contact on the residual \
+             flexibility of the contact nodes is stable only below {closed:.6e} s, and contact that opens and closes \
+             gains energy above {usable:.6e} s"
         ),
         remedy: format!("{}{OTHER_SCHEME}", shorter(usable)),
     }
@@ -192,8 +193,8 @@ pub fn warning(step: f64, limit: MasslessLimit) -> Option<Warning> {
         Warning::new(
             Topic::MasslessEnergy,
             format!(
-                "massless-boundary with an internal step of {step:.3e} s: contact that opens and closes may gain energy (a falling \
-                 `impact_loss` shows it)"
+                "with massless-boundary and an internal step of {step:.3e} s, contact that opens and closes may gain \
+                 energy (visible as a decreasing `impact_loss`)"
             ),
             format!("Set `time.step` below {:.2e} s, or a damping ratio of at least 1e-3", QUIET * limit.closed),
         )

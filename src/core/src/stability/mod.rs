@@ -96,8 +96,8 @@ pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<(
     match scheme {
         Scheme::CentralDifference if product >= 2.0 * (1.0 - CENTRAL_MARGIN) => Err(Error::Unstable {
             problem: format!(
-                "central-difference is unstable with an internal step of {step:.3e} s: ω_max·h = {product:.4}, and from 2 on every \
-                 motion grows"
+                "central-difference is unstable with an internal step of {step:.3e} s: ω_max·h = {product:.4}, but the \
+                 stability limit is 2"
             ),
             remedy: format!("{}{OTHER_SCHEME}", shorter(2.0 / frequency)),
         }),
@@ -116,11 +116,11 @@ pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<Wa
         Scheme::ModalExact if product > 2.0 => Ok(Some(Warning::new(
             Topic::UnresolvedModes,
             format!(
-                "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: free motion stays exact, contact \
-                 forces on them do not",
+                "modes above {:.4} kHz are not resolved by the internal step of {step:.3e} s: their free motion is \
+                 exact, but their response to contact forces is not",
                 1e-3 * 2.0 / step / std::f64::consts::TAU
             ),
-            format!("`time.step` = {:.2e} s resolves all", 2.0 / frequency),
+            format!("Set `time.step` = {:.2e} s to resolve all modes", 2.0 / frequency),
         ))),
         _ => Ok(None),
     }
@@ -209,13 +209,15 @@ fn refuse_unsolvable(solvable: impl Fn(f64) -> bool, exact: bool, step: f64, fri
     };
     Err(Error::Unstable {
         problem: format!(
-            "with friction_coefficient µ = {friction} and internal steps up to h = {step:.3e} s the contact problem {what} ({why})",
+            "with friction_coefficient µ = {friction} and internal steps up to h = {step:.3e} s, the contact problem \
+             {what} ({why})",
             friction = shown(friction)
         ),
         remedy: if low >= LEAST_FRICTION {
             format!("Use µ below {low:.4} for this structure, or another internal step")
         } else {
-            "Use no friction, or fewer contact nodes or more modes: with more contacts than modes no friction is safe"
+            "Use no friction, fewer contact nodes or more modes: with more contacts than modes, no friction \
+             coefficient is safe"
                 .to_owned()
         },
     })
@@ -354,7 +356,7 @@ mod tests {
         };
         let senses = [vec![vec![radial()[0]; 2]]];
         let told = check_solvable_together(&[model], Scheme::ModalExact, 1e-5, 0.3, &senses).unwrap_err().to_string();
-        assert!(told.contains("no friction is safe"), "{told}");
+        assert!(told.contains("no friction coefficient is safe"), "{told}");
     }
 
     /// A definite symmetric part spares the minors: what it lets pass they do, and they alone decide on the rest.

@@ -78,10 +78,10 @@ pub fn warning(step: f64, limit: f64) -> Option<Warning> {
         Warning::new(
             Topic::UnresolvedFlexibility,
             format!(
-                "modal-exact with an internal step of {step:.3e} s does not resolve much of the flexibility that contact sees: expect \
-                 errors of some per cent"
+                "modal-exact with an internal step of {step:.3e} s does not resolve much of the contact flexibility: \
+                 expect errors of a few per cent"
             ),
-            format!("`time.step` below {:.2e} s avoids it", NEAR * limit),
+            format!("Set `time.step` below {:.2e} s", NEAR * limit),
         )
     })
 }
@@ -97,13 +97,17 @@ pub fn check(step: f64, limit: f64, frequency: f64) -> Result<()> {
     }
     Err(Error::Unstable {
         problem: format!(
-            "modal-exact with an internal step of {step:.3e} s (ω_max·h = {:.4}) passes over modes above {:.4} kHz, which have more than \
-             half of the flexibility that contact sees: forces, friction work and energies would be wrong by ten per cent, and with \
-             longer steps beyond all bounds",
+            "modal-exact with an internal step of {step:.3e} s (ω_max·h = {:.4}) does not resolve modes above {:.4} \
+             kHz, which have more than half of the contact flexibility: forces, friction work and energies would be \
+             wrong by ten per cent, and by far more with longer steps",
             frequency * step,
             1e-3 * PASSED_OVER / step / std::f64::consts::TAU
         ),
-        remedy: format!("{}, better below {:.3e} s, or use massless-boundary", shorter(limit), PASSED_OVER / frequency),
+        remedy: format!(
+            "{}, preferably below {:.3e} s, or use massless-boundary",
+            shorter(limit),
+            PASSED_OVER / frequency
+        ),
     })
 }
 

@@ -170,7 +170,7 @@ impl System {
         let mut step = 0.0_f64;
         step.restore(reader);
         if !(0.0..=f64::MAX).contains(&step) {
-            reader.refuse("its internal step is no length of time");
+            reader.refuse("its internal step is not a valid duration");
         }
         let mut endless = Some(0);
         for structure in &self.structures {
@@ -178,7 +178,7 @@ impl System {
             structure.check(reader, &mut saved);
             let places = [&saved.geometry.now.places, &saved.geometry.before.places];
             if !places.into_iter().all(|places| self.places_exist(structure, places)) {
-                reader.refuse("a contact node is nowhere on its surface");
+                reader.refuse("the surface position of a contact node does not exist");
             }
             let found = self
                 .infinite_gaps_of_structure(structure, &saved.gap.now)

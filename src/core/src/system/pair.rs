@@ -181,7 +181,7 @@ impl ContactPair {
         let Some(carrier) = carrier else { return structures[*structure].find_gaps(gap, drive, &[], warm) };
         let points = gap.spline().map_or(0, |surface| surface.control_points().len());
         let Ok([structure, under]) = structures.get_disjoint_mut([*structure, carrier.structure]) else {
-            unreachable!("a structure does not carry what it touches")
+            unreachable!("a structure does not carry the surface that it touches")
         };
         let moved = &under.modes().displacement()[carrier.first_row..][..3 * points];
         structure.find_gaps(gap, drive, moved, warm);

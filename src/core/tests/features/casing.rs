@@ -122,7 +122,7 @@ fn a_load_that_the_contact_grid_cannot_carry_is_refused() {
     with(17).unwrap();
     for order in [18, 34, u32::MAX] {
         let message = with(order).unwrap_err().to_string();
-        assert!(message.contains("casing_load_order") && message.contains("resolves 0 to 17"), "{message}");
+        assert!(message.contains("casing_load_order") && message.contains("resolves only 0 to 17"), "{message}");
     }
 }
 

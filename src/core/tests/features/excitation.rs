@@ -329,8 +329,8 @@ fn an_excitation_that_cannot_be_is_refused() {
         ("structure[1].excitation.mode: mode 9", (|it| it.mode = Some(9)) as fn(&mut ExcitationSettings)),
         ("structure[1].excitation.mode: 0", |it| it.mode = Some(0)),
         ("structure[1].excitation.mode: neither", |it| it.mode = None),
-        ("structure[1].excitation.node: without", |it| it.node = Some("mid_chord".into())),
-        ("structure[1].excitation.node: `tip` is no contact node", |it| {
+        ("structure[1].excitation.node: only one of", |it| it.node = Some("mid_chord".into())),
+        ("structure[1].excitation.node: `tip` is not a contact node", |it| {
             (it.node, it.direction) = (Some("tip".into()), Some(ForceDirection::Axial));
         }),
         ("structure[1].excitation.amplitude", |it| it.amplitude = f64::NAN),

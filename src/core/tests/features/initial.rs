@@ -172,7 +172,7 @@ fn starts_and_ratios_are_checked_parameters() {
         ("structure[1].initial[1].nodal_diameter: 3", |scene| {
             scene.settings.structures[0].initial[0].nodal_diameter = Some(3);
         }),
-        ("structure[1].initial[1].sector: beside", |scene| {
+        ("structure[1].initial[1].sector: cannot be combined", |scene| {
             let one = &mut scene.settings.structures[0].initial[0];
             (one.sector, one.nodal_diameter) = (Some(1), Some(1));
         }),

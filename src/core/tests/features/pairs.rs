@@ -312,7 +312,7 @@ fn a_state_that_one_of_two_rotors_refuses_changes_nothing() {
             simulation.restore_state(&own).unwrap();
             continue;
         };
-        assert!(error.to_string().contains("fitted for"), "{error}");
+        assert!(error.to_string().contains("were fitted"), "{error}");
         refused += 1;
         let mut now = vec![0; own.len()];
         simulation.save_state(&mut now).unwrap();
@@ -346,7 +346,7 @@ fn what_does_not_go_together_is_refused_by_name() {
     let both = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
     let mut scene = both.clone();
     scene.settings.contacts[1].solver = Solver::Film;
-    refused(&scene, "contact[2].solver: needs that of contact[1]: a scene has one solver");
+    refused(&scene, "contact[2].solver: needs the solver of contact[1]: all contacts of a scene use the same solver");
     let mut scene = both.clone();
     scene.settings.contacts[1].coating = Some(tiprub_core::settings::CoatingSettings {
         thickness: 1e-4,
@@ -358,19 +358,19 @@ fn what_does_not_go_together_is_refused_by_name() {
         contact_width: Some(3e-3),
         cutting: None,
     });
-    refused(&scene, "contact[2].coating: excludes contacts solved together");
+    refused(&scene, "contact[2].coating: excludes a contact that is solved together");
     let mut scene = both.clone();
     scene.settings.contacts[1].slave = "front_casing".into();
     refused(&scene, "surface[1].name: `front_casing` is named by 2 contacts");
     let mut scene = both.clone();
     scene.settings.contacts.pop();
     scene.settings.surfaces.pop();
-    refused(&scene, "structure[2].name: `rear` takes no part");
+    refused(&scene, "structure[2].name: `rear` is not part of any contact");
     let mut scene = several::split(&rub(6));
     scene.settings.contacts[1].nodes = None;
     refused(&scene, "contact[2].master: a structure of several contacts needs `contact.nodes`");
     scene.settings.contacts[1].nodes = Some("leading".into());
-    refused(&scene, "claims the node `leading_edge`, which contact[1] claims as well");
+    refused(&scene, "the node `leading_edge` already belongs to contact[1]");
     scene.settings.contacts[1].nodes = Some("tip".into());
     refused(&scene, "no contact node of ROM `blade` has a name that starts with \"tip\"");
     let mut scene = both;
@@ -383,7 +383,7 @@ fn what_does_not_go_together_is_refused_by_name() {
     };
     assert!(
         message.contains(
-            "`massless-boundary` excludes several surfaces on one flexible structure: the largest step is not known"
+            "`massless-boundary` excludes several surfaces on one flexible structure: the largest stable step is unknown"
         ),
         "{message}"
     );

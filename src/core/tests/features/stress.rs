@@ -86,7 +86,7 @@ fn stress_without_places_is_refused() {
         Simulation::new(&scene).map(|_| ()).unwrap_err().to_string()
     };
     let missing = told(|scene| scene.roms[0].extras.stress = None);
-    assert!(missing.starts_with("outputs.stress: needs places of stress in the ROM of a rotor"), "{missing}");
+    assert!(missing.starts_with("outputs.stress: needs stress points in the ROM of a rotor"), "{missing}");
     let unwatched = told(|scene| scene.settings.outputs.watched_sectors.clear());
     assert!(unwatched.starts_with("outputs.stress: needs `outputs.watched_sectors`"), "{unwatched}");
     let short = told(|scene| {
@@ -199,7 +199,7 @@ fn stress_of_a_heated_blade_needs_its_static_thermal_stress() {
     let told = |scene: &Scene| Simulation::new(scene).map(|_| ()).unwrap_err().to_string();
     let refused = told(&scene);
     assert!(
-        refused.starts_with("outputs.stress: with `structure.thermal` of a rotor needs static thermal stress"),
+        refused.starts_with("outputs.stress: stress of a rotor with `structure.thermal` needs static thermal stress"),
         "{refused}"
     );
     assert!(refused.contains("`stress_thermal`"), "{refused}");
@@ -211,11 +211,11 @@ fn stress_of_a_heated_blade_needs_its_static_thermal_stress() {
         told(&scene)
     };
     let shape = changed(|scene| scene.roms[0].extras.stress_thermal = Some(DMatrix::zeros(6, 1)));
-    assert!(shape.contains("`stress_thermal`: shape (6, 1), (12, 1) expected"), "{shape}");
+    assert!(shape.contains("`stress_thermal`: shape (6, 1) found, (12, 1) expected"), "{shape}");
     let broken = changed(|scene| scene.roms[0].extras.stress_thermal.as_mut().unwrap()[(3, 0)] = f64::NAN);
     assert!(broken.contains("`stress_thermal`: non-finite entry at (3, 0)"), "{broken}");
     let alone = changed(|scene| {
         (scene.roms[0].extras.thermal, scene.settings.structures[0].thermal) = (None, false);
     });
-    assert!(alone.contains("`stress_thermal`: given without `stress_map` and `thermal_loads`"), "{alone}");
+    assert!(alone.contains("`stress_thermal`: requires `stress_map` and `thermal_loads`"), "{alone}");
 }

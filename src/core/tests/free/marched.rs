@@ -268,7 +268,7 @@ fn friction_that_puts_energy_in_ends_the_run() {
             simulation.do_step(simulation.time(), H).err()
         });
         let told = ended.map(|error| error.to_string()).unwrap_or_default();
-        assert!(told.contains("friction has put") && told.contains("no sticking"), "{rigid} {tolerance}: {told}");
+        assert!(told.contains("friction has added") && told.contains("not model sticking"), "{rigid} {tolerance}: {told}");
     }
 }
 
@@ -331,7 +331,7 @@ fn contact_without_flexibility_of_its_own_is_told() {
     let told = |rom: Rom| {
         let scene = thrown_at_wall(rom, 0.0203, [-6.0, 30.0, 4.0]);
         let simulation = started(&marched(scene, 1e-3, 0.0));
-        simulation.warnings().iter().filter(|text| text.contains("no flexibility of their own")).count()
+        simulation.warnings().iter().filter(|text| text.contains("no independent flexibility")).count()
     };
     assert_eq!([told(faces([0.0; 3])), told(sprung())], [1, 0]);
 }

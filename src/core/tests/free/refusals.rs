@@ -28,17 +28,17 @@ fn refusal(change: impl FnOnce(&mut Scene)) -> String {
 fn scenes_that_make_no_sense_are_refused_with_the_reason() {
     type Case = (&'static str, fn(&mut Scene));
     let cases: [Case; 24] = [
-        ("held", |scene| scene.roms[0].stiffness[(4, 4)] += 1e3),
+        ("the structure is constrained", |scene| scene.roms[0].stiffness[(4, 4)] += 1e3),
         ("no contact node", |scene| scene.settings.contacts[0].nodes = Some("top".into())),
-        ("claims the node `left_000`", |scene| scene.settings.contacts[1].nodes = Some("le".into())),
-        ("claims all its contact nodes", |scene| scene.settings.contacts[0].nodes = None),
-        ("empty text", |scene| scene.settings.contacts[0].nodes = Some(String::new())),
+        ("the node `left_000` already belongs", |scene| scene.settings.contacts[1].nodes = Some("le".into())),
+        ("would use all contact nodes", |scene| scene.settings.contacts[0].nodes = None),
+        ("the text is empty", |scene| scene.settings.contacts[0].nodes = Some(String::new())),
         ("gap", |scene| scene.settings.contacts[0].gap = 1e-3),
         ("sector_gaps", |scene| scene.settings.contacts[0].sector_gaps = vec![1e-3]),
         ("meridian", |scene| scene.settings.contacts[0].meridian = Meridian::Cylinder),
         ("heat_to_slave", |scene| scene.settings.contacts[0].heat_to_slave = Some(0.5)),
-        ("needs that of contact[1]", |scene| scene.settings.contacts[1].solver = Solver::Film),
-        ("needs to know where its surface is", |scene| scene.settings.surfaces[0].structure = None),
+        ("needs the solver of contact[1]", |scene| scene.settings.contacts[1].solver = Solver::Film),
+        ("the position of its surface", |scene| scene.settings.surfaces[0].structure = None),
         ("shape", |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 }),
         ("moving", |scene| scene.settings.surfaces[0].moving = true),
         ("named by 0 contacts", |scene| drop(scene.settings.contacts.pop())),
@@ -46,12 +46,12 @@ fn scenes_that_make_no_sense_are_refused_with_the_reason() {
         ("all_sectors", |scene| scene.settings.outputs.all_sectors = true),
         ("nodal_diameters", |scene| scene.settings.outputs.nodal_diameters = Some(0)),
         ("an open contact grid in its ROM", |scene| scene.roms[1].extras.grid = None),
-        ("at the same place", |scene| {
+        ("coincide", |scene| {
             scene.roms[1].contact_nodes[1].position = scene.roms[1].contact_nodes[0].position
         }),
         ("velocity: needs `motion = \"free\"`", |scene| scene.settings.structures[1].velocity = [1.0, 0.0, 0.0]),
         ("whirl: needs `motion = \"rotating\"`", |scene| scene.settings.structures[0].whirl = true),
-        ("takes no part", |scene| scene.settings.surfaces[1].structure = Some("left_plate".into())),
+        ("is not part of any contact", |scene| scene.settings.surfaces[1].structure = Some("left_plate".into())),
         ("ω_max·h", |scene| {
             (scene.settings.time.scheme, scene.settings.time.step) = (Scheme::CentralDifference, 1e-5)
         }),
@@ -126,7 +126,7 @@ fn friction_that_jams_a_contact_on_a_plate_is_refused() {
 fn warns_of_friction_without_a_unique_solution_in_flight() {
     let simulation = started(&with_local_mode(0.0203, &[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]));
     let told = simulation.warnings().join(" ");
-    assert!(told.contains("cannot be shown to have one solution"), "{told}");
+    assert!(told.contains("cannot be shown to have a unique solution"), "{told}");
     let mut frictionless = with_local_mode(0.0203, &[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]);
     frictionless.settings.contacts[0].friction = 0.0;
     let simulation = started(&frictionless);
@@ -141,7 +141,7 @@ fn rejects_a_body_that_is_too_fast_for_the_step() {
         scene.settings.accept_implausible = true;
         let mut simulation = started(&with(scene, 0.0, Solver::Lcp, Scheme::ModalExact));
         let error = simulation.do_step(0.0, 1e-5).unwrap_err().to_string();
-        assert!(error.contains("could pass a surface unseen") && error.contains("smaller internal step"), "{error}");
+        assert!(error.contains("could pass through a surface undetected") && error.contains("smaller internal step"), "{error}");
     }
     // A tenth of the block in one step is the limit.
     let mut slow = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.5)], false, [3900.0, 0.0, 0.0]);
@@ -160,7 +160,7 @@ fn a_node_that_comes_over_an_edge_from_behind_is_refused() {
     // Its face flies 0.2 mm to 0.2 µm behind the plate.
     for depth in [2e-4, 2e-5, 2e-7] {
         let error = thrown(0.02 - depth, [0.0, -40.0, 0.0], 60).unwrap_err().to_string();
-        assert!(error.contains("the contact node left_00") && error.contains("over the edge"), "{depth} m: {error}");
+        assert!(error.contains("contact node left_00 has passed the edge"), "{depth} m: {error}");
     }
     // In front of it all is well, and what arrives from in front in the step that passes the edge is an impact.
     assert!(real(&thrown(0.0203, [0.0, -40.0, 0.0], 60).unwrap(), "impact_loss") == 0.0);

@@ -106,7 +106,7 @@ fn rejects_a_speed_beyond_the_fitted_one() {
     simulation.set_input_derivative(speed, 1, 1e8).unwrap();
     simulation.save_state(&mut before).unwrap();
     let error = simulation.do_step(simulation.time(), 2.35e-5).unwrap_err().to_string();
-    assert!(error.contains("fitted for"), "{error}");
+    assert!(error.contains("were fitted"), "{error}");
     simulation.save_state(&mut after).unwrap();
     assert_eq!(before, after);
 }

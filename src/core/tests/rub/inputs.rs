@@ -327,7 +327,7 @@ fn refused_steps_name_the_input_and_change_nothing() {
     let mut simulation = started(&bumps());
     set(&mut simulation, "casing_radius_change", 0.02);
     slope(&mut simulation, "casing_radius_change", 100.0);
-    refused(&mut simulation, 1e-4, &["`casing_radius_change`", "takes it to 0.03", "outside"]);
+    refused(&mut simulation, 1e-4, &["`casing_radius_change`", "it reaches 0.03", "outside"]);
     // The value may be where the derivative alone would not lead from the value reached.
     slope(&mut simulation, "casing_radius_change", 1.0);
     set(&mut simulation, "casing_radius_change", 0.0);
@@ -373,7 +373,7 @@ fn a_scene_without_such_inputs_has_no_choice_of_them() {
     assert!(has(&held(scene)));
     for row in Simulation::new(&rich()).unwrap().table().variables() {
         let moves = row.causality == tiprub_core::variables::Causality::Input || row.name == "gap_offset";
-        let says = row.description.contains("reached at the end of the step") || row.description.contains("held over");
+        let says = row.description.contains("reached at the end of the communication step") || row.description.contains("constant over a");
         assert_eq!(moves, says, "{}: {}", row.name, row.description);
     }
 }

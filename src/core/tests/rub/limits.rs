@@ -36,7 +36,7 @@ fn rejects_a_later_step_beyond_massless_boundary() {
         go(&mut simulation, share * usable);
     }
     let told = simulation.do_step(simulation.time(), 1.01 * usable).unwrap_err().to_string();
-    assert!(told.contains("massless-boundary with an internal step"), "{told}");
+    assert!(told.contains("too long for massless-boundary"), "{told}");
     go(&mut simulation, 0.99 * usable);
 }
 
@@ -181,7 +181,7 @@ fn fast_rotors_with_the_stiffness_of_rest_are_warned_of() {
     assert_eq!(remedy(&scene), None);
     let mut coupled = disk::with_rotor(disk::TestDisk::random(4, 2, 6, 0.3, 5).cyclic());
     coupled.settings.structures[0].speed = 2e3;
-    assert!(remedy(&coupled).unwrap().starts_with("Coupled sectors"));
+    assert!(remedy(&coupled).unwrap().contains("coupled sectors do not support spin effects"));
 }
 
 #[test]
@@ -255,7 +255,7 @@ fn growth_that_is_not_looked_at_is_told() {
         rom.stiffness = stiffness;
         scene.settings.contacts[0].friction = friction;
         let simulation = models::started(&scene);
-        simulation.warnings().iter().any(|text| text.contains("is not checked with"))
+        simulation.warnings().iter().any(|text| text.contains("is not checked: the model has"))
     };
     for scheme in [Scheme::ModalExact, Scheme::Galerkin] {
         let found = [told(scheme, 151, 0.1), told(scheme, 151, 0.0), told(scheme, 150, 0.1)];
@@ -316,7 +316,7 @@ fn refused_steps_name_adaptive_steps_first() {
         assert!(found.starts_with(adaptive), "{scheme:?}: {found}");
     }
     let film = remedy(&|scene| scene.settings.contacts[0].solver = Solver::Film);
-    assert!(film.contains("\"galerkin\"` with `contact.solver = \"lcp\"`), or set `time.step`"), "{film}");
+    assert!(film.contains("\"galerkin\"` and `contact.solver = \"lcp\"`), or set `time.step`"), "{film}");
     // Too few modes, and what its tables do not have.
     let few = remedy(&|scene| scene.roms[0] = models::blade(12));
     let excited = remedy(&|scene| {
@@ -342,7 +342,7 @@ fn remedies_are_those_that_the_preset_leaves() {
     scene.settings.preset = tiprub_core::settings::Preset::Paper;
     scene.settings.contacts[0].solver = Solver::Film;
     let paper = told(&scene);
-    assert!(paper.contains("leave `preset` out") && !paper.contains("modal-exact"), "{paper}");
+    assert!(paper.contains("remove `preset`") && !paper.contains("modal-exact"), "{paper}");
 }
 
 /// A blade that friction bends into the casing: the warning names the µ* above which it does, and there is one only.
@@ -386,14 +386,14 @@ fn what_a_casing_does_to_solvability_is_told_with_its_place() {
         models::on_ring(&mut scene, ring, 0.01);
         scene.settings.contacts[0].friction = friction;
         let warnings = try_started(&scene).unwrap().warnings().to_vec();
-        warnings.into_iter().filter(|text| text.contains("casing's part")).collect::<Vec<_>>()
+        warnings.into_iter().filter(|text| text.contains("contribution of the casing")).collect::<Vec<_>>()
     };
     for (turned, friction) in [(6.0, 0.15), (0.0, 0.15), (1e3, 0.0)] {
         assert!(told(turned, friction).is_empty(), "{:?}", told(turned, friction));
     }
     for turned in [7.0, -7.0] {
         let told = told(turned, 0.15);
-        assert!(told.len() == 1 && told[0].contains("-1.00e0 of the largest, at θ = 0.00 rad"), "{told:?}");
+        assert!(told.len() == 1 && told[0].contains("-1.00e0 times the largest, at θ = 0.00 rad"), "{told:?}");
     }
 }
 

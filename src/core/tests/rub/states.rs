@@ -292,7 +292,7 @@ fn states_of_another_scene_are_refused_and_change_nothing() {
     let mut foreign_scene = models::rub(12);
     foreign_scene.settings.contacts[0].gap = 4e-4;
     let message = simulation.restore_state(&saved(&started(&foreign_scene))).unwrap_err().to_string();
-    assert!(message.contains("another scene"), "{message}");
+    assert!(message.contains("a different scene"), "{message}");
     assert_eq!(bits(&simulation), before);
 }
 

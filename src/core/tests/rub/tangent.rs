@@ -292,7 +292,7 @@ fn what_has_no_derivative_is_refused() {
     };
     go(off, H);
     assert!(ask(off, torque, speed, 1.0).contains("step_derivatives"));
-    assert!(ask(on, torque, speed, 1.0).contains("none is done"));
+    assert!(ask(on, torque, speed, 1.0).contains("none has been completed"));
     go(on, H);
     let (friction, steps) = (reference(on, "friction_coefficient"), reference(on, "internal_steps"));
     assert!(ask(on, speed, speed, 1.0).contains("not a continuous real output"));
@@ -303,14 +303,14 @@ fn what_has_no_derivative_is_refused() {
     // A step that is not the whole story.
     on.begin_partial_step(on.time(), H).unwrap();
     on.advance().unwrap();
-    assert!(ask(on, torque, speed, 1.0).contains("none is done"));
+    assert!(ask(on, torque, speed, 1.0).contains("none has been completed"));
     on.end_step_early().unwrap();
     assert!(ask(on, torque, speed, 1.0).contains("ended early"));
     on.begin_step(on.time(), H).unwrap();
     on.advance().unwrap();
     set(on, "speed", 1301.0);
     while !on.advance().unwrap().finished {}
-    assert!(ask(on, torque, speed, 1.0).contains("something was set within it"));
+    assert!(ask(on, torque, speed, 1.0).contains("a variable was set within it"));
     go(on, H);
     on.step_derivative(&[torque], &[speed], &[1.0], &mut [0.0]).unwrap();
 }

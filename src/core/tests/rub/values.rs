@@ -87,7 +87,7 @@ fn what_does_not_belong_to_the_sectors_is_refused_by_name() {
         (&["sector_gaps", "3 values for 4"], |scene| scene.settings.contacts[0].sector_gaps = vec![3e-4; 3]),
         (&["watched_sectors", "twice"], |scene| scene.settings.outputs.watched_sectors = vec![2, 1, 2]),
         (&["watched_sectors", "twice"], |scene| scene.settings.outputs.watched_sectors = vec![4, 4]),
-        (&["watched_sectors", "counted from 1"], |scene| scene.settings.outputs.watched_sectors = vec![1, 0]),
+        (&["watched_sectors", "Count sectors from 1"], |scene| scene.settings.outputs.watched_sectors = vec![1, 0]),
         (&["watched_sectors", "5"], |scene| scene.settings.outputs.watched_sectors = vec![1, 5]),
     ];
     for (words, change) in changes {
@@ -107,11 +107,11 @@ fn refusals_write_numbers_of_any_size_in_short() {
     let mut scene = models::rub(12);
     scene.settings.structures[0].damping_ratio = Some(1e308);
     let message = refusal(&scene);
-    assert!(message.contains("damping_ratio: 1e308. Give"), "{message}");
+    assert!(message.contains("damping_ratio: 1e308 is out of range. Give"), "{message}");
     scene.settings.structures[0].damping_ratio = None;
     scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 4e-4, order: 100_000, phase: 0.0 };
     let message = refusal(&scene);
-    assert!(message.contains("features of the casing shape 1.000e-5 rad wide"), "{message}");
+    assert!(message.contains("features of the casing shape that are 1.000e-5 rad wide"), "{message}");
     // What is wrong is that entries are too far apart, not that stiffness is negative.
     scene = models::rub(12);
     scene.roms[0].mass[(2, 2)] = 1e-310;

@@ -244,5 +244,5 @@ fn energy_that_no_input_brings_ends_the_run() {
     };
     assert_eq!(ends(2e-6), None);
     let told = ends(1e-4).unwrap();
-    assert!(told.contains("no input brings") && told.contains("Use a smaller internal step"), "{told}");
+    assert!(told.contains("J of spurious energy") && told.contains("Use a smaller internal step"), "{told}");
 }

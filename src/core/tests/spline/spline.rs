@@ -350,7 +350,7 @@ fn bad_data_is_refused_with_its_place() {
     assert!(make(&spoilt(2, [0.0; 3]), 8, 3).unwrap_err().contains("data point 3"));
     let mut swapped = good.clone();
     swapped.rotate_left(8);
-    assert!(make(&swapped, 8, 3).unwrap_err().contains("ring 3 does not lie beyond ring 2"));
+    assert!(make(&swapped, 8, 3).unwrap_err().contains("ring 3 is not at a larger z than ring 2"));
     let mut surface = make(&good, 8, 3).unwrap();
     let before = surface.clone();
     assert!(surface.set_data(&spoilt(9, [0.1, f64::NAN, 0.0])).is_err());

@@ -51,7 +51,7 @@ impl RomReader<'_> {
         match text.trim().parse::<usize>() {
             Ok(rows) => Ok(Some(rows).filter(|rows| *rows != 1)),
             Err(_) => {
-                Err(self.error(format!("metadata `{ROWS}`"), format!("{text:?} is no whole number"), WRITE_AGAIN))
+                Err(self.error(format!("metadata `{ROWS}`"), format!("{text:?} is not a whole number"), WRITE_AGAIN))
             }
         }
     }
@@ -62,7 +62,7 @@ impl RomReader<'_> {
             Some((_, basis)) => Ok(*basis),
             None => {
                 let remedy = suggestion::remedy(text, &BASES.map(|(name, _)| name));
-                Err(self.error("metadata `basis`", format!("{text:?} is none"), remedy))
+                Err(self.error("metadata `basis`", format!("unknown basis {text:?}"), remedy))
             }
         }
     }
@@ -104,7 +104,7 @@ impl RomReader<'_> {
             None => Ok(true),
             Some(missing) => {
                 let list = names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-                let problem = format!("missing, although `{given}` is there");
+                let problem = format!("missing, although `{given}` is present");
                 Err(self.error(format!("array `{missing}`"), problem, format!("Give all of {list}, or none of them")))
             }
         }
@@ -121,7 +121,7 @@ impl RomReader<'_> {
         }
         let square = |name: &str| {
             let array = self.required(arrays, name, 2)?;
-            self.shape(name, array, &[order, order], "that of `mass`")?;
+            self.shape(name, array, &[order, order], "same shape as `mass`")?;
             Ok(DMatrix::from_row_slice(order, order, &array.values))
         };
         let load = |name: &str| {
@@ -171,7 +171,8 @@ impl RomReader<'_> {
         if !self.group(arrays, &SUPPORT_ARRAYS)? {
             if arrays.contains_key(SUPPORT_THERMAL) {
                 let problem = format!("given without the array `{}`", SUPPORT_ARRAYS[0]);
-                return Err(self.error(format!("array `{SUPPORT_THERMAL}`"), problem, "Remove it, or add the others"));
+                let remedy = "Remove it, or add `support_stiffness` and `support_mass`";
+                return Err(self.error(format!("array `{SUPPORT_THERMAL}`"), problem, remedy));
             }
             return Ok(None);
         }
@@ -205,7 +206,7 @@ impl RomReader<'_> {
         };
         let (Some((Ok(around), Ok(along))), Some(closed)) = (counts, closed) else {
             let problem =
-                format!("{text:?} is not two whole numbers with a comma between them, or these and `,{OPEN}`");
+                format!("{text:?} is not of the form `around,along` or `around,along,{OPEN}` with two whole numbers");
             return Err(self.error("metadata `contact_grid`", problem, WRITE_AGAIN));
         };
         Ok(Some(ContactGrid { around, along, closed }))

@@ -33,11 +33,12 @@ impl RomReader<'_> {
         if let Some(number) = numbers.iter().find(|number| !(1..=largest).contains(*number)) {
             let held = arrays.keys().find(|name| parts(name).is_some_and(|(_, other)| other == *number));
             let problem = match largest {
-                0 => format!("nodal diameter {number} of {sectors} sector(s), which has none above 0"),
-                _ => format!("nodal diameter {number} of {sectors} sectors, which have 1 to {largest} above 0"),
+                0 => format!("nodal diameter {number}, but {sectors} sector(s) have none above 0"),
+                _ => format!("nodal diameter {number}, but {sectors} sectors have numbered arrays for 1 to {largest}"),
             };
             let remedy =
-                "Correct the number in the name, or metadata `sectors`; nodal diameter 0 has no number in its names";
+                "Correct the number in the array name or metadata `sectors`; the arrays of nodal diameter 0 have no \
+                 number";
             return Err(self.error(format!("array `{}`", held.unwrap_or(given)), problem, remedy));
         }
         for number in 1..=largest {
@@ -47,7 +48,7 @@ impl RomReader<'_> {
                     "Give `mass_<n>`, `stiffness_<n>` and `contact_map_<n>` for every n from 1 to {largest} (half of \
                      metadata `sectors`), or none of them"
                 );
-                let problem = format!("missing, although `{given}` is there");
+                let problem = format!("missing, although `{given}` is present");
                 return Err(self.error(format!("array `{missing}`"), problem, remedy));
             }
         }
@@ -58,11 +59,13 @@ impl RomReader<'_> {
         let names = HARMONIC_ARRAYS.map(|kind| array_name(kind, number));
         let [mass, stiffness, map] = names.each_ref().map(|name| &arrays[name]);
         let order = mass.shape.first().copied().unwrap_or(0);
-        let of_mass = format!("that of `{}`", names[0]);
+        let of_mass = format!("same shape as `{}`", names[0]);
         self.shape(&names[0], mass, &[order, order, 2], "square, real and imaginary parts")?;
         self.shape(&names[1], stiffness, &[order, order, 2], &of_mass)?;
-        let reason =
-            format!("nodes as in `contact_positions`, 3 components, coordinates as in `{}`, two parts", names[0]);
+        let reason = format!(
+            "nodes as in `contact_positions`, 3 components, coordinates as in `{}`, real and imaginary parts",
+            names[0]
+        );
         self.shape(&names[2], map, &[nodes, 3, order, 2], &reason)?;
         Ok(Harmonic {
             mass: complex(order, order, &mass.values),
@@ -86,7 +89,7 @@ impl RomReader<'_> {
         for other in ["full_frequencies", "reduced_frequencies", "frequency_deviation", "residual_criterion"] {
             let count = arrays.get(other).map_or(values.len(), |array| array.values.len());
             if count != values.len() {
-                let problem = format!("{} values found, but {count} in `{other}`", values.len());
+                let problem = format!("found {} values, but {count} in `{other}`", values.len());
                 return Err(self.error(what, problem, WRITE_AGAIN));
             }
         }
@@ -104,7 +107,7 @@ impl RomReader<'_> {
             return Ok(value as u32);
         }
         let problem = format!("entry {index} is {value}, not a whole number from 0 to {largest}");
-        Err(self.error("array `nodal_diameters`", problem, "Give half of metadata `sectors` at most"))
+        Err(self.error("array `nodal_diameters`", problem, "Use nodal diameters up to half of metadata `sectors`"))
     }
 }
 

@@ -29,14 +29,15 @@ impl RomReader<'_> {
                 (Some(place), Some(value)) if found[place].is_none() => found[place] = Some(value),
                 (None, _) => {
                     let remedy = suggestion::remedy(name.trim(), &DIRECTIONS);
-                    return Err(self.error(format!("metadata `{ERRORS}`"), format!("{part:?} names nothing"), remedy));
+                    let problem = format!("{part:?} does not name a known error");
+                    return Err(self.error(format!("metadata `{ERRORS}`"), problem, remedy));
                 }
                 _ => {
-                    let problem = format!("{part:?} is not one number from 0 on");
+                    let problem = format!("{part:?} is repeated or is not a non-negative number");
                     return Err(self.error(
                         format!("metadata `{ERRORS}`"),
                         problem,
-                        "Write modes=0.01,mesh=0.02, each once",
+                        "Write each error once, for example modes=0.01,mesh=0.02",
                     ));
                 }
             }

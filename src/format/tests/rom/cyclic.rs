@@ -118,11 +118,11 @@ fn nodal_diameters_are_all_there_or_none() {
     let more = |file: &mut Loose| drop(file.entries.insert("sectors".into(), "8".into()));
     refused(6, more, &["array `mass_4`: missing"]);
     let fewer = |file: &mut Loose| drop(file.entries.insert("sectors".into(), "4".into()));
-    refused(7, fewer, &["_3`: nodal diameter 3 of 4 sectors, which have 1 to 2 above 0"]);
+    refused(7, fewer, &["_3`: nodal diameter 3, but 4 sectors have numbered arrays for 1 to 2"]);
     let one = |file: &mut Loose| drop(file.entries.insert("sectors".into(), "1".into()));
-    refused(7, one, &["nodal diameter 1 of 1 sector(s), which has none above 0"]);
+    refused(7, one, &["nodal diameter 1, but 1 sector(s) have none above 0"]);
     let zero = |file: &mut Loose| drop(file.arrays.insert("mass_0".into(), (vec![2, 2, 2], vec![0.0; 8])));
-    refused(6, zero, &["array `mass_0`: nodal diameter 0 of 6 sectors", "has no number in its names"]);
+    refused(6, zero, &["array `mass_0`: nodal diameter 0, but 6 sectors", "nodal diameter 0 have no number"]);
 }
 
 #[test]
@@ -132,23 +132,23 @@ fn names_that_only_look_like_nodal_diameters_are_unknown() {
         refused(6, change, &[&format!("array `{name}`: ")]);
     }
     let change = |file: &mut Loose| drop(file.arrays.insert("stifness_1".into(), (vec![1], vec![0.0])));
-    refused(6, change, &["array `stifness_1`: no such array"]);
+    refused(6, change, &["array `stifness_1`: unknown array"]);
 }
 
 #[test]
 fn wrong_shapes_are_refused_by_name() {
     for name in ["mass_2", "stiffness_2"] {
-        let part = format!("array `{name}`: shape [");
-        refused(6, |file| file.array(name).0 = vec![2, 4], &[&part, "[2, 2, 2] expected"]);
+        let part = format!("array `{name}`: found shape [");
+        refused(6, |file| file.array(name).0 = vec![2, 4], &[&part, "expected [2, 2, 2]"]);
         refused(6, |file| file.array(name).0 = vec![8], &[&part]);
     }
     refused(
         6,
         |file| file.array("contact_map_1").0 = vec![3, 2, 2],
-        &["array `contact_map_1`: shape [3, 2, 2] found, [1, 3, 2, 2] expected"],
+        &["array `contact_map_1`: found shape [3, 2, 2], expected [1, 3, 2, 2]"],
     );
     let other = |file: &mut Loose| *file.array("stiffness_3") = (vec![1, 1, 2], vec![1.0, 0.0]);
-    refused(6, other, &["array `stiffness_3`: shape [1, 1, 2] found, [2, 2, 2] expected (that of `mass_3`)"]);
+    refused(6, other, &["array `stiffness_3`: found shape [1, 1, 2], expected [2, 2, 2] (same shape as `mass_3`)"]);
     let empty = |file: &mut Loose| {
         *file.array("mass_1") = (vec![0, 0, 2], vec![]);
         *file.array("stiffness_1") = (vec![0, 0, 2], vec![]);
@@ -176,7 +176,7 @@ fn nodal_diameters_of_the_checks_fit_sectors_and_checks() {
     }
     refused(6, set(2, f64::NAN), &[name, "entry 2 is NaN"]);
     let short = |file: &mut Loose| *file.array("nodal_diameters") = (vec![3], vec![0.0; 3]);
-    refused(6, short, &[name, "3 values found, but 4 in `full_frequencies`"]);
+    refused(6, short, &[name, "found 3 values, but 4 in `full_frequencies`"]);
     let uncoupled = |file: &mut Loose| file.arrays.retain(|name, _| !name.ends_with(|c: char| c.is_ascii_digit()));
     refused(6, uncoupled, &[name, "given although the sectors are not coupled"]);
 }

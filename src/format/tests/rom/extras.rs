@@ -119,11 +119,11 @@ fn reads_back_known_rub_errors() {
         assert_eq!(read_rom(&write_rom(&rom), "rom").unwrap(), rom);
     }
     for (text, told) in [
-        ("modes=0.1,nodes=0.2", "\"nodes=0.2\" names nothing"),
-        ("modes=0.1,modes=0.2", "\"modes=0.2\" is not one number from 0 on"),
-        ("mesh=-1", "\"mesh=-1\" is not one number"),
-        ("mesh=NaN", "\"mesh=NaN\" is not one number"),
-        ("patches", "\"patches\" is not one number"),
+        ("modes=0.1,nodes=0.2", "\"nodes=0.2\" does not name a known error"),
+        ("modes=0.1,modes=0.2", "\"modes=0.2\" is repeated or is not a non-negative number"),
+        ("mesh=-1", "\"mesh=-1\" is repeated or is not"),
+        ("mesh=NaN", "\"mesh=NaN\" is repeated or is not"),
+        ("patches", "\"patches\" is repeated or is not"),
     ] {
         refused(|file| drop(file.entries.insert("rub_errors".into(), text.into())), &["metadata `rub_errors`", told]);
     }
@@ -199,12 +199,12 @@ fn rows_of_patches_fit_the_patches() {
     assert_eq!(with(&rom, " 2 ").unwrap().rows(), 2);
     assert_eq!(with(&rom, "1").unwrap().extras.rows, None);
     let more = (nodes + 1).to_string();
-    for (rows, told) in [("two", "no whole number"), ("0", "0 rows of"), (more.as_str(), "are rows")] {
+    for (rows, told) in [("two", "not a whole number"), ("0", "0 rows of"), (more.as_str(), "are required")] {
         let error = with(&rom, rows).unwrap_err().to_string();
         assert!(error.contains("`contact_rows`") && error.contains(told), "{error}");
     }
     rom.contact_nodes[0].area = 0.0;
-    assert!(with(&rom, "2").unwrap_err().to_string().contains("not patches with areas"));
+    assert!(with(&rom, "2").unwrap_err().to_string().contains("without areas"));
 }
 
 /// A rectangle of 4 x 3 nodes with free edges, in a Cartesian frame.
@@ -229,8 +229,8 @@ fn an_open_grid_says_so_in_a_third_word() {
     assert_eq!(read_rom(&file.bytes(), "panel").unwrap(), rom);
     for (text, part) in [
         ("4,3", "a closed contact grid needs a cylindrical frame"),
-        ("4,3,shut", "is not two whole numbers with a comma between them, or these and `,open`"),
-        ("4,3,open,open", "or these and `,open`"),
+        ("4,3,shut", "is not of the form `around,along` or `around,along,open` with two whole numbers"),
+        ("4,3,open,open", "or `around,along,open`"),
         ("5,3,open", "5 around x 3 along"),
         ("12,1,open", "at least 2 x 2"),
     ] {
@@ -284,7 +284,7 @@ fn groups_of_arrays_are_all_there_or_none() {
         refused(|file| drop(file.arrays.remove(name)), &[&missing, "Give all of `stiffness_speed2`, "]);
     }
     for (name, other) in [("thermal_loads", "thermal_patches"), ("thermal_patches", "thermal_loads")] {
-        let missing = format!("array `{name}`: missing, although `{other}` is there");
+        let missing = format!("array `{name}`: missing, although `{other}` is present");
         refused(|file| drop(file.arrays.remove(name)), &[&missing]);
     }
     refused(|file| drop(file.entries.remove("largest_speed")), &["metadata `largest_speed`: missing", "(rad/s)"]);
@@ -303,16 +303,16 @@ fn groups_of_arrays_are_all_there_or_none() {
 #[test]
 fn wrong_shapes_are_refused_by_name() {
     for name in ["stiffness_speed2", "stiffness_speed4", "coriolis"] {
-        let shape = format!("array `{name}`: shape [4, 1] found, [2, 2] expected");
+        let shape = format!("array `{name}`: found shape [4, 1], expected [2, 2]");
         refused(|file| file.array(name).0 = vec![4, 1], &[&shape]);
-        let dimensions = format!("array `{name}`: shape [4] found, [n, n] expected");
+        let dimensions = format!("array `{name}`: found shape [4], expected [n, n]");
         refused(|file| file.array(name).0 = vec![4], &[&dimensions]);
     }
-    let parts = ["array `centrifugal_load`: shape [2, 1] found, [n] expected"];
+    let parts = ["array `centrifugal_load`: found shape [2, 1], expected [n]"];
     refused(|file| file.array("centrifugal_load").0 = vec![2, 1], &parts);
-    let parts = ["array `thermal_patches`: shape [4, 2] found, [4, 4] expected", "two angles and two axial"];
+    let parts = ["array `thermal_patches`: found shape [4, 2], expected [4, 4]", "two angles and two axial"];
     refused(|file| file.array("thermal_patches").0 = vec![4, 2], &parts);
-    let parts = ["array `thermal_loads`: shape [1, 4] found, [2, 2] expected"];
+    let parts = ["array `thermal_loads`: found shape [1, 4], expected [2, 2]"];
     refused(|file| file.array("thermal_loads").0 = vec![1, 4], &parts);
     refused(|file| drop(file.arrays.insert("thermal_load".into(), (vec![1], vec![0.0]))), &["`thermal_loads`?"]);
 }
@@ -323,21 +323,21 @@ fn values_that_cannot_be_are_refused() {
     refused(|file| file.array("coriolis").1[0] += 1.0, &["array `coriolis`: not skew-symmetric"]);
     refused(|file| file.array("centrifugal_load").1[0] = f64::NAN, &["array `centrifugal_load`"]);
     refused(|file| file.array("thermal_loads").1[0] = f64::INFINITY, &["array `thermal_loads`"]);
-    refused(|file| file.array("thermal_patches").1[5] = -9.0, &["array `thermal_patches`, patch 2", "are no patch"]);
+    refused(|file| file.array("thermal_patches").1[5] = -9.0, &["array `thermal_patches`, patch 2", "do not define a patch"]);
     for speed in ["0", "-1", "inf", "NaN"] {
         let change = |file: &mut Loose| drop(file.entries.insert("largest_speed".into(), speed.into()));
-        refused(change, &["ROM metadata `largest_speed`", "not a finite speed > 0"]);
+        refused(change, &["ROM metadata `largest_speed`", "not a finite positive speed"]);
     }
     let entry = |name: &'static str, text: &'static str| {
         move |file: &mut Loose| drop(file.entries.insert(name.into(), text.into()))
     };
-    refused(entry("largest_speed", "fast"), &["metadata `largest_speed`: \"fast\" is not such a number"]);
+    refused(entry("largest_speed", "fast"), &["metadata `largest_speed`: \"fast\" is not a valid number"]);
     for text in ["", "6", "6,2,1", "6,2,open,", "open", "6x2", "-6,2", "6.0,2", "99999999999999999999,2"] {
-        refused(entry("contact_grid", text), &["metadata `contact_grid`", "is not two whole numbers with a comma"]);
+        refused(entry("contact_grid", text), &["metadata `contact_grid`", "is not of the form `around,along`"]);
     }
     refused(entry("contact_grid", "2,6"), &["metadata `contact_grid`: 2 around x 6 along"]);
     refused(entry("contact_grid", "18446744073709551615,2"), &["metadata `contact_grid`"]);
-    refused(entry("contact_grid", "4,3"), &["metadata `contact_grid`", "is not at its place of the grid"]);
+    refused(entry("contact_grid", "4,3"), &["metadata `contact_grid`", "is not at its grid position"]);
     refused(entry("sectors", "3"), &["metadata `contact_grid`", "one sector"]);
     let spaces = |file: &mut Loose| drop(file.entries.insert("contact_grid".into(), " 6 , 2 ".into()));
     let mut file = Loose::of(&complete(9, 2, 2));

@@ -215,22 +215,22 @@ fn wrong_arrays_are_refused_by_name_with_both_shapes() {
     ByHand::example().without("mass").refused_with(&["array `mass`: missing", "`stiffness`", "[n, n]"]);
     let mut file = ByHand::example();
     file.array("stiffness").2 = vec![4, 1];
-    file.refused_with(&["array `stiffness`: shape [4, 1] found, [2, 2] expected"]);
+    file.refused_with(&["array `stiffness`: found shape [4, 1], expected [2, 2]"]);
     let mut file = ByHand::example();
     file.array("contact_map").2 = vec![3, 2];
-    file.refused_with(&["array `contact_map`: shape [3, 2] found, [nodes, 3, n] expected"]);
+    file.refused_with(&["array `contact_map`: found shape [3, 2], expected [nodes, 3, n]"]);
     let mut file = ByHand::example();
     file.array("contact_positions").2 = vec![3, 1];
-    file.refused_with(&["array `contact_positions`: shape [3, 1] found, [3, 3] expected"]);
+    file.refused_with(&["array `contact_positions`: found shape [3, 1], expected [3, 3]"]);
     let mut file = ByHand::example();
     file.arrays.push(("contact_meridional_slopes", "F64", vec![2], vec![0.0, 0.0]));
-    file.refused_with(&["array `contact_meridional_slopes`: shape [2] found, [1] expected"]);
+    file.refused_with(&["array `contact_meridional_slopes`: found shape [2], expected [1]"]);
     let mut file = ByHand::example();
     file.arrays.push(("stifness", "F64", vec![1], vec![0.0]));
-    file.refused_with(&["array `stifness`: no such array", "Did you mean `stiffness`?"]);
+    file.refused_with(&["array `stifness`: unknown array", "Did you mean `stiffness`?"]);
     let mut file = ByHand::example();
     file.array("mass").1 = "F32";
-    file.refused_with(&["array `mass`: data type F32 found, F64 expected", "astype(numpy.float64)"]);
+    file.refused_with(&["array `mass`: found data type F32, expected F64", "astype(numpy.float64)"]);
     let mut file = ByHand::example();
     file.arrays.push(("full_frequencies", "F64", vec![2], vec![1.0, f64::NAN]));
     file.refused_with(&["array `full_frequencies`: entry 1 is NaN"]);
@@ -254,21 +254,21 @@ fn values_that_are_no_structure_are_refused() {
 
 #[test]
 fn wrong_metadata_is_refused_by_key() {
-    ByHand::example().with("format", "pt").refused_with(&["metadata `format`: \"pt\" found", "not a tiprub ROM file"]);
-    ByHand::example().without("format").refused_with(&["metadata `format`: nothing found"]);
-    ByHand::example().with("format_version", "2").refused_with(&["metadata `format_version`: \"2\" found", "release"]);
-    ByHand::example().without("sectors").refused_with(&["metadata `sectors`: missing", "at least 1"]);
-    ByHand::example().with("sectors", "-3").refused_with(&["metadata `sectors`: \"-3\" is not such a number"]);
+    ByHand::example().with("format", "pt").refused_with(&["metadata `format`: found \"pt\"", "not a tiprub ROM file"]);
+    ByHand::example().without("format").refused_with(&["metadata `format`: found nothing"]);
+    ByHand::example().with("format_version", "2").refused_with(&["metadata `format_version`: found \"2\"", "release"]);
+    ByHand::example().without("sectors").refused_with(&["metadata `sectors`: missing", "1 to 10000"]);
+    ByHand::example().with("sectors", "-3").refused_with(&["metadata `sectors`: \"-3\" is not a valid number"]);
     ByHand::example().with("sectors", "0").refused_with(&["`sectors`", "zero sectors"]);
     for many in ["10001", "1000000000", "18446744073709551615"] {
-        ByHand::example().with("sectors", many).refused_with(&["`sectors`", many, "more than 10000"]);
+        ByHand::example().with("sectors", many).refused_with(&["`sectors`", many, "exceed the limit of 10000"]);
     }
     ByHand::example().with("frame", "Cylindric").refused_with(&["metadata `frame`", "Did you mean `cylindrical`?"]);
     ByHand::example().with("damping_ratio", "1.5").refused_with(&["`damping_ratio`", "1.5"]);
     ByHand::example().with("dampingratio", "0.1").refused_with(&["`dampingratio`", "Did you mean `damping_ratio`?"]);
-    ByHand::example().with("contact_names", "a,b").refused_with(&["`contact_names`: 2 names found, 1 expected"]);
+    ByHand::example().with("contact_names", "a,b").refused_with(&["`contact_names`: found 2 names, expected 1"]);
     ByHand::example().with("contact_names", "1st").refused_with(&["\"1st\" cannot be part of a variable name"]);
-    ByHand::example().with("checksum", "0").refused_with(&["metadata `checksum`: \"0\" stated", "remove the entry"]);
+    ByHand::example().with("checksum", "0").refused_with(&["metadata `checksum`: stated \"0\"", "remove the entry"]);
 }
 
 #[test]
@@ -276,7 +276,7 @@ fn a_truncated_file_says_so() {
     let bytes = ByHand::example().bytes();
     let message = |length| read_rom(&bytes[..length], "my.rom").unwrap_err().to_string();
     assert!(message(bytes.len() - 1).contains("truncated"), "{}", message(bytes.len() - 1));
-    assert!(message(40).contains("does not fit the file of 40 bytes"), "{}", message(40));
-    assert!(message(3).contains("3 bytes only"), "{}", message(3));
+    assert!(message(40).contains("does not match the file size of 40 bytes"), "{}", message(40));
+    assert!(message(3).contains("only 3 bytes"), "{}", message(3));
     assert!(matches!(read_rom(b"", "my.rom"), Err(Error::Rom { .. })));
 }

@@ -47,17 +47,17 @@ fn slips_of_free_masters_are_located() {
     told("[0.0, -100.0, 0.5]", "[0.0, -100.0, 0.5, 7.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
     told("[0.0, -100.0, 0.5]", "[0.0, nan, 0.5]", &["structure[1].velocity"]);
     told("motion = \"free\"", "motion = \"rotating\"", &["structure[1].velocity: needs `motion = \"free\"`"]);
-    told("nodes = \"left_\"", "nodes = 3", &["contact[1].nodes: integer `3` found"]);
+    told("nodes = \"left_\"", "nodes = 3", &["contact[1].nodes: found integer `3`"]);
     told(
         "nodes = \"left_\"\n",
         "",
-        &["contact[1].master: a structure of several contacts needs `contact.nodes`", "Give every contact `nodes`"],
+        &["contact[1].master: a structure of several contacts needs `contact.nodes`", "Set `nodes` in every contact"],
     );
     told("nodes = \"left_\"", "nodes = \"left_\"\ngap = 1e-3", &["contact[1].gap: excludes a free master"]);
-    told("rigid = true", "rigid = 1", &["surface[2].rigid: integer `1` found, true or false expected"]);
+    told("rigid = true", "rigid = 1", &["surface[2].rigid: found integer `1`, expected true or false"]);
     told("rigid = true", "rigit = true", &["surface[2].rigit: unknown key", "Did you mean `rigid`?"]);
-    told("solver = \"lcp\"", "solver = \"film\"", &["Give all pairs the same solver"]);
-    let parts = ["time.input_interpolation: excludes a scene of free masters only: such a scene has no inputs"];
+    told("solver = \"lcp\"", "solver = \"film\"", &["Give all contacts the same solver"]);
+    let parts = ["time.input_interpolation: excludes a scene with free masters only: such a scene has no inputs"];
     told("[time]", "[time]\ninput_interpolation = \"hold\"", &parts);
 }
 
@@ -151,7 +151,7 @@ fn a_rotating_structure_carries_no_load_or_surface() {
     let remedy = "set motion = \"still\"";
     refused(rotate, &["structure[2].load: needs `motion = \"still\"`", remedy]);
     let parts =
-        ["surface[1].structure: needs a structure with `motion = \"still\"`", "Name a structure that stands still"];
+        ["surface[1].structure: needs a structure with `motion = \"still\"`", "Name a stationary structure"];
     refused(|scene| scene.surfaces[0].structure = Some("rotor".into()), &parts);
     let parts = ["surface[1].structure: `rign` is not defined", "Use one of: ring"];
     refused(|scene| scene.surfaces[0].structure = Some("rign".into()), &parts);
@@ -189,7 +189,7 @@ fn numbers_of_structures_and_surfaces_have_their_ranges() {
     };
     refused(patches(0, 2), &["surface[1].patches.around: 0", "from 1 to 10000"]);
     refused(patches(2, 0), &["surface[1].patches.along: 0", "from 1 to 10000"]);
-    refused(patches(101, 100), &["surface[1].patches: 101 around x 100 along are more than 10000 patches"]);
+    refused(patches(101, 100), &["surface[1].patches: 101 around x 100 along exceed the limit of 10000 patches"]);
 }
 
 #[test]
@@ -208,9 +208,9 @@ fn numbers_of_coatings_have_their_ranges() {
     refused(coating(|c| c.hardening = 1e14), &["contact[1].coating.hardening"]);
     refused(coating(|c| c.cells_around = 1), &["contact[1].coating.cells_around: 1", "from 2 to 10000000"]);
     refused(coating(|c| c.cells_along = 0), &["contact[1].coating.cells_along: 0"]);
-    let parts = ["contact[1].coating: 1000 around x 10001 along are more than 10000000 cells"];
+    let parts = ["contact[1].coating: 1000 around x 10001 along exceed the limit of 10000000 cells"];
     refused(coating(|c| c.cells_along = 10_001), &parts);
-    refused(coating(|c| (c.cells_around, c.cells_along) = (10_000_000, 10_000_000)), &["more than"]);
+    refused(coating(|c| (c.cells_around, c.cells_along) = (10_000_000, 10_000_000)), &["exceed the limit"]);
     for share in [-0.1, 1.1, f64::NAN] {
         let parts = ["contact[1].heat_to_slave", "between 0 and 1"];
         refused(|scene| scene.contacts[0].heat_to_slave = Some(share), &parts);
@@ -260,7 +260,7 @@ fn outputs_of_what_the_scene_does_not_have_are_refused() {
         scene.structures.truncate(1);
     };
     refused(rigid, &parts);
-    let parts = ["structure[2].name: `", "takes no part in any contact", "or remove it"];
+    let parts = ["structure[2].name: `", "is not part of any contact", "or remove it"];
     refused(|scene| scene.surfaces[0].structure = None, &parts);
 }
 
@@ -293,21 +293,21 @@ fn inner_tables_are_tables_with_all_they_need() {
         }
     };
     let motion = "motion = \"rotating\"";
-    told(motion, "spin = true", &["structure[1].spin: boolean found, a table expected", "{ stiffening = true }"]);
-    told(motion, "load = [2, 1.0]", &["structure[1].load: array found, a table expected", "{ order = 2"]);
+    told(motion, "spin = true", &["structure[1].spin: found boolean, expected a table", "{ stiffening = true }"]);
+    told(motion, "load = [2, 1.0]", &["structure[1].load: found array, expected a table", "{ order = 2"]);
     told(motion, "load = {}", &["structure[1].load.order: missing", "to `load` of [[structure]]: whole number"]);
     told(motion, "spin = { growt = true }", &["structure[1].spin.growt: unknown key", "Did you mean `growth`?"]);
-    told(motion, "spin = { growth = 1 }", &["structure[1].spin.growth: integer `1` found, true or false expected"]);
-    told(motion, "thermal = 1.5", &["structure[1].thermal", "true or false expected"]);
+    told(motion, "spin = { growth = 1 }", &["structure[1].spin.growth: found integer `1`, expected true or false"]);
+    told(motion, "thermal = 1.5", &["structure[1].thermal", "expected true or false"]);
     told(motion, "order = 3", &["structure[1].order: unknown key", "belongs to `load` of [[structure]]"]);
     let moving = "moving = true";
-    told(moving, "spline = 72", &["surface[1].spline: integer found, a table expected", "{ around = 72, along = 5 }"]);
-    told(moving, "spline = { around = -1 }", &["surface[1].spline.around: integer `-1` found, a whole number"]);
+    told(moving, "spline = 72", &["surface[1].spline: found integer, expected a table", "{ around = 72, along = 5 }"]);
+    told(moving, "spline = { around = -1 }", &["surface[1].spline.around: found integer `-1`, expected a"]);
     told(moving, "spline = { closure = \"smoth\" }", &["surface[1].spline.closure", "Did you mean `smooth`?"]);
     told(moving, "patches = {}", &["surface[1].patches.around: missing", "to `patches` of [[surface]]"]);
-    told(moving, "structure = 3", &["surface[1].structure: integer `3` found"]);
+    told(moving, "structure = 3", &["surface[1].structure: found integer `3`"]);
     let meridian = "meridian = \"contour\"";
-    told(meridian, "coating = \"thick\"", &["contact[1].coating: string found, a table expected"]);
+    told(meridian, "coating = \"thick\"", &["contact[1].coating: found string, expected a table"]);
     for key in ["thickness", "modulus", "yield_stress", "hardening", "cells_around", "cells_along"] {
         let all =
             "thickness = 5e-3, modulus = 1e9, yield_stress = 1e7, hardening = 1e8, cells_around = 100, cells_along = 9";

@@ -46,7 +46,7 @@ const FIXED: [(&str, &str, &str); 6] = [
 fn a_rigid_casing_has_adaptive_steps_and_needs_no_time_table() {
     let settings = parse_scene(SCENE, "demo.toml").unwrap();
     assert_eq!((settings.time.scheme, settings.time.step), (Scheme::Galerkin, ADAPTIVE_STEP));
-    assert!(settings.time.scheme_reason.as_ref().unwrap().contains("the default on rigid surfaces"));
+    assert!(settings.time.scheme_reason.as_ref().unwrap().contains("the default for rigid surfaces"));
     // What is packaged is this choice, and its reason stays with it.
     assert_eq!(parse_scene(&write_scene(&settings), "again").unwrap(), settings);
 }

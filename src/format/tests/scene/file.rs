@@ -57,7 +57,7 @@ fn scene_files_beyond_any_scene_are_refused() {
     let path = directory.path().join("scene.toml");
     std::fs::write(&path, "[[structure]]\n".repeat(80_000)).unwrap();
     let error = load_settings(&path).unwrap_err().to_string();
-    assert!(error.contains("more than the 1048576 bytes that are read") && error.contains("scene.toml"), "{error}");
+    assert!(error.contains("exceeds the limit of 1048576 bytes") && error.contains("scene.toml"), "{error}");
     let table = format!("kind = \"table\", radius_change = [{}]", "1.2345678901234e-5, ".repeat(50_000));
     let measured = GOOD.replace("kind = \"lobes\", amplitude = 1e-4, order = 2", &table);
     std::fs::write(&path, &measured).unwrap();
@@ -79,7 +79,7 @@ fn the_papers_preset_is_the_method_whole() {
             text = text.replace("gap = 1e-3", "gap = 1e-3\nsolver = \"lcp\"");
         }
         let told = parse_scene(&text, "demo.toml").unwrap_err().to_string();
-        assert!(told.contains(key) && told.contains("the method of the paper whole"), "{told}");
+        assert!(told.contains(key) && told.contains("the scheme and the solver of the paper"), "{told}");
     }
 }
 
@@ -96,14 +96,14 @@ fn unknown_keys_get_a_suggestion() {
         &[
             "surface[1].shape.amplitude: unknown key",
             "belongs to another `kind` of `shape`",
-            "No more keys are accepted",
+            "No further keys are accepted",
         ],
     );
 }
 
 #[test]
 fn wrong_words_get_a_suggestion() {
-    let list = ["surface[1].shape.kind", "\"lobs\" is not one of its values", "Did you mean `lobes`?", "`two-lobe`"];
+    let list = ["surface[1].shape.kind", "\"lobs\" is not an accepted value", "Did you mean `lobes`?", "`two-lobe`"];
     refused("\"lobes\"", "\"lobs\"", ":7:18", &list);
     refused("step = 1e-6", "scheme = \"modal_exact\"\nstep = 1", ":13:10", &["time.scheme", "`modal-exact`?"]);
     let list = ["time.input_interpolation", "Did you mean `hold`?", "`ramp`"];
@@ -127,17 +127,17 @@ fn missing_keys_are_named_with_their_unit_and_range() {
 
 #[test]
 fn wrong_types_say_found_and_expected() {
-    refused("gap = 1e-3", "gap = \"1 mm\"", ":11:7", &["contact[1].gap: string \"1 mm\" found, a number expected"]);
-    let both = ["surface[1].shape.order: integer `-2` found, a whole number, not negative expected", "number of lobes"];
+    refused("gap = 1e-3", "gap = \"1 mm\"", ":11:7", &["contact[1].gap: found string \"1 mm\", expected a number"]);
+    let both = ["surface[1].shape.order: found integer `-2`, expected a non-negative whole number", "number of lobes"];
     refused("order = 2", "order = -2", ":7:53", &both);
-    refused("order = 2", "order = 2.5", ":7:53", &["surface[1].shape.order: floating point `2.5` found"]);
-    refused("order = 2", "order = 2, phase = \"a\"", ":7:64", &["surface[1].shape.phase: string \"a\" found"]);
+    refused("order = 2", "order = 2.5", ":7:53", &["surface[1].shape.order: found floating point `2.5`"]);
+    refused("order = 2", "order = 2, phase = \"a\"", ":7:64", &["surface[1].shape.phase: found string \"a\""]);
     refused("[time]", "[outputs]\nwatched_sectors = [1, -2]\n[time]", ":13:23", &["outputs.watched_sectors[2]"]);
-    refused("[[contact]]", "[contact]", ":8:2", &["contact: table found, a list of tables", "Write [[contact]]"]);
-    refused("[time]", "[[time]]", ":12:3", &["time: array found, a single table", "Write [time]"]);
+    refused("[[contact]]", "[contact]", ":8:2", &["contact: found table, expected a list", "Write [[contact]]"]);
+    refused("[time]", "[[time]]", ":12:3", &["time: found array, expected a single table", "Write [time]"]);
     for (list, problem) in [
-        ("experiment = [0.0, 1.0, 1e-3]", "experiment: array found, a single table"),
-        ("structure = [[\"rotor\", \"rotor.safetensors\"]]", "structure: array found, a list of tables"),
+        ("experiment = [0.0, 1.0, 1e-3]", "experiment: found array, expected a single table"),
+        ("structure = [[\"rotor\", \"rotor.safetensors\"]]", "structure: found array, expected a list of tables"),
     ] {
         let error = parse_scene(&format!("name = \"demo\"\n{list}\n"), "demo.toml").unwrap_err().to_string();
         assert!(error.starts_with(&format!("demo.toml:2:1: {problem}")), "{error}");
@@ -155,8 +155,8 @@ fn wrong_syntax_is_located() {
 #[test]
 fn a_shape_is_a_table_of_named_values() {
     let shape = "{ kind = \"lobes\", amplitude = 1e-4, order = 2 }";
-    refused(shape, "[\"lobes\", 1e-4, 2, 0.0]", ":7:1", &["surface[1].shape: array found, a table expected"]);
-    refused(shape, "\"circular\"", ":7:1", &["surface[1].shape: string found", "{ kind = \"circular\" }"]);
+    refused(shape, "[\"lobes\", 1e-4, 2, 0.0]", ":7:1", &["surface[1].shape: found array, expected a table"]);
+    refused(shape, "\"circular\"", ":7:1", &["surface[1].shape: found string", "{ kind = \"circular\" }"]);
 }
 
 #[test]

@@ -48,7 +48,7 @@ impl Default for CasingOptions {
 
 /// Inner contour of casing37.
 pub fn casing37_contour() -> InnerContour {
-    let blade = blade_mesh(MeshCounts::default()).expect("the blade that ships has a mesh");
+    let blade = blade_mesh(MeshCounts::default()).expect("the built-in blade can be meshed");
     let contact = blade.contact_points(3).expect("the tip has three nodes");
     let tip: Vec<[f64; 3]> = contact.iter().map(|point| blade.mesh.nodes[point.node]).collect();
     // Weights of the three rings at the three nodes, from the splines of unit vectors.
@@ -57,14 +57,14 @@ pub fn casing37_contour() -> InnerContour {
         natural_spline(unit, tip[node][2])
     });
     let wanted = Vector3::from_fn(|node, _| tip[node][0].hypot(tip[node][1]) + TIP_GAP);
-    let radii = weights.lu().solve(&wanted).expect("the three nodes lie between different rings");
+    let radii = weights.lu().solve(&wanted).expect("the three tip nodes lie between different rings");
     let radius = |z| natural_spline(radii.into(), z);
     let last = 2 * POINTS;
     let inner = (0..=last).map(|i| RINGS[0] + (RINGS[1] - RINGS[0]) * f64::from(i) / f64::from(last));
     let mut points: Vec<[f64; 2]> = inner.map(|z| [z, radius(z)]).collect();
     points.insert(0, [AXIAL[0], radius(AXIAL[0])]);
     points.push([AXIAL[1], radius(AXIAL[1])]);
-    InnerContour::new(&points).expect("the tip of the blade that ships is a contour")
+    InnerContour::new(&points).expect("the tip of the built-in blade gives a valid contour")
 }
 
 /// Natural cubic spline through `values` at the three rings, straight beyond them.

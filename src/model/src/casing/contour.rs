@@ -21,20 +21,22 @@ impl InnerContour {
     /// [`Error::Invalid`] for fewer than two points, radii that are not positive, or z that does not grow.
     pub fn new(points: &[[f64; 2]]) -> Result<Self> {
         let refuse = |problem: String| {
-            Err(Error::invalid("contour of the casing", problem, "Give at least two points (z, r) in m by growing z"))
+            let remedy = "Give at least two points (z, r) in m with increasing z";
+            Err(Error::invalid("contour of the casing", problem, remedy))
         };
         if points.len() < 2 {
-            return refuse(format!("{} point", points.len()));
+            return refuse(format!("it has fewer than two points ({})", points.len()));
         }
         if let Some([z, r]) = points.iter().find(|[z, r]| !(z.is_finite() && r.is_finite() && *r > 0.0)) {
             return refuse(format!(
-                "the point z = {} m, r = {} m is not finite, or its radius is not positive",
+                "the point z = {} m, r = {} m is not finite or its radius is not positive",
                 shown(*z),
                 shown(*r)
             ));
         }
         if let Some(pair) = points.windows(2).find(|pair| pair[1][0] <= pair[0][0]) {
-            return refuse(format!("z = {} m does not lie beyond z = {} m", shown(pair[1][0]), shown(pair[0][0])));
+            let [previous, next] = [pair[0][0], pair[1][0]].map(shown);
+            return refuse(format!("z = {next} m is not greater than the previous z = {previous} m"));
         }
         let secants: Vec<f64> =
             points.windows(2).map(|pair| (pair[1][1] - pair[0][1]) / (pair[1][0] - pair[0][0])).collect();

@@ -39,13 +39,13 @@ impl GridNodes {
         if along < 2 || !nodes.len().is_multiple_of(along) || nodes.len() / along < 4 {
             return Err(Error::invalid(
                 "contact nodes of the casing",
-                format!("{} nodes are not {along} rings of at least 4", nodes.len()),
-                "Name the nodes of at least two rings, equally many of each",
+                format!("{} nodes cannot be divided into {along} rings of at least 4 nodes", nodes.len()),
+                "Give at least two rings with the same number of nodes each",
             ));
         }
         if let Some(node) = nodes.iter().find(|node| **node >= mesh.nodes.len()) {
-            let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
-            return Err(Error::invalid("contact nodes of the casing", problem, "Name nodes of the mesh"));
+            let problem = format!("node {} does not exist; the mesh has {} nodes", node + 1, mesh.nodes.len());
+            return Err(Error::invalid("contact nodes of the casing", problem, "Choose nodes of the mesh"));
         }
         let around = nodes.len() / along;
         let mut sorted = nodes.to_vec();
@@ -79,12 +79,12 @@ impl GridNodes {
     ) -> Result<Self> {
         let what = "contact grid of the casing";
         if around < 4 || along < 2 {
-            let problem = format!("{around} around and {along} along");
-            return Err(Error::invalid(what, problem, "Ask for at least 4 x 2"));
+            let problem = format!("{around} points around and {along} along are too few");
+            return Err(Error::invalid(what, problem, "Request at least 4 x 2"));
         }
         if let Some(node) = set.iter().find(|node| **node >= mesh.nodes.len()) {
-            let problem = format!("node {} does not exist; there are {}", node + 1, mesh.nodes.len());
-            return Err(Error::invalid(what, problem, "Name nodes of the mesh"));
+            let problem = format!("node {} does not exist; the mesh has {} nodes", node + 1, mesh.nodes.len());
+            return Err(Error::invalid(what, problem, "Choose nodes of the mesh"));
         }
         let free: Vec<usize> = set.iter().copied().filter(|node| clamped.binary_search(node).is_err()).collect();
         let heights = free.iter().map(|&node| mesh.nodes[node][2]);
@@ -152,8 +152,8 @@ impl GridNodes {
                 let largest = point.weights.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
                 let Some(&(node, _)) = largest.filter(|(_, weight)| weight.abs() > CLAMPED) else {
                     let degrees = (step * place as f64).to_degrees();
-                    let problem = format!("the point at {degrees:.3}° and z = {height:.6} m is at clamped nodes");
-                    let remedy = "Give axial positions away from what is clamped (--contact-axial)";
+                    let problem = format!("the point at {degrees:.3}° and z = {height:.6} m lies on clamped nodes");
+                    let remedy = "Give axial positions away from the clamped nodes (--contact-axial)";
                     return Err(Error::invalid("contact grid of the casing", problem, remedy));
                 };
                 nodes.push(node);
@@ -183,8 +183,8 @@ impl GridNodes {
             return Ok(());
         }
         let problem =
-            format!("{} nodes and {} slopes for rings of {}", self.nodes.len(), self.slopes.len(), self.around);
-        Err(Error::invalid("contact nodes of the casing", problem, "Give every ring its nodes and one slope"))
+            format!("{} nodes and {} slopes do not fit rings of {}", self.nodes.len(), self.slopes.len(), self.around);
+        Err(Error::invalid("contact nodes of the casing", problem, "Give the nodes and one slope of every ring"))
     }
 
     /// Number of rings.

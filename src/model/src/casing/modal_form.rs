@@ -73,7 +73,7 @@ fn mechanism(matrix: &str) -> Error {
     Error::NotPositiveDefinite {
         matrix: matrix.into(),
         remedy:
-            "Clamp the casing, or leave it wholly free, as one connected part with contact nodes that do not coincide"
+            "Clamp the casing, or leave it completely free as one connected part whose contact nodes do not coincide"
                 .into(),
     }
 }

@@ -132,11 +132,11 @@ pub fn reduce_casing(
 /// A grid whose points follow from each other.
 fn too_fine(grid: &GridNodes) -> Error {
     let problem =
-        format!("{} x {} points are more than the faces of the mesh can move independently", grid.around, grid.along());
+        format!("the mesh is too coarse to move {} x {} points independently", grid.around, grid.along());
     Error::invalid(
         "contact grid of the casing",
         problem,
-        "Ask for fewer points around or fewer rings, or refine the mesh",
+        "Use fewer points around or fewer rings, or refine the mesh",
     )
 }
 
@@ -228,11 +228,11 @@ fn origin(
 ) -> String {
     let cut_off = match modes.condensed_from {
         Some(kept) => format!(
-            "; {kept} modes up to {:.0} Hz as they are, above it the static response in {} more",
+            "; {kept} dynamic modes up to {:.0} Hz and {} static modes above",
             modes.squares[..kept].last().map_or(0.0, |square| square.sqrt() / core::f64::consts::TAU),
             modes.squares.len() - kept
         ),
-        None => format!("; all of its {} modes", modes.squares.len()),
+        None => format!("; all {} modes", modes.squares.len()),
     };
     let incompatible = match formulation {
         Formulation::IncompatibleModes => ", hex8 with incompatible modes",

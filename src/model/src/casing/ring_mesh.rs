@@ -84,7 +84,7 @@ impl RingGeometry {
             Err(Error::invalid(
                 format!("casing, {what}"),
                 format!("{} m is not positive", shown(value)),
-                "Give lengths in m",
+                "Give a positive length in m",
             ))
         };
         positive("thickness", self.thickness)?;
@@ -94,7 +94,11 @@ impl RingGeometry {
         }
         let taken: f64 = self.flanges.iter().flatten().map(|flange| flange.thickness).sum();
         if taken >= high - low {
-            let problem = format!("flanges of {} m in all fill the length of {} m", shown(taken), shown(high - low));
+            let problem = format!(
+                "the flanges are {} m thick in total, but the casing is only {} m long",
+                shown(taken),
+                shown(high - low)
+            );
             return Err(Error::invalid("casing, flange thickness", problem, "Give thinner flanges or a longer casing"));
         }
         Ok(())
@@ -153,11 +157,11 @@ fn check_counts(counts: RingCounts, rings: ContactRings, kind: ElementKind) -> R
         }
     }
     if !matches!(kind, ElementKind::Hex8 | ElementKind::Hex20) {
-        let problem = format!("{} is not among hex8 and hex20", kind.calculix_name());
+        let problem = format!("{} is neither hex8 nor hex20", kind.calculix_name());
         return Err(Error::invalid("casing, element kind", problem, "Choose hex20"));
     }
     if rings.around < 4 || rings.along < 2 {
-        let problem = format!("{} around x {} along", rings.around, rings.along);
+        let problem = format!("{} around and {} along are too few", rings.around, rings.along);
         return Err(Error::invalid("casing, contact nodes", problem, "Give at least 4 around and 2 along"));
     }
     if !around.is_multiple_of(rings.around) {
@@ -176,9 +180,9 @@ fn contact_positions(geometry: &RingGeometry, rings: ContactRings) -> Result<Vec
     if !(first > low && first < last && last < high) {
         let problem = {
             let [first, last, low, high] = [first, last, low, high].map(shown);
-            format!("{first} m to {last} m does not lie inside the casing, {low} m to {high} m")
+            format!("{first} m to {last} m is not an ascending range inside the casing ({low} m to {high} m)")
         };
-        return Err(Error::invalid("casing, axial positions of the contact rings", problem, "Choose them inside"));
+        return Err(Error::invalid("casing, axial positions of the contact rings", problem, "Choose positions inside"));
     }
     let share = |k: usize| k as f64 / (rings.along - 1) as f64;
     Ok((0..rings.along).map(|k| if k + 1 == rings.along { last } else { first + (last - first) * share(k) }).collect())

@@ -83,7 +83,7 @@ pub const MODES: usize = 20;
 impl ConductionOptions {
     pub(crate) fn validate(&self) -> Result<()> {
         if self.modes == 0 {
-            return Err(Error::invalid("thermal model, number of modes", "it is zero", "Ask for one at least"));
+            return Err(Error::invalid("thermal model, number of modes", "it is zero", "Request at least one"));
         }
         for (what, value) in [
             ("density (kg/m³)", self.density),
@@ -92,15 +92,16 @@ impl ConductionOptions {
         ] {
             if !(value.is_finite() && value > 0.0) {
                 let problem = format!("{} is not positive", shown(value));
-                return Err(Error::invalid(format!("thermal model, {what}"), problem, "Give SI units"));
+                let remedy = "Give a positive value in SI units";
+                return Err(Error::invalid(format!("thermal model, {what}"), problem, remedy));
             }
         }
         if self.films.iter().any(|film| !(film.is_finite() && *film >= 0.0))
             || self.films.iter().all(|film| *film <= 0.0)
         {
-            let problem = format!("{} inside and {} outside", shown(self.films[0]), shown(self.films[1]));
-            let remedy = "Give none below 0 and one above: without any film there is no steady state. The unit's inputs \
-                          gas_convection_factor and ambient_convection_factor switch films off";
+            let problem = format!("{} inside and {} outside are invalid", shown(self.films[0]), shown(self.films[1]));
+            let remedy = "Give no negative value and at least one above 0: without a film there is no steady state. \
+                          The inputs gas_convection_factor and ambient_convection_factor of the FMU switch films off";
             return Err(Error::invalid("thermal model, film coefficients (W/(m² K))", problem, remedy));
         }
         Ok(())
@@ -139,8 +140,8 @@ impl FullConduction {
         options.validate()?;
         mesh.validate()?;
         if patches.is_empty() {
-            let remedy = "Give at least one: --patches 12x1";
-            return Err(Error::invalid("thermal model, patches", "there is none", remedy));
+            let remedy = "Define at least one, for example with --patches 12x1";
+            return Err(Error::invalid("thermal model, patches", "none defined", remedy));
         }
         let pattern = Arc::new(node_pattern(mesh));
         let surfaces = Surfaces::new(mesh, options.heated, options.surface.as_deref())?;
@@ -189,7 +190,7 @@ fn add(pattern: &Pattern, values: &mut [f64], nodes: &[usize], entry: impl Fn(us
         let start = pattern.starts[column];
         let rows = &pattern.rows[start..pattern.starts[column + 1]];
         for (a, &row) in nodes.iter().enumerate() {
-            let place = rows.binary_search(&row).expect("the pattern holds every element's pairs");
+            let place = rows.binary_search(&row).expect("the sparsity pattern contains all element pairs");
             values[start + place] += entry(a, b);
         }
     }

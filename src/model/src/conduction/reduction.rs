@@ -161,7 +161,7 @@ fn slowest_modes(
 }
 
 const OPERATOR: &str = "K + H (conduction and films)";
-const NO_HOLD: &str = "Check the mesh for parts that hang together with nothing";
+const NO_HOLD: &str = "Check the mesh for disconnected parts";
 
 /// C-orthonormal vectors, the uniform temperature first; nodes × coordinates.
 fn basis(full: &FullConduction, modes: &EigenModes, films: [f64; 2]) -> Result<Mat<f64>> {
@@ -240,8 +240,8 @@ fn project(
     if full.areas[1] == 0.0 {
         return Err(Error::invalid(
             "thermal model",
-            "no face of the mesh is in the air outside",
-            "Check the mesh and its axis, z",
+            "no face of the mesh is exposed to the ambient air",
+            "Check the mesh, whose axis must be z",
         ));
     }
     let mut patch_means = means(&full.patch_means);
@@ -268,7 +268,7 @@ fn project(
 fn origin(mesh: &Mesh, full: &FullConduction, order: usize, options: &ConductionOptions) -> String {
     format!(
         "{} nodes, {} elements; rho = {} kg/m3, c = {} J/(kg K), k = {} W/(m K); films of {} W/(m2 K) on {:.6} m2 inside and {} on {:.6} m2 \
-         outside; heated {:.6} m2 from z = {} m to {} m; {} modes and responses at rest, {order} coordinates",
+         outside; heated {:.6} m2 from z = {} m to {} m; {} modes and steady-state responses, {order} coordinates",
         mesh.nodes.len(),
         mesh.elements.len(),
         options.density,

@@ -59,9 +59,9 @@ impl Surfaces {
         let [gas, _] = &surfaces.sides;
         if gas.is_empty() || surfaces.heated.is_empty() {
             let which =
-                if gas.is_empty() { "faces of the mesh look towards the axis" } else { "face in the gas lies there" };
-            let problem = format!("of z = {} m to {} m: no {which}", heated[0], heated[1]);
-            let remedy = "Give axial positions within the casing; its axis is z";
+                if gas.is_empty() { "no face of the mesh faces the axis" } else { "there is no gas-side face" };
+            let problem = format!("{which} between z = {} m and {} m", heated[0], heated[1]);
+            let remedy = "Give axial positions within the casing, whose axis must be z";
             return Err(Error::invalid("thermal model, heated surface", problem, remedy));
         }
         Ok(surfaces)
@@ -113,7 +113,7 @@ impl Surfaces {
                 Err(Error::invalid(
                     what,
                     "no heated face lies in it",
-                    "Give one row of patches, or heat all of the length",
+                    "Use one row of patches, or heat the full length",
                 ))
             },
         )

@@ -102,7 +102,7 @@ pub fn reduce_cube(options: &CubeOptions, listener: Listener<'_>) -> Result<Redu
         None => master_points(&mesh)?,
         Some(counts) => master_patches(&mesh, counts)?,
     };
-    let model = model(mesh, &cube_material(), options.mass, "Cube of the benchmark between two rings", listener)?;
+    let model = model(mesh, &cube_material(), options.mass, "Benchmark cube between two rings", listener)?;
     let reduction_options = FreeBodyOptions {
         name: options.name.clone(),
         kind: options.kind,
@@ -120,7 +120,7 @@ pub fn reduce_cube(options: &CubeOptions, listener: Listener<'_>) -> Result<Redu
 pub fn reduce_cube_ring(options: &RingOptions, listener: Listener<'_>) -> Result<Reduction> {
     let mesh = ring_of(options.side, options.elements);
     let (clamped, grid) = (mesh.set("CLAMPED")?.to_vec(), ring_grid(options.side, options.elements));
-    let origin = "Ring of the benchmark of a cube between two rings";
+    let origin = "Ring of the benchmark cube between two rings";
     let model = model(mesh, &ring_material(), options.mass, origin, listener)?;
     let reduction_options = PanelOptions {
         name: options.name.clone(),

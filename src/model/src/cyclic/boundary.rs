@@ -46,14 +46,14 @@ impl CyclicBoundary {
         let worst = chosen.worst;
         if worst.distance > tolerance {
             let problem = format!(
-                "node {} turned by 2π/{sectors} lies {:.3e} m from the nearest node of the other face (node {}), the tolerance \
-                 is {tolerance:.3e} m",
+                "node {} rotated by 2π/{sectors} is {:.3e} m from the nearest node of the other face (node {}), more \
+                 than the tolerance of {tolerance:.3e} m",
                 worst.low + 1,
                 worst.distance,
                 worst.high + 1
             );
-            let remedy = "Mesh both faces alike (copy one onto the other), check the number of sectors and that the axis is z, \
-                          or raise the tolerance to the accuracy of the coordinates";
+            let remedy = "Use identical meshes on both faces (copy one to the other), check the number of sectors and \
+                          that the axis is z, or increase the tolerance to the accuracy of the coordinates";
             return Err(Error::invalid("cyclic faces", problem, remedy));
         }
         check_one_to_one(&chosen.pairs)?;
@@ -166,7 +166,7 @@ fn check_sectors(sectors: usize) -> Result<()> {
     if (2..=MAX_SECTORS).contains(&sectors) {
         return Ok(());
     }
-    let problem = format!("{sectors} sectors, 2 to {MAX_SECTORS} are possible");
+    let problem = format!("{sectors} sectors are not between 2 and {MAX_SECTORS}");
     refuse(problem, "Give the number of sectors of the whole disk")
 }
 
@@ -174,10 +174,11 @@ fn check_indices<'a>(count: usize, face_nodes: impl Iterator<Item = &'a usize>) 
     let mut seen = vec![false; count];
     for &node in face_nodes {
         let Some(flag) = seen.get_mut(node) else {
-            return refuse(format!("node {} does not exist; there are {count}", node + 1), "Name nodes of the mesh");
+            let problem = format!("node {} does not exist; the mesh has {count} nodes", node + 1);
+            return refuse(problem, "Choose nodes of the mesh");
         };
         if core::mem::replace(flag, true) {
-            return refuse(format!("node {} appears twice", node + 1), "A node belongs to one of the two faces, once");
+            return refuse(format!("node {} appears twice", node + 1), "List every node once, on one of the faces");
         }
     }
     Ok(())
@@ -186,11 +187,12 @@ fn check_indices<'a>(count: usize, face_nodes: impl Iterator<Item = &'a usize>) 
 fn check_faces(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize, tolerance: f64) -> Result<()> {
     check_sectors(sectors)?;
     if !(tolerance.is_finite() && tolerance >= 0.0) {
-        return refuse(format!("tolerance {tolerance} m"), "Give a finite distance, for example 1e-6 of the radius");
+        let problem = format!("the tolerance of {tolerance} m is invalid");
+        return refuse(problem, "Give a finite distance, for example 1e-6 of the radius");
     }
     if low.is_empty() || low.len() != high.len() {
         let problem = format!("{} nodes on one face and {} on the other", low.len(), high.len());
-        return refuse(problem, "Mesh both faces alike and give all nodes of each, edges included");
+        return refuse(problem, "Use identical meshes on both faces and give all nodes of each, including the edges");
     }
     check_indices(nodes.len(), low.iter().chain(high))?;
     for &node in low.iter().chain(high) {
@@ -201,7 +203,7 @@ fn check_faces(nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors: usize
         let radius = x.hypot(y);
         if radius <= 1e-9 * radius.hypot(z).max(tolerance) {
             let problem = format!("node {} lies on the z axis, where it belongs to every sector", node + 1);
-            return refuse(problem, "Give the structure a bore, however small");
+            return refuse(problem, "Add a bore, even a very small one");
         }
     }
     Ok(())
@@ -222,14 +224,15 @@ fn check_spacing(nodes: &[[f64; 3]], low: &[usize], worst: Worst) -> Result<()> 
         return Ok(());
     }
     let problem = format!(
-        "node {} turned by one pitch misses node {} by {:.3e} m, at a distance of {spacing:.3e} m between neighbouring nodes",
+        "node {} rotated by one pitch misses node {} by {:.3e} m, while neighbouring nodes are {spacing:.3e} m apart",
         worst.low + 1,
         worst.high + 1,
         worst.distance
     );
     refuse(
         problem,
-        "Check the number of sectors and the axis, and mesh both faces alike: no tolerance makes up for that",
+        "Check the number of sectors and the axis, and use identical meshes on both faces: a larger tolerance \
+         does not help",
     )
 }
 
@@ -239,8 +242,8 @@ fn check_one_to_one(pairs: &[[usize; 2]]) -> Result<()> {
     for two in by_high.windows(2) {
         if two[0][0] == two[1][0] {
             let problem =
-                format!("nodes {} and {} both turn onto node {}", two[0][1] + 1, two[1][1] + 1, two[0][0] + 1);
-            let remedy = "Lower the tolerance below the distance of neighbouring nodes, or merge coincident nodes";
+                format!("nodes {} and {} are both matched with node {}", two[0][1] + 1, two[1][1] + 1, two[0][0] + 1);
+            let remedy = "Reduce the tolerance below the distance of neighbouring nodes, or merge coincident nodes";
             return Err(Error::invalid("cyclic faces", problem, remedy));
         }
     }

@@ -48,8 +48,8 @@ impl<'a> Condensed<'a> {
             Some(positive_factor(
                 &inner,
                 &mass,
-                "K_II (stiffness of the sector with faces and contact nodes held)",
-                "A part of the sector hangs on neither face nor clamp: check the mesh for loose parts",
+                "K_II (stiffness of the sector with faces and contact nodes fixed)",
+                "Check the mesh for parts that are connected neither to a cyclic face nor to a clamped node",
             )?)
         };
         let mut condensed = Self { sector, shift, shifted, interior, schur: Mat::zeros(0, 0) };

@@ -73,7 +73,7 @@ fn whole_families(modes: usize, squares: &[&[f64]]) -> Choice {
             let limit = (all[cut] * all[cut - 1]).sqrt();
             let hertz = |square: f64| square.sqrt() / core::f64::consts::TAU;
             let note = format!(
-                "modes cut in the gap from {:.1} Hz to {:.1} Hz that all nodal diameters leave",
+                "modes truncated in the gap from {:.1} Hz to {:.1} Hz that all nodal diameters have in common",
                 hertz(all[cut - 1]),
                 hertz(all[cut])
             );
@@ -82,8 +82,8 @@ fn whole_families(modes: usize, squares: &[&[f64]]) -> Choice {
         _ => {
             let narrow = widest.map_or(0.0, width) * 100.0;
             even(Some(format!(
-                "no gap of frequency common to all nodal diameters near {modes} modes (the widest is {narrow:.2} %): the same \
-                 number is kept at every nodal diameter, so a family may be cut at some"
+                "no frequency gap common to all nodal diameters near {modes} modes (the widest is {narrow:.2} %): the \
+                 same number of modes is kept at every nodal diameter, so a mode family may be truncated at some"
             )))
         }
     }

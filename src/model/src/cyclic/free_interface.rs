@@ -58,14 +58,14 @@ fn check_residual(static_stiffness: &Mat<c64>, seen: &Mat<c64>, squares: &[f64])
     let scaled = Mat::from_fn(seen.nrows(), seen.ncols(), |i, k| seen[(i, k)] / squares[k].sqrt());
     let shares = hermitian((scaled.adjoint() * (static_stiffness * &scaled)).as_ref());
     let eigen = shares.self_adjoint_eigen(Side::Lower).map_err(|_| {
-        Error::invalid("residual flexibility", "its eigenvalue problem did not converge", "Check mesh and material")
+        Error::invalid("residual flexibility", "the eigenvalue problem did not converge", "Check the mesh and material")
     })?;
     let largest = (0..seen.ncols()).map(|k| eigen.S()[k].re).fold(0.0, f64::max);
     if largest <= 1.0 - LEAST_RESIDUAL {
         return Ok(());
     }
-    let problem = format!("{} modes leave no flexibility to the static responses in some direction", squares.len());
-    Err(Error::invalid("number of modes", problem, "Ask for fewer modes, or refine the mesh"))
+    let problem = format!("with {} modes, some static response has no residual flexibility", squares.len());
+    Err(Error::invalid("number of modes", problem, "Request fewer modes or refine the mesh"))
 }
 
 /// ½(A + Aᴴ).

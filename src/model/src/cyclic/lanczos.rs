@@ -170,8 +170,11 @@ pub(super) fn lowest_modes(operator: &CyclicPencil<'_>, order: usize, count: usi
     if count > order {
         return Err(Error::invalid(
             "number of modes",
-            format!("{count} modes asked of {order} degrees of freedom of nodal diameter {}", operator.nodal_diameter),
-            "Ask for fewer modes or refine the mesh",
+            format!(
+                "{count} modes requested, but there are only {order} degrees of freedom at nodal diameter {}",
+                operator.nodal_diameter
+            ),
+            "Request fewer modes or refine the mesh",
         ));
     }
     let capacity = (6 * count + 20 * BLOCK).min(order);

@@ -132,7 +132,7 @@ impl<'a> CyclicPencil<'a> {
         let parts = self.parts();
         let inner = parts.interior;
         let boundary = b.nrows() - inner;
-        assert!(boundary <= self.factored, "this operator was factored for held contact only");
+        assert!(boundary <= self.factored, "this operator was factorised for fixed contact nodes only");
         let mut half = self.split(b.get(..inner, ..));
         self.condensed.solve_interior(&mut half);
         let lift = self.contract_from(self.condensed.boundary_rows(half.as_ref()).as_ref(), 0, boundary);
@@ -213,10 +213,9 @@ fn boundary_pencil(schur: &Mat<f64>, parts: DofCounts, phase: c64) -> Mat<c64> {
 
 pub(super) fn not_positive(nodal_diameter: usize, held: bool) -> Error {
     let remedy = if held {
-        "The structure can move with its contact nodes held: clamp it, or choose at least three contact nodes per sector that \
-         are not on one line"
+        "Clamp the structure, or choose at least three contact nodes per sector that are not on one line"
     } else {
-        "The structure can move as a rigid body: clamp more nodes, or none to keep it free"
+        "Clamp more nodes to prevent rigid-body motion, or none for a free structure"
     };
     Error::NotPositiveDefinite { matrix: format!("K of nodal diameter {nodal_diameter}"), remedy: remedy.into() }
 }

@@ -63,6 +63,6 @@ pub(super) fn for_each<T: Send>(
             None => skipped = true,
         }
     }
-    debug_assert!(!skipped, "work is only left out when another has failed");
+    debug_assert!(!skipped, "items are skipped only after another item has failed");
     Ok(results)
 }

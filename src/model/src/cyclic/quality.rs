@@ -17,7 +17,7 @@ pub(super) fn deviation(full: f64, reduced: f64) -> f64 {
 /// The checks of all nodal diameters, ascending in frequency.
 pub(super) fn merged(diameters: &[NodalDiameter]) -> RomChecks {
     let list = diameters.iter().flat_map(|one| {
-        let number = u32::try_from(one.number).expect("sectors are limited to far fewer");
+        let number = u32::try_from(one.number).expect("the number of sectors fits into 32 bits");
         (0..one.full_frequencies.len()).map(move |k| {
             let values = [
                 one.full_frequencies[k],

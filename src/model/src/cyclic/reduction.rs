@@ -65,13 +65,13 @@ fn check_options(contact: &[ContactPoint], options: &CyclicOptions) -> Result<()
     if contact.is_empty() {
         return Err(Error::invalid(
             "contact nodes",
-            "there are none",
-            "Name at least one, for example at the blade's tip",
+            "none given",
+            "Give at least one, for example at the tip of the blade",
         ));
     }
     match options.modes {
         ModeSelection::UpTo(limit) if !(limit.is_finite() && limit > 0.0) => {
-            let problem = format!("modes up to {limit} Hz");
+            let problem = format!("the frequency limit of {limit} Hz is invalid");
             Err(Error::invalid("fixed-interface modes", problem, "Give a finite frequency above 0"))
         }
         _ => Ok(()),

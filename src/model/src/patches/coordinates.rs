@@ -99,8 +99,10 @@ impl PatchCoordinates {
         let near: BTreeSet<usize> = self.touched.iter().chain(neighbours).copied().collect();
         let near: Vec<usize> = near.into_iter().collect();
         if near.len() * self.touched.len() > MOST_ENTRIES {
-            let problem = format!("{} nodes would all be coupled with each other", self.touched.len() / 3);
-            let remedy = "Mesh the tip more coarsely, or ask for contact nodes; blades on a rigid hub can have more with free-interface modes";
+            let nodes = self.touched.len() / 3;
+            let problem = format!("{nodes} nodes would all be coupled to each other, which needs too much memory");
+            let remedy = "Use a coarser mesh at the tip, contact nodes instead of patches, or free-interface modes if \
+                          the hub is rigid";
             return Err(Error::invalid("contact patches", problem, remedy));
         }
         let pattern = Arc::new(self.filled(old, &near));
@@ -332,8 +334,8 @@ fn pivots(weights: &DMatrix<f64>, contact: &[ContactPoint]) -> Result<Vec<usize>
 fn dependent(point: &ContactPoint) -> Error {
     Error::invalid(
         format!("contact patch `{}`", point.name),
-        "its displacement follows from those of the others",
-        "Remove contact nodes or patches that coincide, or ask for fewer patches",
+        "its displacement depends on those of the other patches",
+        "Remove contact nodes or patches that coincide, or use fewer patches",
     )
 }
 

@@ -73,7 +73,7 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
     let faces = radial_faces(mesh, NormalDirection::Outer);
     let first = (0..faces.len()).max_by(|&a, &b| faces[a].radius.total_cmp(&faces[b].radius).then(b.cmp(&a)));
     let Some(first) = first else {
-        let problem = "no outer face of the mesh faces outward, within 45 degrees of the radial direction";
+        let problem = "no outer face of the mesh points outward within 45 degrees of the radial direction";
         return Err(not_found(problem.to_owned(), "Check the axis of rotation (--axis)"));
     };
     let chosen = connected(&faces, first);
@@ -85,11 +85,11 @@ pub fn find_tip(mesh: &Mesh, fixed: &[usize]) -> Result<FoundTip> {
     let held = nodes.iter().filter(|node| fixed.binary_search(node).is_ok()).count();
     if held > 0 {
         let problem = format!(
-            "of the {} nodes of the outermost faces, at radii up to {} m, {held} are clamped or lie on faces to the neighbours",
+            "of the {} nodes of the outermost faces, at radii up to {} m, {held} are clamped or lie on cyclic faces",
             nodes.len(),
             shown(radius[1])
         );
-        return Err(not_found(problem, "This is no tip of a blade: check clamped nodes and axis"));
+        return Err(not_found(problem, "Check the clamped nodes and the axis"));
     }
     let places = Places::new(&mesh.nodes, &nodes);
     let across = elements_across(mesh, &own, &places);
@@ -147,7 +147,7 @@ fn edges(face: &TipFace) -> Vec<[usize; 2]> {
 }
 
 fn not_found(problem: String, remedy: &str) -> Error {
-    Error::invalid("tip of the blade", problem, format!("{remedy}, or name the tip: --contact-set"))
+    Error::invalid("tip of the blade", problem, format!("{remedy}, or give the nodes of the tip with --contact-set"))
 }
 
 fn extent(mesh: &Mesh, nodes: &[usize], of: fn([f64; 3]) -> f64) -> [f64; 2] {

@@ -25,7 +25,7 @@ pub(super) fn assembled(
     let (materials, of_element) = match &options.material {
         Some(material) => {
             if !materials.is_empty() {
-                notes.push("the file's own material is not used: another one is given".into());
+                notes.push("the material in the file is ignored because another one is given".into());
             }
             (vec![material.clone()], vec![0; numbered.elements.len()])
         }
@@ -52,8 +52,8 @@ fn linear_element_warning(mesh: &Mesh) -> Option<String> {
     let linear = mesh.elements.iter().filter(|element| element.kind != element.kind.quadratic()).count();
     (linear > 0).then(|| {
         format!(
-            "{linear} of {} elements have no mid-side nodes: bending comes out far too stiff (frequencies of thin blades by tens \
-             of percent). Mesh with elements of second order",
+            "{linear} of {} elements have no mid-side nodes: bending is far too stiff (frequencies of thin blades are \
+             tens of percent too high). Use second-order elements",
             mesh.elements.len()
         )
     })
@@ -61,7 +61,7 @@ fn linear_element_warning(mesh: &Mesh) -> Option<String> {
 
 /// Material index of every element, from the file.
 fn file_materials(name: &str, numbered: &Numbered, none: bool) -> Result<Vec<usize>> {
-    let remedy = "Give it on the command line: --material steel, or --young, --poisson and --density";
+    let remedy = "Give a material on the command line: --material steel, or --young, --poisson and --density";
     let refuse = |problem: String| Err(Error::Read { place: name.into(), problem, remedy: remedy.into() });
     if none {
         return refuse("the file has no material".into());
@@ -142,12 +142,12 @@ fn with_file_number(error: Error, numbers: &[u64], file: &str) -> Error {
         Error::NegativeJacobian { element, kind, point, determinant } => Error::Read {
             place: file.into(),
             problem: format!(
-                "element {} ({}) is turned inside out or degenerate: its Jacobian determinant at integration point {point} \
-                 is {determinant:.3e}",
+                "element {} ({}) is inverted or degenerate: its Jacobian determinant at integration point {point} is \
+                 {determinant:.3e}",
                 numbers[element - 1],
                 kind.calculix_name()
             ),
-            remedy: "Mesh that place again; quadratic elements fold where the mesh is too coarse for the curvature"
+            remedy: "Remesh this region; quadratic elements fold where the mesh is too coarse for the curvature"
                 .into(),
         },
         other => other,

@@ -27,12 +27,12 @@ pub fn choose_contact_nodes(nodes: &[[f64; 3]], set: &[usize], choice: &ContactC
     let named = if choice.names.is_empty() { default } else { choice.names.len() };
     let count = choice.count.unwrap_or(named);
     if count == 0 || count > set.len() {
-        let problem = format!("{count} of a set of {} nodes", set.len());
-        return Err(Error::invalid("number of contact nodes", problem, "Give a number from 1 to that of the set"));
+        let problem = format!("{count} requested from a set of {} nodes", set.len());
+        return Err(Error::invalid("number of contact nodes", problem, "Give a number from 1 to the size of the set"));
     }
     if !choice.names.is_empty() && choice.names.len() != count {
         let problem = format!("{} names for {count} contact nodes", choice.names.len());
-        return Err(Error::invalid("names of contact nodes", problem, "Give one name for each, by growing z"));
+        return Err(Error::invalid("names of contact nodes", problem, "Give one name per node, with increasing z"));
     }
     let places = Places::new(nodes, set);
     let chosen = places.evenly(count);

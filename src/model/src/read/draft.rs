@@ -64,8 +64,8 @@ impl MeshDraft {
             if self.positions[index].map(f64::to_bits) == position.map(f64::to_bits) {
                 return Ok(());
             }
-            let problem = format!("node {number} is defined a second time with other coordinates");
-            return Err(place().error(problem, "Number the nodes uniquely"));
+            let problem = format!("node {number} is defined twice with different coordinates");
+            return Err(place().error(problem, "Give every node a unique number"));
         }
         self.index.insert(number, self.numbers.len());
         self.numbers.push(number);
@@ -76,8 +76,8 @@ impl MeshDraft {
     /// Add an element.
     pub(crate) fn add_element(&mut self, element: DraftElement) -> Result<()> {
         if self.element_index.insert(element.number, self.elements.len()).is_some() {
-            let problem = format!("element {} is defined a second time", element.number);
-            return Err(element.place.error(problem, "Number the elements uniquely"));
+            let problem = format!("element {} is defined twice", element.number);
+            return Err(element.place.error(problem, "Give every element a unique number"));
         }
         self.elements.push(element);
         Ok(())
@@ -115,8 +115,8 @@ impl MeshDraft {
         }
         let solids = || self.elements.iter().filter(|element| element.kind.is_some());
         if solids().next().is_none() {
-            let problem = "the file has no solid element (tetrahedra, prisms, bricks)";
-            let remedy = "Mesh the volume and export its elements: shells and faces are not computed";
+            let problem = "the file has no solid elements (tetrahedra, prisms, bricks)";
+            let remedy = "Mesh the volume and export its elements: shells and faces are not supported";
             return Err(Error::Read { place: what.into(), problem: problem.into(), remedy: remedy.into() });
         }
         self.check_overlaid()?;
@@ -148,11 +148,11 @@ impl MeshDraft {
         };
         if kept.len() < self.numbers.len() {
             let left_out = self.numbers.len() - kept.len();
-            self.notes.push(format!("{left_out} nodes that belong to no solid element are left out"));
+            self.notes.push(format!("{left_out} nodes that belong to no solid element are ignored"));
         }
         if !empty.is_empty() {
             let names: Vec<&str> = empty.keys().map(String::as_str).collect();
-            self.notes.push(format!("sets without a node of a solid element are left out: {}", names.join(", ")));
+            self.notes.push(format!("sets without nodes of solid elements are ignored: {}", names.join(", ")));
         }
         Ok((numbered, self.notes, self.warnings))
     }
@@ -164,8 +164,8 @@ impl MeshDraft {
             let mut nodes = element.nodes.clone();
             nodes.sort_unstable();
             if let Some(other) = first.insert(nodes, element.number) {
-                let problem = format!("element {} has the nodes of element {other}", element.number);
-                let remedy = "Remove one of them: that place would be counted twice, in stiffness and in mass";
+                let problem = format!("element {} has the same nodes as element {other}", element.number);
+                let remedy = "Remove one of them, or its stiffness and mass are counted twice";
                 return Err(element.place.error(problem, remedy));
             }
         }
@@ -174,12 +174,12 @@ impl MeshDraft {
 
     fn check_nodes(&self, element: &DraftElement) -> Result<()> {
         if let Some(node) = element.nodes.iter().find(|node| !self.index.contains_key(node)) {
-            let problem = format!("element {} names node {node}, which is not defined", element.number);
-            return Err(element.place.error(problem, "Add the node, or export the mesh again, complete"));
+            let problem = format!("element {} refers to node {node}, which is not defined", element.number);
+            return Err(element.place.error(problem, "Add the node, or export the complete mesh again"));
         }
         let distinct: BTreeSet<&u64> = element.nodes.iter().collect();
         if element.kind.is_some() && distinct.len() < element.nodes.len() {
-            let problem = format!("element {} names a node twice: it is collapsed", element.number);
+            let problem = format!("element {} is collapsed: it refers to a node twice", element.number);
             let remedy = "Use prisms and tetrahedra instead of collapsed bricks";
             return Err(element.place.error(problem, remedy));
         }

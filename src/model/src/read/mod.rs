@@ -146,7 +146,7 @@ fn mesh_format(path: &Path, bytes: &[u8]) -> Result<MeshFormat> {
         _ if bytes.starts_with(b"*") => Ok(MeshFormat::Input),
         _ => {
             let remedy = "Give a CalculiX or Abaqus input file (.inp) or a Gmsh mesh (.msh, version 4.1)";
-            Err(source::about(path, "it is neither an input file nor a Gmsh mesh", remedy))
+            Err(source::about(path, "the file is neither an input file nor a Gmsh mesh", remedy))
         }
     }
 }

@@ -34,7 +34,7 @@ const WAVE: PlausibleRange =
     PlausibleRange { what: "√(E/ρ)", unit: "m/s", usual: [500.0, 20_000.0], possible: [1.0, 1e6] };
 /// Mass over the volume of the box around the model; thin structures fill little of it.
 const FILLING: PlausibleRange = PlausibleRange {
-    what: "mass per volume of the box around it",
+    what: "mass per volume of the bounding box",
     unit: "kg/m³",
     usual: [0.1, 23_000.0],
     possible: [1e-6, 1e5],

@@ -39,9 +39,9 @@ pub(super) fn open_file(path: &Path) -> Result<Vec<u8>> {
     let refuse = |problem: &str| Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     let read = std::fs::metadata(path).and_then(|metadata| {
         if !(metadata.is_file() || metadata.is_dir()) {
-            return refuse("it is a pipe or a device, not a file");
+            return refuse("this is a pipe or a device, not a regular file");
         }
-        if metadata.len() > LARGEST { refuse("it has more than 32 GiB") } else { std::fs::read(path) }
+        if metadata.len() > LARGEST { refuse("the file is larger than 32 GiB") } else { std::fs::read(path) }
     });
     read.map_err(|source| Error::File { path: path.to_path_buf(), source })
 }

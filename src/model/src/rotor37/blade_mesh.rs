@@ -112,8 +112,8 @@ pub(crate) fn spread_contact(line: &[usize], slopes: &[f64], count: usize) -> Re
     if count < 2 || count > available {
         return Err(Error::invalid(
             "number of contact nodes",
-            format!("{count} is outside 2..={available}, the nodes on the tip's mid-thickness line of this mesh"),
-            "Ask for another number or for more elements along the chord",
+            format!("{count} is outside 2..={available}, limited by the nodes on the mid-thickness line of the tip"),
+            "Choose another number or more elements along the chord",
         ));
     }
     let point = |index: usize| {

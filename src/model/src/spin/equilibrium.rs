@@ -22,7 +22,7 @@ const ITERATIONS: usize = 20;
 
 /// Largest strain for which a linear law between Green strain and stress is taken for an elastic solid.
 const STRAIN: f64 = 0.1;
-const APART: &str = "The body flies apart at this speed: give a lower largest speed, or check units and supports";
+const APART: &str = "Give a lower largest speed, or check the units and supports";
 
 /// Forces and stiffness of the free dofs at a displacement.
 struct Linearised {
@@ -89,10 +89,10 @@ impl<'a> Rotating<'a> {
     ) -> Result<Self> {
         if free.len() == assembled.mass.order() {
             let problem = "no node is clamped, so there is no equilibrium with the centrifugal force";
-            return Err(Error::invalid("effects of spin", problem, "Clamp the nodes that turn with the shaft"));
+            return Err(Error::invalid("effects of spin", problem, "Clamp the nodes that rotate with the shaft"));
         }
         let (pattern, entries) = assembled.stiffness.pattern.principal(free);
-        assert_eq!(pattern, *stiffness.pattern, "the free dofs must be those of the stiffness");
+        assert_eq!(pattern, *stiffness.pattern, "the free dofs must match those of the stiffness");
         Ok(Self { mesh, material, assembled, free, reduced: (Arc::clone(&stiffness.pattern), entries) })
     }
 
@@ -117,7 +117,7 @@ impl<'a> Rotating<'a> {
             if correction <= CORRECTION {
                 if largest_strain > STRAIN {
                     let problem =
-                        format!("strains of {largest_strain:.2}, beyond the {STRAIN} that elasticity is taken for");
+                        format!("the strain of {largest_strain:.2} exceeds {STRAIN}, the limit of linear elasticity");
                     return Err(Error::invalid(format!("static equilibrium at {speed} rad/s"), problem, APART));
                 }
                 let residual = unbalanced.norm_max() / load.max(f64::MIN_POSITIVE);
@@ -145,7 +145,10 @@ impl<'a> Rotating<'a> {
         }
         Err(Error::invalid(
             format!("static equilibrium at {speed} rad/s"),
-            format!("Newton's iteration still moves by {correction:.1e} of the displacement after {ITERATIONS} steps"),
+            format!(
+                "Newton's method did not converge in {ITERATIONS} steps: the last correction is {correction:.1e} of \
+                 the displacement"
+            ),
             APART,
         ))
     }

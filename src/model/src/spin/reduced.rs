@@ -160,8 +160,8 @@ fn closest_modes(overlap: DMatrix<f64>) -> Result<DMatrix<f64>> {
         (Some(left), Some(right)) if smallest >= OVERLAP => Ok(left * right),
         _ => Err(Error::invalid(
             "fixed-interface modes under spin",
-            format!("one of them has only {smallest:.2} in common with those at rest"),
-            "Ask for another number of modes, or for a lower largest speed",
+            format!("the overlap of one of them with the modes at rest is only {smallest:.2}"),
+            "Request another number of modes or a lower largest speed",
         )),
     }
 }

@@ -174,17 +174,17 @@ pub fn reduce_stage_casing(options: &StageCasingOptions, listener: Listener<'_>)
 fn check(options: &StageCasingOptions) -> Result<()> {
     let StageCasingOptions { around, kind, contact, .. } = *options;
     if !matches!(kind, ElementKind::Hex8 | ElementKind::Hex20) {
-        let problem = format!("{} is not among hex8 and hex20", kind.calculix_name());
+        let problem = format!("{} is neither hex8 nor hex20", kind.calculix_name());
         return Err(Error::invalid("casing of the stage, element kind", problem, "Choose hex8"));
     }
     if contact[0] < 4 || !(2..=5).contains(&contact[1]) {
-        let problem = format!("{} around x {} along", contact[0], contact[1]);
+        let problem = format!("{} around and {} along are not supported", contact[0], contact[1]);
         let remedy = "Give at least 4 around, and 2 to 5 along";
         return Err(Error::invalid("casing of the stage, contact nodes", problem, remedy));
     }
     if around == 0 || !around.is_multiple_of(contact[0]) {
-        let problem = format!("{around} bricks around are no multiple of the {} contact nodes around", contact[0]);
-        let remedy = "Give 28, 32, 56 or 112 contact nodes to 224 bricks, or another number of bricks";
+        let problem = format!("{around} bricks around are not a multiple of the {} contact nodes around", contact[0]);
+        let remedy = "Use 28, 32, 56 or 112 contact nodes with 224 bricks, or another number of bricks";
         return Err(Error::invalid("casing of the stage, contact nodes", problem, remedy));
     }
     Ok(())

@@ -181,30 +181,30 @@ impl SectorGeometry {
         let (blade, disk) = (&self.blade, &self.disk);
         if self.sectors < 3 {
             let remedy = "Give at least three, so that a sector is less than half a turn";
-            return Err(Error::invalid("stage, number of sectors", format!("{}", self.sectors), remedy));
+            return Err(Error::invalid("stage, number of sectors", format!("{} is too few", self.sectors), remedy));
         }
         let rim_inside = disk.hub_radius - disk.rim_thickness;
         rising(
-            "radii (0, bore, end of its ring, inside of the rim, hub)",
+            "radii (0, bore, outside of the bore ring, inside of the rim, hub)",
             &[0.0, disk.bore_radius, disk.bore_radius + disk.bore_height, rim_inside, disk.hub_radius],
         )?;
         rising("hub radius, end of the fillet, tip radius", &[disk.hub_radius, blade.tip_radius - blade.fillet])?;
-        rising("axial positions of the tip's edges", &blade.tip_axial)?;
-        rising("axial positions of the root's edges", &blade.root_axial)?;
+        rising("axial positions of the blade edges at the tip", &blade.tip_axial)?;
+        rising("axial positions of the blade edges at the root", &blade.root_axial)?;
         for [web, wide] in [[disk.web_thickness[0], disk.bore_width], [disk.web_thickness[1], 2.0 * self.rim_reach()]] {
             rising("thickness of the web, width of bore or rim", &[0.0, web])?;
-            not_above("web thickness", web, "width of bore or rim beside it", wide)?;
+            not_above("web thickness", web, "width of the adjacent bore or rim", wide)?;
         }
         not_above(
-            "axial position of the rim's low end",
+            "axial position of the low end of the rim",
             disk.rim_axial[0],
-            "leading edge at the root",
+            "position of the leading edge at the root",
             blade.root_axial[0],
         )?;
         not_above(
             "axial position of the trailing edge at the root",
             blade.root_axial[1],
-            "rim's high end",
+            "position of the high end of the rim",
             disk.rim_axial[1],
         )?;
         if blade.fillet.is_nan() || blade.fillet < 0.0 {
@@ -236,9 +236,9 @@ impl SectorGeometry {
         let (root, hub) = (self.section(self.disk.hub_radius), self.disk.hub_radius);
         let widest = (0..=20).map(|i| root.at(f64::from(i) / 20.0).half[1]).fold(0.0, f64::max);
         not_above(
-            "width of the blade's root with its fillet",
+            "width of the blade root with its fillet",
             2.0 * widest,
-            "0.9 of the sector",
+            "limit of 0.9 times the sector width",
             0.9 * self.pitch() * hub,
         )
     }
@@ -247,13 +247,13 @@ impl SectorGeometry {
 /// Beyond this angle of the camber line (rad) sections are sheared too much to be meshed.
 const LARGEST_ANGLE: f64 = 1.3;
 
-const REMEDY: &str = "Give lengths in m and angles in rad that make a bladed disk";
+const REMEDY: &str = "Give lengths in m and angles in rad of a valid bladed disk";
 
 fn rising(what: &str, values: &[f64]) -> Result<()> {
     if values.iter().all(|value| value.is_finite()) && values.windows(2).all(|pair| pair[0] < pair[1]) {
         return Ok(());
     }
-    Err(Error::invalid(format!("stage, {what}"), format!("{values:?} do not rise"), REMEDY))
+    Err(Error::invalid(format!("stage, {what}"), format!("{values:?} are not strictly increasing"), REMEDY))
 }
 
 fn not_above(low: &str, value: f64, high: &str, limit: f64) -> Result<()> {

@@ -100,12 +100,12 @@ impl SectorOptions {
             }
         }
         if chord % 2 != 0 {
-            return refuse("chord", format!("{chord} is odd"), "Give an even number: contact is sought at mid-chord");
+            return refuse("chord", format!("{chord} is odd"), "Give an even number: contact is evaluated at mid-chord");
         }
         let columns = counts.columns();
         if web[0] % 2 != 0 || web[0] + 2 * bore[0] > columns {
-            let problem = format!("web {} and bore 2 x {} beside {columns} columns of the rim", web[0], bore[0]);
-            return refuse("web and bore", problem, "Give an even number for the web, in all no more than for the rim");
+            let problem = format!("{} for the web and 2 x {} for the bore, but {columns} for the rim", web[0], bore[0]);
+            return refuse("web and bore", problem, "Give an even number for the web and a total of at most the rim's");
         }
         let kind_fits = match self.kind {
             ElementKind::Penta15 => true,
@@ -114,25 +114,27 @@ impl SectorOptions {
             _ => false,
         };
         if !kind_fits {
-            let problem = format!("{} with {thickness} layers through the blade", self.kind.calculix_name());
+            let name = self.kind.calculix_name();
+            let problem = format!("{name} with {thickness} layers through the blade is not supported");
             return refuse("element kind", problem, "Choose penta15, or penta6 with an even number of layers");
         }
         let (disk, blade) = (&geometry.disk, &geometry.blade);
         let longer = [disk.rim_axial[0] < blade.root_axial[0], disk.rim_axial[1] > blade.root_axial[1]];
         if longer != [overhang > 0; 2] {
             let problem = format!(
-                "{overhang} columns for a rim over {:?} m and a root over {:?} m",
+                "{overhang} does not fit a rim over {:?} m and a root over {:?} m",
                 disk.rim_axial, blade.root_axial
             );
             return refuse(
                 "overhang",
                 problem,
-                "Give columns if the rim is longer than the root at both ends, else none",
+                "Give columns if the rim is longer than the root at both ends, otherwise zero",
             );
         }
         if (disk.bore_width > disk.web_thickness[0]) != (bore[0] > 0) {
-            let problem = format!("{} columns for {} m beside {} m", bore[0], disk.bore_width, disk.web_thickness[0]);
-            return refuse("bore", problem, "Give columns if the bore is wider than the web, else none");
+            let (columns, width, web) = (bore[0], disk.bore_width, disk.web_thickness[0]);
+            let problem = format!("{columns} does not fit a bore width of {width} m and a web thickness of {web} m");
+            return refuse("bore", problem, "Give columns if the bore is wider than the web, otherwise zero");
         }
         Ok(())
     }

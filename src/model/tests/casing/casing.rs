@@ -409,14 +409,14 @@ fn a_mesh_of_ones_own_is_reduced_alike() {
     refused(&held, &patches, "contact node `ring_1_node_6`: it is clamped");
     let mut shifted = grid.clone();
     shifted.nodes.swap(3, 4);
-    refused(&shifted, &patches, "not at its place of the grid");
-    refused(&GridNodes { around: 0, ..grid.clone() }, &patches, "72 nodes and 3 slopes for rings of 0");
-    refused(&GridNodes { slopes: vec![0.0; 2], ..grid.clone() }, &patches, "72 nodes and 2 slopes for rings of 24");
+    refused(&shifted, &patches, "not at its grid position");
+    refused(&GridNodes { around: 0, ..grid.clone() }, &patches, "72 nodes and 3 slopes do not fit rings of 0");
+    refused(&GridNodes { slopes: vec![0.0; 2], ..grid.clone() }, &patches, "2 slopes do not fit rings of 24");
     let outside = ThermalPatch { angle: [0.0, 1.0], axial: [1.0, 2.0] };
     refused(&grid, &[patches[0], outside], "thermal patch 2: no element");
-    refused(&grid, &[patches[0], patches[0]], "thermal patches 1 and 2: both hold element");
+    refused(&grid, &[patches[0], patches[0]], "thermal patches 1 and 2: both contain element");
     let error = GridNodes::sorted(&mesh, &contact[1..], 3).unwrap_err().to_string();
-    assert!(error.contains("71 nodes are not 3 rings"), "{error}");
+    assert!(error.contains("71 nodes cannot be divided into 3 rings"), "{error}");
 }
 
 /// With no mode at all the static response is still that of the full model, and rigid-body modes stay.

@@ -255,12 +255,12 @@ fn what_does_not_fit_is_refused_by_name() {
     refused(&|o| o.counts.around = 30, "Give 48 elements around");
     refused(&|o| o.counts.through = 0, "element count `through`: it is zero");
     refused(&|o| o.geometry.thickness = -1e-3, "casing, thickness: -0.001 m is not positive");
-    refused(&|o| o.geometry.flanges[0].as_mut().unwrap().thickness = 0.09, "fill the length");
-    refused(&|o| o.rings.axial[1] = 0.05, "contact rings: 0.0026 m to 0.05 m does not lie inside");
-    refused(&|o| o.rings.axial[0] = f64::NAN, "does not lie inside");
+    refused(&|o| o.geometry.flanges[0].as_mut().unwrap().thickness = 0.09, "thick in total");
+    refused(&|o| o.rings.axial[1] = 0.05, "contact rings: 0.0026 m to 0.05 m is not an ascending range inside");
+    refused(&|o| o.rings.axial[0] = f64::NAN, "is not an ascending range inside");
     refused(&|o| o.rings.along = 1, "at least 4 around and 2 along");
-    refused(&|o| o.kind = ElementKind::Tet10, "C3D10 is not among hex8 and hex20");
-    refused(&|o| o.material.expansion = 11.7, "thermal expansion coefficient: 11.7 is outside");
+    refused(&|o| o.kind = ElementKind::Tet10, "C3D10 is neither hex8 nor hex20");
+    refused(&|o| o.material.expansion = 11.7, "thermal expansion coefficient: 11.7 does not satisfy");
     refused(&|o| o.patches = [48, 1], "no element has its centroid");
     refused(&|o| o.fixed_interface_modes = 1_000_000, "number of fixed-interface modes");
     for points in [vec![[0.0, 0.25]], vec![[0.0, 0.25], [0.0, 0.26]], vec![[0.0, 0.25], [0.1, -0.2]]] {

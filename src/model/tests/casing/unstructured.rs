@@ -273,14 +273,14 @@ fn rejects_what_is_no_single_full_inner_surface() {
     };
     let axial = RINGS.axial;
     let part = without([1.0, 1.6], [-1.0, 1.0]);
-    refused(&part, "inner", axial, &["no full ring about the z axis", "of 360°", "none is at 6", "Mesh the full ring"]);
+    refused(&part, "inner", axial, &["not a full ring", "of 360°, with no face at 6", "Mesh the full ring"]);
     let hole = without([1.0, 1.6], [0.0, 0.02]);
-    refused(&hole, "inner", axial, &["a gap at 7", "z = -0.001", "nodes around it", "Close it"]);
+    refused(&hole, "inner", axial, &["a hole at 7", "z = -0.001", "nodes on its edge", "Close the hole"]);
     // Beside the rings of the grid a gap does no harm.
     let set = hole.set("inner").unwrap();
     GridNodes::chosen(&hole, (set, &[]), [12, 2], Some([0.036, 0.044])).unwrap();
     let seam = RING.tetrahedra_with(counts, false);
-    refused(&seam, "inner", axial, &["no full ring", "not connected at 5.6", "merge coincident nodes"]);
+    refused(&seam, "inner", axial, &["not a full ring", "not connected at 5.6", "merge coincident nodes"]);
     let mut twice = good.clone();
     let outside = TetrahedralRing { radius: 0.3, ..RING }.tetrahedra(counts);
     let first = twice.nodes.len();
@@ -291,25 +291,25 @@ fn rejects_what_is_no_single_full_inner_surface() {
         twice.elements.push(element);
     }
     twice.sets.insert("all".into(), (0..twice.nodes.len()).collect());
-    refused(&twice, "all", axial, &["2 surfaces that are not connected", "at radius 0.250", "--contact-set"]);
+    refused(&twice, "all", axial, &["there are 2 separate surfaces", "at radius 0.250", "--contact-set"]);
     let mut aside = good.clone();
     aside.nodes.iter_mut().for_each(|node| node[0] += 0.01);
-    refused(&aside, "inner", axial, &["its centre is at x = 0.0", "no ring about the z axis", "--axis"]);
+    refused(&aside, "inner", axial, &["its centre is at x = 0.0", "not centred on the z axis", "--axis"]);
     let mut lying = good.clone();
     lying.nodes.iter_mut().for_each(|node| *node = [node[2], node[0], node[1]]);
-    refused(&lying, "inner", axial, &["no full ring about the z axis", "--axis"]);
+    refused(&lying, "inner", axial, &["not a full ring about the z axis", "--axis"]);
     refused(
         &good,
         "inner",
         [0.0, 0.05],
-        &["from the grid point at 0.000° and z = 0.050000 m", "beyond the tolerance", "to 0.046"],
+        &["from the grid point at 0.000° and z = 0.050000 m", "more than the tolerance", "to 0.046"],
     );
-    refused(&good, "low", axial, &["none of", "looks towards the z axis", "--contact-set"]);
+    refused(&good, "low", axial, &["none of", "directed towards the z axis", "--contact-set"]);
     refused(&good, "inner", [0.2, 0.3], &["lies between z = 0.200000 m and 0.300000 m"]);
     let low = good.set("low").unwrap();
     let set = good.set("inner").unwrap();
     let held = GridNodes::chosen(&good, (set, low), [12, 3], Some([-0.022, 0.033])).unwrap_err().to_string();
-    assert!(held.contains("0.000° and z = -0.022000 m is at clamped nodes"), "{held}");
+    assert!(held.contains("0.000° and z = -0.022000 m lies on clamped nodes"), "{held}");
     // More points than nodes.
     let fine = GridNodes::chosen(&good, (set, low), [96, 8], Some(axial)).unwrap();
     let options = CasingReductionOptions {
@@ -322,5 +322,5 @@ fn rejects_what_is_no_single_full_inner_surface() {
     };
     let error =
         reduce_casing(good.clone(), &Material::steel(), low, &fine, &[], &options, &silent).unwrap_err().to_string();
-    assert!(error.contains("96 x 8 points are more than the faces of the mesh can move"), "{error}");
+    assert!(error.contains("too coarse to move 96 x 8 points"), "{error}");
 }

@@ -144,5 +144,5 @@ fn a_casing_of_tetrahedra_conducts_as_one_of_bricks() {
     let nodes = torn.nodes.clone();
     torn.elements.retain(|element| element.nodes.iter().all(|&node| nodes[node][1] > -0.03));
     let error = reduce_mesh_conduction(&torn, own, PATCHES, &settings, &silent).unwrap_err().to_string();
-    assert!(error.contains("no full ring about the z axis"), "{error}");
+    assert!(error.contains("not a full ring about the z axis"), "{error}");
 }

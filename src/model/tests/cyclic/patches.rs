@@ -216,7 +216,7 @@ fn rejects_dependent_patches_and_a_patch_on_a_face() {
     let on_face = ContactPoint { patch: vec![(own[0].node, 0.5), (face, 0.5)], ..own[0].clone() };
     assert!(refused(&[on_face]).contains("cyclic face"));
     let twice = [own[0].clone(), ContactPoint { name: "again".into(), ..own[0].clone() }];
-    assert!(refused(&twice).contains("follows from those of the others"));
+    assert!(refused(&twice).contains("depends on those of the other patches"));
 }
 
 /// The tip is the outermost connected face: of the sector's blade as its set names it, not the rim beside it.
@@ -233,7 +233,7 @@ fn the_tip_of_a_sector_is_found() {
             "{tip:?}"
         );
         let error = find_tip(&mesh, &tip.nodes).unwrap_err().to_string();
-        assert!(error.contains("are clamped or lie on faces") && error.contains("--contact-set"), "{error}");
+        assert!(error.contains("are clamped or lie on cyclic faces") && error.contains("--contact-set"), "{error}");
     }
     // A second blade beside the first is as far out, and is told of.
     let one = sector(ElementKind::Hex8, 8, COARSE);

@@ -225,9 +225,9 @@ fn unsound_meshes_are_refused_by_name() {
     assert!(refusal(|mesh| mesh.nodes[3][1] = f64::NAN).starts_with("node 4: coordinates"));
     assert!(refusal(|mesh| mesh.nodes.push([0.0; 3])).starts_with("node 9: it belongs to no element"));
     assert!(refusal(|mesh| mesh.elements[0].nodes[2] = 99).starts_with("element 1 (C3D8): node 100 does not exist"));
-    assert!(refusal(|mesh| mesh.elements[0].nodes.truncate(7)).starts_with("element 1 (C3D8): 7 nodes where 8"));
+    assert!(refusal(|mesh| mesh.elements[0].nodes.truncate(7)).starts_with("element 1 (C3D8): it has 7 nodes"));
     assert!(refusal(|mesh| drop(mesh.sets.insert("tip".into(), vec![8]))).starts_with("node set `tip`: node 9"));
-    assert!(refusal(|mesh| *mesh = tiprub_model::Mesh::default()).starts_with("mesh: it has no element"));
+    assert!(refusal(|mesh| *mesh = tiprub_model::Mesh::default()).starts_with("mesh: it has no elements"));
     let mut soft = steel();
     soft.poisson_ratio = 0.5;
     let error = assemble(&sound(), &soft, &silent).err().unwrap().to_string();

@@ -134,7 +134,7 @@ fn a_file_that_is_included_too_often_is_refused() {
         let many = format!("{head}{}{}", include(path, 60), include("list.txt", 60));
         let text = read(&[("a.inp", &many), ("list.txt", &list)], &MeshOptions::default()).unwrap_err().to_string();
         assert!(
-            text.contains("list.txt") && text.contains("8 MiB") && text.contains("Include every file once"),
+            text.contains("list.txt") && text.contains("8 MiB") && text.contains("Include every file only once"),
             "{text}"
         );
     }
@@ -190,20 +190,20 @@ fn wrong_files_are_refused_with_line_and_remedy() {
         (swap("30, 0.11", "30, 0.1x1"), &["a.inp:4", "`0.1x1`", "not a number"]),
         (swap("30, 0.11", "30, nan"), &["a.inp:4", "not a number"]),
         (swap("40, 0.1,", "-4, 0.1,"), &["a.inp:5", "`-4`", "node number"]),
-        (swap("20, 0.11", "10, 0.11"), &["a.inp:3", "node 10", "second time"]),
-        (swap("5, 50", "1, 50"), &["a.inp:16", "element 1", "second time"]),
+        (swap("20, 0.11", "10, 0.11"), &["a.inp:3", "node 10", "twice"]),
+        (swap("5, 50", "1, 50"), &["a.inp:16", "element 1", "twice"]),
         (swap("1, 10, 20", "1, 10, 99"), &["a.inp:15", "node 99", "not defined"]),
         (swap("70, 80\n", "70\n"), &["element 1 (C3D8)", "8"]),
         (swap("120, 130, 140\n", "120, 130\n"), &["a.inp:16", "element 5 (C3D8) has 7 nodes"]),
-        (swap("1, 10, 20", "1, 20, 10"), &["element 1 (C3D8)", "turned inside out"]),
+        (swap("1, 10, 20", "1, 20, 10"), &["element 1 (C3D8)", "inverted"]),
         (swap("1, 10, 20", "1, 10, 10"), &["a.inp:15", "twice", "collapsed"]),
         (swap("C3D8", "C3D8I"), &["a.inp:14", "C3D8I", "incompatible", "--stiffness"]),
         (swap("C3D8", "C3D27"), &["a.inp:14", "C3D27", "Convert"]),
         (swap("TYPE=C3D8, ", ""), &["a.inp:14", "parameter TYPE"]),
         (with("*EQUATION\n2\n10,1,1.,20,1,-1.\n"), &["a.inp:24", "*EQUATION", "not supported", "--stiffness"]),
-        (with("*NSETS, NSET=A\n10\n"), &["a.inp:24", "*NSETS", "not known"]),
+        (with("*NSETS, NSET=A\n10\n"), &["a.inp:24", "*NSETS", "unknown"]),
         (with("*NSET, NSET=A\n10, B\n"), &["a.inp:25", "`B`", "NALL"]),
-        (with("*NSET, NSET=A\n11\n"), &["a.inp:25", "`A` names 11"]),
+        (with("*NSET, NSET=A\n11\n"), &["a.inp:25", "`A` contains 11"]),
         (with("*NSET, NSET=A, GENERATE\n20, 10, 1\n"), &["a.inp:25", "FIRST, LAST, INCREMENT"]),
         (swap("*Density\n7850.,\n", ""), &["a.inp:18", "`Steel`", "*DENSITY", "command line"]),
         (swap("*Elastic\n", "*Elastic, type=ENGINEERING CONSTANTS\n"), &["a.inp:19", "isotropic"]),
@@ -241,8 +241,8 @@ fn gmsh_files_of_other_versions_and_kinds_are_refused() {
         ("$EndNodes", "$EndNodez", "$EndNodes is missing"),
         ("3 1 5 9", "3 1 12 9", "SecondOrderIncomplete"),
         ("3 1 5 9", "3 1 7 9", "pyramids"),
-        ("3 1 5 9", "3 1 999 9", "not known"),
-        ("3 1 5 9", "3 1 5 999999999999", "more than it can hold"),
+        ("3 1 5 9", "3 1 999 9", "unknown"),
+        ("3 1 5 9", "3 1 5 999999999999", "more than it can contain"),
     ] {
         let changed = text.replacen(from, to, 1);
         assert_ne!(changed, text, "{from}");

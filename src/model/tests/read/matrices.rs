@@ -261,9 +261,9 @@ fn wrong_matrices_are_refused_with_the_remedy() {
         ("not symmetric", skewed, m.clone(), table.clone(), &["not symmetric", "(1, 3)"]),
         ("both triangles", first(&both, "general", "symmetric"), m.clone(), table.clone(), &["both sides", "general"]),
         ("one triangle", first(&k, "symmetric", "general"), m.clone(), table.clone(), &["one side", "symmetric"]),
-        ("no matrix", "hello\n".into(), m.clone(), table.clone(), &["no matrix", "Matrix Market"]),
+        ("no matrix", "hello\n".into(), m.clone(), table.clone(), &["not a matrix", "Matrix Market"]),
         ("negative", k.replacen("\n1 1 ", "\n1 1 -", 1), m.clone(), table.clone(), &["k.mtx", "negative"]),
-        ("exchanged", m.clone(), k.clone(), table.clone(), &["m.mtx", "exchanged"]),
+        ("exchanged", m.clone(), k.clone(), table.clone(), &["m.mtx", "swapped"]),
         ("mass cut", k.clone(), first(&m, "\n1 1 ", "\n1 1 -"), table.clone(), &["m.mtx", "mass"]),
         (
             "short table",

@@ -282,11 +282,11 @@ fn normals_point_to_the_cube() {
 fn what_cannot_be_reduced_is_refused() {
     let options = RingOptions { elements: COARSE, static_responses: 76, modes: 4, ..RingOptions::new(RingSide::Left) };
     let error = reduce_cube_ring(&options, &silent).unwrap_err().to_string();
-    assert!(error.contains("only 75 components"), "{error}");
+    assert!(error.contains("only 75 displacements"), "{error}");
     let options = CubeOptions { elements: 2, modes: Some(28), ..CubeOptions::default() };
     let error = reduce_cube(&options, &silent).unwrap_err().to_string();
-    assert!(error.contains("28 asked, but only 27"), "{error}");
+    assert!(error.contains("28 requested, but there are only 27"), "{error}");
     let options = CubeOptions { elements: 2, patches: Some([4, 2]), ..CubeOptions::default() };
     let error = reduce_cube(&options, &silent).unwrap_err().to_string();
-    assert!(error.contains("4 in one direction, in which the face has nodes at 3 places"), "{error}");
+    assert!(error.contains("4 in a direction in which the face has 3 node positions"), "{error}");
 }

@@ -71,7 +71,7 @@ fn a_free_body_has_six_rigid_modes_and_the_dense_elastic_ones() {
     }
     let error = full_modes(&stiffness, &mass, false, 3, &silent).unwrap_err();
     assert!(matches!(error, Error::NotPositiveDefinite { .. }), "{error}");
-    assert!(error.to_string().contains("clamp at least three nodes"), "{error}");
+    assert!(error.to_string().contains("Clamp at least three nodes"), "{error}");
 }
 
 /// Held along one edge the body can still turn about it, whether or not round-off lets the factorisation pass.
@@ -122,7 +122,7 @@ fn more_modes_than_dofs_are_refused() {
     let (stiffness, mass) = clamped_pencil(&straight_box(ElementKind::Hex8, [1, 1, 1], [0.1; 3]));
     let factor = stiffness.factor("K", "").unwrap();
     let error = lowest_modes(&mass, &factor, 0.0, 13, ReductionStage::FullModes, &silent).unwrap_err().to_string();
-    assert!(error.starts_with("number of modes: 13 modes asked of 12"), "{error}");
+    assert!(error.starts_with("number of modes: 13 modes requested, but there are only 12"), "{error}");
 }
 
 #[test]

@@ -173,7 +173,7 @@ fn what_cannot_spin_is_refused() {
     let body = beam(4, 0.5, 0.02, 0.3);
     let too_fast = body.at(1e6).unwrap_err().to_string();
     assert!(
-        too_fast.starts_with("static equilibrium at 1000000 rad/s: strains of")
+        too_fast.starts_with("static equilibrium at 1000000 rad/s: the strain of")
             && too_fast.contains("lower largest speed"),
         "{too_fast}"
     );

@@ -137,11 +137,11 @@ fn places_of_modes_are_where_their_stress_is_largest() {
     let refused =
         |places: StressPlaces| reduced(&mesh, &tip, (ReductionKind::FreeInterface, 6), places).unwrap_err().to_string();
     let told = refused(StressPlaces { nodes: Vec::new(), modes: 7 });
-    assert!(told.starts_with("places of largest stress: 7 asked"), "{told}");
+    assert!(told.starts_with("places of largest stress: 7 requested"), "{told}");
     let told = refused(StressPlaces { nodes: vec![("a".into(), 100_000)], modes: 0 });
     assert!(told.contains("`a`") && told.contains("node 100001 does not exist"), "{told}");
     let told = refused(StressPlaces { nodes: vec![("a".into(), 0), ("a".into(), 1)], modes: 0 });
-    assert!(told.contains("`a`: it is there twice"), "{told}");
+    assert!(told.contains("`a`: it appears twice"), "{told}");
 }
 
 /// Pulses of force on three patches, one after the other (N).

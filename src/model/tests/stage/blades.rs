@@ -236,7 +236,7 @@ fn what_makes_no_stage_is_refused_by_name() {
         (|o| o.geometry.blade.fillet = -1e-3, "fillet"),
         (|o| o.geometry.blade.inlet_angle[1] = 70.0, "angles"),
         (|o| o.geometry.blade.edge_thickness[0] = 0.01, "thicknesses"),
-        (|o| o.geometry.blade.thickness[0] = 0.03, "width of the blade's root"),
+        (|o| o.geometry.blade.thickness[0] = 0.03, "width of the blade root"),
         (|o| o.geometry.disk.rim_axial[0] = -0.01, "rim"),
     ];
     for (change, part) in wrong {

@@ -82,9 +82,9 @@ fn counts_that_do_not_fit_are_refused() {
     let refusal = |options: StageCasingOptions| stage_casing_mesh(&options).err().unwrap().to_string();
     let default = StageCasingOptions::default;
     assert!(
-        refusal(StageCasingOptions { contact: [30, 3], ..default() }).contains("224 bricks around are no multiple")
+        refusal(StageCasingOptions { contact: [30, 3], ..default() }).contains("224 bricks around are not a multiple")
     );
-    assert!(refusal(StageCasingOptions { contact: [28, 6], ..default() }).contains("28 around x 6 along"));
-    assert!(refusal(StageCasingOptions { contact: [2, 3], ..default() }).contains("2 around x 3 along"));
-    assert!(refusal(StageCasingOptions { kind: ElementKind::Tet4, ..default() }).contains("C3D4 is not among"));
+    assert!(refusal(StageCasingOptions { contact: [28, 6], ..default() }).contains("28 around and 6 along"));
+    assert!(refusal(StageCasingOptions { contact: [2, 3], ..default() }).contains("2 around and 3 along"));
+    assert!(refusal(StageCasingOptions { kind: ElementKind::Tet4, ..default() }).contains("C3D4 is neither"));
 }

@@ -24,8 +24,8 @@ impl Gauge {
     pub fn at(mesh: &Mesh, material: &Material, node: usize) -> Result<Self> {
         let around: Vec<&Element> = mesh.elements.iter().filter(|element| element.nodes.contains(&node)).collect();
         if around.is_empty() || around.iter().any(|element| element.kind != ElementKind::Hex20) {
-            let problem = format!("node {} is not one of quadratic bricks alone", node + 1);
-            return Err(Error::invalid("gauge of the full blade", problem, "Mesh it with quadratic bricks"));
+            let problem = format!("node {} is not surrounded by quadratic bricks only", node + 1);
+            return Err(Error::invalid("gauge of the full blade", problem, "Mesh the blade with quadratic bricks"));
         }
         let [x, y, _] = mesh.nodes[node];
         let (sine, cosine) = y.atan2(x).sin_cos();
@@ -82,7 +82,7 @@ fn gradients(mesh: &Mesh, element: &Element, place: [f64; 3]) -> Result<Vec<[f64
             coordinates.iter().enumerate().map(|(node, at)| shape.gradients[node][i] * at[j]).sum()
         });
         let inverse = jacobian.try_inverse().ok_or_else(|| {
-            Error::invalid("gauge of the full blade", "an element around it is flat", "Mesh the blade soundly")
+            Error::invalid("gauge of the full blade", "an element around it is degenerate", "Check the mesh")
         })?;
         for (found, gradient) in found.iter_mut().zip(&shape.gradients) {
             let own = inverse * nalgebra::Vector3::from(*gradient);

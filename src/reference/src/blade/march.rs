@@ -234,5 +234,5 @@ fn rubbed(
 }
 
 fn unsolved(time: f64) -> Error {
-    Error::invalid("contact of the full blade", format!("is not solved at {time:e} s"), "Take shorter steps")
+    Error::invalid("contact of the full blade", format!("no solution at {time:e} s"), "Use shorter steps")
 }

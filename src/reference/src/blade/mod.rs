@@ -66,7 +66,7 @@ impl FullBlade {
     /// # Errors
     /// A blade that is not held.
     pub fn moved(&self, forces: &[(usize, [f64; 3])]) -> Result<Vec<[f64; 3]>> {
-        let factor = self.stiffness.factor("K of the blade", "Clamp it, and mesh it soundly")?;
+        let factor = self.stiffness.factor("K of the blade", "Clamp the blade and check its mesh")?;
         let mut load = Mat::zeros(self.order(), 1);
         for (node, force) in forces {
             if let Some(first) = self.rows[*node] {
@@ -98,7 +98,7 @@ impl FullBlade {
 
     /// M + c K.
     fn factor(&self, c: f64) -> Result<Factor> {
-        self.mass.plus_scaled(c, &self.stiffness).factor("M + c K of the blade", "Clamp it, and mesh it soundly")
+        self.mass.plus_scaled(c, &self.stiffness).factor("M + c K of the blade", "Clamp the blade and check its mesh")
     }
 }
 

@@ -20,7 +20,7 @@ pub struct Chain {
 impl Chain {
     /// ω_n² = (k + 4k_c sin²(πn/N))/m, as ω_n (rad/s).
     pub fn frequency(&self, nodal_diameter: u32) -> f64 {
-        let sectors = u32::try_from(self.sectors).expect("a count of sectors");
+        let sectors = u32::try_from(self.sectors).expect("the number of sectors fits into 32 bits");
         super::frequencies::cyclic_chain(nodal_diameter, sectors, self.mass, self.spring, self.coupling)
     }
 
@@ -31,7 +31,7 @@ impl Chain {
         let root = (k * k + 4.0 * k * c).sqrt();
         // The smaller root by way of the larger, without cancellation.
         let r = 2.0 * c / (k + 2.0 * c + root);
-        let power = |n: usize| r.powi(i32::try_from(n).expect("a count of sectors"));
+        let power = |n: usize| r.powi(i32::try_from(n).expect("the number of sectors fits into 32 bits"));
         (power(sector) + power(self.sectors - sector)) / ((1.0 - power(self.sectors)) * root)
     }
 
@@ -46,6 +46,6 @@ impl Chain {
 
     /// Angle between neighbours (rad).
     pub fn pitch(&self) -> f64 {
-        TAU / f64::from(u32::try_from(self.sectors).expect("a count of sectors"))
+        TAU / f64::from(u32::try_from(self.sectors).expect("the number of sectors fits into 32 bits"))
     }
 }

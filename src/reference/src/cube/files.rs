@@ -58,8 +58,8 @@ impl BodyFile {
             && self.starts.is_sorted()
             && self.rows.iter().all(|row| *row < order);
         if !sound {
-            let problem = format!("matrices do not fit {} nodes", self.nodes.len());
-            return Err(Error::invalid("file of a body", problem, "Write it again with the example `cube`"));
+            let problem = format!("the matrices do not match {} nodes", self.nodes.len());
+            return Err(Error::invalid("file of a body", problem, "Write the file again with the example `cube`"));
         }
         let pattern = Arc::new(Pattern { starts: self.starts, rows: self.rows });
         Ok(FeModel {

@@ -194,11 +194,11 @@ impl AugmentedProblem<'_> {
             multipliers =
                 memory(&contacts, &forces.iter().map(|force| Vector3::new(force[0], 0.0, 0.0)).collect::<Vec<_>>());
         }
-        let problem = format!("step {step} is not settled after {UPDATES} updates; surfaces move by {last:.1e} m");
+        let problem = format!("no convergence in step {step} after {UPDATES} updates; surfaces move by {last:.1e} m");
         Err(Error::invalid(
             "contact problem of the augmented Lagrangian",
             problem,
-            "Take a smaller step or a larger penalty",
+            "Use a smaller step or a larger penalty",
         ))
     }
 
@@ -237,8 +237,8 @@ impl AugmentedProblem<'_> {
                 )
             })?;
         }
-        let problem = format!("Newton's method has not converged in {ITERATIONS} iterations in step {step}");
-        Err(Error::invalid("contact problem of the augmented Lagrangian", problem, "Take a smaller step"))
+        let problem = format!("Newton's method did not converge in {ITERATIONS} iterations in step {step}");
+        Err(Error::invalid("contact problem of the augmented Lagrangian", problem, "Use a smaller step"))
     }
 }
 

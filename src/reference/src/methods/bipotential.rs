@@ -146,8 +146,8 @@ impl BipotentialProblem<'_> {
                 return Ok(BipotentialSolution { contacts, forces, sweeps, penetration });
             }
         }
-        let problem = format!("in step {step} the feet still move by {last:.1e} m after {UPDATES} updates");
-        Err(Error::invalid("contact geometry of the bi-potential method", problem, "Take a smaller step"))
+        let problem = format!("in step {step}, the foot points still move by {last:.1e} m after {UPDATES} updates");
+        Err(Error::invalid("contact geometry of the bi-potential method", problem, "Use a smaller step"))
     }
 
     fn remembered(&self, contact: &RingContact) -> [f64; 3] {
@@ -195,8 +195,8 @@ fn uzawa(
             return Ok(sweep + 1);
         }
     }
-    let problem = format!("Uzawa's iteration has not converged in {SWEEPS} sweeps in step {step}");
-    Err(Error::invalid("contact problem of the bi-potential method", problem, "Take a smaller step"))
+    let problem = format!("Uzawa's iteration did not converge in {SWEEPS} sweeps in step {step}");
+    Err(Error::invalid("contact problem of the bi-potential method", problem, "Use a smaller step"))
 }
 
 /// Projection on Coulomb's cone; the first component is the normal one.

@@ -116,7 +116,7 @@ fn multipliers(
         let matrix = DMatrix::from_fn(active.len(), active.len(), |i, j| entry(active[i], active[j]));
         let right = DVector::from_fn(active.len(), |i, _| -contacts[active[i]].gap);
         let solution = matrix.lu().solve(&right).ok_or_else(|| {
-            Error::invalid("contact matrix of film", "it is singular", "Check the surfaces of the scene")
+            Error::invalid("contact matrix of `film`", "it is singular", "Check the surfaces of the scene")
         })?;
         Ok(solution.iter().copied().collect())
     };
@@ -138,8 +138,8 @@ fn multipliers(
         }
         active = kept;
     }
-    let problem = format!("{} contacts are not settled after {EXCHANGES} exchanges", contacts.len());
-    Err(Error::invalid("contact problem of film", problem, "Take a smaller step or less friction"))
+    let problem = format!("{} contacts did not converge after {EXCHANGES} exchanges", contacts.len());
+    Err(Error::invalid("contact problem of `film`", problem, "Use a smaller step or less friction"))
 }
 
 /// Active contacts after one exchange: the first contact that pulls or that would be inside changes sides (K. G. Murty's rule,

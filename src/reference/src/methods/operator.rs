@@ -112,8 +112,8 @@ impl BodyOperator {
         if step <= limit {
             return Ok(());
         }
-        let problem = format!("{step:.3e} s is beyond the limit of central differences, {limit:.3e} s");
-        Err(Error::invalid("step", problem, "Take a smaller step"))
+        let problem = format!("{step:.3e} s exceeds the stability limit of central differences, {limit:.3e} s");
+        Err(Error::invalid("step", problem, "Use a smaller step"))
     }
 
     /// K u without reactions of clamps.

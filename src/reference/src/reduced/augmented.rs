@@ -83,7 +83,7 @@ impl<'a, S: ReducedScene> Augmented<'a, S> {
             }
             given = found;
         }
-        Err(format!("step {} is not settled after {AUGMENTATIONS} augmentations", self.steps))
+        Err(format!("step {} did not converge in {AUGMENTATIONS} augmentations", self.steps))
     }
 
     /// The piecewise linear problem of one augmentation by Newton's method: closed nodes obey (ε⁻¹ + W) λ = ε⁻¹ k − g.
@@ -112,7 +112,7 @@ impl<'a, S: ReducedScene> Augmented<'a, S> {
             }
             closed = next;
         }
-        Err(format!("Newton's method has not converged in step {}", self.steps))
+        Err(format!("Newton's method did not converge in step {}", self.steps))
     }
 }
 

@@ -122,6 +122,6 @@ fn finite(values: &[f64], step: u64) -> Result<(), String> {
     // An amplitude beyond all bounds is a divergence before it is infinite.
     match values.iter().all(|value| value.abs() < 1e12) {
         true => Ok(()),
-        false => Err(format!("the motion has grown beyond all bounds in step {step}")),
+        false => Err(format!("the motion diverged in step {step}")),
     }
 }

@@ -54,7 +54,7 @@ impl<'a, S: ReducedScene> Moreau<'a, S> {
                 DMatrix::from_fn(count, count, |i, j| group[i].normal.weighted(&self.inertia, &group[j].force));
             let right = DVector::from_fn(count, |i, _| group[i].normal.dot(free) + group[i].rate);
             let found = complementarity::solve(&matrix, &right)
-                .ok_or_else(|| format!("the contact problem of step {} is not solved", self.steps))?;
+                .ok_or_else(|| format!("the contact problem of step {} has no solution", self.steps))?;
             impulses.extend(found.iter());
         }
         Ok(impulses)

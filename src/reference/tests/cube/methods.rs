@@ -87,6 +87,6 @@ fn an_explicit_step_beyond_the_limit_is_refused() {
     for method in [FILM(), PENALTY()] {
         let error =
             method.run(&scene, &MethodRun { step: 1.2e-6, end: 1e-4, stride: 1, snapshots: vec![] }).unwrap_err();
-        assert!(error.to_string().contains("beyond the limit of central differences"), "{error}");
+        assert!(error.to_string().contains("exceeds the stability limit of central differences"), "{error}");
     }
 }

@@ -175,7 +175,7 @@ fn matrices_come_back_from_their_file() {
         assert!(off(&model.mass.values, &body.mass.values) < 1e-15);
         let mut broken = BodyFile::from(body);
         broken.mass.pop();
-        assert!(broken.fe_model("file").unwrap_err().to_string().contains("do not fit"));
+        assert!(broken.fe_model("file").unwrap_err().to_string().contains("do not match"));
     }
     std::fs::remove_dir_all(&directory).unwrap();
 }

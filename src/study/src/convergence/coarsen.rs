@@ -14,7 +14,7 @@ use tiprub_core::{
 pub fn coarsened(rom: &Rom) -> Result<Rom, String> {
     let along = along(rom)?;
     if along < 3 || along.is_multiple_of(2) {
-        return Err(format!("{along} patches have no half: 3, 5, 7, ... do"));
+        return Err(format!("{along} patches along the chord cannot be halved; 3, 5, 7, ... patches can"));
     }
     let shares = DMatrix::identity(rom.rows(), rom.rows()).kronecker(&shares(along));
     let kept = along.div_ceil(2);
@@ -28,15 +28,16 @@ pub fn coarsened(rom: &Rom) -> Result<Rom, String> {
 /// Why there is none: contact nodes, one row, or rows that these are no sums of.
 pub fn fewer_rows(rom: &Rom, rows: usize) -> Result<Rom, String> {
     let along = along(rom)?;
-    let shares = row_shares(rom.rows(), rows).ok_or_else(|| format!("{} rows do not tell of {rows}", rom.rows()))?;
+    let shares = row_shares(rom.rows(), rows)
+        .ok_or_else(|| format!("a model with {rows} rows of patches cannot be derived from one with {}", rom.rows()))?;
     let shares = shares.kronecker(&DMatrix::identity(along, along));
-    made(rom, &shares, rows, |row| row, &format!(" in {rows} rows"))
+    made(rom, &shares, rows, |row| row, &format!(", {rows} across the thickness"))
 }
 
 /// Patches along the chord.
 fn along(rom: &Rom) -> Result<usize, String> {
     if rom.contact_nodes.iter().any(|patch| patch.area <= 0.0) {
-        return Err("contact is at nodes, of which no coarser ones follow".into());
+        return Err("the ROM has contact nodes, which cannot be merged like contact patches".into());
     }
     Ok(rom.contact_nodes.len() / rom.rows())
 }
@@ -74,7 +75,7 @@ fn made(
     let lengths = rows as f64 / rom.rows() as f64;
     found.contact_nodes.iter_mut().for_each(|patch| patch.length *= lengths);
     found.extras.rows = Some(rows).filter(|rows| *rows > 1);
-    found.origin = format!("{}; {kept} patches{told} of its {}", rom.origin, areas.len());
+    found.origin = format!("{}; coarsened from {} to {kept} patches{told}", rom.origin, areas.len());
     found.checks.flexibility_deviation.clear();
     found.checks.rub_errors = None;
     found.validate().map_err(|error| error.to_string())?;
@@ -236,7 +237,7 @@ mod tests {
             let off = (flexibility(found) - flexibility(&expected)).amax() / flexibility(&expected).amax();
             assert!(off < 1e-2, "{off:e}");
         }
-        assert!(fewer_rows(&one, 1).is_err() && fewer_rows(&two, 3).unwrap_err().contains("2 rows do not tell of 3"));
+        assert!(fewer_rows(&one, 1).is_err() && fewer_rows(&two, 3).unwrap_err().contains("a model with 3 rows"));
         let [of_three, of_one] = [&three, &one].map(|rom| common(&rom.contact_nodes, rom.rows()).unwrap());
         let sums = DMatrix::from_element(1, 3, 1.0).kronecker(&DMatrix::identity(5, 5));
         let areas: Vec<f64> = three.contact_nodes.iter().map(|patch| patch.area).collect();

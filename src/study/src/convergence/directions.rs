@@ -30,10 +30,10 @@ pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<Refineme
     }
     if let Some(structure) = scene.settings.structures.get(MODES.len()).filter(|_| again.only.is_empty()) {
         all.push(RefinementDirection {
-            missing: format!("the study refines {} structures", MODES.len()),
+            missing: format!("the study refines the modes of at most {} structures", MODES.len()),
             ..RefinementDirection::new(
                 "modes-more",
-                format!("modes of {} and those after it", structure.name),
+                format!("modes of {} and all further structures", structure.name),
                 MODES_KEPT,
             )
         });

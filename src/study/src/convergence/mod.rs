@@ -164,7 +164,7 @@ pub fn found(name: &str, scene: &Scene, asked: &ConvergenceRequest, console: &Co
         Runner { settings: asked.settings, samples: case.samples(), threads: asked.threads, console, own: None };
     let clock = Instant::now();
     let standing = march(scene, asked.settings, own, case.samples())
-        .map_err(|why| Failure::new(name, format!("the scene as it stands does not run: {why}"), ""))?;
+        .map_err(|why| Failure::new(name, format!("the unrefined scene does not run: {why}"), ""))?;
     let seconds = clock.elapsed().as_secs_f64();
     runner.own = Some(standing);
     let directions = directions(

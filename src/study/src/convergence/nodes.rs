@@ -28,13 +28,13 @@ pub(super) fn common_start(scene: &Scene, index: usize) -> Result<String, String
     let places: Vec<Option<usize>> = rom.contact_nodes.iter().map(|node| Some(of(node)?.0)).collect();
     if let Some(border) = places.windows(2).position(|pair| pair[0] != pair[1]) {
         let told = |place: usize| {
-            let pair =
-                places[place].map_or("touches nothing".to_owned(), |pair| format!("is of contact[{}]", pair + 1));
-            format!("`{}` {pair}", rom.contact_nodes[place].name)
+            let pair = places[place].map_or("no contact".to_owned(), |pair| format!("contact[{}]", pair + 1));
+            format!("`{}` ({pair})", rom.contact_nodes[place].name)
         };
         return Err(format!(
-            "a pair claims its contact nodes by name, and what a new one between two of them would touch is not said: {}, {}. \
-             Reduce the blade with more --contact-nodes, begin their --contact-names as `nodes` of the pairs does, and compare runs",
+            "pairs select contact nodes by name, and the pair of a new node between {} and {} is undefined. Reduce the \
+             blade with more --contact-nodes, let their --contact-names start with the `nodes` of the pairs, and \
+             compare runs",
             told(border),
             told(border + 1)
         ));
@@ -152,9 +152,9 @@ mod tests {
     fn new_nodes_of_which_no_pair_is_known_are_not_made() {
         let own = ["leading", "mid", "trailing"];
         for (pairs, told) in [
-            (&["leading"][..], "`leading` is of contact[1], `mid` touches nothing"),
-            (&["leading", "trailing"], "`leading` is of contact[1], `mid` touches nothing"),
-            (&["trailing", "l", "m"], "`leading` is of contact[2], `mid` is of contact[3]"),
+            (&["leading"][..], "`leading` (contact[1]) and `mid` (no contact)"),
+            (&["leading", "trailing"], "`leading` (contact[1]) and `mid` (no contact)"),
+            (&["trailing", "l", "m"], "`leading` (contact[2]) and `mid` (contact[3])"),
         ] {
             let [_, nodes, _] = refined(own, pairs);
             assert!(nodes.levels.is_empty() && nodes.missing.contains(told), "{pairs:?}: {}", nodes.missing);

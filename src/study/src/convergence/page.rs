@@ -18,13 +18,16 @@ use crate::{Picture, Sheet, Statement, Study, StudyFigure, estimate};
 /// Largest change by the next refinement that is called small.
 const SMALL: f64 = 0.05;
 
-const HOW_TO_READ: &str = "One thing is refined at a time, all else is the scene's own. A change is how far a run is from the next finer one of \
-    the same direction, relative to the larger of both: of the displacements of all contact nodes at all communication points (L2, without flight), the normal \
-    impulse and the work of friction over the window, the largest normal force averaged over a communication step, and the mean strain energy. \
-    Where changes shrink from level to level the three finest tell where the sequence goes (Richardson, with the order that they show, at most \
-    two), and with it the error of every level; where they do not, the scene is not converged in that \
-    direction, or its contact is chaotic, and no limit is read. The direction with the largest change at the scene's own setting is the one to refine first. Forces of \
-    single internal steps are not compared: an impact of a node gives the larger a force the shorter the step.";
+const HOW_TO_READ: &str =
+    "One setting is refined at a time, and all others stay as in the scene. A change is the difference between a run \
+     and the next finer run of the same direction, relative to the larger value. Changes are given for the \
+     displacements of all contact nodes at all communication points (L2, without rigid-body motion of free bodies), \
+     the normal impulse and the friction work over the window, the largest normal force averaged over a communication \
+     step, and the mean strain energy. If the changes shrink from level to level, the limit is extrapolated from the \
+     three finest levels (Richardson, with the observed order, at most two). The limit gives the error of every level. \
+     If the changes do not shrink, the scene is not converged in that direction or its contact is chaotic, and no \
+     limit is given. Refine the direction with the largest change at the scene's setting first. Forces of single \
+     internal steps are not compared, because the force of an impact grows as the step shrinks.";
 
 /// The study from everything that was found.
 ///
@@ -47,8 +50,8 @@ pub fn study(found: &ConvergenceResult) -> Result<Study> {
         figures: figures.map(figure).collect::<Result<_>>()?,
         results: results(found),
         files: [
-            ("levels.csv", "every level of every direction in one table", csv(found)),
-            ("limits.csv", "where every direction goes, and the error of the scene", limits_csv(found)),
+            ("levels.csv", "all levels of all directions in one table", csv(found)),
+            ("limits.csv", "limit of every direction, and the error of the scene", limits_csv(found)),
         ]
         .map(|(name, meaning, text)| (name.into(), meaning.into(), text.into_bytes()))
         .into(),
@@ -85,10 +88,11 @@ fn error(refined: &Refined) -> Option<Statement> {
     let to_finest = own.changes(finest);
     let unread: [Option<f64>; 5] =
         std::array::from_fn(|index| if errors[index].is_none() { to_finest[index] } else { None });
-    let parts = [("", changes_text(&errors)), ("no limit is read, but to the finest level ", changes_text(&unread))];
+    let parts =
+        [("", changes_text(&errors)), ("no limit found; difference from the finest level: ", changes_text(&unread))];
     let found = parts.iter().filter(|(_, told)| !told.is_empty()).map(|(what, told)| format!("{what}{told}"));
     let found = found.collect::<Vec<_>>().join("; ");
-    Some(Statement::remark(format!("Error of the scene by {}", title(refined)), found))
+    Some(Statement::remark(format!("Error of the scene due to {}", title(refined)), found))
 }
 
 /// Returns the results in words.
@@ -105,7 +109,7 @@ pub fn statements(found: &ConvergenceResult) -> Vec<Statement> {
     for refined in &found.refined {
         for (level, run) in refined.direction.levels.iter().zip(&refined.runs) {
             if let Err(why) = run {
-                let expected = format!("{} {} is refused", refined.direction.title, value(refined, level.value));
+                let expected = format!("{}, {}: rejected", refined.direction.title, value(refined, level.value));
                 all.push(Statement::remark(expected, why.clone()));
             }
         }
@@ -123,7 +127,7 @@ fn digging(refined: &Refined) -> Option<Statement> {
     let found = known.collect::<Vec<_>>().join(", ");
     let some = refined.digging.iter().any(Option::is_some);
     some.then(|| {
-        Statement::remark(format!("Friction above which the closed tip digs in (µ*), by {}", title(refined)), found)
+        Statement::remark(format!("Friction coefficient µ* of lock-up of the closed tip, by {}", title(refined)), found)
     })
 }
 
@@ -132,7 +136,7 @@ fn title(refined: &Refined) -> String {
     let RefinementDirection { title, shorter, .. } = &refined.direction;
     match shorter {
         None => title.clone(),
-        Some(factor) => format!("{title} (all at 1/{factor} of the scene's step, at which one is refused)"),
+        Some(factor) => format!("{title} (at 1/{factor} of the scene's step, which is too long for a level)"),
     }
 }
 
@@ -141,7 +145,7 @@ fn small(refined: &Refined) -> Option<Statement> {
     let most = changes.iter().flatten().fold(0.0, |most: f64, change| most.max(*change));
     let which = if onwards { "the next refinement changes" } else { "the last refinement changed" };
     Some(Statement::tested(
-        format!("{}: {which} nothing by more than {} %", title(refined), 100.0 * SMALL),
+        format!("{}: {which} no quantity by more than {} %", title(refined), 100.0 * SMALL),
         most <= SMALL,
         changes_text(&changes),
     ))
@@ -156,7 +160,7 @@ fn worst(found: &ConvergenceResult) -> Option<Statement> {
     let all = found.refined.iter().filter_map(|refined| Some((most(refined)?, &refined.direction.title)));
     let (change, title) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(Statement::remark(
-        "The direction that changes most at the scene's own setting, of those that have other levels here",
+        "Direction with the largest change at the scene's setting, among the refined directions",
         format!("{title}: {:.2} %", 100.0 * change),
     ))
 }
@@ -185,22 +189,22 @@ fn directions(found: &ConvergenceResult) -> [Vec<&str>; 3] {
 /// Returns what was refined and what was not, and the errors that the ROM carries.
 fn scope(found: &ConvergenceResult) -> Vec<Statement> {
     let [finer, coarser, not] = directions(found).map(|titles| titles.join(", "));
-    let parts = [("finer than the scene: ", finer), ("coarser ones only: ", coarser), ("not at all: ", not)];
+    let parts = [("finer levels: ", finer), ("coarser levels only: ", coarser), ("not refined: ", not)];
     let parts: Vec<String> = parts
         .into_iter()
         .filter(|(_, titles)| !titles.is_empty())
         .map(|(what, titles)| format!("{what}{titles}"))
         .collect();
-    let refined = Statement::remark("What was refined; no error of another direction is in these", parts.join("; "));
+    let refined = Statement::remark("Refined directions (other errors are not included)", parts.join("; "));
     let told = estimate::rom_errors_text(&found.of_rom);
-    let of_rom = told.map(|told| Statement::remark("What the ROM of the scene says of itself", told));
+    let of_rom = told.map(|told| Statement::remark("Errors stored in the ROM of the scene", told));
     std::iter::once(refined).chain(of_rom).collect()
 }
 
 const HEADINGS: [&str; 13] = [
     "direction",
-    "value (s of steps, else how many)",
-    "scene's own",
+    "value (step in s or count)",
+    "setting of the scene",
     "internal step (s)",
     "impulse (N·s)",
     "friction work (J)",
@@ -235,7 +239,7 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
                 let changes = changes.next().unwrap_or([None; 5]);
                 cells.extend(changes.map(|change| change.map_or(String::new(), |change| format!("{change:.3e}"))));
             }
-            Err(_) => cells.extend(["refused"; 4].into_iter().chain([""; 5]).map(str::to_owned)),
+            Err(_) => cells.extend(["rejected"; 4].into_iter().chain([""; 5]).map(str::to_owned)),
         }
         cells
     };
@@ -243,12 +247,12 @@ fn rows(refined: &Refined) -> Vec<Vec<String>> {
 }
 
 fn table(refined: &Refined) -> Table {
-    let caption = format!("{}: every level, and the change to the next finer one", title(refined));
+    let caption = format!("{}: all levels, and the changes to the next finer level", title(refined));
     Table { rows: rows(refined), ..Table::new(caption, HEADINGS) }
 }
 
 const LIMIT_HEADINGS: [&str; 6] =
-    ["direction", "quantity", "order (at most 2)", "limit", "of the scene", "error of the scene"];
+    ["direction", "quantity", "order (at most 2)", "limit", "value of the scene", "error of the scene"];
 
 /// Where a direction goes: a row for displacements and for every quantity; cells are empty where nothing is to be read.
 pub fn limit_rows(refined: &Refined) -> Vec<Vec<String>> {
@@ -258,7 +262,7 @@ pub fn limit_rows(refined: &Refined) -> Vec<Vec<String>> {
     };
     let (errors, quantities) = (refined.errors(own), own.quantities());
     let title = &refined.direction.title;
-    let error = |index: usize| errors[index].map_or("not to be read".into(), |error| format!("{error:.3e}"));
+    let error = |index: usize| errors[index].map_or("no limit".into(), |error| format!("{error:.3e}"));
     let order = |limit: Option<super::limit::ConvergedLimit>| {
         limit.map_or(String::new(), |limit| format!("{:.2}", limit.order))
     };
@@ -274,7 +278,7 @@ pub fn limit_rows(refined: &Refined) -> Vec<Vec<String>> {
 }
 
 fn limit_table(refined: &Refined) -> Table {
-    let caption = format!("{}: where the three finest levels go", title(refined));
+    let caption = format!("{}: limits extrapolated from the three finest levels", title(refined));
     Table { rows: limit_rows(refined), ..Table::new(caption, LIMIT_HEADINGS) }
 }
 
@@ -308,12 +312,12 @@ pub fn picture(refined: &Refined) -> Result<Picture> {
         let points = ran.iter().filter_map(|(level, run)| Some((level.value, drawn(refined, run)[index]?)));
         let mut points: Vec<(f64, f64)> = points.collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let how = if read[index].is_some() { "" } else { ", to the finest" };
+        let how = if read[index].is_some() { "" } else { ", from finest level" };
         Series::line(format!("{name}{how}"), points)
     };
     let x_label = match direction.unit {
         SECONDS => format!("{} (s)", direction.title),
-        OF_CLEARANCE => format!("{} (share of the clearance)", direction.title),
+        OF_CLEARANCE => format!("{} (fraction of the clearance)", direction.title),
         unit if direction.title.starts_with(unit) => format!("{} (-)", direction.title),
         unit => format!("{unit}: {} (-)", direction.title),
     };
@@ -331,7 +335,7 @@ fn figure(refined: &Refined) -> Result<StudyFigure> {
     let (ran, changes, direction) = (refined.ran(), refined.changes(), &refined.direction);
     let picture = picture(refined)?;
     let tables = format!("{}{}", limit_table(refined).to_html(false), table(refined).to_html(false));
-    let mut sheet = Sheet { columns: vec!["value".into(), "scene's own (1 yes)".into()], rows: Vec::new() };
+    let mut sheet = Sheet { columns: vec!["value".into(), "setting of the scene (1 yes)".into()], rows: Vec::new() };
     sheet.columns.extend(QUANTITIES.map(|(name, unit)| format!("{name} ({unit})")));
     for what in ["change of", "error of"] {
         sheet.columns.extend(compared().map(|name| format!("{what} {name}")));
@@ -346,7 +350,8 @@ fn figure(refined: &Refined) -> Result<StudyFigure> {
     let own =
         direction.levels.iter().find(|level| level.own).map_or(String::new(), |level| value(refined, level.value));
     let caption = format!(
-        "{}: error of a run against the limit of the sequence, or how far it is from the finest where none is read; the scene has {own}.",
+        "{}: error of every run against the extrapolated limit, or its difference from the finest run if there is no \
+         limit; the scene has {own}.",
         title(refined)
     );
     let html = format!("{}{tables}", picture.html);

@@ -141,10 +141,10 @@ impl<'a> Refiner<'a> {
         let (modes, nodes) = self.own_counts();
         let Meshed { rom: again, nodes: of_mesh } = self.reduced(source, None, [modes, nodes])?;
         let differs = |problem: String| {
-            let remedy = "Give the mesh and the options that the ROM was reduced with (its sets, material, units, axis, sectors)";
+            let remedy = "Give the mesh and the options that the ROM was reduced with (sets, material, units, axis, sectors)";
             Err(Failure::new(
                 "--mesh",
-                format!("it does not give the ROM `{}` of the scene: {problem}", rom.name),
+                format!("the mesh does not reproduce the ROM `{}` of the scene: {problem}", rom.name),
                 remedy,
             ))
         };
@@ -156,7 +156,7 @@ impl<'a> Refiner<'a> {
             rom.contact_nodes.iter().flat_map(|node| node.position).fold(0.0, |most: f64, value| most.max(value.abs()));
         for (own, other) in rom.contact_nodes.iter().zip(&again.contact_nodes) {
             if own.position.iter().zip(other.position).any(|(a, b)| (a - b).abs() > SAME * size) {
-                return differs(format!("contact node `{}` is elsewhere", own.name));
+                return differs(format!("contact node `{}` is at another position", own.name));
             }
         }
         let frequencies = |rom: &Rom| ModalModel::from_rom(rom, 0.0).map(|model| model.frequencies).unwrap_or_default();
@@ -265,9 +265,10 @@ impl<'a> Refiner<'a> {
         if self.again.source.is_none() && builtin.is_none() {
             direction.misses(
                 if self.scene.roms[index].frame == DisplacementFrame::Cartesian || structure.rom.starts_with(BUILTIN) {
-                    "contact nodes are chosen anew of blades only".into()
+                    "other numbers of contact nodes are only supported for blades".into()
                 } else {
-                    no_source(if patches { "more patches" } else { "contact nodes" }, &self.scene.roms[index])
+                    let what = if patches { "more patches" } else { "other numbers of contact nodes" };
+                    no_source(what, &self.scene.roms[index])
                 },
             );
             if !direction.levels.is_empty() {
@@ -350,9 +351,9 @@ impl<'a> Refiner<'a> {
         let mut direction = RefinementDirection::new(MESH, format!("mesh of {}", structure.name), MESH_NODES);
         let Some(own_nodes) = self.mesh_nodes else {
             direction.missing = if structure.rom.starts_with(BUILTIN) || rom.frame == DisplacementFrame::Cartesian {
-                "meshes are chosen anew of blades only".into()
+                "other meshes are only supported for blades".into()
             } else {
-                no_source("what the mesh leaves out", rom)
+                no_source("other meshes", rom)
             };
             return Ok(direction);
         };
@@ -364,7 +365,7 @@ impl<'a> Refiner<'a> {
                     found.push(self.reduced(source, Some(other), [modes, nodes])?);
                 }
                 if found.is_empty() {
-                    direction.missing = "one mesh does not tell what meshes leave: give others of the same blade, coarser or finer, with \
+                    direction.missing = "the mesh error requires other meshes of the same blade: give coarser or finer ones with \
                                          --other-mesh FILE"
                         .into();
                     return Ok(direction);
@@ -393,18 +394,16 @@ impl<'a> Refiner<'a> {
 /// Why a ROM from a file stays as it is; coupled sectors are chosen in whole families, which a ROM does not tell.
 pub(super) fn no_source(what: &str, rom: &Rom) -> String {
     if rom.is_cyclic() {
-        return format!(
-            "{what} are fixed in the ROM file; of coupled sectors only the disk that ships is reduced again"
-        );
+        return format!("{what} are not available: of bladed disks, only the built-in one can be reduced again");
     }
-    format!("{what} are fixed in the ROM file: give the mesh it was reduced from with --mesh FILE and its options")
+    format!("{what} require the mesh of the ROM: give it with --mesh FILE and the options of the reduction")
 }
 
 fn no_more(name: &str, rom: &Rom, master: bool) -> String {
     match (name.starts_with(BUILTIN), master) {
-        (true, _) => "it has all of its modes".into(),
+        (true, _) => "the model already has all of its modes".into(),
         (false, true) => no_source("more modes than the ROM has", rom),
-        (false, false) => "more modes than the ROM has: only the master can be reduced again, from --mesh FILE".into(),
+        (false, false) => "more modes than the ROM has are only available for the master, with --mesh FILE".into(),
     }
 }
 

@@ -113,7 +113,7 @@ fn basis<T: ComplexField<RealField = f64>>(
         return free_basis([mass, stiffness, map], less);
     }
     // Displacements of the contact nodes by the shortest coordinates, and what moves none of them.
-    let gram = (map * map.adjoint()).try_inverse().ok_or("two of its contact displacements are one")?;
+    let gram = (map * map.adjoint()).try_inverse().ok_or("two contact displacements are linearly dependent")?;
     let inverse = map.adjoint() * gram;
     let projector = DMatrix::identity(order, order) - &inverse * map;
     let eigen = projector.symmetric_eigen();
@@ -121,7 +121,7 @@ fn basis<T: ComplexField<RealField = f64>>(
     let inner = eigen.eigenvectors.select_columns(&free);
     let kept = free.len().checked_sub(less).ok_or("no mode would be left at one of the nodal diameters")?;
     let held = inner.adjoint() * stiffness * &inner;
-    let moved = held.try_inverse().ok_or("it moves as a rigid body with its contact nodes held")?;
+    let moved = held.try_inverse().ok_or("the structure moves as a rigid body with its contact nodes held")?;
     let statics = &inverse - &inner * (moved * inner.adjoint() * stiffness * &inverse);
     let modes = modes(&inner, mass, stiffness, kept)?;
     let mut basis = DMatrix::zeros(order, statics.ncols() + kept);
@@ -137,7 +137,10 @@ fn free_basis<T: ComplexField<RealField = f64>>(
 ) -> Result<DMatrix<T>, String> {
     let (order, rows) = (mass.nrows(), map.nrows());
     let kept = order.checked_sub(rows + less).ok_or("no mode would be left at one of the nodal diameters")?;
-    let flexibility = stiffness.clone().try_inverse().ok_or("it moves as a rigid body, and has no response at rest")?;
+    let flexibility = stiffness
+        .clone()
+        .try_inverse()
+        .ok_or("the structure moves as a rigid body and has no static response")?;
     let mut basis = DMatrix::zeros(order, rows + kept);
     // Of the size of modes, so that neither drowns the other.
     let responses = flexibility * map.adjoint();
@@ -156,8 +159,8 @@ fn modes<T: ComplexField<RealField = f64>>(
     stiffness: &DMatrix<T>,
     kept: usize,
 ) -> Result<DMatrix<T>, String> {
-    let lower = congruent(mass, space).cholesky().ok_or("its mass matrix is not positive definite")?.l();
-    let inverse = lower.try_inverse().ok_or("its mass matrix is singular")?;
+    let lower = congruent(mass, space).cholesky().ok_or("the mass matrix is not positive definite")?.l();
+    let inverse = lower.try_inverse().ok_or("the mass matrix is singular")?;
     let scaled = &inverse * congruent(stiffness, space) * inverse.adjoint();
     let eigen = (&scaled + scaled.adjoint()).map(|entry| entry.scale(0.5)).symmetric_eigen();
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();

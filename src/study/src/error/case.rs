@@ -67,7 +67,7 @@ pub trait ErrorCase {
 
     /// Returns the relation of the second reference to the first.
     fn relation(&self) -> &'static str {
-        "which shares no code with it"
+        "an independent implementation"
     }
 
     /// The second reference where it is the same at all sizes.

@@ -123,7 +123,7 @@ impl ErrorChart {
         let (across, up) = (0.5 * (LEFT + RIGHT), 0.5 * (TOP + BOTTOM));
         let _ = write!(
             svg,
-            r#"<text x="{across}" y="{}" text-anchor="middle">time of stepping (s)</text><text transform="translate(18 {up}) rotate(-90)" text-anchor="middle">{}</text>"#,
+            r#"<text x="{across}" y="{}" text-anchor="middle">stepping time (s)</text><text transform="translate(18 {up}) rotate(-90)" text-anchor="middle">{}</text>"#,
             BOTTOM + 40.0,
             escape(&self.error_label)
         );

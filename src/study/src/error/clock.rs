@@ -4,7 +4,7 @@ use std::time::Duration;
 
 /// Meaning of the measured time, in words.
 pub const MEANING: &str =
-    if cfg!(unix) { "processor time of the thread that steps" } else { "wall time, as there is no other clock here" };
+    if cfg!(unix) { "processor time of the stepping thread" } else { "wall time, as there is no processor clock" };
 
 /// Processor time this thread has used.
 #[cfg(unix)]

@@ -220,7 +220,7 @@ pub fn measure(case: &dyn ErrorCase, case_number: usize, repetitions: usize, for
     }
     let exact = case.exact();
     let truth = exact.as_ref().or(references.last().map(|last| &last.first));
-    let Some(truth) = truth else { return Err(Failure::new(case.name(), "the scene has no size", "")) };
+    let Some(truth) = truth else { return Err(Failure::new(case.name(), "the scene has no model size", "")) };
     let mut rows = Vec::new();
     for (size, own) in references.iter().enumerate() {
         for competitor in case.competitors(size) {
@@ -245,7 +245,7 @@ fn refer(case: &dyn ErrorCase, size: usize) -> Result<CaseReferences> {
         run.and_then(|mut run| run::trace(run.as_mut(), case.samples())).map_err(|problem| {
             Failure::new(
                 format!("{}, {}", case.name(), competitor.name()),
-                format!("the reference failed: {problem}"),
+                format!("the reference run failed: {problem}"),
                 "",
             )
         })
@@ -290,7 +290,7 @@ fn judge(
     let plain = if competitor.is_full() { truth } else { &own.first };
     let error = apart(&found, plain);
     if error.is_nan() || error > DIVERGED {
-        return Err(format!("diverged: displacements are {error:.0e} times their size away"));
+        return Err(format!("diverged: the displacement error is {error:.0e} times the displacements"));
     }
     let limit = if competitor.is_full() { truth } else { own.limit(competitor.family()) };
     let window = case.impulse_window();

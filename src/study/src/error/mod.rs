@@ -66,17 +66,17 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn RomSource>, console
         Err(why) => Err(why),
     };
     let summary = format!(
-        "Every time scheme and contact solver on {}, at steps on both sides of the one it asks for ({all} runs); and other numbers of contact \
-         points, of rows of them and of modes, against {}.",
+        "Every time scheme and contact solver on {}, with longer and shorter steps than those of the scene ({all} \
+         runs), and models with other numbers of contact points, rows and modes, compared with {}.",
         arguments.scene,
-        if total.as_ref().is_ok_and(|total| total.is_total()) { "one truth with more of all" } else { "one truth" }
+        if total.as_ref().is_ok_and(|total| total.is_total()) { "a finer reference model" } else { "one reference" }
     );
     let mut study = of_cases(vec![Box::new(case)], &[], (quick, summary), &forecast)?;
     forecast.finish();
     match total {
         Err(why) => study
             .statements
-            .push(Statement::remark(format!("{title}: errors of modes, contact points and mesh are not told"), why)),
+            .push(Statement::remark(format!("{title}: the errors of modes, contact points and mesh are unknown"), why)),
         Ok(total) => {
             let mut statements = total.statements(&title);
             statements.append(&mut study.statements);
@@ -92,12 +92,12 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn RomSource>, console
             for (name, meaning, text) in [
                 (
                     format!("{}.csv", total.key().replace('_', "-")),
-                    format!("every setting with its {}", total.name()),
+                    format!("all settings with their {}", total.name()),
                     total.csv(),
                 ),
                 (
                     "cheapest.csv".into(),
-                    format!("the cheapest setting for errors of the steps, and by its {}", total.name()),
+                    format!("the cheapest settings by error of the steps and by {}", total.name()),
                     cheapest,
                 ),
             ] {
@@ -146,7 +146,7 @@ pub fn of_cases(
         files: Vec::new(),
     };
     let repetitions = repetitions(quick);
-    let time = format!("{}, median of {repetitions} runs or more, one run at a time", clock::MEANING);
+    let time = format!("{}, median of at least {repetitions} runs, one run at a time", clock::MEANING);
     study.facts.push(("time".into(), time));
     let mut measured = Vec::new();
     for (number, case) in cases.into_iter().enumerate() {
@@ -181,7 +181,7 @@ fn add_summary(study: &mut Study, measured: &[(Box<dyn ErrorCase>, Measured)]) {
     let tables = [
         ("summary-steps.md", "cheapest settings for an error of the steps", summary::of_steps(&scenes)),
         ("summary-total.md", "cheapest settings for a total error", summary::in_total(&scenes)),
-        ("summary-limits.md", "distances of the references", summary::limits(&scenes)),
+        ("summary-limits.md", "differences between the references", summary::limits(&scenes)),
     ];
     for (name, meaning, table) in tables {
         study.files.push((name.into(), meaning.into(), table.to_markdown().into_bytes()));
@@ -251,7 +251,7 @@ fn add(study: &mut Study, case: &dyn ErrorCase, found: &Measured) -> Vec<Table> 
     study.statements.extend(statements(case, found));
     study.files.push((
         format!("{}.csv", case.name()),
-        format!("every configuration of {}", case.title()),
+        format!("all configurations of {}", case.title()),
         sheets::csv(case, found).into_bytes(),
     ));
     all
@@ -263,8 +263,8 @@ fn caption(case: &dyn ErrorCase, found: &Measured, kind: ErrorKind, chart: &Erro
     let size = case.sizes()[standard];
     let what = match kind {
         ErrorKind::OfTime | ErrorKind::OfOwn => format!(
-            "{}: error of the steps alone at {size} {}: relative L2 of the displacements against {} at h = {:.2e} s. {} at h = {:.2e} s, {}, is \
-             {:.1e} away.",
+            "{}: error of the steps alone with {size} {}: relative L2 error of the displacements against {} at h = \
+             {:.2e} s. The second reference, {} at h = {:.2e} s ({}), differs by {:.1e}.",
             case.title(),
             case.size_name(),
             case.first().name(),
@@ -275,23 +275,25 @@ fn caption(case: &dyn ErrorCase, found: &Measured, kind: ErrorKind, chart: &Erro
             own.apart[0]
         ),
         ErrorKind::Total => {
-            format!("{}: total error of the displacements, all numbers of {}.", case.title(), case.size_name())
+            format!("{}: total error of the displacements, for all numbers of {}.", case.title(), case.size_name())
         }
     };
     let away = |family: EquationFamily, what: &str| {
         own.away(family)
-            .map_or_else(String::new, |away| format!(" {what} tends to a limit of its own, {away:.1e} away."))
+            .map_or_else(String::new, |away| format!(" {what} converges to a solution that differs by {away:.1e}."))
     };
     let mut limits = away(case.tolerant().family(), "massless-boundary") + &away(EquationFamily::STICKING, "coulomb");
     if let Some(apart) = own.massless_apart {
         limits.push_str(&format!(
-            " galerkin tends to that of massless-boundary: two fine runs are {apart:.1e} apart. Every method is held against its own limit."
+            " galerkin converges to the solution of massless-boundary: two fine runs differ by {apart:.1e}. Every \
+             method is compared with the converged solution of its own model."
         ));
     }
     let refused = found.rows.iter().filter(|row| row.outcome.is_err()).count();
     let shown: usize = chart.all.iter().map(|each| each.points.len()).sum();
     format!(
-        "{what}{} {} {shown} configurations; {refused} of this scene were refused or failed and stand in the table of all runs.",
+        "{what}{} {} {shown} configurations are shown; {refused} configurations of this scene were rejected or failed \
+         and are listed in the table of all runs.",
         if kind == ErrorKind::Total { "" } else { limits.as_str() },
         if kind == ErrorKind::Total { String::new() } else { case.description() }
     )
@@ -311,8 +313,8 @@ fn statements(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let takes_part = found.rows.iter().any(|row| lcp.contains(&row.competitor));
     all.extend(takes_part.then(|| {
         Statement {
-            expected: format!("{title}: lcp neither penetrates nor pulls at any internal step of any run"),
-            found: format!("deepest {deepest:.1e} m, least force {least:.1e} N in {} runs", ran.len()),
+            expected: format!("{title}: lcp has no penetration and no tensile force at any internal step of any run"),
+            found: format!("largest penetration {deepest:.1e} m, smallest force {least:.1e} N in {} runs", ran.len()),
             // The surface of a coating is there to be penetrated.
             holds: (!case.is_coated())
                 .then(|| !ran.is_empty() && ran.iter().all(|one| one.penetration <= 0.0 && one.adhesion >= 0.0)),
@@ -329,9 +331,9 @@ fn meeting(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let (size, apart) = (case.sizes()[case.standard()], found.references[case.standard()].apart[0]);
     let Some((full, who)) = case.meeting() else {
         return vec![Statement::tested(
-            format!("{title}: the two references, the second {}, meet to {MEET:e}", case.relation()),
+            format!("{title}: the two references agree to {MEET:e} (second reference: {})", case.relation()),
             apart < MEET,
-            format!("displacements {apart:.1e} apart at {size} {}", case.size_name()),
+            format!("displacements differ by {apart:.1e} with {size} {}", case.size_name()),
         )];
     };
     let truncation: Vec<String> = zip(case.sizes(), &found.truncation)
@@ -339,12 +341,12 @@ fn meeting(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
         .collect();
     vec![
         Statement::tested(
-            format!("{title}: two references that share neither stepping nor contact code meet to {MEET:e}"),
+            format!("{title}: two references with independent stepping and contact code agree to {MEET:e}"),
             full < MEET,
-            format!("displacements {full:.1e} apart: {who}"),
+            format!("displacements differ by {full:.1e}: {who}"),
         ),
         Statement::tested(
-            format!("{title}: the product comes nearer to them with the number of {}", case.size_name()),
+            format!("{title}: the error of the product falls as the number of {} grows", case.size_name()),
             found.truncation.len() > 1 && found.truncation.windows(2).all(|pair| pair[1] < pair[0]),
             truncation.join(", "),
         ),
@@ -359,14 +361,14 @@ fn massless(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
         return Vec::new();
     };
     let between = Statement::remark(
-        format!("{title}: limits of the equations with mass of the contact nodes and without"),
-        format!("displacements {away:.1e} apart: that is of the model, and no error of the steps"),
+        format!("{title}: converged solutions with and without mass of the contact nodes"),
+        format!("displacements differ by {away:.1e}; this is a difference of the models, not an error of the steps"),
     );
     let witness = own.massless_apart.map(|apart| {
         Statement::tested(
-            format!("{title}: massless-boundary with fine steps and galerkin with a fine tolerance meet to {MEET:e}"),
+            format!("{title}: massless-boundary with fine steps and galerkin with a fine tolerance agree to {MEET:e}"),
             apart < MEET,
-            format!("displacements {apart:.1e} apart"),
+            format!("displacements differ by {apart:.1e}"),
         )
     });
     std::iter::once(between).chain(witness).collect()
@@ -421,8 +423,8 @@ fn bounds(case: &dyn ErrorCase, tried: &[Tried]) -> String {
         };
         let longest = steps(true).fold(0.0, f64::max);
         let shortest = steps(false).fold(f64::INFINITY, f64::min);
-        let refused = if shortest.is_finite() { format!("{shortest:.3} µs refused") } else { "none refused".into() };
-        format!("with {size} {} {longest:.3} µs ran, {refused}", case.size_name())
+        let refused = if shortest.is_finite() { format!("{shortest:.3} µs rejected") } else { "none rejected".into() };
+        format!("with {size} {}: {longest:.3} µs ran, {refused}", case.size_name())
     };
     case.sizes().into_iter().enumerate().map(|(at, size)| of(at, size)).collect::<Vec<_>>().join("; ")
 }
@@ -447,7 +449,8 @@ fn limits(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     vec![
         Statement {
             expected: format!(
-                "{}: central differences refuse steps, for ω_max·h ≥ 2 alone, and at every size all that run are shorter",
+                "{}: central differences reject steps only because of ω_max·h ≥ 2, and at every size all steps that \
+                 run are shorter than those rejected",
                 case.title()
             ),
             found: bounds(case, &tried),

@@ -108,13 +108,13 @@ pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Ta
     let sizes = case.sizes();
     let what = match kind {
         ErrorKind::OfTime | ErrorKind::OfOwn => format!(
-            "{}: cheapest for an error of the steps alone, at {} {}",
+            "{}: cheapest setting for an error of the steps alone, with {} {}",
             case.title(),
             sizes[case.standard()],
             case.size_name()
         ),
         ErrorKind::Total => {
-            format!("{}: cheapest for a total error, over all numbers of {}", case.title(), case.size_name())
+            format!("{}: cheapest setting for a total error, over all numbers of {}", case.title(), case.size_name())
         }
     };
     let columns = ["error", "cheapest", case.size_name(), "step or tolerance", "time", "the paper's method", "factor"];
@@ -123,7 +123,7 @@ pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Ta
     for target in TARGETS {
         let told = that_tell(case, measured, kind, &rows, target);
         if told.is_empty() && cheapest(&rows, kind, None, target).is_some() {
-            let why = format!("not to be read: the references are {readable:.1e} apart");
+            let why = format!("not measurable: the references differ by {readable:.1e}");
             let empty = std::iter::repeat_n(String::new(), table.columns.len() - 2);
             table.rows.push([format!("{target:.0e}"), why].into_iter().chain(empty).collect());
             continue;
@@ -137,10 +137,10 @@ pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Ta
             };
             format!("{} ({size}{})", seconds(figures.seconds), row.competitor.setting(row.step))
         };
-        let paper_text = paper.map_or_else(|| "does not reach it".into(), text);
+        let paper_text = paper.map_or_else(|| "not reached".into(), text);
         let mut cells = vec![format!("{target:.0e}")];
         cells.extend(match cheapest(&told, kind, None, target) {
-            None => ["nobody", "", "", ""].map(String::from).into_iter().chain([paper_text, String::new()]).collect(),
+            None => ["none", "", "", ""].map(String::from).into_iter().chain([paper_text, String::new()]).collect(),
             Some((row, figures)) => vec![
                 row.competitor.name(),
                 sizes[row.size].to_string(),
@@ -158,11 +158,11 @@ pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Ta
 /// Returns the cost of every competitor for every target.
 pub fn costs(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Table {
     let rows = kind.rows(case, measured);
-    let of = if kind == ErrorKind::Total { "all, modes included" } else { "the steps alone" };
-    let caption = format!("{}: time that every competitor needs for an error of {of}", case.title());
+    let of = if kind == ErrorKind::Total { "total error" } else { "error of the steps alone" };
+    let caption = format!("{}: time of every competitor for a given {of}", case.title());
     let mut table = Table::new(
         caption,
-        ["competitor", "1e-1", "1e-2", "1e-3", "1e-4", "least error", "largest step or tolerance that ran"],
+        ["competitor", "1e-1", "1e-2", "1e-3", "1e-4", "smallest error", "largest step or tolerance that ran"],
     );
     for competitor in Competitor::all() {
         let own: Vec<&MeasuredRow> = rows.iter().copied().filter(|row| row.competitor == competitor).collect();
@@ -174,7 +174,7 @@ pub fn costs(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Tabl
         let mut cells = vec![competitor.name()];
         cells.extend(TARGETS.map(|target| match cheapest(&own, kind, None, target) {
             None => "-".into(),
-            Some(_) if target < readable => "not to be read".into(),
+            Some(_) if target < readable => "not measurable".into(),
             Some((_, figures)) => seconds(figures.seconds),
         }));
         if done().next().is_none() {
@@ -200,9 +200,9 @@ pub fn floor(case: &dyn ErrorCase, found: &Measured) -> Option<Statement> {
     let (film, lcp) = (*errors(Solver::Film).last()?, *errors(Solver::Lcp).last()?);
     case.several_nodes().then(|| {
         Statement::remark(
-            format!("{}: film behind lcp", case.title()),
+            format!("{}: error of film compared with lcp", case.title()),
             format!(
-                "modal-exact at the finest step: {film:.1e} with film, {lcp:.1e} with lcp, {:.1} times",
+                "modal-exact at the finest step: {film:.1e} with film, {lcp:.1e} with lcp, a factor of {:.1}",
                 film / lcp
             ),
         )
@@ -263,7 +263,8 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 /// Orders of all competitors in several scenes.
 pub fn orders(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let caption = format!(
-        "Observed orders: power of h with which displacements tend to the limit of their own equations, from the finest {FITTED} steps"
+        "Observed orders of convergence of the displacements to the converged solution of the same model, from the \
+         finest {FITTED} steps"
     );
     let mut columns = vec!["competitor".to_owned()];
     columns.extend(scenes.iter().map(|(case, _)| case.title().to_owned()));

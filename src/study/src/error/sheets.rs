@@ -29,13 +29,13 @@ pub fn chart(case: &dyn ErrorCase, found: &Measured, kind: ErrorKind) -> (ErrorC
     let mut chart = ErrorChart {
         error_label: match kind {
             ErrorKind::OfTime => "error of the steps, displacements (relative L2)".into(),
-            ErrorKind::OfOwn => "error of the steps, displacements (relative L2), each to its own limit".into(),
+            ErrorKind::OfOwn => "error of the steps, displacements (relative L2), per-method limit".into(),
             ErrorKind::Total => "total error, displacements (relative L2)".into(),
         },
         all: Vec::new(),
         joined: kind != ErrorKind::Total,
         readable: (kind != ErrorKind::Total)
-            .then(|| (found.references[case.standard()].apart[0], "distance of the two references".into())),
+            .then(|| (found.references[case.standard()].apart[0], "difference of the two references".into())),
     };
     let competitors: Vec<Competitor> = Competitor::all()
         .into_iter()
@@ -65,15 +65,15 @@ type NamedFigure = (&'static str, &'static str, bool, fn(&Figures) -> Option<f64
 const FIGURES: [NamedFigure; 11] = [
     ("time (s)", "seconds", false, |figures| Some(figures.seconds)),
     ("error of the steps", "error_of_steps", false, |figures| Some(figures.of_time)),
-    ("error against the own limit", "error_of_own_limit", false, |figures| Some(figures.of_own)),
+    ("error against the method's limit", "error_of_own_limit", false, |figures| Some(figures.of_own)),
     ("total error", "total_error", true, |figures| Some(figures.total)),
-    ("impulse of the steps", "impulse_error_of_steps", false, |figures| Some(figures.impulse)),
-    ("total impulse", "total_impulse_error", true, |figures| Some(figures.impulse_total)),
-    ("energy", "energy_error", false, |figures| Some(figures.energy)),
-    ("ledger", "ledger_residual", false, |figures| figures.residual),
+    ("impulse error of the steps", "impulse_error_of_steps", false, |figures| Some(figures.impulse)),
+    ("total impulse error", "total_impulse_error", true, |figures| Some(figures.impulse_total)),
+    ("energy error", "energy_error", false, |figures| Some(figures.energy)),
+    ("energy balance residual", "ledger_residual", false, |figures| figures.residual),
     ("penetration (m)", "penetration", false, |figures| Some(figures.penetration)),
-    ("least force (N)", "least_force", false, |figures| Some(figures.adhesion)),
-    ("release", "release_error", false, |figures| figures.release),
+    ("smallest force (N)", "least_force", false, |figures| Some(figures.adhesion)),
+    ("release error", "release_error", false, |figures| figures.release),
 ];
 
 /// Whether a case has models finer than its own, or an exact solution: without them there are no total errors.
@@ -141,7 +141,7 @@ fn cells(case: &dyn ErrorCase, row: &MeasuredRow) -> Vec<String> {
 /// Tabulates the distance of the references, size by size.
 pub fn references(case: &dyn ErrorCase, found: &Measured) -> Table {
     let caption = format!(
-        "{}: references, {} and {}, and what the number of {} leaves out",
+        "{}: differences between the references ({} and {}), and truncation errors by number of {}",
         case.title(),
         case.first().name(),
         case.second().name(),
@@ -149,17 +149,17 @@ pub fn references(case: &dyn ErrorCase, found: &Measured) -> Table {
     );
     let columns = [
         case.size_name(),
-        "displacements apart",
-        "impulses apart",
-        "massless-boundary away",
-        "galerkin from massless-boundary",
-        "coulomb away",
-        "reference from the truth",
+        "displacement difference",
+        "impulse difference",
+        "massless-boundary against reference",
+        "galerkin against massless-boundary",
+        "coulomb against reference",
+        "truncation error",
     ];
     let mut table = Table::new(caption, columns);
     for ((size, own), truncation) in case.sizes().iter().zip(&found.references).zip(&found.truncation) {
         let away = |family| own.away(family).map_or_else(|| "-".into(), |away: f64| format!("{away:.1e}"));
-        let truncation = if *truncation == 0.0 { "is the truth".into() } else { format!("{truncation:.1e}") };
+        let truncation = if *truncation == 0.0 { "0 (reference)".into() } else { format!("{truncation:.1e}") };
         let [displacements, impulses] = own.apart.map(|apart| format!("{apart:.1e}"));
         table.rows.push(vec![
             size.to_string(),

@@ -80,7 +80,7 @@ pub fn in_total(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
             if let (Some(left), "none") = (case.model_error(), cells[0].as_str())
                 && left > target
             {
-                cells[1] = format!("the model's own error is {left:.1e}");
+                cells[1] = format!("the model error is {left:.1e}");
             }
             table.rows.push(beside(case, target, cells));
         }
@@ -118,7 +118,7 @@ fn cells<'a>(
     let factor = any.zip(paper).map(|((_, any), (_, paper))| format!("{:.1}", paper.seconds / any.seconds));
     let first = match any {
         Some((row, _)) => [format!("`{}`", row.competitor.name()), row.competitor.setting(row.step) + &size(row)],
-        None if readable.is_empty() => ["none".into(), "below the distance of the references".into()],
+        None if readable.is_empty() => ["none".into(), "below the difference of the references".into()],
         None => ["none".into(), String::new()],
     };
     let without =
@@ -149,7 +149,7 @@ fn paper_misses(rows: &[&MeasuredRow]) -> String {
 /// Distances of the references, which limit the errors that can be read.
 pub fn limits(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let mut table = Table::new(
-        "Errors below these distances cannot be read",
+        "Smallest measurable errors: differences between the references",
         ["scene", "window (ms)", "first and second reference", "galerkin and massless-boundary"],
     );
     for &(case, measured) in scenes {

@@ -137,7 +137,7 @@ pub fn prepare<'a>(case: &'a UserScene, again: &'a Again<'a>) -> Result<std::res
     let models = coarser(scene, again.quick);
     let truth = finer.pop();
     if models.len() == 1 && truth.is_none() {
-        return Ok(Err("no coarser model follows from its ROM, and no finer one can be reduced".into()));
+        return Ok(Err("no coarser model can be derived from the ROM, and no finer one can be reduced".into()));
     }
     Ok(Ok(Prepared { refiner, models, finer, truth }))
 }
@@ -189,7 +189,7 @@ pub fn measure(
     let truth_scene = truth.unwrap_or_else(|| scene.clone());
     let (division, truth) = match true_run(case, &truth_scene) {
         Ok(found) => found,
-        Err(why) => return Ok(Err(format!("the truth does not run: {why}"))),
+        Err(why) => return Ok(Err(format!("the reference does not run: {why}"))),
     };
     forecast.done(kind(0, case.method()), work(case, &truth_scene, case.method(), division));
     let before = finer.last().unwrap_or(scene);
@@ -209,7 +209,7 @@ pub fn measure(
     let finer = [modes > own.modes, finest.points > own.points, finest.rows > own.rows || touching == "nodes"];
     let of_rom = estimate::of_rom(&scene.roms[master(scene)]);
     let step = case.method().setting(value(case, case.method(), division));
-    let whose = if of_source { "" } else { ", the scene's own model, which is not reduced again" };
+    let whose = if of_source { "" } else { " (the model of the scene, which cannot be refined)" };
     let method = case.method().name();
     let truth = format!("{} and {modes} modes with {method} at {step}{whose}", finest.tip(touching));
     Ok(Ok(Total { models, rows, truth, readable, touching, finer, of_rom, mesh }))
@@ -287,7 +287,7 @@ fn rows(
                 let found = observed(case, &model.scene, competitor, division);
                 let outcome = found.and_then(|(seconds, run)| match run.displacement_change(truth) {
                     Some(error) if error.is_finite() => Ok((seconds, error)),
-                    _ => Err("its displacements cannot be compared with the truth".into()),
+                    _ => Err("the displacements cannot be compared with the reference".into()),
                 });
                 let own = model.own && competitor == case.method() && division == own;
                 rows.push(TotalRow { model: index, competitor, step: value(case, competitor, division), own, outcome });
@@ -305,7 +305,9 @@ fn observed(
     competitor: Competitor,
     division: u32,
 ) -> std::result::Result<(f64, RunSummary), String> {
-    let Competitor::Core(scheme, solver) = competitor else { return Err("not on a scene of one's own".into()) };
+    let Competitor::Core(scheme, solver) = competitor else {
+        return Err("the method is not available for user scenes".into());
+    };
     let scene = SceneRun::by(scene, (scheme, solver), case.interval(), division, 0.0);
     let (observer, points) = Observed::of(&scene.roms[master(&scene)]);
     let mut times: Vec<f64> = Vec::new();
@@ -329,17 +331,17 @@ fn observed(
 /// Error of the scene by its mesh, from others.
 fn mesh(case: &UserScene, refiner: &Refiner, again: &Again) -> Result<std::result::Result<f64, String>> {
     if again.quick {
-        return Ok(Err("other meshes are left out of a quick study".into()));
+        return Ok(Err("a quick study does not run other meshes".into()));
     }
     let direction = refiner.meshes()?;
     if direction.levels.len() < 3 {
-        let few = "three meshes are needed, the scene's among them".to_owned();
+        let few = "three meshes are needed, including that of the scene".to_owned();
         return Ok(Err(if direction.missing.is_empty() { few } else { direction.missing }));
     }
     let runner = Runner::new(case.settings(), case.samples(), again.console);
     let refined = runner.as_it_is(direction)?;
     let error = refined.own_errors().and_then(|errors| errors[0]);
-    Ok(error.ok_or_else(|| "changes from mesh to mesh do not shrink, or a run is refused".into()))
+    Ok(error.ok_or_else(|| "the changes from mesh to mesh do not shrink, or a run was rejected".into()))
 }
 
 #[cfg(test)]

@@ -81,20 +81,19 @@ impl Total {
 
     /// With what the mesh leaves.
     fn with_mesh(&self, error: f64) -> String {
-        self.mesh.as_ref().map_or("not known".into(), |mesh| format!("{:.1e}", error + mesh))
+        self.mesh.as_ref().map_or("unknown".into(), |mesh| format!("{:.1e}", error + mesh))
     }
 
     fn winners(&self, title: &str) -> Table {
         let name = self.name();
-        let columns =
-            [name.as_str(), "cheapest setting", "time", "its error", "with that of the mesh", "the paper's method"];
-        let mut table = Table::new(format!("{title}: cheapest setting, {} ({})", self.name(), self.scope()), columns);
+        let columns = [name.as_str(), "cheapest setting", "time", "error", "error with mesh", "the paper's method"];
+        let mut table = Table::new(format!("{title}: cheapest setting by {} ({})", self.name(), self.scope()), columns);
         for target in TARGETS {
             let paper = self.cheapest(target, Some(PAPER));
-            let paper = paper.map_or("does not reach it".into(), |(_, time, _)| seconds(time));
+            let paper = paper.map_or("not reached".into(), |(_, time, _)| seconds(time));
             let cells = match self.cheapest(target, None) {
-                _ if self.hidden(target) => vec!["not to be read: the truth itself is not as good".into()],
-                None => vec!["nobody".into()],
+                _ if self.hidden(target) => vec!["not measurable: the reference is not accurate enough".into()],
+                None => vec!["none".into()],
                 Some((row, time, error)) => {
                     vec![self.setting(row), seconds(time), format!("{error:.1e}"), self.with_mesh(error), paper]
                 }
@@ -110,7 +109,7 @@ impl Total {
     fn best(&self, title: &str) -> Table {
         let points: Vec<(f64, f64)> = self.ran().map(|(_, time, error)| (time, error)).collect();
         let mut table = Table::new(
-            format!("{title}: settings that no other beats in both time and {}", self.name()),
+            format!("{title}: Pareto-optimal settings of time and {}", self.name()),
             ["setting", "time", self.name().as_str()],
         );
         for (time, error) in front(&points) {
@@ -145,13 +144,13 @@ impl Total {
             error_label: format!("{}, displacements (relative L2)", self.name()),
             all,
             joined: false,
-            readable: self.readable.map(|least| (least, "what the truth leaves".into())),
+            readable: self.readable.map(|least| (least, "accuracy of the reference".into())),
         }
     }
 
     fn sheet(&self) -> Sheet {
-        let mut sheet =
-            Sheet::new(["time (s)", self.name().as_str(), "points", "rows", "modes", STEP, "scene's own (1 yes)"]);
+        let own = "setting of the scene (1 yes)";
+        let mut sheet = Sheet::new(["time (s)", self.name().as_str(), "points", "rows", "modes", STEP, own]);
         for (row, time, error) in self.ran() {
             let (model, own) = (&self.models[row.model], f64::from(u8::from(row.own)));
             let [points, rows, modes] = [model.points, model.rows, model.modes].map(|count| count as f64);
@@ -168,16 +167,17 @@ impl Total {
         html.push_str(&self.best(title).to_html(false));
         html.push_str(&self.all(title).to_html(true));
         let mesh = match &self.mesh {
-            Ok(mesh) => format!("The mesh leaves {mesh:.1e} more, whatever the setting"),
-            Err(why) => format!("What the mesh leaves is not in it ({why})"),
+            Ok(mesh) => format!("The mesh adds an error of {mesh:.1e} to every setting"),
+            Err(why) => format!("The mesh error is not included ({why})"),
         };
         StudyFigure {
             name: if self.is_total() { "scene-total" } else { "scene-own-model" },
             caption: format!(
-                "{title}: {} (displacements) at other steps, schemes, numbers of {}{} and of modes, against {}; {}. {mesh}.",
+                "{title}: {} (displacements) with other steps, schemes and numbers of {}{} and modes, against {}; {}. \
+                 {mesh}.",
                 self.name(),
                 self.touching,
-                if self.touching == "nodes" { "" } else { ", of their rows" },
+                if self.touching == "nodes" { "" } else { ", rows" },
                 self.truth,
                 self.scope()
             ),
@@ -190,39 +190,39 @@ impl Total {
     pub fn statements(&self, title: &str) -> Vec<Statement> {
         let mut all = Vec::new();
         if let Some((row, time, error)) = self.ran().find(|(row, ..)| row.own) {
-            let found = format!("{error:.1e} in {} of stepping ({})", seconds(time), self.setting(row));
+            let found = format!("{error:.1e}, stepping time {} ({})", seconds(time), self.setting(row));
             all.push(Statement::remark(
                 format!("{title}: {} of the scene as it stands ({})", self.name(), self.scope()),
                 found,
             ));
         }
         if let Some(told) = estimate::rom_errors_text(&self.of_rom) {
-            all.push(Statement::remark(format!("{title}: what its ROM says of itself"), told));
+            all.push(Statement::remark(format!("{title}: errors stored in the ROM"), told));
         }
         for target in TARGETS {
             let found = match self.cheapest(target, None) {
                 _ if self.hidden(target) => {
                     format!(
-                        "not to be read: the last refinement to the truth changed {:.1e}",
+                        "not measurable: the last refinement of the reference changed {:.1e}",
                         self.readable.unwrap_or(0.0)
                     )
                 }
-                None => "nobody".into(),
+                None => "none".into(),
                 Some((row, time, error)) => format!("{}: {}, error {error:.1e}", seconds(time), self.setting(row)),
             };
             all.push(Statement::remark(
-                format!("{title}: cheapest, {} at most {target:.0e} ({})", self.name(), self.scope()),
+                format!("{title}: cheapest setting, {} at most {target:.0e} ({})", self.name(), self.scope()),
                 found,
             ));
         }
         let found = match &self.mesh {
             Ok(mesh) => {
-                format!("{mesh:.1e} of the displacements; no setting of a run changes that: reduce with a finer mesh")
+                format!("{mesh:.1e} of the displacements; only a reduction with a finer mesh makes it smaller")
             }
-            Err(why) => format!("not known: {why}"),
+            Err(why) => format!("unknown: {why}"),
         };
-        all.push(Statement::remark(format!("{title}: what the mesh leaves"), found));
-        all.push(Statement::remark(format!("{title}: the truth of these errors"), self.truth.clone()));
+        all.push(Statement::remark(format!("{title}: mesh error"), found));
+        all.push(Statement::remark(format!("{title}: reference of these errors"), self.truth.clone()));
         all
     }
 

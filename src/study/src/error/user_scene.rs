@@ -40,7 +40,7 @@ const COMPARED: [&str; 4] = ["scheme", "solver", "internal_step_max", "tolerance
 pub fn refuse_compared(settings: &[(String, String)]) -> Result<()> {
     match settings.iter().find(|(name, _)| COMPARED.contains(&name.as_str())) {
         Some((name, _)) => {
-            let problem = "the study compares all of them";
+            let problem = "the study varies this setting itself";
             Err(Failure::usage(format!("--set {name}"), problem, "Leave it out"))
         }
         None => Ok(()),
@@ -98,7 +98,7 @@ impl UserScene {
             parting: Vec::new(),
         };
         let refused = |problem| Failure::new(name, problem, "");
-        let task = console.task("How long the scene can be followed", None);
+        let task = console.task("Finding the window in which runs do not diverge", None);
         let (touch, samples) = loop {
             match case.follow((window, most), schedule.count) {
                 Ok((touch, samples, parting)) => {
@@ -117,15 +117,15 @@ impl UserScene {
         if touch >= samples {
             let problem = if touch < schedule.count {
                 let when = shown(interval * touch as f64);
-                format!("nothing touches within the window: first contact after the start is at {when} s")
+                format!("no contact within the window: the first contact after the start is at {when} s")
             } else {
-                "nothing touches before the experiment ends".into()
+                "no contact before the end of the experiment".into()
             };
-            return Err(Failure::new(name, problem, "Give a longer --window, or a scene that rubs"));
+            return Err(Failure::new(name, problem, "Give a longer --window, or a scene with contact"));
         }
         case.samples = window::samples(&case.parting, samples);
         if case.samples == 0 {
-            let problem = "runs that differ by almost nothing part within the first communication step".into();
+            let problem = "nearly identical runs diverge within the first communication step".into();
             return Err(refused(problem));
         }
         Ok(case)
@@ -331,7 +331,7 @@ impl ErrorCase for UserScene {
     }
 
     fn perturbed(&self) -> &'static str {
-        "clearance or velocity"
+        "the clearance or velocity"
     }
 
     fn families(&self, _: usize) -> Vec<EquationFamily> {
@@ -345,7 +345,9 @@ impl ErrorCase for UserScene {
         division: u32,
         perturbation: f64,
     ) -> Result<Box<dyn TimedRun + 'a>, String> {
-        let Competitor::Core(scheme, solver) = competitor else { return Err("not on a scene of one's own".into()) };
+        let Competitor::Core(scheme, solver) = competitor else {
+            return Err("the method is not available for user scenes".into());
+        };
         let scene = SceneRun::by(&self.scene, (scheme, solver), self.interval, division, perturbation);
         Ok(Box::new(SceneRun::with_start_values(&scene, self.interval, division, &self.settings)?))
     }

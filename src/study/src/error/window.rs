@@ -63,13 +63,14 @@ pub fn statement(case: &dyn ErrorCase) -> Option<Statement> {
     let long = case.interval() * parting.len() as f64;
     Some(Statement::tested(
         format!(
-            "{}: the window of {:.2} ms ends before trajectories part",
+            "{}: the window of {:.2} ms ends before trajectories diverge",
             case.title(),
             1e3 * case.interval() * case.samples() as f64
         ),
         end <= PARTED,
         format!(
-            "{} changed by {PERTURBATION:.0e} has moved the nodes by {end:.1e} at the end of the window, by {last:.1e} after {:.1} ms",
+            "a relative change of {} by {PERTURBATION:.0e} moves the nodes by {end:.1e} at the end of the window and \
+             by {last:.1e} after {:.1} ms",
             case.perturbed(),
             1e3 * long
         ),
@@ -98,7 +99,8 @@ pub fn statistics(case: &dyn ErrorCase) -> Option<Table> {
     let [amplitude, force] = of(&fine);
     let step = 1e6 * case.interval() / f64::from(DIVISION);
     let caption = format!(
-        "{}: from {:.2} to {:.2} ms at h = {step:.2} µs against {} at h = {:.3} µs (effective displacement {:.3e} m, mean of all normal forces {force:.4e} N)",
+        "{}: from {:.2} to {:.2} ms at h = {step:.2} µs against {} at h = {:.3} µs (effective displacement {:.3e} m, \
+         mean of all normal forces {force:.4e} N)",
         case.title(),
         1e3 * case.interval() * case.samples() as f64,
         1e3 * case.interval() * samples as f64,

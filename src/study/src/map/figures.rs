@@ -76,10 +76,10 @@ fn heat_map(map: &Map) -> StudyFigure {
     StudyFigure {
         name: "map",
         caption: format!(
-            "Amplitude of the displacement of the leading edge, of the blade that has most, over angular velocity and frequency in \
-             the rotating frame. Solid: engine orders that the casing excites; dotted: the others; dashed: natural frequencies{}; \
-             circles: predicted coincidences. Grey columns are runs that were refused ({}).",
-            if map.prediction.stiffening { " of the turning blades" } else { " at rest" },
+            "Displacement amplitude of the leading edge (largest of all blades) over angular velocity and frequency in \
+             the rotating frame. Solid: engine orders that the casing excites; dotted: other engine orders; dashed: \
+             natural frequencies{}; circles: predicted coincidences. Grey columns are rejected runs ({}).",
+            if map.prediction.stiffening { " of the rotating blades" } else { " at rest" },
             map.runs.len() - map.answered().count()
         ),
         picture: Picture { html: svg.clone(), svg },
@@ -140,7 +140,7 @@ fn amplitudes(map: &Map) -> Result<StudyFigure> {
     sheet.columns.extend(orders.iter().map(|order| format!("engine order {order}; leading edge (m)")));
     sheet.columns.extend(
         [
-            "share of time in contact",
+            "fraction of time in contact",
             "mean normal force (N)",
             "largest normal force (N)",
             "largest penetration (m)",
@@ -188,12 +188,12 @@ fn against_speed(
 
 fn contact(map: &Map) -> Result<[StudyFigure; 2]> {
     let time = [
-        "Share of time in which a blade touches (mean of all blades) against angular velocity.",
-        "share of time in contact",
-        "share of time in contact (%)",
+        "Fraction of time in which a blade is in contact (mean of all blades) against angular velocity.",
+        "fraction of time in contact",
+        "fraction of time in contact (%)",
     ];
     let force = [
-        "The sum of all normal forces (mean over time) against angular velocity.",
+        "Sum of all normal forces (mean over time) against angular velocity.",
         "mean normal force (N)",
         "mean normal force (N)",
     ];
@@ -219,7 +219,7 @@ fn spectrum(map: &Map) -> Result<Option<StudyFigure>> {
     sheet.rows = rows.map(|(bin, (a, b))| vec![bin as f64 * response.resolution, *a, *b]).collect();
     Ok(Some(StudyFigure {
         name: "spectrum",
-        caption: format!("Spectrum of the first blade at {speed:.2} rad/s, where the leading edge swings most."),
+        caption: format!("Spectrum of the first blade at {speed:.2} rad/s, where the leading edge moves most."),
         picture: Picture::plot(&plot)?,
         sheet,
     }))

@@ -205,11 +205,11 @@ pub fn coincidence_sheet(coincidences: &[Coincidence]) -> Sheet {
         "predicted speed (rad/s)",
         "predicted frequency (Hz)",
         "speed of the largest response to that order (rad/s)",
-        "its amplitude (m)",
+        "amplitude of that response (m)",
         "relative shift",
-        "sought from (rad/s)",
-        "sought to (rad/s)",
-        "larger still at the end of the range (rad/s)",
+        "searched from (rad/s)",
+        "searched to (rad/s)",
+        "larger response at the end of the range (rad/s)",
     ]);
     sheet.rows = coincidences
         .iter()

@@ -140,7 +140,7 @@ pub fn of_scene(
     {
         return Err(Failure::new(
             "study map",
-            format!("every angular velocity is refused, the first one: {refusal}"),
+            format!("all angular velocities were rejected, the first one: {refusal}"),
             "",
         ));
     }
@@ -154,7 +154,7 @@ impl Map {
     /// Everything before the runs, and the speeds to run.
     fn prepare(scene: Scene, request: &MapRequest) -> Result<(Self, Vec<f64>)> {
         if request.settings.iter().any(|(name, _)| name == "speed") {
-            return Err(Failure::usage("--set speed", "the study sets the speed", "Use --speeds FROM:TO:COUNT"));
+            return Err(Failure::usage("--set speed", "the study varies the speed", "Use --speeds FROM:TO:COUNT"));
         }
         let mut setup =
             MapSetup { scene, settings: request.settings.clone(), samples: 0, transient: 0, revolutions: 0, top: 0.0 };
@@ -229,11 +229,11 @@ impl Map {
             name: "map",
             title: "Interaction map".into(),
             summary: format!(
-                "How large the blade tips of the scene `{}` swing over angular velocity and frequency, from {} runs, and where \
-                 engine orders of the casing meet natural frequencies.{}",
+                "Amplitudes of the blade tips of the scene `{}` over angular velocity and frequency, from {} runs, and \
+                 the speeds at which engine orders of the casing meet natural frequencies.{}",
                 self.setup.scene.settings.name,
                 self.runs.len(),
-                if quick { " Quick form: few short runs, for a first look only." } else { "" }
+                if quick { " Quick form: few, short runs, for a first look only." } else { "" }
             ),
             facts: self.facts(steps, stepping)?,
             statements: self.statements(),
@@ -259,7 +259,7 @@ impl Map {
                 ),
                 (
                     "coincidences.csv".into(),
-                    "where engine orders meet modes, and where the response to that order is largest".into(),
+                    "crossings of engine orders and modes, and the largest response to each order".into(),
                     findings::coincidence_sheet(&self.coincidences).to_csv().into_bytes(),
                 ),
             ],
@@ -272,7 +272,7 @@ impl Map {
         facts.push((
             "stepping".into(),
             format!(
-                "{:.2} µs per internal step, {stepping:.1} s in all on one processor",
+                "{:.2} µs per internal step, {stepping:.1} s in total on one processor",
                 1e6 * stepping / steps.max(1) as f64
             ),
         ));
@@ -298,7 +298,7 @@ impl Map {
                 format!("clearance at rest{without}"),
                 if low < high { format!("{low:.4e} to {high:.4e} m") } else { format!("{low:.4e} m") },
             ),
-            (format!("the casing reaches beyond the tips by{without}"), format!("{:.4e} m", self.intrusion)),
+            (format!("intrusion of the casing beyond the tips{without}"), format!("{:.4e} m", self.intrusion)),
             ("friction coefficient".into(), self.start.friction.to_string()),
             ("damping ratio".into(), self.start.damping_ratio.to_string()),
         ])
@@ -324,12 +324,15 @@ impl Map {
             ),
             (
                 "one run".into(),
-                format!("{} revolutions pass, {} are transformed (Hann window)", setup.transient, setup.revolutions),
+                format!(
+                    "{} start-up revolutions, then {} in the Fourier transform (Hann window)",
+                    setup.transient, setup.revolutions
+                ),
             ),
             (
                 "frequency resolution".into(),
                 format!(
-                    "{:.3} to {:.3} Hz from bin to bin: 1/{} of the rotational frequency",
+                    "{:.3} to {:.3} Hz, 1/{} of the rotational frequency",
                     bin(first),
                     bin(last),
                     setup.revolutions
@@ -338,8 +341,9 @@ impl Map {
             (
                 "sampling".into(),
                 format!(
-                    "{} samples per revolution from {} to {} internal steps each, by four boxcars of one sample's length; what \
-                     lies beyond the sampling rate folds into the map with at most {folded:.3} % of its amplitude",
+                    "{} samples per revolution from {} to {} internal steps each, filtered by four boxcars of one \
+                     sample's length; frequencies above the sampling rate alias into the map with at most {folded:.3} \
+                     % of their amplitude",
                     setup.samples,
                     factor,
                     factors.iter().copied().max().unwrap_or(1)
@@ -384,7 +388,7 @@ fn samples(top: f64, slowest: f64) -> Result<usize> {
     Err(Failure::usage(
         "--speeds",
         format!("at {slowest} rad/s a revolution would need {least:.1e} samples to show frequencies up to {top:.0} Hz"),
-        format!("Begin at {lowest:.1e} rad/s or above"),
+        format!("Start at {lowest:.1e} rad/s or above"),
     ))
 }
 

@@ -142,8 +142,8 @@ impl MapSetup {
         Err(Failure::usage(
             format!("--revolutions {}", self.revolutions),
             format!(
-                "with {} samples per revolution and {runs} angular velocities that is more than {MOST_SAMPLES} recorded numbers \
-                 per blade, or more than 2 GiB for the spectra of all runs",
+                "with {} samples per revolution and {runs} angular velocities this exceeds {MOST_SAMPLES} recorded \
+                 values per blade or 2 GiB for the spectra of all runs",
                 self.samples
             ),
             if most > 0 {
@@ -194,7 +194,7 @@ impl MapSetup {
             if simulation.real(reference).is_ok_and(|longest| longest > coarsest) {
                 return Err(Failure::new(
                     format!("scene `{}` at {} rad/s", self.scene.settings.name, shown(speed)),
-                    format!("its internal step is longer than a quarter of the {step:.3e} s from sample to sample"),
+                    format!("the internal step is longer than a quarter of the sampling interval of {step:.3e} s"),
                     format!(
                         "Use an internal step of at most {coarsest:.3e} s (--set internal_step_max={coarsest:.1e})"
                     ),
@@ -281,7 +281,7 @@ impl March<'_> {
         }
         let steps = usize::try_from(self.internal_steps - before).unwrap_or(usize::MAX);
         if steps != factor * (count + Decimator::TAIL) {
-            let problem = format!("{steps} internal steps in {count} samples of {factor}");
+            let problem = format!("{steps} internal steps do not make {count} samples of {factor}");
             return Err(Failure::new("sampling", problem, "Report this to the developers"));
         }
         Ok(WindowRecording { decimator, blades, tally, factor })

@@ -100,17 +100,17 @@ pub fn master(settings: &SceneSettings) -> Result<usize> {
     let what = || format!("scene `{}`", settings.name);
     let name = settings.contacts.first().map(|contact| &contact.master);
     let found = settings.structures.iter().position(|structure| Some(&structure.name) == name);
-    let master = found.ok_or_else(|| Failure::new(what(), "it has no contact with a master", "Add one"))?;
+    let master = found.ok_or_else(|| Failure::new(what(), "no contact has a master", "Add a contact"))?;
     let instead = match settings.structures[master].motion {
         BodyMotion::Rotating => return Ok(master),
-        BodyMotion::Free => "flies freely",
-        BodyMotion::Still => "stands still",
+        BodyMotion::Free => "is a free body",
+        BodyMotion::Still => "does not rotate",
     };
     let name = &settings.structures[master].name;
     Err(Failure::usage(
         what(),
-        format!("an interaction map is over angular velocities, and the master of its contact, `{name}`, {instead}"),
-        "Give a scene whose first contact has a rotating master, such as builtin:rotor37; `tiprub run` runs this one",
+        format!("an interaction map needs a rotating master, and `{name}` {instead}"),
+        "Give a scene whose first contact has a rotating master, such as builtin:rotor37, or use `tiprub run`",
     ))
 }
 

@@ -28,7 +28,7 @@ pub fn statements(map: &Map) -> Vec<Statement> {
     all.push(steadiness(map));
     let residual = map.answered().map(|(_, response)| response.energy_residual).fold(0.0, f64::max);
     all.push(Statement::tested(
-        format!("The energy ledger closes in every run that ends, to {LEDGER:e} of the energy exchanged"),
+        format!("The energy balance closes in every completed run, to {LEDGER:e} of the energy exchanged"),
         map.answered().all(|(_, response)| response.energy_residual < LEDGER),
         format!("largest residual {residual:.1e}"),
     ));
@@ -48,7 +48,7 @@ fn runs_end(map: &Map) -> Statement {
         .collect();
     let found = match refused.first() {
         None => format!("all {} runs", map.runs.len()),
-        Some(first) => format!("{} of {} are refused, marked grey in the map; {first}", refused.len(), map.runs.len()),
+        Some(first) => format!("{} of {} runs were rejected (grey in the map); {first}", refused.len(), map.runs.len()),
     };
     Statement::tested("Every run reaches its end", refused.is_empty(), found)
 }
@@ -60,24 +60,24 @@ fn contact(map: &Map) -> Vec<Statement> {
     let (share, force) = (most(|response| response.contact_share), most(|response| response.normal_force));
     let depth = most(|response| response.penetration);
     let sum = format!(
-        "at {touching} of {} angular velocities; on average over the blades a blade touches at most {:.2} % of the time, the mean \
-         of all normal forces together is at most {force:.1} N, the largest one of a node {:.0} N",
+        "contact at {touching} of {} angular velocities; a blade is in contact for at most {:.2} % of the time (mean \
+         of all blades), the mean sum of normal forces is at most {force:.1} N, the largest force on a node is {:.0} N",
         map.runs.len(),
         100.0 * share,
         most(|response| response.largest_force)
     );
     let contact = &map.setup.scene.settings.contacts[0];
     let gap = contact.sector_gaps.iter().copied().reduce(f64::min).unwrap_or(contact.gap);
-    let expected = "In no window a node penetrates by more than a thousandth of the clearance";
+    let expected = "No node penetrates by more than a thousandth of the clearance";
     let found =
-        format!("deepest at any internal step of any window: {depth:.2e} m, {:.1e} of the clearance", depth / gap);
+        format!("largest value at any internal step of any window: {depth:.2e} m, {:.1e} of the clearance", depth / gap);
     // Gaps count from the surface as it was before anything wore off.
     let penetration = if contact.coating.is_some() {
-        Statement::remark("Deepest place of a node under the unworn surface of the coating", found)
+        Statement::remark("Largest depth of a node below the unworn surface of the coating", found)
     } else {
         Statement::tested(expected, depth <= 1e-3 * gap, found)
     };
-    let expected = "The tips touch the casing at every angular velocity whose run ends";
+    let expected = "The tips touch the casing in every completed run";
     vec![Statement::tested(expected, touching > 0 && touching == map.answered().count(), sum), penetration]
 }
 
@@ -91,7 +91,8 @@ fn on_orders(map: &Map) -> Statement {
     let strongest = off.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
     let strongest = strongest.map_or(String::new(), |peak| {
         format!(
-            "; the largest that does not: {:.2} µm, {:.3} times the rotational frequency ({:.1} Hz) at {:.1} rad/s",
+            "; largest peak off these orders: {:.2} µm at {:.3} times the rotational frequency ({:.1} Hz) and {:.1} \
+             rad/s",
             1e6 * peak.amplitude,
             peak.order,
             peak.frequency,
@@ -99,18 +100,18 @@ fn on_orders(map: &Map) -> Statement {
         )
     });
     let expected = format!(
-        "Response is a repetition of the casing's shape: peaks lie on engine orders that the casing excites, with {:.0} % of the sum \
-         of their squared amplitudes",
+        "The response repeats the shape of the casing: peaks on engine orders that the casing excites have {:.0} % of \
+         the sum of squared amplitudes",
         100.0 * NEARLY_ALL
     );
     if all.0 == 0 {
-        return Statement::remark(expected, "there is no peak");
+        return Statement::remark(expected, "there are no peaks");
     }
     Statement::tested(
         expected,
         on.1 >= NEARLY_ALL * all.1,
         format!(
-            "multiples of {}: {} of {} peaks, {:.3} % of the sum of their squared amplitudes{strongest}",
+            "multiples of {}: {} of {} peaks, {:.3} % of the sum of squared amplitudes{strongest}",
             map.prediction.base_order,
             on.0,
             all.0,
@@ -125,7 +126,7 @@ fn at_coincidence(map: &Map) -> Option<Statement> {
     let orders = map.coincidences.iter().filter(|one| (one.crossing.order as f64 - peak.order).abs() <= peak.bin);
     let distance = |one: &&Coincidence| (peak.speed / one.crossing.speed - 1.0).abs();
     let place = format!(
-        "largest: {:.2} µm at {:.2} Hz and {:.2} rad/s, {:.3} times the rotational frequency",
+        "largest response: {:.2} µm at {:.2} Hz and {:.2} rad/s, {:.3} times the rotational frequency",
         1e6 * peak.amplitude,
         peak.frequency,
         peak.speed,
@@ -135,7 +136,7 @@ fn at_coincidence(map: &Map) -> Option<Statement> {
         return Some(Statement::tested(
             expected,
             false,
-            format!("{place}; no excited order there meets a mode in this range"),
+            format!("{place}; no excited engine order at this frequency meets a mode in the range of speeds"),
         ));
     };
     let Crossing { order, mode, speed, frequency, .. } = nearest.crossing;
@@ -152,9 +153,9 @@ fn room(map: &Map) -> Option<Statement> {
     let peak = map.peaks.iter().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
     let [first, last] = [map.answered().next()?, map.answered().last()?].map(|end| end.0);
     Some(Statement::tested(
-        "The largest response lies within the range of speeds, not at an end of it",
+        "The largest response lies inside the range of speeds, not at one of its ends",
         first < peak.speed && peak.speed < last,
-        format!("it is at {:.2} rad/s, the runs reach from {first:.2} to {last:.2} rad/s", peak.speed),
+        format!("it is at {:.2} rad/s; the runs cover {first:.2} to {last:.2} rad/s", peak.speed),
     ))
 }
 
@@ -180,18 +181,18 @@ pub fn stiffens(coincidences: &[Coincidence], spacing: f64) -> Option<Statement>
     let shift = strongest.map_or(0.0, |one| one.response.map_or(0.0, |place| place.0) - one.crossing.speed);
     let why = match leaving {
         Some(one) => format!(
-            "undecided: the response of engine order {} on mode {} runs out of the range of speeds and is larger at its end \
-             than any resonance found; ",
+            "undecided: the response of engine order {} on mode {} extends beyond the range of speeds and is larger at \
+             its end than any resonance found; ",
             one.crossing.order,
             one.crossing.mode + 1
         ),
-        None if shift.abs() < spacing => "undecided: the shift is below the distance of the speeds; ".into(),
+        None if shift.abs() < spacing => "undecided: the shift is smaller than the spacing of the speeds; ".into(),
         None => String::new(),
     };
     let list: Vec<String> = coincidences.iter().filter_map(place_found).collect();
     Some(Statement {
-        expected: "Contact stiffens: the strongest resonance lies above the predicted one".into(),
-        found: format!("{why}{}; one speed is {spacing:.2} rad/s from the next", list.join("; ")),
+        expected: "Contact stiffens the blades: the strongest resonance lies above the predicted one".into(),
+        found: format!("{why}{}; the spacing of the speeds is {spacing:.2} rad/s", list.join("; ")),
         holds: why.is_empty().then_some(shift > 0.0),
     })
 }
@@ -203,14 +204,15 @@ fn place_found(one: &Coincidence) -> Option<String> {
         |(speed, amplitude): (f64, f64)| format!("the end of the range, {:.2} µm at {speed:.2} rad/s", 1e6 * amplitude);
     let place = match (one.response, one.beyond) {
         (None, None) => return None,
-        (None, Some(beyond)) => format!("no maximum for {predicted:.2} rad/s, largest at {}", end(beyond)),
+        (None, Some(beyond)) => format!("no maximum, predicted at {predicted:.2} rad/s, largest at {}", end(beyond)),
         (Some((speed, amplitude)), beyond) => format!(
-            "{:+.2} % ({speed:.2} for {predicted:.2} rad/s, {:.2} µm, sought from {:.1} to {:.1} rad/s{})",
+            "{:+.2} % (found at {speed:.2}, predicted at {predicted:.2} rad/s, {:.2} µm, searched from {:.1} to {:.1} \
+             rad/s{})",
             100.0 * one.shift().unwrap_or(0.0),
             1e6 * amplitude,
             one.window[0],
             one.window[1],
-            beyond.map_or(String::new(), |beyond| format!(", larger still at {}", end(beyond)))
+            beyond.map_or(String::new(), |beyond| format!(", larger at {}", end(beyond)))
         ),
     };
     Some(format!("engine order {order} on mode {}: {place}", mode + 1))
@@ -219,10 +221,11 @@ fn place_found(one: &Coincidence) -> Option<String> {
 fn scale(map: &Map) -> Option<Statement> {
     let slow = map.static_displacement?;
     let expected = format!(
-        "The scale of the response is plausible: at most {MOST_DYNAMIC} times that of a blade pushed back by the depth of the casing's shape"
+        "The scale of the response is plausible: at most {MOST_DYNAMIC} times the static displacement caused by the \
+         depth of the casing's shape"
     );
     if map.answered().all(|(_, response)| response.contact_share <= 0.0) {
-        return Some(Statement::remark(expected, "undecided: nothing touches, so that nothing is pushed"));
+        return Some(Statement::remark(expected, "undecided: there is no contact"));
     }
     let largest = map.answered().map(|(_, response)| response.deflection[0]).fold(0.0, f64::max);
     let smallest = map.answered().map(|(_, response)| response.deflection[0]).fold(f64::INFINITY, f64::min);
@@ -230,8 +233,8 @@ fn scale(map: &Map) -> Option<Statement> {
         expected,
         largest <= MOST_DYNAMIC * slow,
         format!(
-            "the leading edge swings by {:.1} to {:.1} µm about its mean; the casing reaches {:.1} µm beyond the tips{}, its radius \
-             varies by {:.1} µm, and a slow push by that much moves the leading edge by {:.1} µm",
+            "the leading edge moves by {:.1} to {:.1} µm about its mean; the casing reaches {:.1} µm beyond the \
+             tips{}, its radius varies by {:.1} µm, and a slow push by this amount moves the leading edge by {:.1} µm",
             1e6 * smallest,
             1e6 * largest,
             1e6 * map.intrusion,
@@ -248,15 +251,16 @@ fn steadiness(map: &Map) -> Statement {
         (count + 1, if response.drift.abs() > worst.1.abs() { (speed, response.drift) } else { worst })
     });
     let found = match count {
-        0 => format!("all {} within {:.0} %", map.answered().count(), 100.0 * STEADY),
+        0 => format!("all {} runs within {:.0} %", map.answered().count(), 100.0 * STEADY),
         _ => format!(
-            "{count} of {} change by more than {:.0} % from the first half of the window to the second, most at {:.2} rad/s: {:+.1} %",
+            "{count} of {} runs change by more than {:.0} % from the first half of the window to the second, the \
+             largest change at {:.2} rad/s: {:+.1} %",
             map.answered().count(),
             100.0 * STEADY,
             worst.0,
             100.0 * worst.1
         ),
     };
-    let expected = format!("Effective displacement is steady over the window of every run, to {:.0} %", 100.0 * STEADY);
+    let expected = format!("The effective displacement is steady to {:.0} % in every window", 100.0 * STEADY);
     Statement::tested(expected, count == 0, found)
 }

@@ -218,14 +218,14 @@ fn scenes_with_more_than_one_thing_to_vary_are_refused() {
     assert_eq!(crate::one_rotor(&settings), Ok(()), "friction is not refined");
     settings.contacts[1].master = "rear".into();
     let failure = crate::one_rotor(&settings).unwrap_err();
-    assert!(failure.problem.contains("`rotor` and `rear` both touch"), "{failure}");
+    assert!(failure.problem.contains("`rotor` and `rear` are both masters"), "{failure}");
 }
 
 #[test]
 fn rejects_a_master_at_rest_before_reduction() {
     let settings = scene_source::settings("builtin:cube-between-rings").unwrap();
     let failure = start::master(&settings).unwrap_err();
-    assert!(failure.usage && failure.problem.contains("`cube`, flies freely"), "{failure}");
+    assert!(failure.usage && failure.problem.contains("`cube` is a free body"), "{failure}");
     assert!(failure.remedy.contains("builtin:rotor37"), "{failure}");
     let without = Scene { settings, roms: Vec::new() };
     assert_eq!(of_scene(without, &MapRequest::default(), 1, |_, _, _| {}).unwrap_err(), failure);
@@ -237,7 +237,7 @@ fn numbers_do_not_depend_on_threads() {
     let [one, three] = [1, 3].map(|threads| run(scene(FIRST, 4), &request, threads));
     assert_eq!(one.figures.len(), 5);
     // One unit on each axis.
-    for (name, unit) in [("contact", "share of time in contact (%)"), ("normal-force", "mean normal force (N)")] {
+    for (name, unit) in [("contact", "fraction of time in contact (%)"), ("normal-force", "mean normal force (N)")] {
         assert_eq!(one.figure(name).unwrap().picture.svg.matches(unit).count(), 1, "{name}");
     }
     for (a, b) in one.figures.iter().zip(&three.figures) {
@@ -274,7 +274,7 @@ fn refused_speeds_are_marked_and_all_refused_is_a_failure() {
         [170.0, 190.0]
     );
     let failure = of_scene(scene, &request(speeds(170.0, 190.0)), 1, |_, _, _| {}).unwrap_err();
-    assert!(failure.problem.contains("every angular velocity is refused"), "{failure}");
+    assert!(failure.problem.contains("all angular velocities were rejected"), "{failure}");
 }
 
 #[test]
@@ -394,7 +394,7 @@ fn nothing_that_moves_is_no_verdict() {
     let study = run(scene(FIRST, 2), &request, 1);
     let holds = |start: &str| study.statements.iter().find(|one| one.expected.starts_with(start)).unwrap().holds;
     assert_eq!(holds("The tips touch"), Some(false));
-    assert_eq!([holds("The scale of the response"), holds("Response is a repetition")], [None, None]);
+    assert_eq!([holds("The scale of the response"), holds("The response repeats")], [None, None]);
 }
 
 #[test]
@@ -414,7 +414,7 @@ fn stiffening_is_decided_only_where_it_shows() {
     assert_eq!(verdict(&[one(4, Some((95.0, 3e-3)), None), one(6, Some((120.0, 1e-3)), None)]).unwrap().0, Some(false));
     for shift in [-1.9, 1.9] {
         let (holds, found) = verdict(&[one(4, Some((100.0 + shift, 3e-3)), None)]).unwrap();
-        assert!(holds.is_none() && found.contains("below the distance of the speeds"), "{found}");
+        assert!(holds.is_none() && found.contains("smaller than the spacing of the speeds"), "{found}");
     }
     // Another crossing runs out of the range: smaller there it does not matter, larger it may be the strongest.
     assert_eq!(verdict(&[above, one(6, Some((104.0, 1e-3)), Some((150.0, 2e-3)))]).unwrap().0, Some(true));

@@ -36,7 +36,7 @@ impl StabilityGrid {
     pub fn new(arguments: &StabilityArguments, own: &SceneStart, coupled: bool, usable: Option<f64>) -> Result<Self> {
         let quick = arguments.common.quick;
         let refuse = |option: &str, what: &str| {
-            Err(Failure::usage(option, format!("the scene has no {what} that could be changed"), "Leave it out"))
+            Err(Failure::usage(option, format!("the scene has no {what} that can be changed"), "Leave it out"))
         };
         let frictions = match (own.friction, arguments.friction) {
             (None, Some(_)) => return refuse("--friction", "friction coefficient"),

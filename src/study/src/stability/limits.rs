@@ -36,9 +36,9 @@ impl Usable {
     /// For people.
     pub fn to_text(&self) -> String {
         match &self.sought {
-            Sought::All(step) => format!("none refused up to {step:.1e} s"),
+            Sought::All(step) => format!("none rejected up to {step:.1e} s"),
             Sought::Below(step, _) => format!("{step:.3e} s"),
-            Sought::None(why) => format!("refused: {}", why.trim_start_matches("refused: ")),
+            Sought::None(why) => format!("rejected: {why}"),
         }
     }
 

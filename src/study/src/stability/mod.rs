@@ -119,7 +119,7 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     let mut ledger = WorkPlan::new(seconds_per_answer(&asked, &own) / threads as f64);
     ledger.plan(LIMITS, limits::ANSWERS as f64);
     ledger.plan(GRID, (first.places().len() * first.steps.len()) as f64);
-    let forecast = Forecast::new(console, &format!("Asking {}", scene.settings.name), ledger);
+    let forecast = Forecast::new(console, &format!("Checking {}", scene.settings.name), ledger);
     let limits = limits::of(&asked, &own, threads, arguments.common.quick, &forecast)?;
     let usable = limits.iter().find(|usable| usable.method == own.method).and_then(limits::Usable::step);
     let grid = StabilityGrid::new(arguments, &own, coupled, usable)?;
@@ -166,7 +166,7 @@ fn structures<'a>(
     let (settings, rom) = (&scene.settings.structures[index], &scene.roms[index]);
     if settings.motion == BodyMotion::Free || rom.frame == DisplacementFrame::Cartesian {
         return Ok(Err(
-            "the master flies freely: which contacts are closed, where and how long is not known beforehand",
+            "the master is a free body, and it is not known in advance which contacts close, where and for how long",
         ));
     }
     let damping = own.damping_ratio.unwrap_or(rom.damping_ratio);
@@ -180,7 +180,7 @@ fn structures<'a>(
     // A speed that the structure does not take is refused by the core, place by place.
     let found: Vec<SingleStructure> =
         grid.speeds.iter().map(at).collect::<tiprub_core::Result<_>>().unwrap_or_default();
-    Ok(if found.is_empty() { Err("its modes cannot be found at every speed") } else { Ok(found) })
+    Ok(if found.is_empty() { Err("the modes of the master cannot be computed at every speed") } else { Ok(found) })
 }
 
 /// All answers.
@@ -212,7 +212,7 @@ fn points(
     let progress = |_| forecast.done(GRID, places.len() as f64);
     let found = sweep::sweep(&grid.steps, threads, of_step, progress)?;
     let found = found.concat();
-    if found.is_empty() { Err(Failure::new("stability", "nothing was asked", "")) } else { Ok(found) }
+    if found.is_empty() { Err(Failure::new("stability", "the grid of the study is empty", "")) } else { Ok(found) }
 }
 
 fn rates(structure: &SingleStructure, scheme: Scheme, step: f64, place: OperatingPoint) -> Option<Rates> {

@@ -14,20 +14,23 @@ use crate::{Picture, Sheet, Statement, Study, StudyFigure, error::competitor::me
 
 const VERDICTS: [AnswerKind; 4] = [AnswerKind::Right, AnswerKind::Warned, AnswerKind::Flutter, AnswerKind::Refused];
 
-const HOW_TO_READ: &str = "Every cell is the answer to a run with that friction, speed and internal step: the refusal or the warnings that \
-    `tiprub run` would give, here without the run. Read a column from the bottom up: where it turns to refused is the longest step for that \
-    friction, and no longer one is accepted. The table of largest accepted steps names the step below the first refusal. An accepted step has \
-    passed the checks of the start and has not been run. Flutter is physics and no error of the step: friction feeds the blades while they touch, and \
-    a shorter step does not help; a frequency of 0 Hz is divergence, which grows without swinging. The framed cell is the scene as it stands; the words of a cell show where the pointer rests on it, and stand \
-    in the table and in answers-in-words.csv.";
+const HOW_TO_READ: &str =
+    "Every cell shows whether a run with this friction coefficient, speed and internal step is accepted: with the \
+     warnings or the error message that `tiprub run` would give, but the study does not execute the run. Read a column \
+     from the bottom up: the longest step for a friction coefficient is the last one before the first rejection, and \
+     all longer steps are rejected. The table of largest accepted steps lists this step. An accepted step has passed \
+     the checks at the start of a run and has not been run. Flutter is physical and not an error of the step: friction \
+     feeds energy into the blades during contact, and a shorter step does not help. A frequency of 0 Hz means \
+     divergence, which is growth without oscillation. The framed cell is the scene as it stands. Move the pointer over \
+     a cell to see its message; all messages are in the table and in answers-in-words.csv.";
 
 impl AnswerKind {
     fn kind(self) -> CellKind {
         let (label, color, sign) = match self {
-            Self::Right => ("right", "#c5e0d2", ""),
+            Self::Right => ("accepted", "#c5e0d2", ""),
             Self::Warned => ("accepted with warnings", "#f4e3a1", "!"),
-            Self::Flutter => ("accepted, flutters by friction", "#f2b98c", "~"),
-            Self::Refused => ("refused", "#cf8a98", "×"),
+            Self::Flutter => ("accepted with friction-induced flutter", "#f2b98c", "~"),
+            Self::Refused => ("rejected", "#cf8a98", "×"),
         };
         CellKind { label: label.into(), color, sign }
     }
@@ -46,7 +49,7 @@ pub fn study(found: &StabilityResult) -> Result<Study> {
     figures.extend(growth(found)?);
     Ok(Study {
         name: "stability",
-        title: format!("What {} allows", found.scene.settings.name),
+        title: format!("Stability of {}", found.scene.settings.name),
         summary: HOW_TO_READ.into(),
         facts: facts(found),
         statements: statements(found),
@@ -55,7 +58,7 @@ pub fn study(found: &StabilityResult) -> Result<Study> {
         files: vec![
             (
                 "answers-in-words.csv".into(),
-                "every answer with its words and growth rates".into(),
+                "all results with messages and growth rates".into(),
                 answer_text(found).into_bytes(),
             ),
             (
@@ -84,12 +87,12 @@ fn micro(step: f64) -> String {
 fn facts(found: &StabilityResult) -> Vec<(String, String)> {
     let (settings, own) = (&found.scene.settings, &found.own);
     let range = |values: &[Option<f64>]| match values {
-        [Some(low), .., Some(high)] => format!("{} from {} to {}", values.len(), short(*low), short(*high)),
+        [Some(low), .., Some(high)] => format!("{} values from {} to {}", values.len(), short(*low), short(*high)),
         [one] => or_none(*one),
         _ => or_none(None),
     };
     let steps = match found.grid.steps.as_slice() {
-        [low, .., high] => format!("{} from {low:.3e} to {high:.3e}", found.grid.steps.len()),
+        [low, .., high] => format!("{} values from {low:.3e} to {high:.3e}", found.grid.steps.len()),
         steps => steps.iter().map(|step| shown(*step)).collect(),
     };
     let mut facts = vec![
@@ -98,9 +101,9 @@ fn facts(found: &StabilityResult) -> Vec<(String, String)> {
         ("speed of the scene (rad/s)".into(), or_none(own.speed)),
         ("internal step of the scene (s)".into(), shown(own.step)),
         ("scheme and solver of the scene".into(), method_name(own.method)),
-        ("asked: friction coefficients".into(), range(&found.grid.frictions)),
-        ("asked: speeds (rad/s)".into(), range(&found.grid.speeds)),
-        ("asked: internal steps (s)".into(), steps),
+        ("studied friction coefficients".into(), range(&found.grid.frictions)),
+        ("studied speeds (rad/s)".into(), range(&found.grid.speeds)),
+        ("studied internal steps (s)".into(), steps),
     ];
     for usable in &found.limits {
         facts.push((format!("largest accepted step, {}", method_name(usable.method)), usable.to_text()));
@@ -124,7 +127,7 @@ fn statements(found: &StabilityResult) -> Vec<Statement> {
     if let Some(point) = own_point(found) {
         let words = match (&point.answer, point.reason()) {
             (Err(_), words) => words,
-            (Ok(_), words) if words.is_empty() => "accepted without a warning".into(),
+            (Ok(_), words) if words.is_empty() => "accepted without warnings".into(),
             (Ok(_), words) => format!("accepted with warnings: {words}"),
         };
         all.push(Statement::tested("The scene as it stands is accepted", point.answer.is_ok(), words));
@@ -134,28 +137,28 @@ fn statements(found: &StabilityResult) -> Vec<Statement> {
     if let Some(usable) = usable {
         let within = usable.step().is_some_and(|step| found.own.step <= step);
         all.push(Statement::tested(
-            "Its internal step lies within those of which all shorter ones are accepted",
+            "Its internal step does not exceed the largest accepted step",
             within,
-            format!("{} s of {}", shown(found.own.step), usable.to_text()),
+            format!("step {} s, largest accepted step: {}", shown(found.own.step), usable.to_text()),
         ));
     }
     let count = |verdict: AnswerKind| found.points.iter().filter(|point| point.verdict() == verdict).count();
     let counts: Vec<String> =
         VERDICTS.iter().map(|verdict| format!("{} {}", count(*verdict), verdict.kind().label)).collect();
-    all.push(Statement::remark(format!("Answers at {} places", found.points.len()), counts.join(", ")));
+    all.push(Statement::remark(format!("Results at {} points", found.points.len()), counts.join(", ")));
     all
 }
 
 fn flutter(found: &StabilityResult, point: &StabilityPoint) -> Option<Statement> {
-    let expected = "At the scene's friction sliding contact does not grow by itself (flutter)";
+    let expected = "Sliding contact does not flutter at the friction coefficient of the scene";
     if let Some(why) = found.no_rates {
-        return Some(Statement::remark(expected, format!("not known: {why}")));
+        return Some(Statement::remark(expected, format!("unknown: {why}")));
     }
     let Some(rates) = &point.rates else {
-        return Some(Statement::remark(expected, "not known: no friction, or more modes than rates are computed for"));
+        return Some(Statement::remark(expected, "unknown: no friction, or too many modes for growth rates"));
     };
     let frequency = rates.frequency().map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
-    let text = format!("growth rate {:.3e} 1/s{frequency}, closed at {}", rates.physical.rate, rates.closed);
+    let text = format!("growth rate {:.3e} 1/s{frequency}, closed nodes: {}", rates.physical.rate, rates.closed);
     Some(Statement::tested(expected, !rates.is_flutter(), text))
 }
 
@@ -176,7 +179,7 @@ fn answers(found: &StabilityResult) -> StudyFigure {
             "µ {}, h {} µs: {}",
             point.place.friction.map_or("-".into(), short),
             micro(point.step),
-            if point.reason().is_empty() { "right".into() } else { point.reason() }
+            if point.reason().is_empty() { "accepted".into() } else { point.reason() }
         ),
     };
     let at = |values: &[Option<f64>], own: Option<f64>| values.iter().position(|value| *value == own);
@@ -199,7 +202,7 @@ fn answers(found: &StabilityResult) -> StudyFigure {
     StudyFigure {
         name: "answers",
         caption: format!(
-            "Answers of {} with {}, a panel per speed.",
+            "Results of {} with {}, one panel per speed.",
             found.scene.settings.name,
             method_name(found.own.method)
         ),
@@ -212,10 +215,10 @@ const COLUMNS: [&str; 7] = [
     "speed (rad/s)",
     "friction",
     "internal step (s)",
-    "answer (0 right, 1 warned, 2 flutter, 3 refused)",
-    "growth of the equations (1/s)",
-    "growth of the steps (1/s)",
-    "frequency of flutter (Hz)",
+    "result (0 accepted, 1 warnings, 2 flutter, 3 rejected)",
+    "growth rate without time steps (1/s)",
+    "growth rate with time steps (1/s)",
+    "flutter frequency (Hz)",
 ];
 
 /// NaN where the scene has no such value, or a rate cannot be told.
@@ -246,7 +249,7 @@ fn row(point: &StabilityPoint) -> Vec<String> {
         point.place.speed.map_or(String::new(), shown),
         point.place.friction.map_or(String::new(), short),
         format!("{:.4e}", point.step),
-        point.verdict().name().into(),
+        point.verdict().kind().label,
         rate(point.rates.as_ref().map(|rates| rates.physical.rate)),
         rate(growth.map(|growth| growth.stepped)),
         frequency.map_or(String::new(), |hertz| format!("{hertz:.1}")),
@@ -258,15 +261,15 @@ const HEADINGS: [&str; 8] = [
     "speed (rad/s)",
     "friction",
     "internal step (s)",
-    "answer",
-    "growth of the equations (1/s)",
-    "growth of the steps (1/s)",
-    "flutter (Hz)",
-    "words",
+    "result",
+    "growth rate without time steps (1/s)",
+    "growth rate with time steps (1/s)",
+    "flutter frequency (Hz)",
+    "message",
 ];
 
 fn points_table(found: &StabilityResult) -> Table {
-    let caption = format!("All {} answers in words", found.points.len());
+    let caption = format!("All {} results", found.points.len());
     Table { rows: found.points.iter().map(row).collect(), ..Table::new(caption, HEADINGS) }
 }
 
@@ -291,12 +294,13 @@ fn limits_csv(found: &StabilityResult) -> String {
 fn limits_table(found: &StabilityResult) -> Table {
     let (friction, speed) = (or_none(found.own.friction), or_none(found.own.speed));
     let caption = format!(
-        "Largest internal step that the start of a run accepts at the scene's friction ({friction}) and speed ({speed} rad/s), to within 1 %: all shorter ones that were tried are accepted"
+        "Largest internal step that passes the checks at the start of a run, at the scene's friction coefficient \
+         ({friction}) and speed ({speed} rad/s), to within 1 %; all shorter steps that were tried are accepted"
     );
-    let mut table = Table::new(caption, ["scheme and solver", "largest step (s)", "what refuses a longer one"]);
+    let mut table = Table::new(caption, ["scheme and solver", "largest step (s)", "why longer steps are rejected"]);
     for usable in &found.limits {
         let step = match &usable.sought {
-            Sought::All(step) => format!("none refused up to {step:.1e}"),
+            Sought::All(step) => format!("none rejected up to {step:.1e}"),
             Sought::Below(step, _) => format!("{step:.3e}"),
             Sought::None(_) => "none".into(),
         };
@@ -323,12 +327,12 @@ fn growth(found: &StabilityResult) -> Result<Option<StudyFigure>> {
     }
     let mut series = vec![Series::line("without time discretisation", equations.clone())];
     let mut sheet =
-        Sheet { columns: vec!["friction".into(), "growth of the equations (1/s)".into()], rows: Vec::new() };
+        Sheet { columns: vec!["friction".into(), "growth rate without time steps (1/s)".into()], rows: Vec::new() };
     let mut columns = vec![equations];
     for step in &found.grid.steps {
         let points = at(*step, &|rates| rates.growth.stepped);
         series.push(Series::line(format!("h = {} µs", micro(*step)), points.clone()));
-        sheet.columns.push(format!("growth of steps of {} s (1/s)", shown(*step)));
+        sheet.columns.push(format!("growth rate with steps of {} s (1/s)", shown(*step)));
         columns.push(points);
     }
     for (index, (friction, _)) in columns[0].iter().enumerate() {
@@ -339,9 +343,9 @@ fn growth(found: &StabilityResult) -> Result<Option<StudyFigure>> {
     Ok(Some(StudyFigure {
         name: "growth",
         caption: format!(
-            "Growth of closed sliding contact at {}, of all sets of closed nodes the one that grows most: above 0 without time \
-             discretisation (and without the mass of the contact nodes, where the model allows) it flutters. The steps are those of \
-             {}, with the mass that they give the nodes.",
+            "Growth rate of closed sliding contact at {}, for the set of closed nodes that grows fastest. A positive \
+             rate without time discretisation (and without the mass of the contact nodes, where the model allows) \
+             means flutter. The steps are those of {}, with the node mass of that scheme.",
             title(found.own.speed),
             found.own.method.0.name()
         ),

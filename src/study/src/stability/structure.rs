@@ -61,8 +61,8 @@ impl StepLimit {
     pub fn to_text(&self) -> String {
         match &self.limit {
             SchemeLimit::Below(step) => format!("{step:.4e} s"),
-            SchemeLimit::Tried(step) => format!("none found up to {step:.1e} s"),
-            SchemeLimit::Refused(why) => format!("refused: {why}"),
+            SchemeLimit::Tried(step) => format!("no limit found up to {step:.1e} s"),
+            SchemeLimit::Refused(why) => format!("rejected: {why}"),
         }
     }
 
@@ -280,7 +280,7 @@ impl<'a> SingleStructure<'a> {
             Sought::Below(step, ()) => SchemeLimit::Below(step),
             Sought::None(()) => {
                 let step = shown((low * 1e9).round() / 1e9);
-                SchemeLimit::Refused(format!("a step of {step} s is refused, at which every mode is resolved"))
+                SchemeLimit::Refused(format!("even a step of {step} s, which resolves every mode, is rejected"))
             }
         }
     }
@@ -307,7 +307,7 @@ impl<'a> SingleStructure<'a> {
         let mut usable = f64::INFINITY;
         for model in &self.models {
             if model.dynamic_modes(scheme) == 0 {
-                return Err("it makes three modes per contact node quasi-static, and none is left".to_owned());
+                return Err("the scheme makes three modes per contact node quasi-static, and no mode is left".to_owned());
             }
             let copies = model.contact_modes.nrows() / (3 * self.rom.contact_nodes.len());
             let normals = self.closed[0].repeat(copies).into_iter().map(|(normal, _)| normal).collect();

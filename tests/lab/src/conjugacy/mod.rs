@@ -109,10 +109,10 @@ pub(crate) fn study(quick: bool) -> Result<Study> {
     let figure = curvature(if quick { 2 } else { HALVINGS })?;
     Ok(Study {
         name: "conjugacy",
-        title: "Forces, moments and work that agree".into(),
-        summary: "Rotors that speed up, whirl and shift in casings that close, turn and change shape, and a free body between \
-                  plates, with every scheme and solver: forces and moments on both sides of the contacts, the torque against \
-                  the work of the shaft, and what the ledger cannot name."
+        title: "Consistency of forces, moments and work".into(),
+        summary: "Rotors that accelerate, whirl and shift in casings that close, rotate and change shape, and a free \
+                  body between plates, with every scheme and solver: balance of forces and moments on both sides of \
+                  the contacts, of torque and shaft work, and of energy."
             .into(),
         facts: vec![
             ("runs".into(), rows.len().to_string()),
@@ -121,7 +121,7 @@ pub(crate) fn study(quick: bool) -> Result<Study> {
         ],
         statements: statements(&rows),
         results: json!({ "rows": rows.iter().copied().map(ConjugacyRow::to_json).collect::<Vec<_>>() }),
-        files: vec![(TABLE.into(), "the table".into(), table(&rows).into_bytes())],
+        files: vec![(TABLE.into(), "table".into(), table(&rows).into_bytes())],
         figures: vec![figure],
     })
 }
@@ -143,35 +143,40 @@ fn statements(rows: &[ConjugacyRow]) -> Vec<Statement> {
     let massless = |row: &ConjugacyRow| row.case.scheme.0 == Scheme::MasslessBoundary;
     let curved = |step: usize| worst(rows, |row| if massless(row) { 0.0 } else { row.seen[step].curvature.abs() });
     vec![
-        Statement::tested("every run has contacts", touching > 0, format!("{touching} in the run with the fewest")),
-        below("moment about the axis of a round casing of revolution without friction, of |F| r", 1e-14, round(false)),
-        below("the same of a spline through 60 points of a circle", 1e-5, round(true)),
+        Statement::tested("every run has contacts", touching > 0, format!("at least {touching} per run")),
+        below("moment about the axis of a frictionless round surface of revolution, relative to |F| r", 1e-14,
+            round(false)),
+        below("the same moment for a spline through 60 points of a circle, relative to |F| r", 1e-5, round(true)),
         below(
-            "integral of torque times speed plus work of the shaft, of all work",
+            "sum of the integral of torque times speed and the shaft work, relative to the total work",
             1e-13,
             worst(rows, |row| row.seen[0].shaft),
         ),
-        below("closure of the ledger, of all work", 1e-13, worst(rows, |row| row.seen[0].balance)),
-        below("forces on master and slave, of |F|", 1e-14, worst(rows, |row| row.seen[0].force)),
+        below("residual of the energy balance, relative to the total work", 1e-13, worst(rows,
+            |row| row.seen[0].balance)),
+        below("imbalance of the forces on master and slave, relative to |F|", 1e-14, worst(rows,
+            |row| row.seen[0].force)),
         below(
-            "moments on master and slave about one point where the slave has control points, of |F| r",
+            "imbalance of the moments on master and slave about one point, for slaves with control points, relative to \
+             |F| r",
             1e-13,
             of(WrenchSide::ControlPoints),
         ),
         below(
-            "the same on surfaces of revolution, whose nodes stand off by the penetration of a step",
+            "the same imbalance on surfaces of revolution, where nodes are offset by the penetration of a step, \
+             relative to |F| r",
             1e-4,
             of(WrenchSide::Surface),
         ),
         below(
-            "modal forces on carriers from the forces on control points",
+            "deviation of the modal forces on the surface carrier from those of the control-point forces",
             1e-12,
             worst(rows, |row| row.seen[0].modal),
         ),
         Statement::tested(
-            "curvature work vanishes with the step (schemes with node mass)",
+            "curvature work decreases with the step (schemes with node mass)",
             curved(1) < 0.7 * curved(0),
-            format!("at most {:.1e} of all work with h, {:.1e} with h/2", curved(0), curved(1)),
+            format!("at most {:.1e} of the total work with h, {:.1e} with h/2", curved(0), curved(1)),
         ),
     ]
 }
@@ -192,8 +197,9 @@ impl ConjugacyRow {
 /// The table in Markdown.
 fn table(rows: &[ConjugacyRow]) -> String {
     let mut text = String::from(
-        "| scene | scheme | solver | µ | contacts | moment about the axis, µ = 0, round | torque·speed + shaft work | ledger | force \
-         | moment | curvature work, h | h/2 |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "| scene | scheme | solver | µ | contacts | axial moment, round casing, µ = 0 | torque·speed + shaft work | \
+         energy balance | force | moment | curvature work, h | h/2 \
+         |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for ConjugacyRow { case, seen: [first, second], round } in rows {
         let ConjugacyCase { feature, scheme, solver, friction } = case;
@@ -226,7 +232,7 @@ fn curvature(halvings: i32) -> Result<StudyFigure> {
         steps.iter().flat_map(|step| features.map(|feature| (*step, feature))).collect();
     let run = |(step, feature): &(f64, SurfaceFeature)| {
         run(&feature.scene(0.15, true, false), *step)
-            .map_err(|error| Failure::new("study conjugacy", error.to_string(), ""))
+            .map_err(|error| Failure::new("lab conjugacy", error.to_string(), ""))
     };
     let seen = sweep::sweep(&tasks, sweep::processors(), run, |_| ())?;
     for (step, seen) in steps.iter().zip(seen.chunks(features.len())) {
@@ -239,12 +245,13 @@ fn curvature(halvings: i32) -> Result<StudyFigure> {
         logarithmic: true,
         logarithmic_x: true,
         marked: true,
-        ..Plot::new("internal step (s)", "curvature work, of all work", series.collect())
+        ..Plot::new("internal step (s)", "curvature work / total work", series.collect())
     };
     Ok(StudyFigure {
         name: "curvature",
         caption:
-            "Work of normals that turn and surfaces that curve within an internal step (modal-exact, lcp, µ = 0.15)."
+            "Work due to the rotation of normals and the curvature of surfaces within an internal step (modal-exact, \
+             lcp, µ = 0.15)."
                 .into(),
         picture: Picture::plot(&plot)?,
         sheet,

@@ -53,13 +53,13 @@ impl Losses {
         let off = self.0.iter().map(|loss| (loss.without_gain / limit - 1.0).abs()).fold(0.0, f64::max);
         let told = self.0.iter().map(|loss| {
             let [lost, without] = [loss.lost, loss.without_gain].map(|share| 100.0 * share);
-            format!("h = {} µs {lost:.3} % ({without:.3} %)", 1e6 * loss.step)
+            format!("h = {} µs: {lost:.3} % ({without:.3} %)", 1e6 * loss.step)
         });
         Statement::tested(
-            "Without friction the loss tends to what it is without curvature work at any step, within 5 %",
+            "Without friction, the loss without curvature work is within 5 % of the limit h → 0 at every step",
             off < 0.05,
             format!(
-                "lost, and without curvature work: {}; for h → 0 {:.3} %; the paper, at its own step, {:.2} %",
+                "loss (without curvature work) at {}; limit h → 0: {:.3} %; in the paper, at its step: {:.2} %",
                 told.collect::<Vec<_>>().join(", "),
                 100.0 * limit,
                 100.0 * PAPER_LOSS
@@ -70,8 +70,8 @@ impl Losses {
     /// As a table.
     pub(super) fn markdown(&self) -> String {
         let mut text = String::from(
-            "## Energy at 50 m/s without friction\n\nlcp, modal-exact; lost up to the lowest total energy.\n\n| h (µs) | lost | without \
-             curvature work |\n|---|---|---|\n",
+            "## Energy at 50 m/s without friction\n\nlcp, modal-exact; loss up to the minimum of the total \
+             energy.\n\n| h (µs) | loss | without curvature work |\n|---|---|---|\n",
         );
         for EnergyShares { step, lost, without_gain } in &self.0 {
             let _ = writeln!(text, "| {} | {:.3} % | {:.3} % |", 1e6 * step, 100.0 * lost, 100.0 * without_gain);
@@ -93,7 +93,7 @@ fn loss(scene: &Scene, step: f64) -> Result<EnergyShares> {
         Product { solver: Solver::Lcp, scheme: Scheme::ModalExact, step, interpolation: Interpolation::Spline };
     let run = product
         .run(scene, &FRICTIONLESS, END, RECORD)
-        .map_err(|error| Failure::new(format!("study cube, h = {step} s"), error.to_string(), ""))?;
+        .map_err(|error| Failure::new(format!("lab cube, h = {step} s"), error.to_string(), ""))?;
     let total = run.history.total();
     let lost = |energies: &mut dyn Iterator<Item = f64>| 1.0 - energies.fold(f64::INFINITY, f64::min) / total[0];
     Ok(EnergyShares {

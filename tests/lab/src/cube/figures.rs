@@ -41,8 +41,8 @@ pub(super) fn scene() -> StudyFigure {
     StudyFigure {
         name: "scene",
         caption:
-            "The cube before it enters, and the two rings; dots are the corners of its contact faces, circles those behind \
-             something (figs 1 and 2)."
+            "The cube before it enters between the two rings. Dots mark the corners of its contact faces, circles the \
+             hidden ones (figs 1 and 2)."
                 .into(),
         picture: Picture { html: svg.clone(), svg },
         sheet,
@@ -100,7 +100,7 @@ pub(super) fn symmetry(name: &str, history: &CubeHistory) -> Result<Vec<StudyFig
         figure("fig3a-ux", format!("ux of the corners, {name} (fig. 3a)."), "ux (mm)", moved.collect())?,
         figure(
             "fig3b-lambda",
-            format!("Normal force on the corners, {name}, means over 10 µs (fig. 3b)."),
+            format!("Normal force on the corners, {name}, averaged over 10 µs (fig. 3b)."),
             "λ (N)",
             force.collect(),
         )?,
@@ -128,9 +128,9 @@ pub(super) fn node_1(outcomes: &[CubeRun], speed: f64, touching: f64) -> Result<
         };
         runs.iter().map(curve).collect::<Vec<_>>()
     };
-    let whole = "Normal force on node 1, means over 10 µs (fig. 4d).".to_owned();
+    let whole = "Normal force on node 1, averaged over 10 µs (fig. 4d).".to_owned();
     figures.push(figure("fig4d-lambda1", whole, "λ1 (N)", force(f64::MAX))?);
-    let near = "Normal force on node 1 while it touches, means over 10 µs (fig. 5).".to_owned();
+    let near = "Normal force on node 1 during contact, averaged over 10 µs (fig. 5).".to_owned();
     figures.push(figure("fig5-lambda1", near, "λ1 (N)", force(touching))?);
     Ok(figures)
 }
@@ -155,7 +155,7 @@ pub(super) fn agreement(pairs: &[RunPair]) -> Result<StudyFigure> {
         sheet.rows.push([(index + 1) as f64].into_iter().chain(places.map(|place| 100.0 * shares[place])).collect());
     }
     if sheet.rows.is_empty() {
-        return Err(Failure::new("study cube", "no two runs ended well", "See the messages of the runs"));
+        return Err(Failure::new("lab cube", "fewer than two runs completed", "See the messages of the runs"));
     }
     let names = ["u1x", "slowing", "u1z", "λ1 in windows"];
     let series = names.iter().enumerate().map(|(column, name)| {
@@ -165,14 +165,14 @@ pub(super) fn agreement(pairs: &[RunPair]) -> Result<StudyFigure> {
     let plot = Plot {
         logarithmic: true,
         height: 320,
-        ..Plot::new("pair, by its line in the table", "relative L2 difference (%)", series.collect())
+        ..Plot::new("pair (line of the table)", "relative L2 difference (%)", series.collect())
     };
     let mut picture = Picture::plot(&plot)?;
     picture.html.push_str(&pairs::html(pairs));
     Ok(StudyFigure {
         name: "pairs",
-        caption: "Every two methods: relative L2 differences of node 1 while it touches, of its force in windows of 20 µs; the other columns \
-                  are ratios less one."
+        caption: "All pairs of methods: relative L2 differences of node 1 during contact and of its force in windows \
+                  of 20 µs; the other columns are ratios minus one."
             .into(),
         picture,
         sheet,

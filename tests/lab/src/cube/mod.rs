@@ -51,7 +51,7 @@ struct Flown {
 
 impl Flown {
     fn outcome(&self, name: &str) -> Result<&CubeRun> {
-        let missing = || Failure::new("study cube", format!("no run `{name}`"), "");
+        let missing = || Failure::new("lab cube", format!("there is no run `{name}`"), "");
         self.outcomes.iter().find(|outcome| outcome.name == name).ok_or_else(missing)
     }
 
@@ -86,14 +86,14 @@ pub(crate) fn study(arguments: &LabCubeArguments, console: &Console) -> Result<S
         .map(|(speed, friction)| CubeFlight { speed, friction });
     let flights = if quick { &all[..1] } else { &all[..] };
     let planned: usize = flights.iter().map(|flight| competitors(flight, quick, *flight == all[0]).len()).sum();
-    let task = console.task("Flying", Some(planned as u64));
+    let task = console.task("Cube runs", Some(planned as u64));
     let mut done = 0;
     let mut flown = Vec::new();
     for flight in flights {
         flown.push(fly(flight, &scene, quick, *flight == all[0], (&task, &mut done))?);
     }
     drop(task);
-    let a = flown[0].outcome(A)?.history().ok_or_else(|| Failure::new("study cube", "method a failed", ""))?;
+    let a = flown[0].outcome(A)?.history().ok_or_else(|| Failure::new("lab cube", "method a failed", ""))?;
     let sizes = SizeStudy::new(&scene, &all[0], a, quick, (&arguments.cache.cache(), console))?;
     let end = quick.then_some(QUICK_END);
     let patches = PatchStudy::new(&scene, (&all[0], FRICTIONLESS), end, (&arguments.cache.cache(), console))?;
@@ -104,13 +104,13 @@ pub(crate) fn study(arguments: &LabCubeArguments, console: &Console) -> Result<S
 fn of_patches(patches: &PatchStudy) -> Study {
     Study {
         name: "cube",
-        title: "A cube between two rings, its faces as patches".into(),
-        summary: "The shipped simulation with patches in place of the nodes of the cube's faces.".into(),
+        title: "A cube between two rings, with contact patches on its faces".into(),
+        summary: "tiprub with contact patches instead of contact nodes on the faces of the cube.".into(),
         facts: machine::facts(),
         statements: patches.statements(),
         figures: Vec::new(),
         results: json!({ "patches": patches.json() }),
-        files: vec![("tables.md".into(), "the table, as Markdown".into(), patches.markdown().into_bytes())],
+        files: vec![("tables.md".into(), "table in Markdown".into(), patches.markdown().into_bytes())],
     }
 }
 
@@ -133,7 +133,7 @@ fn fly(
 }
 
 fn report(scene: &Scene, flown: &[Flown], sizes: &SizeStudy, patches: &PatchStudy, quick: bool) -> Result<Study> {
-    let main = flown.first().ok_or_else(|| Failure::new("study cube", "no flight", ""))?;
+    let main = flown.first().ok_or_else(|| Failure::new("lab cube", "there are no runs", ""))?;
     let best = main.outcome(BEST)?;
     let mut figures = vec![figures::scene()];
     let touching = main.outcome(A)?.history().map_or(0.0, released);
@@ -150,7 +150,7 @@ fn report(scene: &Scene, flown: &[Flown], sizes: &SizeStudy, patches: &PatchStud
     figures.push(figures::agreement(&main.pairs)?);
     let facts = machine::facts().into_iter().map(|(name, value)| format!("* {name}: {value}\n"));
     let mut tables =
-        vec![format!("# A cube between two rings: every pair of methods\n\n{}", facts.collect::<String>())];
+        vec![format!("# A cube between two rings: all pairs of methods\n\n{}", facts.collect::<String>())];
     let flights =
         flown.iter().map(|flown| format!("## {}\n\n{}", flown.title(), pairs::markdown(&flown.outcomes, &flown.pairs)));
     tables.extend(flights);
@@ -174,23 +174,24 @@ fn report(scene: &Scene, flown: &[Flown], sizes: &SizeStudy, patches: &PatchStud
         name: "cube",
         title: "A cube between two rings".into(),
         summary: format!(
-            "The shipped simulation on reduced models against independent methods on the full finite-element model, in {} flights.{}",
+            "tiprub with reduced models compared with independent methods on the full finite-element model, in {} \
+             cases.{}",
             flown.len(),
-            if quick { " Quick form: the first 0.2 ms of one flight." } else { "" }
+            if quick { " Quick form: the first 0.2 ms of one case." } else { "" }
         ),
         facts: scene.roms.iter().map(|rom| (rom.name.clone(), rom.origin.clone())).collect(),
         statements,
         figures,
         results: json!({ "flights": all.collect::<Vec<_>>(), "sizes": sizes.json(), "patches": patches.json(), "energies": energies }),
-        files: vec![("tables.md".into(), "all pairs and runs, as Markdown".into(), tables.join("\n").into_bytes())],
+        files: vec![("tables.md".into(), "all pairs and runs in Markdown".into(), tables.join("\n").into_bytes())],
     })
 }
 
 /// Compares two runs with bounds of u1x, slowing and u1z.
 fn near(flown: &Flown, first: &str, second: &str, bounds: [f64; 3], why: &str) -> Statement {
-    let expected = format!("{second} follows {first}{why}: u1x, slowing and u1z of node 1 within {bounds:?} %");
+    let expected = format!("{second} agrees with {first}{why}: u1x, slowing and u1z of node 1 within {bounds:?} %");
     match flown.pair(first, second) {
-        None => Statement::tested(expected, false, "one of them failed"),
+        None => Statement::tested(expected, false, "one of the two runs failed"),
         Some(pair) => {
             let found = pair.found.touching.map(|share| 100.0 * share);
             let holds = found.iter().zip(bounds).all(|(share, bound)| *share <= bound);
@@ -199,7 +200,8 @@ fn near(flown: &Flown, first: &str, second: &str, bounds: [f64; 3], why: &str) -
                 expected,
                 holds,
                 format!(
-                    "{x:.3}, {slowing:.3}, {z:.3} % while node 1 touches; windows of its force {:.2} %, exit speed {:+.3} %",
+                    "{x:.3}, {slowing:.3}, {z:.3} % while node 1 is in contact; its force in windows {:.2} %, exit \
+                     speed {:+.3} %",
                     100.0 * pair.found.windows,
                     100.0 * pair.found.exit
                 ),
@@ -209,15 +211,15 @@ fn near(flown: &Flown, first: &str, second: &str, bounds: [f64; 3], why: &str) -
 }
 
 fn meeting(main: &Flown) -> Vec<Statement> {
-    let independent = ", which shares no stepping, contact or reduction with it";
+    let independent = ", which shares no time stepping, contact or reduction code with it";
     let mut all = vec![
-        near(main, A, PAPER, [0.2, 0.5, 0.2], ", the same equations on the full model"),
+        near(main, A, PAPER, [0.2, 0.5, 0.2], ", which solves the same equations on the full model"),
         near(main, A, BEST, [0.5, 1.0, 0.5], independent),
         near(main, B, BEST, [0.5, 1.0, 0.5], independent),
     ];
     if main.outcomes.iter().any(|outcome| outcome.name == C) {
         // 5·10⁸ N/m let nodes in by 30 µm of 1 mm.
-        all.push(near(main, BEST, C, [3.0, 3.0, 4.0], ", whose contact is softer"));
+        all.push(near(main, BEST, C, [3.0, 3.0, 4.0], ", which has softer contact"));
     }
     all
 }
@@ -228,10 +230,10 @@ fn truncation(sizes: &SizeStudy) -> Statement {
     let falls = modal.windows(2).all(|pair| (0..3).all(|i| pair[1].apart[i] < pair[0].apart[i]));
     let told = modal.iter().map(|size| {
         let [x, slowing, z, _] = size.apart.map(|share| 100.0 * share);
-        format!("{} modes {x:.3}, {slowing:.3}, {z:.3} %", size.modes)
+        format!("{} modes: {x:.3}, {slowing:.3}, {z:.3} %", size.modes)
     });
     Statement::tested(
-        "More modes of the rings bring the product nearer to method a: u1x, slowing and u1z",
+        "With more ring modes, u1x, slowing and u1z of tiprub come closer to method a",
         falls && modal.len() > 1,
         told.collect::<Vec<_>>().join("; "),
     )
@@ -263,19 +265,19 @@ fn at_any_speed(flown: &[Flown]) -> Vec<Statement> {
     vec![
         Statement::tested(
             format!(
-                "Left and right are equal in every flight that passes: ux and λ of nodes 1, 6, 85, 90 and 31, 36, 91, 96 to rounding that \
-                 grows through the steps, {SYMMETRIC:e} (fig. 3)"
+                "Left and right are equal in every run in which the cube passes: ux and λ of nodes 1, 6, 85, 90 and \
+                 31, 36, 91, 96 agree to accumulated rounding, {SYMMETRIC:e} (fig. 3)"
             ),
             !apart.is_empty() && apart.iter().all(|apart| *apart < SYMMETRIC),
             format!("largest differences of ux and λ relative to the largest values: {}", uneven.join("; ")),
         ),
         Statement::tested(
-            format!("The energy ledger closes in every run of the product, to {LEDGER:e} of the energy exchanged"),
+            format!("The energy balance closes in every tiprub run to {LEDGER:e} of the energy exchanged"),
             ran().count() > 0 && ran().all(|(.., run)| run.residual < LEDGER),
             format!("largest residual {residual:.1e}"),
         ),
         Statement::tested(
-            "Every method ends well",
+            "Every method completes its run",
             failed.is_empty(),
             if failed.is_empty() { "all of them".into() } else { failed.join("; ") },
         ),
@@ -285,7 +287,7 @@ fn at_any_speed(flown: &[Flown]) -> Vec<Statement> {
 /// Energies at 50 m/s.
 fn slow(flown: &[Flown]) -> Result<Vec<Statement>> {
     let flight = |friction: bool| {
-        let missing = || Failure::new("study cube", "no slow flight", "");
+        let missing = || Failure::new("lab cube", "there is no slow run", "");
         flown.iter().find(|f| f.flight.speed <= SLOW && (f.flight.friction > 0.0) == friction).ok_or_else(missing)
     };
     let (smooth, rough) = (flight(false)?, flight(true)?);
@@ -303,9 +305,9 @@ fn slow(flown: &[Flown]) -> Result<Vec<Statement>> {
     let listed = losses.iter().map(|(name, lost, exit)| format!("{name} {:.3} %, {exit:.2} m/s", 100.0 * lost));
     let product = losses.iter().filter(|(name, ..)| name.starts_with("product"));
     all.push(Statement::tested(
-        "Without friction the cube crosses (fig. 6a)",
+        "Without friction, the cube passes between the rings (fig. 6a)",
         product.clone().count() > 0 && product.clone().all(|(.., exit)| *exit > 45.0),
-        format!("largest loss at the steps of these runs and exit speed: {}", listed.collect::<Vec<_>>().join("; ")),
+        format!("largest energy loss and exit speed of these runs: {}", listed.collect::<Vec<_>>().join("; ")),
     ));
     let rest = |outcome: &CubeRun| {
         let history = outcome.history()?;
@@ -327,12 +329,12 @@ fn slow(flown: &[Flown]) -> Result<Vec<Statement>> {
         .collect();
     all.push(Statement::tested(
         format!(
-            "With friction the cube is blocked by every method: its kinetic energy goes to nothing, less than {:.0} % of the strain \
-             energy that is left (fig. 6b)",
+            "With friction, every method stops the cube: its kinetic energy falls below {:.0} % of the remaining \
+             strain energy (fig. 6b)",
             100.0 * AT_REST
         ),
         !at_rest.is_empty() && at_rest.iter().all(|still| *still),
-        format!("kinetic and strain energy after 3 ms of 1218.75 J: {}", told.join("; ")),
+        format!("kinetic and strain energy after 3 ms, of initially 1218.75 J: {}", told.join("; ")),
     ));
     Ok(all)
 }
@@ -346,9 +348,9 @@ fn times(main: &Flown) -> Result<Statement> {
         Some(format!("{} {time:.2} s ({:.2})", outcome.name, time / base))
     });
     Ok(Statement::remark(
-        "Run times (the paper: c within 5 % of a, b 10 times a)",
+        "Run times (in the paper, c is within 5 % of a, and b takes 10 times as long as a)",
         format!(
-            "processor time of the steps, relative to the first run of the product: {}",
+            "processor time of the steps (relative to the first tiprub run): {}",
             told.collect::<Vec<_>>().join("; ")
         ),
     ))

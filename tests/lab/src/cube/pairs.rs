@@ -19,18 +19,18 @@ const PAIR: [&str; 10] = [
     "λ1, impulse",
     "left face, impulse",
     "exit speed",
-    "u1x until the cube leaves",
+    "u1x until the cube separates",
 ];
 /// Headings of the runs.
 const RUN: [&str; 9] = [
     "u1x (mm)",
     "u1z (mm)",
-    "λ1, largest 20 µs mean (N)",
-    "node 1 leaves (ms)",
-    "cube leaves (ms)",
+    "λ1, largest 20 µs average (N)",
+    "node 1 separates (ms)",
+    "cube separates (ms)",
     "exit (m/s)",
     "left/right: ux, λ",
-    "deepest (m)",
+    "largest penetration (m)",
     "steps + preparation (CPU s)",
 ];
 

@@ -94,7 +94,8 @@ impl PatchStudy {
         let apart: Vec<f64> = self.0.iter().flat_map(|one| one.apart).collect();
         let residual = self.0.iter().map(|one| one.residual).fold(0.0, f64::max);
         let mut found = vec![Statement::tested(
-            format!("With patches left and right are equal, to {SYMMETRIC:e}, and the ledger closes, to {LEDGER:e}"),
+            format!("With patches, left and right are equal to {SYMMETRIC:e}, and the energy balance closes to \
+                     {LEDGER:e}"),
             apart.iter().all(|apart| *apart < SYMMETRIC) && residual < LEDGER,
             format!("largest difference {:.0e}, residual {residual:.0e}", apart.iter().fold(0.0_f64, |a, b| a.max(*b))),
         )];
@@ -106,7 +107,8 @@ impl PatchStudy {
                 ["5, 2 ×", "5, 3 ×", "5, 4 ×", "5, 6 ×"].map(|start| impulse(start).unwrap_or(f64::NAN) / nodes - 1.0);
             let told = patches.map(|share| format!("{:+.1} %", 100.0 * share));
             found.push(Statement::tested(
-                "More patches on the flat faces, which meet a curved surface, come nearer to its nodes: impulse of the left face",
+                "With more patches on the flat faces, the impulse of the left face comes closer to that of contact \
+                 nodes",
                 patches.is_sorted_by(|a, b| a.abs() > b.abs()),
                 told.join(", "),
             ));
@@ -126,8 +128,9 @@ impl PatchStudy {
 
     pub(super) fn markdown(&self) -> String {
         let mut text = String::from(
-            "## Patches\n\n| elements, contact | left face, impulse (N·s) | exit (m/s) | left/right: ux, λ | ledger | deepest (m) | 50 m/s, µ = 0: \
-             lost | exit (m/s) | GetFEM: left face, impulse | lost speed |\n|---|---|---|---|---|---|---|---|---|---|\n",
+            "## Patches\n\n| elements, contact | left face, impulse (N·s) | exit (m/s) | left/right: ux, λ | energy \
+             residual | largest penetration (m) | 50 m/s, µ = 0: energy loss | exit (m/s) | against GetFEM: left face, \
+             impulse | speed loss |\n|---|---|---|---|---|---|---|---|---|---|\n",
         );
         let shares = |pair: Option<[f64; 2]>, digits: usize, second: &dyn Fn(f64) -> String| match pair {
             Some([a, b]) => format!("{:.digits$} % | {}", 100.0 * a, second(b)),
@@ -179,7 +182,7 @@ impl PatchRuns<'_> {
 
     fn beside_getfem(&self, patches: Option<usize>) -> Result<[f64; 2]> {
         let theirs =
-            outside::read(GETFEM, self.fast.speed).map_err(|error| Failure::from_below("study cube", error))?;
+            outside::read(GETFEM, self.fast.speed).map_err(|error| Failure::from_below("lab cube", error))?;
         let end = theirs.times[theirs.times.len() - 1];
         let mut scene = self.with(5, patches, MassMatrix::Consistent)?;
         for side in RingSide::BOTH {
@@ -216,7 +219,7 @@ impl PatchRuns<'_> {
 
     fn run(&self, scene: &Scene, flight: &CubeFlight, interpolation: Interpolation, end: f64) -> Result<ProductRun> {
         let run = product(interpolation).run(scene, flight, end, RECORD);
-        run.map_err(|error| Failure::from_below("study cube", error))
+        run.map_err(|error| Failure::from_below("lab cube", error))
     }
 }
 
@@ -228,7 +231,7 @@ fn impulse(history: &CubeHistory, end: f64) -> f64 {
 
 /// Put a ROM in the place of that of the same name.
 pub(super) fn replace(scene: &mut Scene, rom: Rom) -> Result<()> {
-    let missing = || Failure::new("study cube", format!("the scene has no structure `{}`", rom.name), "");
+    let missing = || Failure::new("lab cube", format!("the scene has no structure `{}`", rom.name), "");
     let place = scene.roms.iter().position(|old| old.name == rom.name).ok_or_else(missing)?;
     scene.roms[place] = rom;
     Ok(())

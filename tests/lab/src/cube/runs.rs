@@ -116,7 +116,7 @@ pub(super) fn run(
         CubeCompetitor::Product(product) => product.run(scene, flight, end, RECORD).map_err(|error| error.to_string()),
         CubeCompetitor::Reference { method, surface, step, stride } => {
             let setting = CubeSetting { speed: flight.speed, friction: flight.friction, surface, mass: Mass::Lumped };
-            let full = FullScene::new(setting).map_err(|error| Failure::from_below("study cube", error))?;
+            let full = FullScene::new(setting).map_err(|error| Failure::from_below("lab cube", error))?;
             let history = method.run(&full, &MethodRun { step, end, stride, snapshots: Vec::new() });
             history.map_err(|error| error.to_string()).map(|history| ProductRun {
                 internal_steps: (history.times.len() * stride) as u64,

@@ -87,7 +87,8 @@ impl SizeStudy {
     pub(super) fn markdown(&self) -> String {
         let percent = |share: f64| format!("{:.3} %", 100.0 * share);
         let mut text = String::from(
-            "## Reduced models\n\nRings against method a:\n\n| modes | static responses | ROM file (MB) | u1x | slowing | u1z | λ1, windows | \
+            "## Reduced models\n\nRings, compared with method a:\n\n| modes | static responses | ROM file (MB) | u1x | \
+             slowing | u1z | λ1, windows | \
              steps (CPU s) |\n|---|---|---|---|---|---|---|---|\n",
         );
         for CubeSize { modes, static_responses, bytes, apart, seconds } in &self.rings {
@@ -97,7 +98,8 @@ impl SizeStudy {
         }
         if !self.cube.is_empty() {
             text.push_str(
-                "\nThe cube against all its modes:\n\n| fixed-interface modes | u1x | slowing | u1z | λ1, windows |\n|---|---|---|---|---|\n",
+                "\nCube, compared with the model with all modes:\n\n| fixed-interface modes | u1x | slowing | u1z | \
+                 λ1, windows |\n|---|---|---|---|---|\n",
             );
         }
         for size in &self.cube {
@@ -150,7 +152,7 @@ impl SizeRuns<'_> {
 
     fn run(&self, scene: &Scene) -> Result<ProductRun> {
         let run = PRODUCT.run(scene, self.flight, self.end, RECORD);
-        run.map_err(|error| Failure::from_below("study cube", error))
+        run.map_err(|error| Failure::from_below("lab cube", error))
     }
 
     fn size(

@@ -182,13 +182,14 @@ impl ErrorCase for Bars {
 
     fn description(&self) -> String {
         match self.problem {
-            BarProblem::Carpenter => "Two elastic bars meet head-on (N. J. Carpenter, R. L. Taylor, M. G. Katona, 1991); linear elements, lumped \
-                                   mass. The truth is the exact solution: relative displacement of the ends, force, release."
+            BarProblem::Carpenter => "Two elastic bars meet head-on (N. J. Carpenter, R. L. Taylor, M. G. Katona, \
+                                      1991); linear elements, lumped mass. Compared with the exact solution: relative \
+                                      displacement of the ends, force and release."
                 .into(),
             BarProblem::Bouncing => "A bar bounces on rigid ground under gravity (D. Doyen, A. Ern, S. Piperno, 2011), one period with two \
-                                  contacts; linear elements, lumped mass. The truth is the exact series."
+                                  contacts; linear elements, lumped mass. Compared with the exact series solution."
                 .into(),
-            BarProblem::Shaken { .. } => "A bar held at its top, shaken without a change of contact.".into(),
+            BarProblem::Shaken { .. } => "A bar clamped at its top and excited without a change of contact.".into(),
         }
     }
 

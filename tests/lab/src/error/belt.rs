@@ -120,8 +120,9 @@ impl ErrorCase for BeltCase {
     }
 
     fn description(&self) -> String {
-        "A block on a spring is thrown along a belt at rest and is stopped by friction, where it sticks and slides again (the stick-slip oscillator \
-         of J. P. den Hartog, 1931, with a flexible contact). Only `coulomb` models sticking. The truth is the closed form."
+        "A block on a spring starts with a velocity along a belt at rest. Friction stops it; it sticks and slides \
+         again (the stick-slip oscillator of J. P. den Hartog, 1931, with a flexible contact). Only `coulomb` models \
+         sticking. Compared with the closed-form solution."
             .into()
     }
 
@@ -189,7 +190,7 @@ impl ErrorCase for BeltCase {
     ) -> Result<Box<dyn TimedRun + 'a>, String> {
         match competitor {
             Competitor::Core(scheme, solver) => Ok(Box::new(self.run((scheme, solver), division, perturbation)?)),
-            _ => Err("only the product's own methods run on the belt".into()),
+            _ => Err("only the methods of tiprub are available for the belt".into()),
         }
     }
 

@@ -50,8 +50,8 @@ pub(crate) const LIGHT: BuiltInFacts = BuiltInFacts {
     name: "rotor37-light",
     figures: ["rotor37-light-steps", "rotor37-light-total"],
     title: "Rotor 37, light rub",
-    description: "36 blades of rotor 37 with 18 contact patches and 80 modes each, at design speed, µ = 0.15. The two bumps of the rigid casing \
-                  intrude by a fifth of the gap.",
+    description: "36 blades of rotor 37 with 18 contact patches and 80 modes each, at design speed, µ = 0.15. The \
+                  interference of the two bumps of the rigid casing is a fifth of the gap.",
     scene: "builtin:rotor37",
     depth: Some(0.6),
     samples: [66, 14],
@@ -63,7 +63,7 @@ pub(crate) const HEAVY: BuiltInFacts = BuiltInFacts {
     name: "rotor37-heavy",
     figures: ["rotor37-heavy-steps", "rotor37-heavy-total"],
     title: "Rotor 37, heavy rub",
-    description: "The same blades. The two bumps intrude by the whole gap.",
+    description: "The same blades. The interference of the two bumps equals the gap.",
     depth: Some(1.0),
     ..LIGHT
 };
@@ -72,7 +72,8 @@ pub(crate) const CASING: BuiltInFacts = BuiltInFacts {
     name: "flexible-casing",
     figures: ["flexible-casing-steps", "flexible-casing-total"],
     title: "Rotor 37 in an elastic casing",
-    description: "36 blades of rotor 37 in an elastic casing with a B-spline surface, one revolution: all blades are coupled by the casing.",
+    description: "36 blades of rotor 37 in an elastic casing with a B-spline surface, one revolution. The casing \
+                  couples all blades.",
     scene: "builtin:flexible-casing",
     depth: None,
     samples: [44, 8],
@@ -84,7 +85,7 @@ pub(crate) const STAGE: BuiltInFacts = BuiltInFacts {
     name: "stage",
     figures: ["stage-steps", "stage-total"],
     title: "Stage",
-    description: "56 blades that are coupled by their disk, with 18 contact patches each, in an elastic casing under load.",
+    description: "56 blades coupled by their disk, with 18 contact patches each, in an elastic casing under load.",
     scene: "builtin:stage",
     samples: [60, 8],
     ..CASING
@@ -217,7 +218,7 @@ impl ErrorCase for BuiltIn {
         perturbation: f64,
     ) -> std::result::Result<Box<dyn TimedRun + 'a>, String> {
         let Competitor::Core(scheme, solver) = competitor else {
-            return Err("only the product's own methods run on a built-in scene".into());
+            return Err("only the methods of tiprub are available for a built-in scene".into());
         };
         let scene = SceneRun::by(&self.scene, (scheme, solver), INTERVAL, division, perturbation);
         Ok(Box::new(SceneRun::with_start_values(&scene, INTERVAL, division, &[])?))

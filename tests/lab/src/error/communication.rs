@@ -74,7 +74,7 @@ pub(crate) fn table(case: &BuiltIn, quick: bool, console: &Console) -> Result<Ta
         |error: tiprub_core::Error| Failure::new(case.name(), error.to_string(), "Report this to the developers");
     let finest = record(scene, FINEST, 100, milliseconds).map_err(failed)?;
     let columns = ["scene", "tolerance", "H (µs)", "time (s/s)", "error"];
-    let mut table = Table::new("Adaptive steps by the length H of the communication step", columns);
+    let mut table = Table::new("Adaptive steps for several communication steps H", columns);
     let multiples = if quick || scene.roms.len() > 1 { &MULTIPLES[1..] } else { &MULTIPLES[..] };
     let task = console
         .task(&format!("{}: communication steps", case.title()), Some((TOLERANCES.len() * multiples.len()) as u64));

@@ -73,7 +73,7 @@ impl Cube {
         let speed = shipped.settings.structures[0].velocity[1].abs();
         let friction = shipped.settings.contacts[0].friction;
         let setting = CubeSetting { speed, friction, surface: SurfaceKind::Spline, mass: Mass::Lumped };
-        let full = FullScene::new(setting).map_err(|error| Failure::from_below("study error", error))?;
+        let full = FullScene::new(setting).map_err(|error| Failure::from_below("lab error", error))?;
         let samples = if quick { QUICK_SAMPLES } else { SAMPLES };
         let mut cube = Self { sizes, full, quick, samples, speed, references: Vec::new(), parting: Vec::new() };
         let failed = |problem: String| Failure::new("cube", problem, "Report this to the developers");
@@ -111,9 +111,10 @@ impl ErrorCase for Cube {
     }
 
     fn description(&self) -> String {
-        "A cube flies at 100 m/s between two elastic rings that are too close together for it, µ = 0.15, while node 1 touches. Displacements of \
-         its 72 contact nodes without the flight. The truth is method a on the full finite-element model at a fine step; full-model methods \
-         are held against it in both figures."
+        "A cube enters the gap between two elastic rings at 100 m/s; the gap is narrower than the cube, µ = 0.15. \
+         Errors are those of the displacements of its 72 contact nodes without the uniform motion while node 1 is in \
+         contact, relative to method a on the full finite-element model with a fine step. Methods on the full \
+         model are compared with this solution in both figures."
             .into()
     }
 
@@ -205,7 +206,7 @@ impl ErrorCase for Cube {
                 Box::new(FlightRemoved { run, speed: self.speed })
             }
             Competitor::Full(method) => Box::new(FullRun::new(&self.full, method, (INTERVAL, self.samples), division)?),
-            _ => return Err("this method knows no free master".into()),
+            _ => return Err("this method does not support a free master".into()),
         })
     }
 

@@ -44,7 +44,7 @@ impl FullRun {
         let run = methods::MethodRun { step, end: end(samples - 1), stride: 1, snapshots };
         let history = method.run(scene, &run).map_err(|error| error.to_string())?;
         if history.snapshots.len() < samples {
-            return Err("the run has ended early".into());
+            return Err("the run ended early".into());
         }
         let record = history.times.iter().take_while(|time| **time < 0.5 * step).count();
         Ok(Self { history, step, speed: scene.setting.speed, interval, samples: 0, record })

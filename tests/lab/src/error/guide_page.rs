@@ -68,7 +68,7 @@ pub(super) fn write(study: &Study, directory: &Path, is_whole: bool) -> Result<(
 }
 
 fn failed(path: &Path, problem: String) -> Failure {
-    Failure::new(path.display().to_string(), problem, "Give the directory `docs` of the sources with `--guide`")
+    Failure::new(path.display().to_string(), problem, "Set `--guide` to the directory `docs` of the sources")
 }
 
 /// The table of a block of the page with the rows of the scenes in `table` replaced or added; the first cell of a row is its scene.
@@ -87,7 +87,7 @@ fn with_rows(page: &str, name: &str, table: &str) -> String {
 fn replaced(page: &str, name: &str, content: &str, date: &str) -> std::result::Result<String, String> {
     let begin = format!("<!-- written: lab error {name};");
     let end = "<!-- end -->";
-    let missing = || format!("there is no block `{begin} ... -->` that ends with `{end}`");
+    let missing = || format!("there is no block from `{begin} ... -->` to `{end}`");
     let (before, rest) = page.split_once(&begin).ok_or_else(missing)?;
     let (_, after) = rest.split_once(end).ok_or_else(missing)?;
     Ok(format!("{before}{begin} {date}, version {} -->\n{content}\n{end}{after}", env!("CARGO_PKG_VERSION")))

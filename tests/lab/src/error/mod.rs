@@ -40,7 +40,7 @@ const COMMUNICATION: &str = "communication-steps.md";
 pub(crate) fn study(arguments: &LabErrorArguments, console: &Console) -> Result<Study> {
     let guide = arguments.guide.as_deref();
     if guide.is_some() && arguments.common.quick {
-        return Err(Failure::new("--guide", "the guide shows the whole study", "Leave out `--quick`"));
+        return Err(Failure::new("--guide", "the guide needs the full study", "Remove `--quick`"));
     }
     let scenes = if arguments.scenes.is_empty() { ErrorScene::ALL.to_vec() } else { arguments.scenes.clone() };
     let quick = arguments.common.quick;
@@ -52,15 +52,15 @@ pub(crate) fn study(arguments: &LabErrorArguments, console: &Console) -> Result<
     }
     let shaken = [Bars::shaken(false).map_err(never)?, Bars::shaken(true).map_err(never)?];
     let smooth = shaken.each_ref().map(|bars| bars as &dyn ErrorCase);
-    let summary = "Adaptive steps, fixed steps and the paper's method on built-in scenes; every scheme and solver on standard problems, beside \
-                   methods that share no code with them."
+    let summary = "Adaptive steps, fixed steps and the paper's method on built-in scenes; all schemes and solvers on \
+                   standard problems, compared with methods that share no code with them."
         .to_owned();
     let forecast = Forecast::new(console, "Error against run time", planned(&cases, &smooth, quick));
     let mut study = of_cases(cases, &smooth, (quick, summary), &forecast)?;
     forecast.finish();
     if let Some(table) = communication {
         let text = table.to_markdown().into_bytes();
-        study.files.push((COMMUNICATION.into(), "time and error by the length of the communication step".into(), text));
+        study.files.push((COMMUNICATION.into(), "time and error against the communication step".into(), text));
     }
     let time = format!("{:.0} min", clock::now().as_secs_f64() / 60.0);
     study.facts.push(("processor time of the study".into(), time));
@@ -71,7 +71,7 @@ pub(crate) fn study(arguments: &LabErrorArguments, console: &Console) -> Result<
 }
 
 fn never(problem: String) -> Failure {
-    Failure::new("error study", problem, "Report this to the developers")
+    Failure::new("lab error", problem, "Report this to the developers")
 }
 
 /// The scene of this name, reduced where it has to be; rows of built-in scenes are added to the table of communication steps.

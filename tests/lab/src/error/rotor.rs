@@ -74,8 +74,9 @@ pub(crate) fn rotor(
         sizes.push((modes, scene, outside));
     }
     let description = format!(
-        "36 blades of rotor 37 with three contact nodes each, at design speed, rub with µ = 0.15 against a rigid casing whose two bumps intrude by {intrusion}. The truth \
-         is the reference with most component modes."
+        "36 blades of rotor 37 with three contact nodes each, at design speed, rub with µ = 0.15 against a rigid \
+         casing with two bumps. The interference is {intrusion}. The total error is relative to the reference with the \
+         most component modes."
     );
     let facts = TurningFacts {
         name,

@@ -45,11 +45,12 @@ pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<
         let mut scene = coarse.clone();
         scene.roms[0] = disk(modes, cache, console)?;
         scene.settings.surfaces[0].ramp_time = RAMP;
-        let outside = outside(&scene).ok_or_else(|| Failure::new("stage", "the disk has no mass", ""))?;
+        let outside = outside(&scene).ok_or_else(|| Failure::new("stage",
+            "the disk has no positive definite mass matrix", ""))?;
         sizes.push((modes, scene, outside));
     }
-    let description = "56 coupled sectors (coarse mesh) in an elastic casing that goes oval until it touches, µ = 0.15. The truth is the \
-                       reference with most component modes.";
+    let description = "56 coupled sectors (coarse mesh) in an elastic casing that becomes oval until the blades touch \
+                       it, µ = 0.15. The total error is relative to the reference with the most component modes.";
     let facts = TurningFacts {
         name: "stage-coarse",
         figures: ["stage-coarse-steps", "stage-coarse-total"],

@@ -21,7 +21,7 @@ const NAMED: usize = 10;
 /// No library, files that cannot be written, or a scene that is wrong.
 pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<CommandOutcome> {
     let directory = tempfile::tempdir()
-        .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
+        .map_err(|error| Failure::file(&std::env::temp_dir(), "cannot create a temporary directory", &error))?;
     let faces = if arguments.fmu > 0 { Some(load(arguments, console, directory.path())?) } else { None };
     if let Some(seed) = arguments.only {
         return only(arguments, faces.as_ref(), seed);
@@ -56,8 +56,8 @@ pub(crate) fn run(arguments: &RandomArguments, console: &Console) -> Result<Comm
     }
     console.print_progress(table.to_text());
     let named: Vec<String> = seeds.iter().take(NAMED).map(u64::to_string).collect();
-    let problem = format!("{} of {} scenes are wrong: {}", seeds.len(), arguments.scenes, named.join(", "));
-    Err(Failure::new("random scenes", problem, format!("Run one alone with `lab random --only {}`", named[0])))
+    let problem = format!("{} of {} scenes failed: {}", seeds.len(), arguments.scenes, named.join(", "));
+    Err(Failure::new("lab random", problem, format!("Run a single scene with `lab random --only {}`", named[0])))
 }
 
 /// Seed of a scene of a run: its place in the run decides nothing else.
@@ -95,7 +95,8 @@ fn load(arguments: &RandomArguments, console: &Console, directory: &Path) -> Res
     let here = tiprub_fmi_host::Platform::here();
     let fitting = libraries.into_iter().find(|library| Some(library.platform) == here);
     let fitting =
-        fitting.ok_or_else(|| Failure::new("FMU library", "none is for this machine", "Give one with --library"))?;
+        fitting.ok_or_else(|| Failure::new("FMU library", "there is no library for this platform",
+            "Choose a library with `--library`"))?;
     let path = directory.join("tiprub_fmi");
     output_file::write(&path, fitting.bytes)?;
     LibraryFaces::load(&path)

@@ -98,16 +98,16 @@ fn difference<I: PortableInstance>(
     let (plan, record) = match native {
         Native::Rejected(message) => {
             return match start(0.0) {
-                Ok(_) => Some(format!("{name} accepts what is rejected natively: {message}")),
+                Ok(_) => Some(format!("{name} accepts a scene that the core rejects: {message}")),
                 Err(log) if log.contains(message) => None,
-                Err(log) => Some(format!("{name} rejects with {log:?} what is natively rejected with {message:?}")),
+                Err(log) => Some(format!("{name} rejects the scene with {log:?}, the core with {message:?}")),
             };
         }
         Native::Ran(plan, record) => (plan, record),
     };
     let mut slave = match start(0.0) {
         Ok(slave) => slave,
-        Err(log) => return Some(format!("{name} rejects what runs natively: {log}")),
+        Err(log) => return Some(format!("{name} rejects a scene that the core runs: {log}")),
     };
     let mut random = numbers(trial.seed, 4);
     let at = random.below(record.points.len() + 1);
@@ -132,10 +132,10 @@ fn difference<I: PortableInstance>(
     };
     if let Err(log) = other.resume(&bytes) {
         return Some(format!(
-            "{name}: an instance that began at {began} s refuses the state of communication point {at}: {log}"
+            "{name}: an instance started at {began} s rejects the state of communication point {at}: {log}"
         ));
     }
     let after = plan.march(&mut other, at, |_, _| ());
     let off = after.differs(&record.from(at), plan, at)?;
-    Some(format!("{name}, state of communication point {at} in an instance that began at {began} s: {off}"))
+    Some(format!("{name}, state of communication point {at} in an instance started at {began} s: {off}"))
 }

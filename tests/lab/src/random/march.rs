@@ -130,7 +130,7 @@ impl OutputRecord {
                 let end = record.end.as_deref().unwrap_or("reached the end");
                 format!("{} steps ({end})", record.points.len())
             });
-            return Some(format!("it does {own} instead of {other}"));
+            return Some(format!("it completes {own} instead of {other}"));
         }
         let ends = [self, other].map(|record| record.end.as_deref().unwrap_or_default());
         (!ends[0].contains(ends[1])).then(|| format!("it ends with {:?} instead of {:?}", ends[0], ends[1]))

@@ -218,10 +218,10 @@ impl OracleWatch {
         let mut findings = Vec::new();
         let mut add = |oracle: &'static str, text: String| findings.push(Finding { oracle, text });
         if let Some(name) = &self.infinite {
-            add("finite", format!("output {name}"));
+            add("finite", format!("output {name} is not finite"));
         }
         if self.residual.is_nan() || self.residual > ROUNDING {
-            add("ledger", format!("the ledger is off by {:.1e} of {:.3e} J exchanged", self.residual, self.scale));
+            add("ledger", format!("the energy residual is {:.1e} of {:.3e} J exchanged", self.residual, self.scale));
         }
         for one in &self.growing {
             if let Some([beyond, fall, when]) = one.worst {
@@ -232,7 +232,8 @@ impl OracleWatch {
                     _ => "wear",
                 };
                 let text = format!(
-                    "{} has fallen by {fall:.1e} at t = {when:.3e} s, {beyond:.1e} more than is announced, of {:.3e} J exchanged; it ends at {:.3e}",
+                    "{} has decreased by {fall:.1e} at t = {when:.3e} s, {beyond:.1e} more than documented, with \
+                     {:.3e} J exchanged; its final value is {:.3e}",
                     one.name, self.scale, one.now
                 );
                 add(oracle, text);
@@ -240,14 +241,15 @@ impl OracleWatch {
         }
         if let Some([excess, energy, bound, time]) = self.excess {
             let text = format!(
-                "{energy:.4e} J at t = {time:.3e} s, {excess:.1e} J above {bound:.4e} J, of {:.3e} J exchanged",
+                "{energy:.4e} J at t = {time:.3e} s, {excess:.1e} J above the bound of {bound:.4e} J, with {:.3e} J \
+                 exchanged",
                 self.scale
             );
             add("energy", text);
         }
         let [deepest, promised] = self.deepest;
         if -deepest > promised {
-            add("penetration", format!("{:.2e} m deep, {promised:.1e} m promised", -deepest));
+            add("penetration", format!("penetration of {:.2e} m, {promised:.1e} m allowed", -deepest));
         }
         findings
     }
@@ -336,16 +338,17 @@ pub(crate) fn names(error: &Error) -> Option<Finding> {
         Error::Invalid { what, problem, remedy } => (what.as_str(), problem, remedy),
         Error::Unstable { problem, remedy } | Error::Exhausted { problem, remedy } => ("run", problem, remedy),
         Error::NonFinite { .. } => return finding("the state became non-finite"),
-        Error::UnknownReference { .. } | Error::State { .. } => return finding("it is no answer to a scene"),
+        Error::UnknownReference { .. } | Error::State { .. } => return
+            finding("it is an unexpected kind of error for a scene"),
     };
     if what.trim().is_empty() || problem.trim().is_empty() {
-        return finding("it does not name what or where");
+        return finding("it does not name the place or the problem");
     }
     if what == "run" && !problem.contains(|letter: char| letter.is_ascii_digit()) {
-        return finding("it has no figure");
+        return finding("it contains no number");
     }
     if remedy.len() < 8 || !remedy.starts_with(|letter: char| letter.is_ascii_uppercase()) {
-        return finding("it has no remedy");
+        return finding("it contains no remedy");
     }
     None
 }
@@ -357,10 +360,11 @@ pub(crate) fn ends(message: &str) -> Option<Finding> {
         return finding("the state became non-finite");
     }
     if !message.contains("t = ") {
-        return finding("it does not say when");
+        return finding("it does not contain the time");
     }
     let remedy = message.rsplit_once(". ").map_or("", |(_, remedy)| remedy);
-    if !remedy.starts_with(|letter: char| letter.is_ascii_uppercase()) { finding("it has no remedy") } else { None }
+    if !remedy.starts_with(|letter: char| letter.is_ascii_uppercase()) { finding("it contains no remedy") } else { None
+        }
 }
 
 /// The law that a scene is solved by.

@@ -45,11 +45,11 @@ fn go_on(
     (plan, record): (&RandomPlan, &OutputRecord),
 ) -> Option<String> {
     if let Err(error) = simulation.restore_state(state) {
-        return Some(format!("the state of communication point {at} is refused by {name}: {error}"));
+        return Some(format!("{name} rejects the state of communication point {at}: {error}"));
     }
     let after = plan.march(simulation, at, |_, _| ());
     let off = after.differs(&record.from(at), plan, at)?;
-    Some(format!("restored at communication point {at} into {name}: {off}"))
+    Some(format!("state of communication point {at} restored into {name}: {off}"))
 }
 
 /// At a communication point: saving disturbs nothing, and the state leads to the same bits in this and in other instances.
@@ -67,7 +67,7 @@ fn saved_between(
     let state = save(&simulation);
     let after = plan.march(&mut simulation, at, |_, _| ());
     if let Some(off) = after.differs(&record.from(at), plan, at) {
-        return Some(format!("a state saved at communication point {at} disturbs: {off}"));
+        return Some(format!("saving the state at communication point {at} changes the run: {off}"));
     }
     let both = (plan, record);
     let (name, other) = match random.below(4) {
@@ -104,7 +104,7 @@ fn saved_within(
     let state = save(&simulation);
     let mut fresh = started(trial, 0.0).ok()?;
     if let Err(error) = fresh.restore_state(&state) {
-        return Some(format!("the state within communication step {} is refused: {error}", at + 1));
+        return Some(format!("the state within communication step {} is rejected: {error}", at + 1));
     }
     for (name, instance) in [("the same", &mut simulation), ("a fresh", &mut fresh)] {
         while !instance.advance().ok()?.finished {}
@@ -113,8 +113,8 @@ fn saved_within(
         if let Some(place) = after.iter().zip(expected).position(|(own, other)| own != other) {
             let [own, other] = [after[place], expected[place]].map(f64::from_bits);
             return Some(format!(
-                "{name} instance goes on after {before} internal steps of communication step {} with {own:e} for output {}, \
-                 not {other:e}",
+                "{name} instance continues after {before} internal steps of communication step {} with {own:e} for \
+                 output {}, not {other:e}",
                 at + 1,
                 plan.outputs[place]
             ));
@@ -140,7 +140,7 @@ fn after_reset(
     }
     simulation.reset();
     if let Err(error) = simulation.initialise(0.0) {
-        return Some(format!("after a reset the start is refused: {error}"));
+        return Some(format!("initialisation after a reset is rejected: {error}"));
     }
     let again = plan.march(&mut simulation, 0, |_, _| ());
     let off = again.differs(record, plan, 0)?;
@@ -181,7 +181,7 @@ pub(crate) fn differentiated(trial: &RandomScene, plan: &RandomPlan, record: &Ou
                 let mut found = vec![0.0; outputs.len()];
                 match simulation.step_derivative(&outputs, &inputs, &seed, &mut found) {
                     Ok(()) if found.iter().all(|value| value.is_finite()) => {}
-                    Ok(()) => refusal = Some(format!("a derivative is {found:?}")),
+                    Ok(()) => refusal = Some(format!("the derivatives are not finite: {found:?}")),
                     Err(error) => refusal = super::oracles::names(&error).map(|finding| finding.text),
                 }
             }
@@ -190,7 +190,7 @@ pub(crate) fn differentiated(trial: &RandomScene, plan: &RandomPlan, record: &Ou
     };
     let text = refusal.or_else(|| {
         let off = after.differs(record, plan, 0)?;
-        Some(format!("derivatives over the steps {asked:?} disturb: {off}"))
+        Some(format!("computing derivatives over the steps {asked:?} changes the run: {off}"))
     })?;
     Some(Finding { oracle: "derivatives", text })
 }

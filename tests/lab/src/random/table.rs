@@ -105,7 +105,7 @@ impl RandomTable {
             let _ = writeln!(text, "  {name:<20}{}", cells.concat());
         }
         for (oracle, count) in self.oracles() {
-            let _ = write!(text, "\n  {count} findings of the oracle `{oracle}`");
+            let _ = write!(text, "\n  {count} findings of the check `{oracle}`");
         }
         text
     }

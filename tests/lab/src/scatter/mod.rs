@@ -186,14 +186,15 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
             [0.0, 0.15, 0.3, 0.6].map(|friction| sectors::solutions(degree, friction, TRIALS[which] / 5))
         })
         .collect();
-    let told = |error| tiprub_shell::Failure::from_core("a mission", error);
+    let told = |error| tiprub_shell::Failure::from_core("mission", error);
     let long = mission::long_steps(if arguments.quick { 1 } else { 10 }).map_err(told)?;
     let hour = mission::hour(if arguments.quick { 100 } else { 1 }).map_err(told)?;
     Ok(Study {
         name: "scatter",
-        title: "A tolerance on what nobody chose".into(),
-        summary: "Random rubs of four blades with three contact nodes: relative L2 error of displacements against the tolerance. What is left \
-                  at the shortest steps. Energy over very many switches, and contact problems of random sectors."
+        title: "Tolerance and energy in random rubs".into(),
+        summary: "Random rubs of four blades with three contact nodes: relative L2 error of displacements against the \
+                  tolerance, and the error at the shortest steps. Energy over very many contact changes, and contact \
+                  problems of random sectors."
             .into(),
         facts: machine::facts(),
         statements: statements(&of_ratios, &kept, &problems, &solutions),
@@ -224,7 +225,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         }),
         files: vec![(
             "scatter.md".into(),
-            "the tables of the guide".into(),
+            "tables for the guide".into(),
             tables(&of_ratios, &left, (&kept, &problems, &solutions), (long, &hour)).into_bytes(),
         )],
     })
@@ -235,7 +236,7 @@ type Left = (f64, f64, f64, [u64; 2]);
 
 fn left() -> Result<Vec<Left>> {
     let scene = bumps(rich_blade(SECTORS));
-    let told = |error: tiprub_core::Error| tiprub_shell::Failure::from_core("what is left", error);
+    let told = |error: tiprub_core::Error| tiprub_shell::Failure::from_core("error at the shortest steps", error);
     let truth = run(&scene, (1e-5, 1e-9), 0.0).map_err(told)?;
     let mut all = Vec::new();
     for longest in LONGEST {
@@ -260,30 +261,31 @@ fn statements(
     let plain: u64 = problems.iter().filter(|one| one.friction == 0.0).map(|one| one.unsolved).sum();
     vec![
         Statement::tested(
-            "Half of the random rubs are within half of their tolerance, 95 % within three times it".to_owned(),
+            "The error is within half the tolerance for half of the random rubs, and within three times the tolerance \
+             for 95 %".to_owned(),
             worst[0] < 0.5 && worst[1] < 3.0,
             format!("median {:.2}, 95 % {:.2} at the worst tolerance", worst[0], worst[1]),
         ),
         Statement::tested(
-            "Switches never leave more energy than there was".to_owned(),
+            "Contact changes never add energy".to_owned(),
             kept.iter().all(Option::is_some) && gained < 1e-9,
             format!("gain of at most {gained:.0e}"),
         ),
         Statement::tested(
-            "Without friction every contact problem has a solution that is found".to_owned(),
+            "Without friction, a solution of every contact problem is found".to_owned(),
             plain == 0,
-            format!("{plain} had none"),
+            format!("{plain} were not solved"),
         ),
         Statement::tested(
-            "Without friction every contact problem has one solution".to_owned(),
+            "Without friction, every contact problem has exactly one solution".to_owned(),
             solutions.iter().all(|one| one.friction > 0.0 || one.none + one.several == 0),
             format!(
-                "with friction up to {} have none, {} several",
+                "with friction, up to {} have no solution, up to {} have several",
                 solutions.iter().map(|one| one.none).max().unwrap_or(0),
                 solutions.iter().map(|one| one.several).max().unwrap_or(0)
             ),
         ),
-        Statement::remark("Random sectors that no step was short enough for".to_owned(), format!("{given_up} spans")),
+        Statement::remark("Random sectors for which no step was short enough".to_owned(), format!("{given_up} spans")),
     ]
 }
 
@@ -333,23 +335,24 @@ fn tables(
         format!("{:.0e}", hour.residual),
     ];
     [
-        table(&["tolerance", "median of error over tolerance", "95 %", "most"], &ratios),
+        table(&["tolerance", "median of error / tolerance", "95 %", "maximum"], &ratios),
         table(&["longest step", "tolerance 1e-6", "1e-7", "1e-8", "1e-9"], &left),
         table(
-            &["tolerance", "switches", "steps", "with constant force", "most energy, less one", "energy left"],
+            &["tolerance", "switches", "steps", "with constant force", "largest energy gain (-)", "final energy (-)"],
             &kept,
         ),
-        table(&["degree", "µ", "problems", "unsolved at first", "given up"], &problems),
-        table(&["flown over", "by spans", "with a rub"], &[long.map(|time| format!("{time:.3} ms")).to_vec()]),
+        table(&["degree", "µ", "problems", "initially unsolved", "finally unsolved"], &problems),
+        table(&["without contact, in one step", "without contact, by spans",
+            "with a rub"], &[long.map(|time| format!("{time:.3} ms")).to_vec()]),
         table(&["degree", "µ", "problems", "no solution", "several"], &solutions),
         table(
             &[
-                "steps, of them rubbing",
-                "time without, with rub",
-                "internal steps of the rub",
-                "tried",
+                "steps: all, with rub",
+                "time: without, with rub",
+                "internal steps in the rub",
+                "trials",
                 "friction heat",
-                "residual of energy",
+                "energy residual",
             ],
             &[hour],
         ),

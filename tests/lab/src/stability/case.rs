@@ -109,7 +109,7 @@ impl Check {
 
     fn to_text(&self) -> String {
         if self.bound == 0.0 {
-            return if self.holds() { self.what.clone() } else { format!("not so: {}", self.what) };
+            return if self.holds() { self.what.clone() } else { format!("not fulfilled: {}", self.what) };
         }
         format!("{} {:.1e} (at most {:.0e})", self.what, self.found, self.bound)
     }
@@ -236,19 +236,19 @@ pub(crate) fn judge(expected: &Expected, happened: &CaseEnd) -> (CaseVerdict, St
         Expected::Refused(words) | Expected::Either(_, words) => Some(words),
     };
     match (&happened.refusal, words) {
-        (Some(message), None) => (CaseVerdict::Wrong, format!("refused: {message}")),
+        (Some(message), None) => (CaseVerdict::Wrong, format!("rejected: {message}")),
         (Some(message), Some(words)) => {
             if let Some(missing) = unnamed(message, words) {
-                return (CaseVerdict::Wrong, format!("refused without naming {missing}: {message}"));
+                return (CaseVerdict::Wrong, format!("rejected without naming {missing}: {message}"));
             }
             if !failed.is_empty() {
-                return (CaseVerdict::Wrong, format!("{}; refused: {message}", failed.join("; ")));
+                return (CaseVerdict::Wrong, format!("{}; rejected: {message}", failed.join("; ")));
             }
             let verdict = if message.contains(IN_A_STEP) { CaseVerdict::Ended } else { CaseVerdict::Refused };
             (verdict, format!("{message}{remarks}"))
         }
         (None, _) if !failed.is_empty() => (CaseVerdict::Wrong, format!("{}{remarks}", failed.join("; "))),
-        (None, _) if matches!(expected, Expected::Refused(_)) => (CaseVerdict::Wrong, "was not refused".to_owned()),
+        (None, _) if matches!(expected, Expected::Refused(_)) => (CaseVerdict::Wrong, "was not rejected".to_owned()),
         (None, _) if happened.checks.is_empty() => (CaseVerdict::Wrong, "nothing was compared".to_owned()),
         (None, _) => (CaseVerdict::Right, format!("{}{remarks}", tightest(&happened.checks))),
     }

@@ -75,7 +75,7 @@ fn read(case: &StabilityCase, ended: &str, stdout: &str, stderr: &str) -> (CaseV
         None => {
             let words: Vec<char> = stderr.trim().chars().collect();
             let words: String = words[words.len().saturating_sub(LAST_WORDS)..].iter().collect();
-            let ended = if ended.is_empty() { "ended without an answer" } else { ended };
+            let ended = if ended.is_empty() { "ended without a result" } else { ended };
             (CaseVerdict::Crashed, format!("{ended}: {}", words.replace('\n', " ")))
         }
     }

@@ -67,12 +67,12 @@ fn verdict(table: &StabilityTable, directory: &std::path::Path) -> Option<Failur
     let named = unsound[..unsound.len().min(NAMED)].join(", ");
     let more = if unsound.len() > NAMED { format!(" and {} more", unsound.len() - NAMED) } else { String::new() };
     let problem = format!(
-        "{} of {} cases are neither right nor refused as they should be: {named}{more}",
+        "{} of {} cases are neither right nor refused as expected: {named}{more}",
         unsound.len(),
         table.rows.len()
     );
     let remedy = format!("See {}", directory.join("index.html").display());
-    Some(Failure::new("stability", problem, remedy))
+    Some(Failure::new("lab stability", problem, remedy))
 }
 
 /// The scenes whose variables are walked, as FMUs of both versions in a temporary directory.
@@ -81,7 +81,7 @@ fn package(arguments: &LabStabilityArguments, console: &Console) -> Result<tempf
         LibraryArguments { library: arguments.library.iter().cloned().collect(), ..LibraryArguments::default() };
     let libraries = library::load(library::LibraryUnit::Scene, &chosen, console)?;
     let directory = tempfile::tempdir()
-        .map_err(|error| Failure::file(&std::env::temp_dir(), "no temporary directory can be made", &error))?;
+        .map_err(|error| Failure::file(&std::env::temp_dir(), "cannot create a temporary directory", &error))?;
     for name in values::SCENES {
         let scene = values::scene(name);
         let package = FmuPackage::new(&scene, &libraries)?;
@@ -101,9 +101,9 @@ fn chosen(arguments: &LabStabilityArguments) -> Result<Vec<StabilityCase>> {
         let mut families: Vec<&str> = cases.iter().map(StabilityCase::family).chain(["judge"]).collect();
         families.sort_unstable();
         families.dedup();
-        let of = if arguments.quick { " of the quick form" } else { "" };
+        let of = if arguments.quick { " in the quick form" } else { "" };
         let problem = format!("no case{of} begins with `{prefix}`");
-        return Err(Failure::usage("--case", problem, format!("Begin with one of {}", families.join(", "))));
+        return Err(Failure::usage("--case", problem, format!("Choose from {}", families.join(", "))));
     }
     Ok(cases)
 }

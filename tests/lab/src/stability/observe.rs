@@ -217,7 +217,7 @@ impl StabilityWatch {
     pub(crate) fn laws(&self) -> Vec<Check> {
         vec![
             Check::so("all outputs finite", self.finite),
-            Check::at_most("ledger residual", self.residual, 1e-9),
+            Check::at_most("energy residual", self.residual, 1e-9),
             self.impact(1e-9),
             self.heat(1e-9),
         ]
@@ -226,15 +226,15 @@ impl StabilityWatch {
     /// Impacts take energy. Those of galerkin are paid from impacts before: their loss stays above 0.
     pub(crate) fn impact(&self, bound: f64) -> Check {
         if self.galerkin {
-            return Check::at_most("impact loss below 0 by", self.share(self.impact_deficit), ITERATED);
+            return Check::at_most("negative impact loss", self.share(self.impact_deficit), ITERATED);
         }
-        Check::at_most("impact loss falls by", self.impact_drop(), bound)
+        Check::at_most("decrease of the impact loss", self.impact_drop(), bound)
     }
 
     /// Friction takes energy.
     pub(crate) fn heat(&self, bound: f64) -> Check {
         let bound = if self.galerkin { bound.max(ITERATED) } else { bound };
-        Check::at_most("friction heat falls by", self.heat_drop(), bound)
+        Check::at_most("decrease of the friction heat", self.heat_drop(), bound)
     }
 
     /// The same for a scheme: massless-boundary takes contact forces a step late, and gives back a little of what it took.
@@ -248,7 +248,7 @@ impl StabilityWatch {
 
     /// The ledger alone.
     pub(crate) fn ledger(&self) -> Check {
-        Check::at_most("ledger residual", self.residual, 1e-9)
+        Check::at_most("energy residual", self.residual, 1e-9)
     }
 
     /// Returns the largest fall of the impact loss in a communication step, relative to all energy exchanged.
@@ -274,7 +274,7 @@ impl StabilityWatch {
             Check::at_most("λg", self.product, distance),
         ];
         if self.round {
-            checks.push(Check::at_most("gap again from displacements", self.again, 1e-9));
+            checks.push(Check::at_most("deviation of the gap from that of the displacements", self.again, 1e-9));
         }
         checks
     }

@@ -123,10 +123,10 @@ impl Press {
             off = off.max(differs / scale);
         }
         let mut checks = vec![
-            Check::at_most("λ from the static solution", off, tolerance),
-            Check::at_most("sectors differ", alike, precise + if rom.is_cyclic() { 1e-9 } else { 0.0 }),
+            Check::at_most("deviation of λ from the static solution", off, tolerance),
+            Check::at_most("difference between sectors", alike, precise + if rom.is_cyclic() { 1e-9 } else { 0.0 }),
             Check::relative(
-                "strain energy from the static one",
+                "deviation of the strain energy from the static one",
                 real(simulation, "strain_energy"),
                 exact.strain * rom.sectors as f64,
                 10.0 * tolerance,
@@ -137,7 +137,8 @@ impl Press {
             checks.push(Check::at_most("resultant force", force / total, 1e-9 + precise));
         }
         let torque = real(simulation, "torque") + contact.friction * sense * total * RADIUS;
-        checks.push(Check::at_most("torque from −µΣλr", (torque / (total * RADIUS)).abs(), 10.0 * tolerance));
+        checks.push(Check::at_most("deviation of the torque from −µΣλr", (torque / (total * RADIUS)).abs(),
+            10.0 * tolerance));
         checks
     }
 }

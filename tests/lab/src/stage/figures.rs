@@ -51,8 +51,8 @@ fn clearances(setup: &StageSetup, casing: StageCasing, run: &Run, names: &[Strin
     Ok(StudyFigure {
         name: of_casing(casing, ["clearances-smooth", "clearances-rigid", "clearances-flexible"]),
         caption: format!(
-            "Clearance between blade 1 and the casing at its three contact nodes, {}, at {:.1} rad/s. The oval grows over the first \
-             {RAMP_PERIODS} periods; where the curves are zero the blade is in contact.",
+            "Clearance between blade 1 and the casing at its three contact nodes, {}, at {:.1} rad/s. The oval grows \
+             over the first {RAMP_PERIODS} periods. The blade is in contact where a curve is zero.",
             casing.name(),
             run.speed
         ),
@@ -116,13 +116,14 @@ fn amplitudes(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &[St
         ..Plot::new("angular velocity (rad/s)", "effective amplitude (µm)", series.collect())
     };
     let mut caption = format!(
-        "Effective amplitude (root mean square once the oval is there) of the nodal diameters against angular velocity, {}.",
+        "Effective amplitude (root mean square after the growth of the oval) of the nodal diameters against angular \
+         velocity, {}.",
         casing.name()
     );
     if !silent.is_empty() {
         let silent = silent.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         caption.push_str(&format!(
-            " Not drawn, below {SILENT:e} of the largest: nodal diameters {silent}; the numbers are whole."
+            " Nodal diameters {silent} are below {SILENT:e} of the largest and not drawn; the data file contains them."
         ));
     }
     Ok(StudyFigure {
@@ -138,10 +139,10 @@ fn speeds_sheet(setup: &StageSetup, runs: &[Run], names: &[String]) -> Sheet {
     let diameters = runs.first().map_or(0, |run| run.amplitudes.len());
     let mut sheet = Sheet::new(["speed (rad/s)", "speed / critical speed"]);
     sheet.columns.extend((0..diameters).map(|number| format!("nodal diameter {number} (m)")));
-    sheet.columns.extend(["points with contact", "largest force (N)", "least clearance (m)"].map(String::from));
-    sheet.columns.extend(names.iter().map(|name| format!("least clearance of {name} of blade 1 (m)")));
-    sheet.columns.extend(names.iter().map(|name| format!("touches of {name} of blade 1")));
-    sheet.columns.push("reaches its end (1 yes; 0 no)".into());
+    sheet.columns.extend(["points with contact", "largest force (N)", "smallest clearance (m)"].map(String::from));
+    sheet.columns.extend(names.iter().map(|name| format!("smallest clearance of {name} of blade 1 (m)")));
+    sheet.columns.extend(names.iter().map(|name| format!("contacts of {name} of blade 1")));
+    sheet.columns.push("completed (1 yes; 0 no)".into());
     for run in runs {
         let mut row = vec![run.speed, run.speed / setup.critical_speed()];
         row.extend((0..diameters).map(|number| run.effective(number, setup.full())));
@@ -181,7 +182,8 @@ pub(super) fn shares(setup: &StageSetup, runs: &[Vec<Run>; 3]) -> Result<StudyFi
     Ok(StudyFigure {
         name: "share-of-4",
         caption:
-            "Effective amplitude of nodal diameter 4 relative to that of 2 against angular velocity, of runs that reach their end."
+            "Effective amplitude of nodal diameter 4 relative to that of 2 against angular velocity, for completed \
+             runs."
                 .into(),
         picture: Picture::plot(&plot)?,
         sheet,

@@ -157,7 +157,7 @@ fn flexibility(scene: &Scene) -> Result<f64> {
     let mut scene = scene.clone();
     scene.settings.outputs.slave_displacement = true;
     let load = scene.settings.structures[1].load.as_mut();
-    let load = load.ok_or_else(|| Failure::new("scene `stage`", "there is no load on the casing", ""))?;
+    let load = load.ok_or_else(|| Failure::new("scene `stage`", "the casing has no load", ""))?;
     // Small enough not to touch.
     load.amplitude = 1e-3;
     let amplitude = load.amplitude;
@@ -169,7 +169,8 @@ fn flexibility(scene: &Scene) -> Result<f64> {
     for reference in (first..).take(count) {
         largest = largest.max(simulation.real(reference).map_err(in_scene)?.abs());
     }
-    if largest > 0.0 { Ok(largest / amplitude) } else { Err(Failure::new("casing", "the load does not deform it", "")) }
+    if largest > 0.0 { Ok(largest / amplitude) } else { Err(Failure::new("casing",
+        "the load does not deform the casing", "")) }
 }
 
 /// The study: load the models, run all speeds in all casings, draw.
@@ -223,7 +224,7 @@ fn nearest<'a>(setup: &StageSetup, runs: &'a [Run]) -> Result<&'a Run> {
         let [a, b] = [place(a), place(b)];
         a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
     });
-    shown.ok_or_else(|| Failure::new("study stage", "no run", ""))
+    shown.ok_or_else(|| Failure::new("lab stage", "there are no runs", ""))
 }
 
 fn report(setup: &StageSetup, runs: &[Vec<Run>; 3]) -> Result<Study> {
@@ -241,7 +242,8 @@ fn report(setup: &StageSetup, runs: &[Vec<Run>; 3]) -> Result<Study> {
         name: "stage",
         title: "Blades against an oval casing".into(),
         summary: format!(
-            "{} coupled blades turn in a casing that becomes oval: rigid without and with friction, and elastic, at {} angular velocities each.{}",
+            "{} coupled blades rotate in a casing that becomes oval: rigid without friction, rigid with friction, and \
+             elastic, at {} angular velocities each.{}",
             setup.scenes[0].roms[0].sectors,
             runs[0].len(),
             if setup.quick { " Quick form: coarse meshes and few short runs, for a first look only." } else { "" }
@@ -284,14 +286,14 @@ fn facts(setup: &StageSetup, steps: u64, stepping: f64) -> Vec<(String, String)>
     let facts = [
         ("disk", disk.origin.clone()),
         ("elastic casing", ring.origin.clone()),
-        ("rigid casing", "spline through 28 × 3 points, oval alike all along the axis".into()),
+        ("rigid casing", "spline through 28 × 3 points, with the same oval at every axial position".into()),
         ("degrees of freedom of the reduced disk", disk.total_order().to_string()),
         ("modes of the elastic casing", ring.order().to_string()),
         ("clearance at rest", format!("{} m", setup.gap())),
         ("friction coefficient", scene.settings.contacts[0].friction.to_string()),
         ("damping ratios of disk and casing", format!("{}, {}", damping(0), damping(1))),
-        ("oval", format!("where nothing gives way it reaches {OVERLAP} of the clearance beyond the tips")),
-        ("load amplitude that does so", format!("{:.1} N/m", setup.amplitude)),
+        ("oval", format!("without deformation, the interference is {OVERLAP} of the clearance")),
+        ("load amplitude for this oval", format!("{:.1} N/m", setup.amplitude)),
         ("first frequency of nodal diameter 2", format!("{:.2} Hz", setup.frequency)),
         ("critical speed of an oval casing", format!("{:.2} rad/s", setup.critical_speed())),
         ("simulated time per run", format!("{:.4} s", setup.schedule.stop - setup.schedule.start)),

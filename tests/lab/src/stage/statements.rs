@@ -19,8 +19,8 @@ pub(super) fn of(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &
     let shares: Vec<(f64, f64)> = runs.iter().map(|run| (run.speed, share(run))).collect();
     let shares = if runs.iter().all(|run| run.ended.is_none()) { shares } else { Vec::new() };
     let resonance = format!(
-        "contact twice per revolution also shakes at four times the speed, which meets the first mode of nodal diameter 4 at {:.1} \
-         rad/s ({:.2} of the critical speed)",
+        "contact twice per revolution also excites at four times the speed, in resonance with the first mode of nodal \
+         diameter 4 at {:.1} rad/s ({:.2} of the critical speed)",
         setup.second_resonance,
         setup.second_resonance / setup.critical_speed()
     );
@@ -33,8 +33,9 @@ pub(super) fn of(setup: &StageSetup, casing: StageCasing, runs: &[Run], names: &
         Statement::remark(
             "Residual penetrations (fig. 11)",
             format!(
-                "deepest reported at any communication point of any run: {deepest} m. The solver lcp closes every gap of a step \
-                 exactly, so this is no measurement; what the turning of a normal within a step leaves is in the chapter Validation"
+                "largest at any communication point of any run: {deepest} m. The solver lcp closes every gap of a step \
+                 exactly, so this is not a measurement; the chapter Validation gives the error due to the rotation of \
+                 normals within a step"
             ),
         ),
         prevails(&shares, setup.critical_speed()),
@@ -59,7 +60,7 @@ pub(crate) fn all_nodes_touch(run: &Run, names: &[String], gap: f64) -> Statemen
         format!("{} {:.3} of the clearance at rest, {touches} times in contact", name.replace('_', " "), least / gap)
     });
     Statement::tested(
-        "The clearance of each of the three nodes of blade 1 reaches zero again and again (fig. 11)",
+        "The clearance of each of the three nodes of blade 1 reaches zero repeatedly (fig. 11)",
         !run.touches.is_empty() && run.touches.iter().all(|count| *count >= OFTEN),
         format!(
             "smallest clearances at {:.1} rad/s, and contacts after the first {RAMP_PERIODS} periods: {}",
@@ -74,9 +75,9 @@ fn reaches_end(runs: &[Run]) -> Statement {
         runs.iter().filter_map(|run| Some(format!("{:.1} rad/s: {}", run.speed, run.ended.as_ref()?))).collect();
     let found = match ended.first() {
         None => format!("all {}", runs.len()),
-        Some(first) => format!("{} of {} do not; {first}", ended.len(), runs.len()),
+        Some(first) => format!("{} of {} end early; {first}", ended.len(), runs.len()),
     };
-    Statement::tested("Every run reaches its end", ended.is_empty(), found)
+    Statement::tested("Every run is completed", ended.is_empty(), found)
 }
 
 fn contact_everywhere(runs: &[Run]) -> Statement {
@@ -95,28 +96,28 @@ fn listed(shares: &[(f64, f64)]) -> String {
 /// Above the resonance of nodal diameter 2 alone: undecided where there is no run.
 pub(crate) fn prevails(shares: &[(f64, f64)], critical: f64) -> Statement {
     let expected = format!(
-        "Nodal diameter {}, that of the oval, prevails over nodal diameter {} in every run from the critical speed on",
+        "Nodal diameter {}, that of the oval, dominates nodal diameter {} in every run at or above the critical speed",
         SHOWN[0], SHOWN[1]
     );
     let fast: Vec<(f64, f64)> = shares.iter().copied().filter(|(speed, _)| *speed >= critical).collect();
     if fast.is_empty() {
         return Statement::remark(
             expected,
-            format!("undecided: no run at or above {critical:.1} rad/s, or some end early"),
+            format!("undecided: no run at or above {critical:.1} rad/s, or some runs end early"),
         );
     }
-    let found = format!("effective amplitude of 4 relative to that of 2 (rad/s): {}", listed(&fast));
+    let found = format!("effective amplitude of 4 relative to that of 2 (at rad/s): {}", listed(&fast));
     Statement::tested(expected, fast.iter().all(|(_, share)| *share < 1.0), found)
 }
 
 /// Checks the statement of the paper about its figure 12: the share falls all the way, and is negligible in the end.
 pub(crate) fn becomes_negligible(shares: &[(f64, f64)], resonance: &str) -> Statement {
     let expected = format!(
-        "The share of nodal diameter {} becomes negligible against that of {} as the angular velocity grows (fig. 12): their ratio \
-         falls from each angular velocity to the next, and ends below {NEGLIGIBLE}",
+        "Nodal diameter {} becomes negligible compared with {} as the angular velocity increases (fig. 12): the ratio \
+         of their amplitudes falls from each angular velocity to the next and ends below {NEGLIGIBLE}",
         SHOWN[1], SHOWN[0]
     );
-    let found = format!("ratios (rad/s): {}; {resonance}", listed(shares));
+    let found = format!("ratios (at rad/s): {}; {resonance}", listed(shares));
     if shares.len() < 3 {
         let why = format!("undecided: fewer than three angular velocities, or runs that end early; {found}");
         return Statement::remark(expected, why);
@@ -128,7 +129,7 @@ pub(crate) fn becomes_negligible(shares: &[(f64, f64)], resonance: &str) -> Stat
 fn ledger(runs: &[Run]) -> Statement {
     let largest = runs.iter().map(|run| run.energy_residual).fold(0.0, f64::max);
     Statement::tested(
-        format!("The energy ledger closes in every run, to {LEDGER:e} of the energy exchanged"),
+        format!("The energy balance closes in every run to {LEDGER:e} of the energy exchanged"),
         runs.iter().all(|run| run.energy_residual < LEDGER),
         format!("largest residual {largest:.1e}"),
     )

@@ -147,7 +147,7 @@ fn rom(quick: bool, modes: usize, console: &Console) -> Result<Rom> {
 
 /// The scene, and the second mode per revolution.
 fn scene(rom: &Rom, case: WearCase) -> Result<(Scene, f64)> {
-    let mut settings = tiprub_format::parse_scene(SCENE, "the scene of the study")?;
+    let mut settings = tiprub_format::parse_scene(SCENE, "scene of the study")?;
     let (squares, _) = dense_modes(&rom.stiffness, &rom.mass).map_err(|error| reduction::failure("modes", error))?;
     let speed = squares[0].sqrt() / f64::from(case.order);
     let turn = TAU / speed;
@@ -213,30 +213,31 @@ fn windows(roms: &[(usize, Rom)], case: &WearCase) -> Result<Vec<WearWindow>> {
 }
 
 fn table(windows: &[WearWindow]) -> String {
-    let head = "| speed (rad/s) | first mode per revolution, without contact | revolutions | new wear (µm) | wear at the end: mean, largest (µm) | \
-                the tip swings most at, per revolution | lobes of the new wear |\n|---|---|---|---|---|---|---|\n";
+    let head = "| speed (rad/s) | first mode per revolution, without contact | revolutions | new wear (µm) | wear at \
+                the end: mean, largest (µm) | strongest tip vibrations per revolution | lobes of the new wear \
+                |\n|---|---|---|---|---|---|---|\n";
     std::iter::once(head.to_owned()).chain(windows.iter().map(WearWindow::row)).collect()
 }
 
 fn figure(windows: &[WearWindow]) -> Result<StudyFigure> {
     let mut sheet = Sheet::new([
         "first mode per revolution",
-        "second",
+        "second mode per revolution",
         "modes",
         "cells",
         "step (s)",
         "revolution at the end",
         "new wear (m)",
-        "wear, mean (m)",
-        "wear, largest (m)",
-        "swings at, per revolution",
-        "with (m)",
-        "and at",
-        "with (m)",
-        "lobes",
-        "with (m)",
-        "and",
-        "with (m)",
+        "mean wear (m)",
+        "largest wear (m)",
+        "tip vibrations 1 per revolution",
+        "amplitude 1 (m)",
+        "tip vibrations 2 per revolution",
+        "amplitude 2 (m)",
+        "lobes 1",
+        "wear amplitude 1 (m)",
+        "lobes 2",
+        "wear amplitude 2 (m)",
     ]);
     for window in windows {
         let WearWindow { case, second, end, wear, added, swings, lobes, .. } = window;
@@ -255,12 +256,13 @@ fn figure(windows: &[WearWindow]) -> Result<StudyFigure> {
         .filter(|window| window.judged())
         .flat_map(|window| window.swings.iter().map(|line| (line.rate, window.order())));
     let series = vec![
-        Series::line("as many", vec![(0.0, 0.0), (20.0, 20.0)]).drawn(SeriesForm::Thin, 1),
+        Series::line("equal numbers", vec![(0.0, 0.0), (20.0, 20.0)]).drawn(SeriesForm::Thin, 1),
         Series::line("windows of revolutions", points.collect()).drawn(SeriesForm::Dots, 0),
     ];
     Ok(StudyFigure {
         name: "lobes",
-        caption: "Largest order of the wear that some revolutions add against what the tip swings at in them, while the casing closes.".into(),
+        caption: "Dominant order of the wear added in a window of revolutions against the tip vibrations per \
+                  revolution in it, while the casing closes.".into(),
         picture: Picture::plot(&Plot::new("vibrations per revolution", "lobes of the new wear", series))?,
         sheet,
     })
@@ -277,23 +279,25 @@ fn statements(windows: &[WearWindow]) -> Vec<Statement> {
     let last = windows.iter().filter(|window| window.end == TURNS);
     vec![
         Statement::tested(
-            "While the casing closes, lobes of new wear are a whole number next to what the tip swings at per revolution, or next to twice or \
-             three times it",
+            "While the casing closes, the number of lobes of new wear is an integer next to the tip vibrations per \
+             revolution, or next to two or three times these",
             !judged.is_empty() && farthest < 1.0,
             format!(
-                "at most {farthest:.2} apart in {} windows that add at least {:.0} µm; in {once} of them next to what it swings at",
+                "differences of at most {farthest:.2} in {} windows that add at least {:.0} µm; in {once} of them next \
+                 to the tip vibrations themselves",
                 judged.len(),
                 1e6 * JUDGED
             ),
         ),
         Statement::tested(
-            "It is more than the first mode per revolution without contact",
+            "The tip vibrations per revolution exceed those of the first mode without contact",
             !judged.is_empty() && stiffened > 1.1,
-            format!("at least {stiffened:.2} times it"),
+            format!("at least {stiffened:.2} times the first mode"),
         ),
         Statement::remark(
-            "What the tip swings at last, nearest to the second mode without contact",
-            last.map(|window| format!("{:.3} times it", window.swings_over_second())).collect::<Vec<_>>().join(", "),
+            "Final tip vibrations, nearest to the second mode without contact",
+            last.map(|window| format!("{:.3} times the second mode",
+                window.swings_over_second())).collect::<Vec<_>>().join(", "),
         ),
     ]
 }
@@ -307,7 +311,7 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let roms: Vec<(usize, Rom)> =
         roms.map(|modes| Ok((modes, rom(arguments.quick, modes, console)?))).collect::<Result<_>>()?;
     let cases = if arguments.quick { &CASES[2..3] } else { &CASES[..] };
-    let task = console.task("Runs into the coating", Some(cases.len() as u64));
+    let task = console.task("Coating runs", Some(cases.len() as u64));
     let found = sweep::sweep(cases, processors(), |case| windows(&roms, case), |done| task.at(done as u64))?;
     drop(task);
     let windows: Vec<WearWindow> = found.into_iter().flatten().collect();
@@ -315,8 +319,8 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
         name: "wear",
         title: "Wear of the coating".into(),
         summary: format!(
-            "One blade of rotor 37 in a coating that closes by {CLOSING:e} m over {CLOSED} of {TURNS} revolutions: lobes of the wear beside \
-             vibrations of the tip.{}",
+            "One blade of rotor 37 in a coated casing that closes by {CLOSING:e} m over {CLOSED} of {TURNS} \
+             revolutions: wear lobes compared with tip vibrations.{}",
             if arguments.quick { " Quick form: one speed, a coarse mesh." } else { "" }
         ),
         facts: machine::facts(),
@@ -328,6 +332,6 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
             "swings": window.swings.iter().map(|line| line.rate).collect::<Vec<_>>(),
             "lobes": window.lobes.iter().map(|line| line.rate).collect::<Vec<_>>(),
         })).collect::<Vec<_>>()),
-        files: vec![("wear.md".into(), "the table of the guide".into(), table(&windows).into_bytes())],
+        files: vec![("wear.md".into(), "table for the guide".into(), table(&windows).into_bytes())],
     })
 }

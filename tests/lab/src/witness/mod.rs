@@ -125,7 +125,7 @@ impl WitnessSize {
         let one = |name, touching, modes, (method, division)| WitnessModel { name, touching, modes, method, division };
         let patches = Touching::Patches;
         let all = [
-            one("the paper's", Touching::Nodes(3), 20, PAPER),
+            one("paper model", Touching::Nodes(3), 20, PAPER),
             one("default", patches(few, 1), own, DEFAULT),
             one("short steps", patches(few, 1), own, FINE),
             one("more modes", patches(few, 1), most, FINE),
@@ -133,13 +133,13 @@ impl WitnessSize {
             one("two rows", patches(few, 2), own, DEFAULT),
             one("two rows, short steps", patches(few, 2), own, FINE),
             one("two rows, massless", patches(few, 2), own, MASSLESS),
-            one("two rows, by a tolerance", patches(few, 2), own, GALERKIN),
+            one("two rows, adaptive steps", patches(few, 2), own, GALERKIN),
             one("two rows, more modes", patches(few, 2), most, FINE),
             one("three rows, more modes", patches(few, 3), most, FINE),
             one("two rows, more patches", patches(many, 2), most, FINE),
         ];
         // Each asks at its start whether closed contact grows, which takes longer than the run.
-        let quick = ["the paper's", "default", "more modes", "two rows, more modes"];
+        let quick = ["paper model", "default", "more modes", "two rows, more modes"];
         all.into_iter().filter(|one| self.rows > 2 || quick.contains(&one.name)).collect()
     }
 
@@ -169,7 +169,7 @@ struct WitnessScene {
 impl WitnessScene {
     fn new(quick: bool) -> Result<Self> {
         let size = WitnessSize::of(quick);
-        let told = |error| failure("the full blade", error);
+        let told = |error| failure("full model of the blade", error);
         let material = Rotor37Options::default().material;
         let blade = blade_mesh(size.mesh).map_err(told)?;
         let clamped = blade.mesh.set("hub").map_err(told)?;
@@ -194,15 +194,15 @@ impl WitnessScene {
                 mesh.set("tip").and_then(|tip| tip_patches(mesh, tip, [count, rows], name))
             }
             Touching::Points(_) | Touching::Sides => {
-                return Err(Failure::new("study witness", "no model is reduced to points or sides", ""));
+                return Err(Failure::new("lab witness", "reduced models cannot have contact points or sides", ""));
             }
         };
-        found.map_err(|error| failure("the tip of the blade", error))
+        found.map_err(|error| failure("tip of the blade", error))
     }
 
     fn parts(&self, touching: Touching) -> Result<Vec<TipPart>> {
         let mesh = &self.blade.mesh;
-        let tip = mesh.set("tip").map_err(|error| failure("the tip of the blade", error))?;
+        let tip = mesh.set("tip").map_err(|error| failure("tip of the blade", error))?;
         match touching {
             Touching::Points(each) => return Ok(TipPart::points(mesh, tip, each)),
             Touching::Sides => return Ok(TipPart::outline(mesh, tip)),
@@ -217,7 +217,7 @@ impl WitnessScene {
     }
 
     fn rom_with(&self, reduced: &WitnessModel, stress: StressPlaces) -> Result<Rom> {
-        let told = |error| failure("reducing the blade", error);
+        let told = |error| failure("reduction of the blade", error);
         let options = ReductionOptions {
             name: "rotor37".into(),
             kind: match reduced.touching {
@@ -264,10 +264,10 @@ impl WitnessScene {
 
     /// The full model, with stress at gauges.
     fn run_full(&self, touching: Touching, division: u32, gauges: &[Gauge]) -> Result<BladeHistory> {
-        let told = |error| failure("the full blade", error);
+        let told = |error| failure("full model of the blade", error);
         let settings = scene_source::settings("builtin:rotor37-one-row")?;
         let Shape::TwoLobe { depth, width, .. } = settings.surfaces[0].shape else {
-            return Err(Failure::new("study witness", "the scene has no bumps", ""));
+            return Err(Failure::new("lab witness", "the scene has no bumps", ""));
         };
         let contact = &settings.contacts[0];
         let obstacle = BumpedCasing {
@@ -283,7 +283,7 @@ impl WitnessScene {
 
     /// Nodes whose displacements are compared.
     fn watched(&self) -> Result<Vec<usize>> {
-        let points = self.blade.contact_points(3).map_err(|error| failure("the full blade", error))?;
+        let points = self.blade.contact_points(3).map_err(|error| failure("full model of the blade", error))?;
         Ok(points.iter().map(|point| point.node).collect())
     }
 
@@ -317,7 +317,8 @@ struct WitnessRuns {
 impl WitnessRuns {
     /// The witness with this contact and the shortest steps.
     fn witness(&self, touching: Touching) -> Result<&RunSummary> {
-        let missing = || Failure::new("study witness", format!("no witness with {}", touching.name()), "");
+        let missing = || Failure::new("lab witness", format!("there is no full-model run with {}", touching.name()),
+            "");
         self.witnesses.iter().rev().find(|((other, _), _)| *other == touching).map(|(_, run)| run).ok_or_else(missing)
     }
 
@@ -344,7 +345,7 @@ impl WitnessRuns {
             let name = format!("{name}: {}, {modes} modes, {step} µs", touching.name());
             match run {
                 Ok(run) => self.row(name, run, *touching),
-                Err(_) => Ok(WitnessRow { name: format!("{name}: refused"), finest: true, ..WitnessRow::default() }),
+                Err(_) => Ok(WitnessRow { name: format!("{name}: rejected"), finest: true, ..WitnessRow::default() }),
             }
         });
         witnesses.chain(reduced).collect()
@@ -383,14 +384,16 @@ fn shown(value: &Option<f64>) -> String {
 /// shortest steps, and the reduced ones.
 fn tables(rows: &[WitnessRow]) -> String {
     let mut text = String::from(
-        "| run | impulse (N·s) | friction work (J) | same contact: displacements | impulse | friction work |\n|---|---|---|---|---|---|\n",
+        "| run | impulse (N·s) | friction work (J) | against the full model with the same contact: displacements | \
+         impulse | friction work |\n|---|---|---|---|---|---|\n",
     );
     for WitnessRow { name, impulse, friction_work, own, .. } in rows {
         let cells: Vec<String> = own[..3].iter().map(shown).collect();
         text.push_str(&format!("| {name} | {impulse:.4} | {friction_work:.2} | {} |\n", cells.join(" | ")));
     }
     text.push_str(
-        "\n| contact | impulse (N·s) | friction work (J) | sides: displacements | impulse | friction work |\n|---|---|---|---|---|---|\n",
+        "\n| contact | impulse (N·s) | friction work (J) | against the full model with contact at the sides: \
+         displacements | impulse | friction work |\n|---|---|---|---|---|---|\n",
     );
     for WitnessRow { name, impulse, friction_work, sides, .. } in rows.iter().filter(|row| row.finest) {
         let cells: Vec<String> = sides[..3].iter().map(shown).collect();
@@ -409,7 +412,7 @@ fn figure(runs: &WitnessRuns, size: &WitnessSize) -> Result<StudyFigure> {
         ("full model, sides", Some(sides)),
         ("default", named("default")),
         ("two rows", named("two rows, more modes")),
-        ("the paper's", named("the paper's")),
+        ("paper model", named("paper model")),
     ];
     let time = |sample: usize| 1e3 * (sample + 1) as f64 * INTERVAL;
     // Radial displacement of the trailing edge, the third node.
@@ -428,7 +431,9 @@ fn figure(runs: &WitnessRuns, size: &WitnessSize) -> Result<StudyFigure> {
     }
     Ok(StudyFigure {
         name: "trailing-edge",
-        caption: "The blade passes the bumps: full finite elements, the default reduction, and the paper's.".into(),
+        caption:
+            "The blade passes the bumps: full finite-element model, default reduced model, and the paper's \
+             model.".into(),
         picture: Picture::plot(&plot)?,
         sheet,
     })
@@ -440,39 +445,43 @@ fn percent(share: f64) -> String {
 
 fn statements(rows: &[WitnessRow], runs: &WitnessRuns) -> Result<Vec<Statement>> {
     let find = |start: &str| {
-        let missing = || Failure::new("study witness", format!("no run `{start}`"), "");
+        let missing = || Failure::new("lab witness", format!("there is no run `{start}`"), "");
         rows.iter().find(|row| row.name.starts_with(start)).ok_or_else(missing)
     };
     let (coarse, fine) = (&rows[0], &rows[1]);
-    let (default, more, paper) = (find("default:")?, find("more modes:")?, find("the paper's:")?);
+    let (default, more, paper) = (find("default:")?, find("more modes:")?, find("paper model:")?);
     let full = find("full model, 9 × 2").or_else(|_| find("full model, 3 × 2"))?;
     let two = find("two rows, more modes:")?;
     let [of, left] = [0, 1].map(|which| move |row: &WitnessRow| row.sides[which].unwrap_or(f64::NAN));
     Ok(vec![
         Statement::tested(
-            "The witness balances its energy to rounding that grows through the steps, 1e-6",
+            "The energy balance of the full model closes to accumulated rounding, 1e-6",
             runs.residual < 1e-6,
             format!("{:.0e} of the largest energy", runs.residual),
         ),
         Statement::tested(
-            "Shorter steps bring the witness nearer to its own limit",
+            "The full model converges with shorter steps",
             fine.displacement() < 0.75 * coarse.displacement(),
             format!(
-                "displacements change by {} from four times its step, by {} from twice",
+                "displacements differ by {} with four times the step, by {} with twice the step",
                 percent(coarse.displacement()),
                 percent(fine.displacement())
             ),
         ),
         Statement::tested(
-            "More modes bring the reduced model to the full one with the same patches, as near as the witness knows itself",
+            "With more modes, the reduced model converges to the full model with the same patches, within the step \
+             error of the full model",
             more.displacement() < default.displacement() && more.displacement() < 1.5 * fine.displacement(),
-            format!("displacements {} away, {} before", percent(more.displacement()), percent(default.displacement())),
+            format!("displacements differ by {}, with fewer modes by {}", percent(more.displacement()),
+                percent(default.displacement())),
         ),
         Statement::tested(
-            "Two rows of patches, which stand at the sides of the tip, are contact at its sides: the impulse is three times as near as with one, or more",
+            "Two rows of patches at the sides of the tip represent contact at its sides: the impulse error is less \
+             than a third of that with one row",
             3.0 * left(two) < left(default) && 3.0 * left(full) < left(default) && of(two) < of(default),
             format!(
-                "impulse {} away with one row, {} with two, the full model with two {}; displacements {} and {}",
+                "impulse error {} with one row, {} with two rows, {} for the full model with two rows; displacement \
+                 error {} and {}",
                 percent(left(default)),
                 percent(left(two)),
                 percent(left(full)),
@@ -481,10 +490,10 @@ fn statements(rows: &[WitnessRow], runs: &WitnessRuns) -> Result<Vec<Statement>>
             ),
         ),
         Statement::tested(
-            "The default model is nearer to the full one with contact at the sides than the paper's",
+            "The default model is closer to the full model with contact at the sides than the paper's model",
             of(default) < of(paper),
             format!(
-                "displacements {}, impulse {}, friction work {}; the paper's displacements {}",
+                "errors of displacements {}, impulse {}, friction work {}; displacements of the paper's model {}",
                 percent(of(default)),
                 percent(default.sides[1].unwrap_or(f64::NAN)),
                 percent(default.sides[2].unwrap_or(f64::NAN)),
@@ -517,7 +526,7 @@ fn results(rows: &[WitnessRow], runs: &WitnessRuns) -> Value {
 pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study> {
     let setting = WitnessScene::new(arguments.quick)?;
     let size = setting.size;
-    let task = console.task("The full blade rubs", Some(size.witnesses().len() as u64));
+    let task = console.task("Full model of the blade", Some(size.witnesses().len() as u64));
     // The longest first.
     let mut asked = size.witnesses();
     asked.sort_by_key(|(_, division)| std::cmp::Reverse(*division));
@@ -534,21 +543,22 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let MeshCounts { chord, thickness, span } = size.mesh;
     Ok(Study {
         name: "witness",
-        title: "Reduced blades against full finite elements".into(),
+        title: "Reduced blades compared with full finite elements".into(),
         summary: format!(
-            "One blade of rotor 37, without damping, passes bumps of its casing. The witness is the whole finite-element model, {} \
-             degrees of freedom, without any reduction, stepped implicitly with contact of its own.{}",
+            "One blade of rotor 37, without damping, passes bumps of its casing. The reference is the full \
+             finite-element model with {} degrees of freedom, integrated implicitly with an independent contact \
+             algorithm.{}",
             setting.full.order(),
-            if arguments.quick { " Quick form: a coarse mesh and one touch." } else { "" }
+            if arguments.quick { " Quick form: a coarse mesh and one contact." } else { "" }
         ),
         facts: vec![
             ("mesh".into(), format!("{chord} × {thickness} × {span} quadratic bricks")),
             ("window".into(), format!("{:.2} ms", 1e3 * INTERVAL * size.samples as f64)),
-            ("turned by".into(), format!("{:.2} turns", 1800.0 * INTERVAL * size.samples as f64 / TAU)),
+            ("rotation".into(), format!("{:.2} turns", 1800.0 * INTERVAL * size.samples as f64 / TAU)),
         ],
         statements: statements(&rows, &runs)?,
         figures: vec![figure(&runs, size)?],
         results: results(&rows, &runs),
-        files: vec![("witness.md".into(), "the tables of the guide".into(), tables(&rows).into_bytes())],
+        files: vec![("witness.md".into(), "tables for the guide".into(), tables(&rows).into_bytes())],
     })
 }

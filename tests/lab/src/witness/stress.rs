@@ -109,7 +109,7 @@ impl WitnessScene {
 
     /// Names of the places, and the full model's gauges there.
     fn gauges(&self, rom: &Rom) -> Result<(Vec<String>, Vec<Gauge>)> {
-        let missing = || Failure::new("lab stress", "the reduced model has no places of stress", "");
+        let missing = || Failure::new("lab stress", "the reduced model has no stress points", "");
         let mesh = &self.blade.mesh;
         let mut gauges = Vec::new();
         let points = &rom.extras.stress.as_ref().ok_or_else(missing)?.points;
@@ -119,7 +119,8 @@ impl WitnessScene {
             let off = |node: &[f64; 3]| (0..3).map(|i| (node[i] - place[i]).powi(2)).sum::<f64>();
             let all = mesh.nodes.iter().enumerate();
             let node = all.min_by(|a, b| off(a.1).total_cmp(&off(b.1))).map_or(0, |(node, _)| node);
-            gauges.push(Gauge::at(mesh, &self.material, node).map_err(|error| failure("a gauge of the blade", error))?);
+            gauges.push(Gauge::at(mesh, &self.material, node).map_err(|error| failure("stress gauge of the blade",
+                error))?);
         }
         Ok((points.iter().map(|point| point.name.clone()).collect(), gauges))
     }
@@ -146,9 +147,9 @@ impl WitnessScene {
 
     /// Stress of the same forces at rest, ROM against full model: difference beside the largest.
     fn at_rest(&self, rom: &Rom, gauges: &[Gauge], touching: Touching) -> Result<f64> {
-        let told = |error| failure("the blade at rest", error);
+        let told = |error| failure("blade at rest", error);
         let solve = || rom.stiffness.clone().cholesky();
-        let held = solve().ok_or_else(|| Failure::new("lab stress", "the reduced model is not held", ""))?;
+        let held = solve().ok_or_else(|| Failure::new("lab stress", "the reduced model is not constrained", ""))?;
         let stress = rom.extras.stress.as_ref().map(|stress| stress.map.clone()).unwrap_or_default();
         let (mut off, mut largest) = (0.0_f64, 0.0_f64);
         for (index, point) in self.contact(touching)?.iter().enumerate() {
@@ -266,7 +267,7 @@ impl StressResult {
             (format!("{modes} modes"), Some(forced.apart(witness)), rubbed)
         });
         let (modes, told) = &self.ships;
-        let ships = (format!("{modes} modes, by the tolerance that ships"), None, Some(told.apart(witness)));
+        let ships = (format!("{modes} modes, default tolerance"), None, Some(told.apart(witness)));
         own.chain(reduced).chain([ships]).collect()
     }
 }
@@ -281,13 +282,13 @@ fn find(setting: &WitnessScene, quick: bool, console: &Console) -> Result<Stress
     let heights = setting.heights(&roms[0]);
     let rest = setting.at_rest(&roms[0], &gauges, touching)?;
     let divisions = divisions(quick);
-    let task = console.task("The full blade rubs", Some(divisions.len() as u64));
+    let task = console.task("Full model of the blade", Some(divisions.len() as u64));
     let march = |division: &u32| setting.run_full(touching, *division, &gauges).map(StressHistory::full);
     let mut full = sweep::sweep(divisions, sweep::processors(), march, |done| task.at(done as u64))?;
     let forces = full.last_mut().map(|(_, forces)| std::mem::take(forces)).unwrap_or_default();
     let full = divisions.iter().copied().zip(full.into_iter().map(|(told, _)| told)).collect();
     let finest = divisions[divisions.len() - 1];
-    let task = console.task("Reduced blades rub", Some(roms.len() as u64));
+    let task = console.task("Reduced models of the blade", Some(roms.len() as u64));
     let all: Vec<(usize, Rom)> = counts(quick).iter().copied().zip(roms).collect();
     let rub = |(modes, rom): &(usize, Rom)| {
         let forced = pushed(rom, &forces, finest)?;
@@ -303,20 +304,21 @@ fn find(setting: &WitnessScene, quick: bool, console: &Console) -> Result<Stress
 fn tables(found: &StressResult) -> String {
     let rows = found.rows();
     let head = "displacements | stress | largest von Mises | at the worst place |\n|---|---|---|---|---|\n";
-    let mut text = format!("| the full model's forces | {head}");
+    let mut text = format!("| with the forces of the full model | {head}");
     for (name, forced, _) in rows.iter().filter(|row| row.1.is_some()) {
         text.push_str(&format!("| {name} | {} |\n", forced.map(Apart::cells).unwrap_or_default()));
     }
-    text.push_str(&format!("\n| a rub of its own | {head}"));
+    text.push_str(&format!("\n| with its own contact forces | {head}"));
     for (name, forced, rubbed) in &rows {
         match rubbed {
             Some(apart) => text.push_str(&format!("| {name} | {} |\n", apart.cells())),
-            None if forced.is_some() => text.push_str(&format!("| {name}: refused |  |  |  |  |\n")),
+            None if forced.is_some() => text.push_str(&format!("| {name}: rejected |  |  |  |  |\n")),
             None => {}
         }
     }
     text.push_str(
-        "\n| place | height | largest von Mises: full model (MPa) | what ships (MPa) | stress: what ships | halving the full model's steps |\n\
+        "\n| place | height | largest von Mises: full model (MPa) | default model (MPa) | stress error: default model \
+         | full model, steps twice as long |\n\
          |---|---|---|---|---|---|\n",
     );
     let (full, ships) = (found.witness().largest(), found.ships.1.largest());
@@ -339,7 +341,7 @@ fn figure(found: &StressResult) -> Result<StudyFigure> {
     let largest = found.witness().largest();
     let most = (0..largest.len()).max_by(|a, b| largest[*a].total_cmp(&largest[*b])).unwrap_or_default();
     let few = found.reduced.iter().find_map(|(modes, _, rubbed)| Some((*modes, rubbed.as_ref().ok()?)));
-    let mut shown = vec![("full model".to_owned(), found.witness()), ("what ships".to_owned(), &found.ships.1)];
+    let mut shown = vec![("full model".to_owned(), found.witness()), ("default model".to_owned(), &found.ships.1)];
     shown.extend(few.map(|(modes, told)| (format!("{modes} modes"), told)));
     let time = |sample: usize| 1e3 * (sample + 1) as f64 * INTERVAL;
     let line = |told: &StressHistory| -> Vec<(f64, f64)> {
@@ -355,10 +357,10 @@ fn figure(found: &StressResult) -> Result<StudyFigure> {
     Ok(StudyFigure {
         name: "von-mises",
         caption: format!(
-            "Von Mises at `{}`, the place that has most, while the blade passes the bumps.",
+            "Von Mises stress at `{}`, the place with the largest stress, while the blade passes the bumps.",
             found.names[most]
         ),
-        picture: Picture::plot(&Plot::new("time (ms)", "von Mises (MPa)", series))?,
+        picture: Picture::plot(&Plot::new("time (ms)", "von Mises stress (MPa)", series))?,
         sheet,
     })
 }
@@ -372,28 +374,31 @@ fn statements(found: &StressResult) -> Vec<Statement> {
     let most = found.reduced.last().and_then(|(_, _, rubbed)| rubbed.as_ref().ok()).map(|told| told.apart(witness));
     vec![
         Statement::tested(
-            "Stress of forces at rest is the full model's with the fewest modes, to 1e-6",
+            "With the fewest modes, the static stress agrees with that of the full model to 1e-6",
             found.rest < 1e-6,
             format!("{:.0e} of the largest with {} modes", found.rest, found.reduced[0].0),
         ),
         Statement::tested(
-            "Under the full model's contact forces stress converges with the number of modes: to an eighth of what the fewest leave",
+            "Under the contact forces of the full model, the stress error decreases with the number of modes, to an \
+             eighth of that with the fewest",
             last.stresses < 0.125 * first.stresses && apart.windows(2).all(|pair| pair[1].stresses < pair[0].stresses),
             apart.iter().map(|one| percent(one.stresses)).collect::<Vec<_>>().join(", "),
         ),
         Statement::tested(
-            "In a rub of its own the model with most modes is as near as the witness knows itself, twice what halving its steps changes",
+            "With its own contact forces, the model with the most modes differs from the full model by at most twice \
+             the change due to halving the steps of the full model",
             most.is_some_and(|most| most.stresses < 2.0 * coarser.stresses),
             format!(
-                "stress {}, halving changes {}",
-                most.map_or_else(|| "refused".to_owned(), |most| percent(most.stresses)),
+                "stress error {}, change due to halving {}",
+                most.map_or_else(|| "rejected".to_owned(), |most| percent(most.stresses)),
                 percent(coarser.stresses)
             ),
         ),
         Statement::tested(
-            "What ships tells the largest von Mises of the rub within 5 %",
+            "The default model gives the largest von Mises stress of the rub within 5 %",
             ships.most < 0.05,
-            format!("{} at the place that has most, {} at the worst", percent(ships.most), percent(ships.worst)),
+            format!("{} at the place with the largest stress, {} at the worst place", percent(ships.most),
+                percent(ships.worst)),
         ),
     ]
 }
@@ -415,13 +420,14 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
     let largest = json!({ "full": found.witness().largest(), "ships": found.ships.1.largest() });
     Ok(Study {
         name: "stress",
-        title: "Stress of reduced blades against full finite elements".into(),
+        title: "Stress of reduced blades compared with full finite elements".into(),
         summary: format!(
-            "One blade of rotor 37, without damping, passes bumps of its casing with its tip in two rows of patches. The witness is the whole \
-             finite-element model, {} degrees of freedom, with steps, contact and stress of its own. Compared where six modes have their \
-             largest stress.{}",
+            "One blade of rotor 37, without damping, passes bumps of its casing with two rows of contact patches at \
+             its tip. The reference is the full finite-element model with {} degrees of freedom and independent time \
+             integration, contact and stress recovery. Stresses are compared where six modes have their largest \
+             stress.{}",
             setting.full.order(),
-            if arguments.quick { " Quick form: a coarse mesh and one touch." } else { "" }
+            if arguments.quick { " Quick form: a coarse mesh and one contact." } else { "" }
         ),
         facts: vec![("places".into(), found.names.join(", "))],
         statements: statements(&found),
@@ -430,6 +436,6 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
             "runs": rows.collect::<Vec<_>>(), "refused": refused.collect::<Vec<_>>(), "rest": found.rest,
             "largest_von_mises": largest,
         }),
-        files: vec![("stress.md".into(), "the tables of the guide".into(), tables(&found).into_bytes())],
+        files: vec![("stress.md".into(), "tables for the guide".into(), tables(&found).into_bytes())],
     })
 }

@@ -138,12 +138,13 @@ impl CyclicModel {
                     return Err(Error::invalid(
                         "ROM harmonics",
                         format!(
-                            "nodal diameter {} has a mode of {} Hz where the checks of the ROM tell {} Hz",
+                            "nodal diameter {} has a mode at {} Hz, but the checks stored in the ROM give {} Hz",
                             diameter.nodal_diameter,
                             shown(found),
                             shown(*told)
                         ),
-                        "Write the harmonics in the order of the nodal diameters, or the ROM again with `tiprub reduce`",
+                        "Store the harmonics in the order of their nodal diameters, or regenerate the ROM with `tiprub \
+                         reduce`",
                     ));
                 }
             }
@@ -226,7 +227,7 @@ fn hermitian_modes(harmonic: &Harmonic, suffix: &str) -> Result<(Vec<f64>, DMatr
     }
     let Some(lower) = cholesky(mass) else {
         let what = format!("ROM array `mass{suffix}`");
-        return Err(Error::invalid(what, "not positive definite", "Write the ROM again"));
+        return Err(Error::invalid(what, "not positive definite", "Regenerate the ROM"));
     };
     let half = lower.solve_lower_triangular(stiffness).unwrap_or_else(|| stiffness.clone());
     let full = lower.solve_lower_triangular(&half.adjoint()).unwrap_or(half);

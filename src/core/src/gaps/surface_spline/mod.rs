@@ -197,15 +197,17 @@ impl SurfaceSpline {
 
     fn check(&self, data: &[[f64; 3]]) -> Result<()> {
         let refuse = |what: String, problem: String| {
-            let remedy = "Give rings of growing z, each with points at angles growing by 2π/around about z";
+            let remedy = "Give rings in order of increasing z, each with points at angles about z that increase by \
+                          2π/around";
             Err(Error::invalid(what, problem, remedy))
         };
         if data.len() != self.around * self.along {
-            let problem = format!("{} data points for {} x {}", data.len(), self.around, self.along);
+            let problem = format!("{} data points for a grid of {} x {} points", data.len(), self.around, self.along);
             return refuse("surface spline".into(), problem);
         }
         if let Some(index) = data.iter().position(|point| point.iter().any(|value| !value.is_finite())) {
-            return refuse(format!("surface spline, data point {}", index + 1), format!("{:?} m", data[index]));
+            let problem = format!("{:?} m is not finite", data[index]);
+            return refuse(format!("surface spline, data point {}", index + 1), problem);
         }
         if self.ends == Ends::Open {
             return Ok(());
@@ -217,13 +219,14 @@ impl SurfaceSpline {
             let turns = (libm::atan2(point[1], point[0]) - expected) / std::f64::consts::TAU;
             let off = (turns - libm::round(turns)).abs() * std::f64::consts::TAU;
             if off > 0.25 * spacing || (point[0] == 0.0 && point[1] == 0.0) {
-                let problem = format!("{point:?} m is {off:.3e} rad from its place in the ring");
+                let problem = format!("{point:?} m is {off:.3e} rad away from its expected angle in the ring");
                 return refuse(format!("surface spline, data point {}", index + 1), problem);
             }
         }
         let rings = data.chunks(self.around);
         if let Some(ring) = rings.clone().zip(rings.skip(1)).position(|(a, b)| mean_axial(a) >= mean_axial(b)) {
-            return refuse("surface spline".into(), format!("ring {} does not lie beyond ring {}", ring + 2, ring + 1));
+            let problem = format!("ring {} is not at a larger z than ring {}", ring + 2, ring + 1);
+            return refuse("surface spline".into(), problem);
         }
         Ok(())
     }

@@ -139,7 +139,7 @@ impl SurfaceSpline {
         let mut rows = [[[0.0; 4]; 4]; 3];
         for ring in 0..4 {
             let start = (q + ring) * width + p;
-            let window = self.mesh[start..].first_chunk().expect("the mesh has three columns more than patches");
+            let window = self.mesh[start..].first_chunk().expect("the mesh has three more columns than patches");
             for order in 0..orders {
                 rows[order][ring] = combine(&around[order], window);
             }

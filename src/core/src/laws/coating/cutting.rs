@@ -107,7 +107,7 @@ impl CoatingCut {
             let mut edge = Edge::default();
             edge.restore(&mut bytes);
             if edge.cell > cells as u64 || edge.ahead < 0.0 || edge.sense.abs() > 1.0 {
-                reader.refuse("its blades cut where no coating is");
+                reader.refuse("a blade cuts outside the coating");
             }
         }
     }

@@ -402,12 +402,12 @@ fn what_cannot_be_a_coating_is_refused() {
     refused(made(&[], 1), "0 contact nodes");
     refused(made(&[0.1, 0.0, 0.1], 1), "nodes 1 and 3 are at the same axial");
     refused(made(&[0.0, 1.0], 5), "8 x 2 cells for 5 blades");
-    refused(made(&[0.0, f64::NAN], 1), "m along the axis");
+    refused(made(&[0.0, f64::NAN], 1), "over an axial length of");
     let as_wide = |cells: f64, blades: usize| {
         Coating::new(&settings, &BladeTip::new(&[0.0, 1.0], &[1.0; 2], cells * TAU / 8.0), blades)
     };
     assert!(as_wide(2.999, 2).is_ok());
-    refused(as_wide(3.001, 2), "the tip is as wide as 3.001 cells, of 8 that 2 blades share");
-    refused(as_wide(f64::INFINITY, 1), "as wide as inf cells");
-    refused(as_wide(f64::NAN, 1), "as wide as NaN cells");
+    refused(as_wide(3.001, 2), "the tip covers 3.001 cells, but the 2 blades share only 8");
+    refused(as_wide(f64::INFINITY, 1), "the tip covers inf cells");
+    refused(as_wide(f64::NAN, 1), "the tip covers NaN cells");
 }

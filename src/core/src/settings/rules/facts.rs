@@ -41,8 +41,8 @@ pub(super) const INITIAL: Fact = fact("structure.initial", "", |at| !at.structur
 pub(super) const INITIAL_SECTOR: Fact =
     fact("structure.initial.sector", "", |at| at.structure().initial.iter().any(|one| one.sector.is_some()));
 pub(super) const ROM_AROUND: Fact =
-    fact("structure.rom", "around an axis", |at| at.meets(|motion| motion != BodyMotion::Free));
-pub(super) const ROM_FREE: Fact = fact("structure.rom", "of a free structure, or of what it meets", |at| {
+    fact("structure.rom", "a structure around an axis", |at| at.meets(|motion| motion != BodyMotion::Free));
+pub(super) const ROM_FREE: Fact = fact("structure.rom", "a free structure or one that it meets", |at| {
     at.meets(|motion| motion == BodyMotion::Free)
 });
 
@@ -51,9 +51,9 @@ pub(super) const MOVING: Fact = fact("surface.moving", "", |at| at.surface().mov
 pub(super) const RAMP_TIME: Fact = fact("surface.ramp_time", "", |at| at.surface().ramp_time != 0.0);
 pub(super) const CARRIED: Fact = fact("surface.structure", "", |at| at.surface().structure.is_some());
 pub(super) const CARRIED_AROUND: Fact =
-    fact("surface.structure", "around an axis", |at| at.surface().structure.is_some() && !at.is_free());
+    fact("surface.structure", "a surface around an axis", |at| at.surface().structure.is_some() && !at.is_free());
 pub(super) const CARRIED_OPEN: Fact =
-    fact("surface.structure", "under a free master", |at| at.surface().structure.is_some() && at.is_free());
+    fact("surface.structure", "the surface of a free master", |at| at.surface().structure.is_some() && at.is_free());
 pub(super) const RIGID: Fact = fact("surface.rigid", "", |at| at.surface().rigid);
 pub(super) const PATCHES: Fact = fact("surface.patches", "", |at| at.surface().patches.is_some());
 pub(super) const CLOSURE: Fact = fact("surface.spline.closure", "", |at| {
@@ -68,7 +68,7 @@ pub(super) const SECTOR_GAPS: Fact = fact("contact.sector_gaps", "", |at| !at.co
 pub(super) const MERIDIAN: Fact = fact("contact.meridian", "", |at| at.contact().meridian != Meridian::default());
 pub(super) const COATING: Fact = fact("contact.coating", "", |at| at.is_coated());
 pub(super) const PLASTIC_COATING: Fact =
-    fact("contact.coating", "without `cutting`", |at| at.is_coated() && !at.is_cut());
+    fact("contact.coating", "a coating without `cutting`", |at| at.is_coated() && !at.is_cut());
 pub(super) const CONTACT_WIDTH: Fact = fact("contact.coating.contact_width", "", |at| {
     at.contact().coating.is_some_and(|coating| coating.contact_width.is_some())
 });
@@ -82,9 +82,10 @@ pub(super) const FILM: Fact = fact("contact.solver", "`film`", |at| at.solver ==
 pub(super) const COULOMB: Fact = fact("contact.solver", "`coulomb`", |at| at.solver == Solver::Coulomb);
 
 pub(super) const OTHER_SOLVER: Fact =
-    fact("contact.solver", "other than `film`", |at| at.contact().solver != Solver::Film);
-pub(super) const OTHER_SCHEME: Fact =
-    fact("time.scheme", "other than `central-difference`", |at| at.settings.time.scheme != Scheme::CentralDifference);
+    fact("contact.solver", "a solver other than `film`", |at| at.contact().solver != Solver::Film);
+pub(super) const OTHER_SCHEME: Fact = fact("time.scheme", "a scheme other than `central-difference`", |at| {
+    at.settings.time.scheme != Scheme::CentralDifference
+});
 pub(super) const MASSLESS: Fact =
     fact("time.scheme", "`massless-boundary`", |at| at.scheme == Scheme::MasslessBoundary);
 pub(super) const GALERKIN: Fact = fact("time.scheme", "`galerkin`", |at| at.scheme == Scheme::Galerkin);
@@ -92,15 +93,16 @@ pub(super) const QUASI_STATIC: Fact =
     fact("time.scheme", "`massless-boundary` or `galerkin`", |at| at.scheme.is_massless());
 pub(super) const INTERPOLATION: Fact =
     fact("time.input_interpolation", "", |at| at.settings.time.input_interpolation != InputInterpolation::default());
-pub(super) const OTHER_SECTORS: Fact =
-    fact("outputs.watched_sectors", "beyond 1", |at| at.outputs().watched_sectors.iter().any(|sector| *sector != 1));
+pub(super) const OTHER_SECTORS: Fact = fact("outputs.watched_sectors", "a sector other than 1", |at| {
+    at.outputs().watched_sectors.iter().any(|sector| *sector != 1)
+});
 pub(super) const ALL_SECTORS: Fact = fact("outputs.all_sectors", "", |at| at.outputs().all_sectors);
 pub(super) const DIAMETERS: Fact = fact("outputs.nodal_diameters", "", |at| at.outputs().nodal_diameters.is_some());
 pub(super) const STRESS: Fact = fact("outputs.stress", "", |at| at.outputs().stress);
-pub(super) const HEATED_STRESS: Fact = fact("outputs.stress", "with `structure.thermal` of a rotor", |at| {
+pub(super) const HEATED_STRESS: Fact = fact("outputs.stress", "stress of a rotor with `structure.thermal`", |at| {
     at.outputs().stress && at.stressed(|own| own.thermal).next().is_some()
 });
-pub(super) const GROWN_STRESS: Fact = fact("outputs.stress", "with `structure.spin.growth`", |at| {
+pub(super) const GROWN_STRESS: Fact = fact("outputs.stress", "stress of a rotor with `structure.spin.growth`", |at| {
     at.outputs().stress && at.stressed(|own| own.spin.growth).next().is_some()
 });
 pub(super) const MODES: Fact = fact("outputs.modal_amplitudes", "", |at| at.outputs().modal_amplitudes.is_some());

@@ -169,7 +169,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
     ("contact[1].heat_to_slave: needs `contact.friction`", |scene| {
         (scene.settings.contacts[0].friction, scene.settings.contacts[0].heat_to_slave) = (0.0, Some(0.5));
     }),
-    ("contact[2].coating: excludes contacts solved together", |scene| {
+    ("contact[2].coating: excludes a contact that is solved together", |scene| {
         second(&mut scene.settings);
         scene.settings.contacts[1].coating = coating();
     }),
@@ -187,7 +187,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.surfaces[0].structure = None;
         scene.settings.outputs.support_reaction = true;
     }),
-    ("outputs.support_reaction: needs rows of the support", |scene| {
+    ("outputs.support_reaction: needs support rows", |scene| {
         scene.settings.outputs.support_reaction = true;
     }),
     ("time.scheme: `galerkin` excludes `outputs.support_reaction`", |scene| {
@@ -199,7 +199,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.outputs.modal_amplitudes = Some(1);
         couple(&mut scene.roms[0]);
     }),
-    ("contact[2].solver: needs that of contact[1]", |scene| {
+    ("contact[2].solver: needs the solver of contact[1]", |scene| {
         second(&mut scene.settings);
         scene.settings.contacts[1].solver = Solver::Film;
     }),
@@ -208,16 +208,16 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.outputs.stress = true;
         scene.settings.outputs.watched_sectors.clear();
     }),
-    ("outputs.stress: needs places of stress in the ROM of a rotor", |scene| {
+    ("outputs.stress: needs stress points in the ROM of a rotor", |scene| {
         scene.settings.outputs.stress = true;
     }),
-    ("outputs.stress: with `structure.thermal` of a rotor needs static thermal stress", |scene| {
+    ("outputs.stress: stress of a rotor with `structure.thermal` needs static thermal stress", |scene| {
         stressed(scene);
         let patches = vec![ThermalPatch { angle: [0.0, 1.0], axial: [0.0, 1.0] }];
         scene.roms[0].extras.thermal = Some(Thermal { loads: DMatrix::zeros(4, 1), patches });
         scene.settings.structures[0].thermal = true;
     }),
-    ("outputs.stress: with `structure.spin.growth` needs static centrifugal stress", |scene| {
+    ("outputs.stress: stress of a rotor with `structure.spin.growth` needs static centrifugal stress", |scene| {
         stressed(scene);
         let none = DMatrix::zeros(4, 4);
         scene.roms[0].extras.spin = Some(Spin {
@@ -245,11 +245,11 @@ const OF_ROTORS: &[(&str, Change)] = &[
         second(&mut scene.settings);
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
-    ("time.scheme: other than `central-difference` excludes `preset = \"paper\"`", |scene| {
+    ("time.scheme: a scheme other than `central-difference` excludes `preset = \"paper\"`", |scene| {
         scene.settings.preset = Preset::Paper;
         scene.settings.contacts[0].solver = Solver::Film;
     }),
-    ("contact[1].solver: other than `film` excludes `preset = \"paper\"`", |scene| {
+    ("contact[1].solver: a solver other than `film` excludes `preset = \"paper\"`", |scene| {
         scene.settings.preset = Preset::Paper;
         scene.settings.time.scheme = Scheme::CentralDifference;
     }),
@@ -277,7 +277,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.settings.time.scheme = Scheme::MasslessBoundary;
         scene.roms[0].mass = DMatrix::identity(3, 3);
     }),
-    ("structure[1].rom: around an axis needs `frame = cylindrical`", |scene| {
+    ("structure[1].rom: a structure around an axis needs `frame = cylindrical`", |scene| {
         scene.roms[0].frame = DisplacementFrame::Cartesian
     }),
     ("structure[1].spin.growth: needs spin matrices", |scene| scene.settings.structures[0].spin.growth = true),
@@ -286,11 +286,11 @@ const OF_ROTORS: &[(&str, Change)] = &[
         couple(&mut scene.roms[0]);
     }),
     ("structure[2].thermal: needs thermal loads", |scene| scene.settings.structures[1].thermal = true),
-    ("contact[1].coating: without `cutting` needs `contact.coating.contact_width`, or contact patches", |scene| {
+    ("contact[1].coating: a coating without `cutting` needs `contact.coating.contact_width`", |scene| {
         scene.settings.contacts[0].coating =
             coating().map(|coating| CoatingSettings { contact_width: None, ..coating });
     }),
-    ("contact[1].coating: excludes a ROM whose contact patches are in rows", |scene| {
+    ("contact[1].coating: excludes a ROM with several rows of contact patches", |scene| {
         scene.settings.contacts[0].coating = coating();
         scene.roms[0].extras.rows = Some(2);
     }),
@@ -299,7 +299,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
         scene.roms[1].extras.grid = None;
     }),
     ("surface[1].structure: excludes a structure whose sectors", |scene| couple(&mut scene.roms[1])),
-    ("surface[1].structure: around an axis needs a contact grid", |scene| scene.roms[1].extras.grid = None),
+    ("surface[1].structure: a surface around an axis needs a contact grid", |scene| scene.roms[1].extras.grid = None),
 ];
 
 /// The same of a scene with a free master.
@@ -310,26 +310,26 @@ const OF_FREE_MASTERS: &[(&str, Change)] = &[
     ("contact[1].master: a free structure needs `surface.structure`", |scene| {
         scene.settings.surfaces[0].structure = None;
     }),
-    ("outputs.casing_forces: excludes a scene of free masters only", |scene| {
+    ("outputs.casing_forces: excludes a scene with free masters only", |scene| {
         scene.settings.outputs.casing_forces = true;
     }),
-    ("outputs.all_sectors: excludes a scene of free masters only", |scene| scene.settings.outputs.all_sectors = true),
+    ("outputs.all_sectors: excludes a scene with free masters only", |scene| scene.settings.outputs.all_sectors = true),
     ("outputs.slave_displacement: needs `surface.structure` of a surface around an axis", |scene| {
         scene.settings.outputs.slave_displacement = true;
     }),
-    ("time.input_interpolation: excludes a scene of free masters only", |scene| {
+    ("time.input_interpolation: excludes a scene with free masters only", |scene| {
         scene.settings.time.input_interpolation = InputInterpolation::Hold;
     }),
     ("time.scheme: `massless-boundary` excludes a free master", |scene| {
         scene.settings.time.scheme = Scheme::MasslessBoundary;
     }),
-    ("structure[2].rom: of a free structure, or of what it meets needs `frame = cartesian`", |scene| {
+    ("structure[2].rom: a free structure or one that it meets needs `frame = cartesian`", |scene| {
         scene.roms[1].frame = DisplacementFrame::Cylindrical;
     }),
-    ("structure[1].rom: of a free structure, or of what it meets needs `sectors = 1`", |scene| {
+    ("structure[1].rom: a free structure or one that it meets needs `sectors = 1`", |scene| {
         scene.roms[0].sectors = 2;
     }),
-    ("surface[1].structure: under a free master needs an open contact grid", |scene| {
+    ("surface[1].structure: the surface of a free master needs an open contact grid", |scene| {
         scene.roms[1].extras.grid = Some(ContactGrid { around: 8, along: 2, closed: true });
     }),
 ];

@@ -32,9 +32,9 @@ impl SceneSettings {
             if count != 1 {
                 return Err(Error::invalid(
                     format!("surface[{}].name", index + 1),
-                    format!("`{}` is named by {count} contacts; a surface belongs to one pair", surface.name),
-                    "Name it in one [[contact]], or remove it: another pair takes a [[surface]] of its own, on the same structure if \
-                     it has one",
+                    format!("`{}` is named by {count} contacts, but a surface belongs to exactly one", surface.name),
+                    "Name it in exactly one [[contact]], or remove it; give each further contact a separate \
+                     [[surface]], which may be on the same structure",
                 ));
             }
         }
@@ -49,12 +49,12 @@ impl StructureSettings {
         match part {
             [false, false] if self.motion == BodyMotion::Free => Err(Error::invalid(
                 format!("{at}.motion"),
-                format!("`{name}` flies freely and is the master of no contact"),
+                format!("the free structure `{name}` is not the master of any contact"),
                 "Make it the master of a [[contact]], or remove it",
             )),
             [false, false] => {
                 let remedy = "Make it the `master` of a [[contact]] or the `structure` of a [[surface]], or remove it";
-                Err(Error::invalid(what, format!("`{name}` takes no part in any contact"), remedy))
+                Err(Error::invalid(what, format!("`{name}` is not part of any contact"), remedy))
             }
             _ => Ok(()),
         }

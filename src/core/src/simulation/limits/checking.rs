@@ -188,12 +188,14 @@ impl<'a> Checking<'a> {
         // No step of galerkin adds growth: what there may be is of the equations, and stays whatever the step.
         let remedy = match self.parameters.scheme {
             Scheme::Galerkin => "Check a ROM with fewer modes for flutter and self-locking",
-            _ => "Halve the internal step and compare",
+            _ => "Halve the internal step and compare the results",
         };
         (self.friction != 0.0 && modes > stability::GROWTH_UP_TO).then(|| {
             let most = stability::GROWTH_UP_TO;
-            let problem =
-                format!("growth of closed, sliding contact is not checked with {modes} modes, only up to {most}");
+            let problem = format!(
+                "growth of closed, sliding contact is not checked: the model has {modes} modes, and the check supports \
+                 only {most}"
+            );
             Warning::new(Topic::GrowthUnchecked, problem, remedy)
         })
     }
@@ -218,15 +220,16 @@ impl<'a> Checking<'a> {
         let kilohertz = 1e-3 * frequency / std::f64::consts::TAU;
         // What grows without turning round within its growth is no vibration.
         let motion = if frequency < 1e-3 * rate {
-            "bending one way".to_owned()
+            "deflection in one direction".to_owned()
         } else {
             format!("vibration at {kilohertz:.4} kHz")
         };
         let problem = format!(
-            "cutting is physically unstable: with all contact nodes of a blade in fresh coating {motion} grows by {rate:.2e} 1/s"
+            "cutting is physically unstable: with all contact nodes of a blade in fresh coating, {motion} grows by \
+             {rate:.2e} 1/s"
         );
-        let remedy = "No shorter step helps: use a larger `normal_ratio`, a smaller `specific_energy` or more damping, or let \
-                      the blades leave the coating sooner";
+        let remedy = "Use a larger `normal_ratio`, a smaller `specific_energy` or more damping, or let the blades \
+                      leave the coating sooner; a shorter step does not help";
         Some(Warning::new(Topic::CuttingGrowth, problem, remedy))
     }
 
@@ -255,12 +258,13 @@ impl<'a> Checking<'a> {
             }
             (worst < -1e-9).then(|| {
                 let problem = format!(
-                    "with µ = {friction} and an internal step of {step:.3e} s the casing's part of the Delassus matrix is not \
-                     positive semidefinite (lowest eigenvalue {worst:.2e} of the largest, at θ = {at:.2} rad)",
+                    "with µ = {friction} and an internal step of {step:.3e} s, the contribution of the casing to the \
+                     Delassus matrix is not positive semidefinite (lowest eigenvalue {worst:.2e} times the largest, at \
+                     θ = {at:.2} rad)",
                     friction = shown(self.friction)
                 );
-                let remedy = "Where the blades add less flexibility than that, a step may have no unique solution and ends the run; \
-                              less friction avoids it";
+                let remedy = "Use less friction: where the blades add less flexibility than that, a step may have no \
+                              unique solution, which ends the run";
                 Warning::new(Topic::CasingSolvability, problem, remedy)
             })
         };
@@ -307,11 +311,12 @@ impl<'a> Checking<'a> {
         let (master, slave) = worst;
         if master + sectors * slave >= 4.0 {
             let problem = format!(
-                "massless-boundary is shown stable for up to {:.0} blades in contact with the casing at once, not for all \
-                 {sectors}",
+                "massless-boundary is proven stable for up to {:.0} blades in simultaneous contact with the casing, \
+                 not for all {sectors}",
                 ((4.0 - master) / slave).floor()
             );
-            warnings.push(Warning::new(Topic::MasslessBlades, problem, "A shorter `time.step` allows more of them"));
+            let remedy = "Use a shorter `time.step` to allow more blades in contact";
+            warnings.push(Warning::new(Topic::MasslessBlades, problem, remedy));
         }
         Ok((warnings, limit))
     }

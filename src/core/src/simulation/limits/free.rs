@@ -76,12 +76,13 @@ impl Compiled {
         let rigid = flexibility.iter().filter(|value| **value <= RIGID * flexibility.max()).count();
         (rigid > 0).then(|| {
             let problem = format!(
-                "with galerkin the {} highest modes follow contact immediately, so that {rigid} of {} directions of the contact nodes have no \
-                 flexibility of their own: contact that needs one of them loses energy, whatever the tolerance",
+                "with galerkin the {} highest modes respond quasi-statically to contact, so {rigid} of {} directions \
+                 of the contact nodes have no independent flexibility: contact that needs one of these directions \
+                 loses energy at any tolerance",
                 model.len() - dynamic,
                 flexibility.len()
             );
-            let remedy = "Use a ROM of the kind free-interface, or fewer contact nodes or patches";
+            let remedy = "Use a free-interface ROM, or fewer contact nodes or patches";
             Warning::new(Topic::RigidContact, problem, remedy).named(self.structure_name(body))
         })
     }
@@ -131,13 +132,13 @@ impl FlightCheck<'_> {
         }
         if worst < ROUNDING {
             let problem = format!(
-                "with µ = {friction} the contact problem cannot be shown to have one solution for all contacts that the flight \
-                 of the undeformed structure leads to (the symmetric part of the Delassus matrix has the eigenvalue \
-                 {worst:.2e} of its diagonal)",
+                "with µ = {friction} the contact problem cannot be shown to have a unique solution for all contacts \
+                 that the undeformed structure meets in free flight (the symmetric part of the Delassus matrix, scaled \
+                 to unit diagonal, has the eigenvalue {worst:.2e})",
                 friction = shown(friction)
             );
             let remedy =
-                "A step whose problem is not solved ends the run; less friction or the solver coulomb avoids that";
+                "Use less friction or the solver coulomb; a step whose contact problem is not solved ends the run";
             warnings.push(Warning::new(Topic::FlightSolvability, problem, remedy));
         }
         Ok(warnings)
@@ -167,8 +168,8 @@ impl FlightCheck<'_> {
             let node = self.compiled.node_name(self.body, met.nodes[jammed]);
             return Err(Error::Unstable {
                 problem: format!(
-                    "with friction_coefficient µ = {friction} and an internal step of {step:.3e} s the contact of {node} alone has \
-                     no unique solution on the flight: friction drives it into the surface",
+                    "with friction_coefficient µ = {friction} and an internal step of {step:.3e} s, the contact of \
+                     {node} alone has no unique solution in free flight: friction drives it into the surface",
                     friction = shown(friction)
                 ),
                 remedy: "Use less friction, another internal step, or the solver coulomb".to_owned(),

@@ -77,7 +77,9 @@ impl Sense {
         self.grows.iter().map(move |warning| match warning.topic() {
             Topic::Flutter if opens_before => warning
                 .clone()
-                .with_remedy(format!("Contact opens after {closed:.2e} s at most, before that matters: nothing to do"))
+                .with_remedy(format!(
+                    "No action is needed: contact opens after at most {closed:.2e} s, before the growth matters"
+                ))
                 .at_level(Severity::Note),
             _ => warning.clone(),
         })
@@ -289,22 +291,24 @@ impl Checking<'_> {
                 rate => format!(", at {rate:.2e} 1/s and 0 Hz"),
             };
             let contact = self.contact(nodes, sign);
-            let remedy = "Use less friction, a casing that gives way, or a coating";
+            let remedy = "Use less friction, a more compliant casing, or a coating";
             Warning::new(Topic::LockUp, format!("sliding contact locks up above µ* = {least:.3}{rate}: {contact}"), remedy)
                 .with_text(format!(
-                    "sliding contact locks up: above µ* = {least:.3} ({contact}) the tip turns into the casing faster than it yields, \
-                     and its force grows without limit{rate}. This is physics of the model, and no shorter step helps. {remedy}"
+                    "sliding contact locks up: above µ* = {least:.3} ({contact}) the tip is driven into the casing \
+                     faster than the casing yields, and the contact force grows without limit{rate}. This instability \
+                     is a physical property of the model, so a shorter step does not help. {remedy}"
                 ))
         });
         let flutter = physics.flutter.as_ref().map(|Flutter { found, nodes, with_mass, share }| {
             let contact = self.contact(nodes, sign);
             let kilohertz = 1e-3 * found.frequency / std::f64::consts::TAU;
             let problem =
-                format!("contact that stays closed grows by {:.2e} 1/s at {kilohertz:.4} kHz: {contact}", found.rate);
-            let remedy = "No shorter step helps. Use less friction or more damping, or let contact open sooner";
+                format!("vibration in closed contact grows by {:.2e} 1/s at {kilohertz:.4} kHz: {contact}", found.rate);
+            let remedy = "Use less friction or more damping, or let contact open sooner; a shorter step does not help";
             Warning::new(Topic::Flutter, problem, remedy).with_text(format!(
-                "sliding contact is physically unstable (flutter): {contact}, vibration at {kilohertz:.4} kHz grows by {:.2e} 1/s{} and \
-                 moves tips by up to {:.1} % of what contact does. This is physics of the model. {remedy}",
+                "sliding contact is physically unstable (flutter): {contact}, vibration at {kilohertz:.4} kHz grows by \
+                 {:.2e} 1/s{} and displaces the tips by up to {:.1} % of their displacement by contact. This \
+                 instability is a physical property of the model. {remedy}",
                 found.rate,
                 confirmed(found, with_mass.as_ref()),
                 100.0 * share
@@ -316,8 +320,8 @@ impl Checking<'_> {
 
     fn warning(&self, (step, nodes, judged): (f64, &[usize], SetGrowth), silent: Option<f64>, sign: f64) -> Warning {
         let problem = format!(
-            "the step makes sliding contact grow: {} at {:.2e} 1/s with steps of {} s, where the equations have {:.2e} 1/s; that may \
-             displace the tips by {:.0} % of what contact does",
+            "the time step destabilises sliding contact: {}, growing by {:.2e} 1/s in steps of {} s, but by {:.2e} 1/s \
+             in continuous time; this may displace the tips by {:.0} % of their displacement by contact",
             self.contact(nodes, sign),
             judged.growth.stepped,
             shown(rounded(step)),
@@ -338,8 +342,9 @@ impl Checking<'_> {
         let step_remedy = if step_remedy.is_empty() { "Use".to_owned() } else { step_remedy };
         Error::Unstable {
             problem: format!(
-                "`time.step` is too long for friction: sliding contact {} grows by {:.2e} 1/s in steps of {} s, by {:.2e} 1/s in the \
-                 equations, and this alone may displace the tips by {:.0} % of what contact does",
+                "`time.step` is too long for friction: sliding contact {} grows by {:.2e} 1/s in steps of {} s, but by \
+                 {:.2e} 1/s in continuous time, and this alone may displace the tips by {:.0} % of their displacement \
+                 by contact",
                 self.contact(nodes, sign),
                 judged.growth.stepped,
                 shown(rounded(step)),
@@ -355,11 +360,11 @@ impl Checking<'_> {
 fn confirmed(found: &Fastest, with_mass: Option<&Fastest>) -> String {
     match with_mass {
         Some(other) if other.rate < ALIKE * found.rate && found.rate < ALIKE * other.rate => {
-            " (with and without the mass of the contact nodes alike, so that more modes will hardly change it)"
+            " (the same with and without the mass of the contact nodes, so more modes will hardly change it)"
                 .to_owned()
         }
         Some(other) => format!(
-            " (without the mass of the contact nodes; {:.2e} 1/s with it, so that more modes may change it)",
+            " (without the mass of the contact nodes; {:.2e} 1/s with it, so more modes may change it)",
             other.rate.max(0.0)
         ),
         None => String::new(),
@@ -408,7 +413,7 @@ mod tests {
             assert_eq!(found[0].level(), Severity::Warning, "self-locking is never a note");
             assert_eq!(found[1].level(), level, "{closed} s");
             for text in [&found[1].lines()[1], &*found[1]] {
-                assert_eq!(text.contains("nothing to do"), level == Severity::Note, "{text}");
+                assert_eq!(text.contains("No action is needed"), level == Severity::Note, "{text}");
                 assert_eq!(text.contains("Use less friction"), level == Severity::Warning, "{text}");
             }
         }

@@ -217,13 +217,13 @@ impl Simulation {
 fn coarse_excitation(what: &str, turn: f64) -> Warning {
     let error = turn / libm::sin(turn) - 1.0;
     let problem = format!(
-        "{what} turns by {turn:.2} rad in one internal step: central differences make a resonance {:.0} % too large and move it by {:.1} % \
-         of its frequency",
+        "{what} rotates by {turn:.2} rad in one internal step: central differences make a resonance {:.0} % too large \
+         and shift its frequency by {:.1} %",
         100.0 * error,
         100.0 * turn * turn / 24.0
     );
     let remedy =
-        format!("Use modal-exact, or an internal_step_max (time.step) {:.1} times smaller", turn / RESOLVED_TURN);
+        format!("Use modal-exact, or make internal_step_max (time.step) {:.1} times smaller", turn / RESOLVED_TURN);
     Warning::new(Topic::CoarseExcitation, problem, remedy)
 }
 
@@ -234,16 +234,20 @@ impl BodyLimits {
         match self.senses[sense].as_ref().map(|sense| sense.warnings(closed)) {
             Some(Ok(warnings)) => warnings,
             Some(Err(refusal)) => vec![
-                Warning::new(Topic::StepGrowth, refusal.to_string(), "A step with that speed would end the run")
-                    .with_text(refusal.to_string()),
+                Warning::new(
+                    Topic::StepGrowth,
+                    refusal.to_string(),
+                    "Change the speed before the next step, which would otherwise end the run",
+                )
+                .with_text(refusal.to_string()),
             ],
             None => vec![Warning::new(
                 Topic::OtherSense,
                 format!(
-                    "{rotor} turns the other way than at the start: growth of contact that slides that way was not checked, \
-                     because the check takes long with coupled sectors"
+                    "{rotor} now rotates opposite to its initial direction: growth of contact that slides in this \
+                     direction was not checked, because the check takes long with coupled sectors"
                 ),
-                "Start once with a speed of that sign",
+                "Start once with a speed of this sign to run the check",
             )],
         }
     }

@@ -11,18 +11,22 @@ use crate::variables::{DataType, Quantity, StartValue};
 /// Excitation and temperature.
 pub fn inputs(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     if let Some(excitation) = &body.structure.excitation {
-        let text = "Amplitude of the excitation of each blade by an engine order";
+        let text = "Amplitude of the engine-order excitation of each blade";
         let (name, quantity) = ("excitation_amplitude", Quantity::Excitation(0));
         let row = table.moving_input(quantity, name, Some(&FORCE), excitation.amplitude, text);
         row.nominal = Some(1.0);
         (row.min, row.max) = (Some(-ranges::EXCITATION), Some(ranges::EXCITATION));
         let text =
-            "Phase of the excitation: blade j of N feels amplitude cos(order (rotor angle + 2 pi (j - 1)/N) - phase)";
+            "Phase of the excitation: the load on blade j of N is amplitude cos(order (rotor angle + 2 pi (j - 1)/N) - \
+             phase)";
         let (name, quantity) = ("excitation_phase", Quantity::Excitation(1));
         table.moving_input(quantity, name, Some(&ANGLE), excitation.phase, text).display = Some(0);
     }
     if body.structure.thermal {
-        let text = format!("Temperature of {} above the reference, at which it is undeformed", parts.rotor(body));
+        let text = format!(
+            "Temperature of {} relative to the reference temperature, at which it is undeformed",
+            parts.rotor(body)
+        );
         let row = table.moving_input(Quantity::RotorTemperature, "rotor_temperature", Some(&TEMPERATURE), 0.0, &text);
         row.nominal = Some(100.0);
         (row.min, row.max) = (Some(-LARGEST_TEMPERATURE), Some(LARGEST_TEMPERATURE));
@@ -43,13 +47,13 @@ pub fn parameters(table: &mut TableBuilder, body: &BodyFacts) {
     }
     let [displacements, velocities] =
         [initial.iter().map(|one| one.displacement).collect(), initial.iter().map(|one| one.velocity).collect()];
-    let text = "Displacement of the blades at the start, of each [[structure.initial]]";
+    let text = "Initial displacement of the blades, one value per [[structure.initial]]";
     let (name, quantity) = ("initial_displacement", Quantity::InitialDisplacement);
     let row = table.parameter(quantity, name, Some(&LENGTH), 0.0, text);
     (row.dimension, row.start, row.nominal, row.display) =
         (Some(initial.len()), Some(StartValue::Real(displacements)), Some(1e-4), Some(1));
     (row.min, row.max) = (Some(-ranges::POSITION), Some(ranges::POSITION));
-    let text = "Velocity of the blades at the start, of each [[structure.initial]]";
+    let text = "Initial velocity of the blades, one value per [[structure.initial]]";
     let row = table.parameter(Quantity::InitialRate, "initial_velocity", Some(&LINEAR_SPEED), 0.0, text);
     (row.dimension, row.start, row.nominal) = (Some(initial.len()), Some(StartValue::Real(velocities)), Some(1.0));
     (row.min, row.max) = (Some(-ranges::VELOCITY), Some(ranges::VELOCITY));

@@ -12,9 +12,10 @@ use crate::variables::{
 use crate::{Result, ranges};
 
 /// Description of inputs that would cause an impact if they jumped.
-pub const RAMPED: &str = "; reached at the end of the step (input_interpolation)";
+pub const RAMPED: &str = "; reached at the end of the communication step (see input_interpolation)";
 /// The same of angles.
-const RAMPED_ANGLE: &str = "; reached at the end of the step (input_interpolation), so never to be wrapped to one turn";
+const RAMPED_ANGLE: &str =
+    "; reached at the end of the communication step (see input_interpolation), so do not wrap it to one turn";
 
 /// Collects rows and hands out references.
 #[derive(Default)]
@@ -166,13 +167,13 @@ impl TableBuilder {
             "internal_step_max",
             Some(&TIME),
             settings.time.step,
-            "Largest internal time step; the step in use divides the communication step evenly",
+            "Maximum internal time step; the step in use divides the communication step evenly",
         );
         (step.min, step.max) = (Some(SHORTEST_STEP), Some(LONGEST_STEP));
         (step.nominal, step.display) = (Some(settings.time.step), Some(1));
         let (scheme, solver) = (settings.time.scheme as i32 + 1, settings.contacts[0].solver as i32 + 1);
         if settings.takes_a_tolerance() {
-            let text = "Error that a step of galerkin may make in displacements, as a share of the smallest clearance";
+            let text = "Permitted displacement error of a galerkin step, as a fraction of the smallest clearance";
             let start = settings.time.tolerance.unwrap_or(TOLERANCE);
             let tolerance = self.parameter(Quantity::Tolerance, "tolerance", None, start, text);
             (tolerance.min, tolerance.max) = (Some(ranges::TOLERANCE[0]), Some(ranges::TOLERANCE[1]));
@@ -181,16 +182,16 @@ impl TableBuilder {
         if settings.bounds_steps() {
             self.steps_at_most(settings);
         }
-        let reason =
-            settings.time.scheme_reason.as_ref().map_or(String::new(), |reason| format!("; at the start {reason}"));
+        let reason = settings.time.scheme_reason.as_ref();
+        let reason = reason.map_or(String::new(), |reason| format!("; the start value is {reason}"));
         self.choice(Quantity::SchemeChoice, "scheme", &SCHEMES, scheme, &format!("Time-stepping scheme{reason}"));
         self.choice(Quantity::SolverChoice, "solver", &SOLVERS, solver, "Contact solver");
     }
 
     /// Most internal steps, which may change between communication steps.
     fn steps_at_most(&mut self, settings: &SceneSettings) {
-        let text = "Most internal steps of one communication step, those tried in vain included (0: any number); a step that takes \
-                    more is discarded";
+        let text = "Maximum number of internal steps in one communication step, including rejected trials (0: no \
+                    limit); a communication step that needs more is discarded";
         let most = self.parameter(Quantity::StepsAtMost, "steps_at_most", None, 0.0, text);
         (most.kind, most.variability) = (DataType::Integer, Variability::Tunable);
         (most.min, most.max) = (Some(0.0), Some(ranges::STEPS));
@@ -202,20 +203,21 @@ impl TableBuilder {
     pub fn input_interpolation(&mut self, settings: &SceneSettings) {
         let start = settings.time.input_interpolation as i32 + 1;
         let text =
-            "Inputs that move or load something, and gap_offset, between communication points; speed is always held";
+            "Interpolation of gap_offset and of all motion and load inputs between communication points; speed is \
+             always held";
         self.choice(Quantity::InputInterpolation, "input_interpolation", &INPUT_INTERPOLATIONS, start, text);
     }
 
     /// Whether derivatives over communication steps can be asked for.
     pub fn step_derivatives(&mut self) {
-        let text = "Whether directional derivatives are those of outputs at the end of the last communication step by inputs over it; \
-                    when on, the state at the start of each step is kept";
+        let text = "Whether directional derivatives of the outputs at the end of the last communication step with \
+                    respect to the inputs over it are available; if on, the state at the start of each step is stored";
         self.choice(Quantity::StepDerivatives, "step_derivatives", &STEP_DERIVATIVES, 1, text);
     }
 
     /// Name of the scene.
     pub fn scene_name(&mut self, settings: &SceneSettings) {
-        let name = self.push(Quantity::SceneName, "scene", "Name of the scene this FMU was made from");
+        let name = self.push(Quantity::SceneName, "scene", "Name of the scene from which this FMU was generated");
         (name.kind, name.causality, name.variability) = (DataType::String, Causality::Local, Variability::Constant);
         name.start = Some(StartValue::String(settings.name.clone()));
     }

@@ -35,7 +35,7 @@ pub fn totals(table: &mut TableBuilder, friction: bool) {
             "friction_power",
             Span::Mean,
             Some((&POWER, 100.0)),
-            "Friction heat per time, mean over the communication step",
+            "Friction power, mean over the communication step",
             scalar(|view| view.mean * view.window.friction_heat),
         );
     }
@@ -43,7 +43,7 @@ pub fn totals(table: &mut TableBuilder, friction: bool) {
         "contact_count",
         Span::Point,
         None,
-        "Contact nodes touching at the communication point",
+        "Number of contact nodes in contact at the communication point",
         scalar(|view| view.contacts()),
     );
     (count.kind, count.variability, count.quantity) =
@@ -53,7 +53,7 @@ pub fn totals(table: &mut TableBuilder, friction: bool) {
         "in_contact",
         Span::Point,
         None,
-        "Whether any contact node touches at the communication point",
+        "Whether any contact node is in contact at the communication point",
         scalar(|view| f64::from(u8::from(!view.system.events().is_empty()))),
     );
     (touching.kind, touching.variability) = (DataType::Boolean, Variability::Discrete);
@@ -70,14 +70,14 @@ const ENERGIES: [Energy; 19] = [
         "scheme_energy",
         Span::Point,
         Quantity::Output,
-        "Energy that the time scheme conserves and the ledger closes with: kinetic plus strain energy up to the second order of \
-         the step",
+        "Energy conserved by the time scheme and used in the energy balance: kinetic plus strain energy, with a \
+         difference of second order in the step",
         |view| view.conserved,
     ),
-    ("damping_loss", Span::Total, Quantity::DampingLoss, "Energy lost by modal damping since the start", |view| {
+    ("damping_loss", Span::Total, Quantity::DampingLoss, "Energy dissipated by modal damping since the start", |view| {
         view.ledger().damping_loss.value()
     }),
-    ("friction_loss", Span::Total, Quantity::FrictionLoss, "Friction heat since the start", |view| {
+    ("friction_loss", Span::Total, Quantity::FrictionLoss, "Energy dissipated by friction since the start", |view| {
         view.ledger().friction_loss.value()
     }),
     ("impact_loss", Span::Total, Quantity::ImpactLoss, "", |view| view.ledger().impact_loss.value()),
@@ -85,14 +85,14 @@ const ENERGIES: [Energy; 19] = [
         "wear_work",
         Span::Total,
         Quantity::Output,
-        "Work of the coating's normal force against the approach of the blades since the start",
+        "Work of the normal force of the coating against the approaching blades since the start",
         |view| view.ledger().wear_work.value(),
     ),
     (
         "cutting_work",
         Span::Total,
         Quantity::Output,
-        "Work along the way against what blades cut off the coating since the start: specific cutting energy times volume",
+        "Work for cutting the coating since the start: specific cutting energy times removed volume",
         |view| view.ledger().cutting_work.value(),
     ),
     (
@@ -113,7 +113,7 @@ const ENERGIES: [Energy; 19] = [
         "external_work",
         Span::Total,
         Quantity::ExternalWork,
-        "Work of all inputs but loads since the start: shaft, whirl, axial shift, moving casing",
+        "Work of all inputs except loads since the start: shaft, whirl, axial shift, casing motion",
         |view| view.ledger().external_work(),
     ),
     (
@@ -127,7 +127,7 @@ const ENERGIES: [Energy; 19] = [
         "stiffening_work",
         Span::Total,
         Quantity::Output,
-        "Strain energy that changes of the speed add by stiffening since the start",
+        "Strain energy added since the start by centrifugal stiffening when the speed changes",
         |view| view.ledger().stiffening_work.value(),
     ),
     (
@@ -144,15 +144,15 @@ const ENERGIES: [Energy; 19] = [
         "casing_motion_work",
         Span::Total,
         Quantity::Output,
-        "Work of prescribed motion of the casing (radius, gap offset, shape) since the start",
+        "Work of the prescribed motion of the casing (radius, gap offset, shape) since the start",
         |view| view.ledger().casing_work.value(),
     ),
     (
         "curvature_work",
         Span::Total,
         Quantity::CurvatureWork,
-        "Energy that contact forces add since the start because normals turn and surfaces curve within an internal step \
-         (vanishes with the step)",
+        "Spurious energy added by contact forces since the start because normals rotate and surfaces curve within an \
+         internal step (vanishes with the step)",
         |view| view.ledger().curvature_work.value(),
     ),
     (
@@ -162,7 +162,7 @@ const ENERGIES: [Energy; 19] = [
         "Energy added by changes of the internal step since the start",
         |view| view.ledger().step_change.value(),
     ),
-    ("energy_residual", Span::Point, Quantity::Output, "Closure residual of the energy ledger", |view| {
+    ("energy_residual", Span::Point, Quantity::Output, "Residual of the energy balance", |view| {
         view.ledger().residual(view.conserved)
     }),
 ];
@@ -179,7 +179,7 @@ pub fn energies(table: &mut TableBuilder, parts: &TableFacts) {
         "energy_residual_relative",
         Span::Point,
         None,
-        "Closure residual relative to the initial energy plus all work exchanged",
+        "Residual of the energy balance relative to the initial energy plus all work exchanged",
         scalar(|view| view.relative_residual()),
     );
     relative.quantity = Quantity::EnergyResidualRelative;
@@ -187,7 +187,7 @@ pub fn energies(table: &mut TableBuilder, parts: &TableFacts) {
 
 /// Stiffening where heat softens too.
 const SOFTENED: &str =
-    "Strain energy that changes of speed and temperature add by stiffening and softening since the start";
+    "Strain energy added since the start by stiffening and softening when speed and temperature change";
 
 fn softens(parts: &TableFacts) -> bool {
     parts.bodies().iter().any(|body| body.structure.softening != 0.0)
@@ -197,15 +197,15 @@ fn softens(parts: &TableFacts) -> bool {
 fn energy_descriptions(parts: &TableFacts) -> [&'static str; 3] {
     if parts.bodies().iter().any(|body| body.free) {
         return [
-            "Kinetic energy of all structures, flight included",
+            "Kinetic energy of all structures, including rigid-body motion",
             "Strain energy of all structures",
-            "Energy lost by contact nodes stopping at a surface since the start",
+            "Energy lost since the start when contact nodes hit a surface",
         ];
     }
     [
-        "Kinetic energy of the vibration in the rotating frame, of the instant",
-        "Strain energy of the instant",
-        "Energy lost by contact nodes stopping at the casing since the start",
+        "Instantaneous kinetic energy of the vibration in the rotating frame",
+        "Instantaneous strain energy",
+        "Energy lost since the start when contact nodes hit the casing",
     ]
 }
 
@@ -234,17 +234,19 @@ type Count = (&'static str, &'static str, fn(&OutputView) -> f64);
 
 /// Counts of the effort for a tolerance since the start.
 const EFFORTS: [Count; 3] = [
-    ("internal_trials", "Internal steps tried since the start, those taken included, of all blades together", |view| {
-        view.trials()
-    }),
+    (
+        "internal_trials",
+        "Number of trial internal steps of all blades together since the start, including accepted steps",
+        |view| view.trials(),
+    ),
     (
         "internal_steps_most",
-        "Most internal steps tried within one communication step since the start, of all blades together",
+        "Largest number of trial internal steps of all blades together in any communication step since the start",
         |view| view.most_tried(),
     ),
     (
         "missed_steps",
-        "Shortest steps of galerkin since the start that were taken although they miss the tolerance",
+        "Number of shortest galerkin steps since the start that were accepted although they miss the tolerance",
         |view| view.missed(),
     ),
 ];
@@ -256,7 +258,11 @@ pub fn internal_steps(table: &mut TableBuilder, settings: &SceneSettings) {
         "internal_step",
         Span::Point,
         Some((&TIME, settings.time.step)),
-        if with_tolerance { "Internal time step in use; the longest of galerkin" } else { "Internal time step in use" },
+        if with_tolerance {
+            "Internal time step in use; with galerkin the maximum step"
+        } else {
+            "Internal time step in use"
+        },
         scalar(|view| view.system.step_size()),
     );
     (internal.variability, internal.quantity) = (Variability::Discrete, Quantity::InternalStep);
@@ -265,9 +271,9 @@ pub fn internal_steps(table: &mut TableBuilder, settings: &SceneSettings) {
         Span::Total,
         None,
         if with_tolerance {
-            "Internal steps done since the start; with galerkin of all blades together"
+            "Number of internal steps since the start; with galerkin of all blades together"
         } else {
-            "Internal steps done since the start"
+            "Number of internal steps since the start"
         },
         scalar(|view| view.internal_steps()),
     );

@@ -45,8 +45,8 @@ pub fn inputs(table: &mut TableBuilder, parts: &TableFacts) {
 fn shaft(table: &mut TableBuilder, body: &BodyFacts) {
     let largest = largest_length(body.rom);
     let rows = [
-        (body.structure.whirl, "whirl_x", "Displacement of the shaft's centre along fixed x"),
-        (body.structure.whirl, "whirl_y", "Displacement of the shaft's centre along fixed y"),
+        (body.structure.whirl, "whirl_x", "Displacement of the shaft's centre along the fixed x axis"),
+        (body.structure.whirl, "whirl_y", "Displacement of the shaft's centre along the fixed y axis"),
         (body.structure.axial_shift, "axial_shift", "Axial displacement of the rotor along +z"),
     ];
     for (component, (exists, name, text)) in rows.into_iter().enumerate() {
@@ -66,7 +66,7 @@ fn loads(table: &mut TableBuilder, CarrierFacts { structure, rom, .. }: &Carrier
             "casing_temperature",
             Some(&TEMPERATURE),
             0.0,
-            "Temperature of each casing patch above the reference, at which the casing is undeformed",
+            "Temperature of each casing patch relative to the reference temperature, at which the casing is undeformed",
         );
         let patches = thermal.patches.len();
         row.dimension = Some(patches);
@@ -75,12 +75,12 @@ fn loads(table: &mut TableBuilder, CarrierFacts { structure, rom, .. }: &Carrier
         (row.min, row.max) = (Some(-LARGEST_TEMPERATURE), Some(LARGEST_TEMPERATURE));
     }
     if let Some(load) = structure.load {
-        let text = "Amplitude of the radial line load with nodal diameters on the casing, outwards positive";
+        let text = "Amplitude of the radial nodal-diameter line load on the casing, positive outwards";
         let (name, quantity) = ("casing_load_amplitude", Quantity::LoadAmplitude);
         let row = table.moving_input(quantity, name, Some(&LINE_LOAD), load.amplitude, text);
         row.nominal = Some(1e4);
         (row.min, row.max) = (Some(-ranges::LINE_LOAD), Some(ranges::LINE_LOAD));
-        let text = "Phase of the nodal-diameter load: amplitude cos(n theta - phase)";
+        let text = "Phase of the nodal-diameter load: the load is amplitude cos(n theta - phase)";
         table.moving_input(Quantity::LoadPhase, "casing_load_phase", Some(&ANGLE), load.phase, text).display = Some(0);
     }
 }
@@ -113,7 +113,7 @@ pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
     for pair in parts.pairs() {
         if let Some(share) = pair.contact.heat_to_slave.filter(|_| parts.has_friction()) {
             table.belongs(pair.index, parts.of_pair(&pair));
-            let text = "Share of the friction heat that goes into the casing, the rest into the blades";
+            let text = "Fraction of the friction heat that flows into the casing; the rest flows into the blades";
             let row = table.parameter(Quantity::HeatToSlave, "casing_heat_fraction", None, share, text);
             (row.min, row.max, row.variability) = (Some(0.0), Some(1.0), Variability::Tunable);
         }
@@ -146,7 +146,7 @@ pub fn outputs(table: &mut TableBuilder, parts: &TableFacts) {
     for carrier in parts.carriers().iter().filter(|carrier| parts.settings.outputs.slave_displacement && !carrier.open)
     {
         table.belongs(carrier.index, parts.of_carrier(carrier));
-        let text = "Radial displacement of the contact grid of the casing, ring after ring along z, outwards positive";
+        let text = "Radial displacement of the contact grid of the casing, ring by ring along z, positive outwards";
         let index = carrier.index;
         let read = array_reader(move |view, out| view.slave_displacement(index, out));
         let row = table.output("casing_displacement", Span::Point, Some((&LENGTH, 1e-4)), text, read);
@@ -159,14 +159,15 @@ pub fn outputs(table: &mut TableBuilder, parts: &TableFacts) {
 fn casing_forces(table: &mut TableBuilder, pair: &PairFacts) {
     let index = pair.index;
     for (axis, letter) in AXES.into_iter().enumerate() {
-        let text = format!("Contact force on the casing along fixed {letter}, mean over the communication step");
+        let text =
+            format!("Contact force on the casing along the fixed {letter} axis, mean over the communication step");
         let read = scalar(move |view| -view.mean * view.window.pairs[index].force_impulse[axis]);
         table.output(format!("casing_force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
     }
     for (axis, letter) in AXES.into_iter().enumerate() {
         let text = format!(
-            "Moment of the contact forces on the casing about fixed {letter} through the origin on its axis, mean over the \
-             communication step"
+            "Moment of the contact forces on the casing about the fixed {letter} axis through the origin on the casing \
+             axis, mean over the communication step"
         );
         let read = scalar(move |view| -view.mean * view.window.pairs[index].casing_moment[axis]);
         table.output(format!("casing_moment_{letter}"), Span::Mean, Some((&TORQUE, 10.0)), text, read);
@@ -178,13 +179,14 @@ fn support(table: &mut TableBuilder, carrier: &CarrierFacts) {
     let index = carrier.index;
     for (row, (axis, letter)) in (0..2).flat_map(|_| AXES.into_iter().enumerate()).enumerate() {
         let (name, text, unit) = if row < 3 {
-            let text =
-                format!("Force of the support on the casing along fixed {letter}, mean over the communication step");
+            let text = format!(
+                "Force of the support on the casing along the fixed {letter} axis, mean over the communication step"
+            );
             ("force", text, (&FORCE, 100.0))
         } else {
             let text = format!(
-                "Moment of the support on the casing about fixed {letter} through the origin on its axis, mean over the \
-                 communication step"
+                "Moment of the support on the casing about the fixed {letter} axis through the origin on the casing \
+                 axis, mean over the communication step"
             );
             ("moment", text, (&TORQUE, 10.0))
         };
@@ -215,12 +217,12 @@ fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating:
     let text = "Largest wear depth of the coating";
     table.output("wear_depth_maximum", Span::Total, depth, text, read).display = Some(1);
     let read = scalar(move |view| view.coating(index, Coating::worn_volume));
-    table.output("worn_volume", Span::Total, Some((&VOLUME, 1e-9)), "Volume worn off the coating", read);
+    table.output("worn_volume", Span::Total, Some((&VOLUME, 1e-9)), "Worn volume of the coating", read);
     // Of all coatings together.
     if parts.settings.contacts[..index].iter().all(|contact| contact.coating.is_none()) {
         table.belongs_to_all();
-        let text = "Energy that wearing the coating takes since the start; the shaft pays it where it is cut, no force where it is \
-                    pressed in";
+        let text = "Energy consumed by wear of the coating since the start; supplied by the shaft if the coating is \
+                    cut, and not in the energy balance if it is pressed in";
         let read = scalar(|view| view.ledger().wear_energy.value());
         table.output("wear_energy", Span::Total, Some((&ENERGY, 1.0)), text, read);
         table.belongs(index, parts.of_pair(pair));
@@ -230,7 +232,7 @@ fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating:
             (
                 "wear_profile_around",
                 true,
-                "Wear depth at each place around, from theta = 0, mean over the rows along z",
+                "Wear depth at each circumferential cell position from theta = 0, mean over the rows along z",
             ),
             ("wear_profile_along", false, "Wear depth of each row along z, mean over the circumference"),
         ] {
@@ -242,7 +244,7 @@ fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating:
     }
     if parts.settings.outputs.wear {
         let text = format!(
-            "Wear depth of each coating cell: {} around from theta = 0, row after row along z ({} rows)",
+            "Wear depth of each coating cell: {} cells around from theta = 0, row by row along z ({} rows)",
             coating.cells_around, coating.cells_along
         );
         let read = each(move |view, cell| view.coating(index, |coating| coating.wear_depth(cell)));

@@ -17,7 +17,7 @@ pub fn velocity(table: &mut TableBuilder, body: &BodyFacts) {
             &format!("initial_velocity_{name}"),
             Some(&LINEAR_SPEED),
             body.structure.velocity[axis],
-            &format!("Velocity of {} as a whole along {name} at the start", body.structure.name),
+            &format!("Initial rigid-body velocity of {} along {name}", body.structure.name),
         );
         velocity.nominal = Some(100.0);
         (velocity.min, velocity.max) = (Some(-ranges::VELOCITY), Some(ranges::VELOCITY));
@@ -59,8 +59,8 @@ fn nodes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
         if row.exists(parts.settings.outputs.instantaneous_forces, parts.has_friction()) {
             let text = match row.name {
                 "clearance" => {
-                    "Clearance normal to the surface at the communication point; 1e9 m where there is nothing to touch, beyond an \
-                     edge and for nodes of no pair"
+                    "Clearance normal to the surface at the communication point; 1e9 m where a node faces no surface, \
+                     beyond an edge, and for nodes in no contact pair"
                 }
                 "tangential_force" => "Magnitude of the friction force, mean over the communication step",
                 _ => row.text,
@@ -69,7 +69,7 @@ fn nodes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
         }
     }
     for (axis, letter) in AXES.into_iter().enumerate() {
-        let text = format!("Displacement along {letter} since the start, rigid motion included ({list})");
+        let text = format!("Displacement along {letter} since the start, including rigid-body motion ({list})");
         let read = each(move |view, node| view.modes(index).displacement()[3 * node + axis]);
         let name = format!("node_displacement_{letter}");
         let row = table.output(name, Span::Point, Some((&LENGTH, 1e-3)), text, read);

@@ -49,7 +49,10 @@ pub fn build(scene: &Scene) -> Result<(VariableTable, Vec<OutputReader>)> {
 fn inputs(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
     for body in parts.bodies().iter().filter(|body| body.structure.motion == BodyMotion::Rotating) {
         table.belongs(body.index, parts.of_body(body));
-        let text = format!("Speed of {} about +z; held over a step, or linear with a derivative", parts.rotor(body));
+        let text = format!(
+            "Speed of {} about +z; constant over a communication step, or linear if a derivative is set",
+            parts.rotor(body)
+        );
         let speed = table.input(Quantity::Speed, "speed", Some(&ANGULAR_SPEED), body.structure.speed, &text);
         speed.display = Some(0);
         speed.nominal = Some(1000.0);
@@ -63,7 +66,7 @@ fn inputs(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
             "casing_radius_change",
             Some(&LENGTH),
             0.0,
-            "Uniform change of the casing radius; positive opens every clearance",
+            "Uniform change of the casing radius; positive values increase every clearance",
         );
         (change.nominal, change.display) = (Some(1e-4), Some(1));
         (change.min, change.max) = (Some(-largest), Some(largest));
@@ -97,7 +100,7 @@ fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
     for body in &bodies {
         table.belongs(body.index, parts.of_body(body));
         let ratio = body.structure.damping_ratio.unwrap_or(body.rom.damping_ratio);
-        let rigid = if body.free { "; its rigid modes are not damped" } else { "" };
+        let rigid = if body.free { "; its rigid-body modes are undamped" } else { "" };
         let text = format!("Modal damping ratio of {}{rigid}", parts.rotor(body));
         table.damping(Quantity::DampingRatio, "damping_ratio", ratio, &text);
         let name = parts.rotor(body);
@@ -115,12 +118,12 @@ fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
     }
     for body in bodies.iter().filter(|body| !body.free) {
         table.belongs(body.index, parts.of_body(body));
-        let text = format!("Angle of {} about +z at the start", parts.rotor(body));
+        let text = format!("Initial angle of {} about +z", parts.rotor(body));
         table.parameter(Quantity::InitialAngle, "initial_rotor_angle", Some(&ANGLE), 0.0, &text).display = Some(0);
     }
     for pair in pairs.iter().filter(|pair| !pair.body.free && pair.surface.shape != (Shape::Circular {})) {
         table.belongs(pair.index, parts.of_pair(pair));
-        let text = "Time over which the casing shape grows smoothly from round to full after the start";
+        let text = "Time after the start over which the casing shape grows smoothly from round to its full amplitude";
         let ramp = table.parameter(Quantity::RampTime, "casing_ramp_time", Some(&TIME), pair.surface.ramp_time, text);
         (ramp.min, ramp.max) = (Some(0.0), Some(ranges::TIME));
     }
@@ -159,7 +162,7 @@ pub fn has_one_friction(settings: &SceneSettings) -> bool {
 }
 
 fn gap_offset(table: &mut TableBuilder, rom: &Rom) {
-    let text = "Added to the radial clearance of every sector";
+    let text = "Offset added to the radial clearance of every sector";
     let offset = table.parameter(Quantity::GapOffset, "gap_offset", Some(&LENGTH), 0.0, text);
     offset.description += RAMPED;
     (offset.display, offset.nominal, offset.variability) = (Some(1), Some(1e-4), Variability::Tunable);
@@ -197,8 +200,8 @@ fn smallest_clearance(table: &mut TableBuilder, parts: &TableFacts) {
     let gap = if free { 1e-3 } else { parts.settings.contacts[0].nominal_gap() };
     let text = match (free, parts.plan.pairs.len()) {
         (true, _) => {
-            "Smallest clearance of all contact nodes within the communication step, normal to their surfaces; 1e9 m where none of \
-             them has a surface to touch, beyond the edges"
+            "Smallest clearance of all contact nodes within the communication step, normal to their surfaces; 1e9 m if \
+             no node faces a surface, for example beyond the edges"
         }
         (false, 1) => "Smallest clearance of the whole disk within the communication step, normal to the casing",
         _ => "Smallest clearance of all contact nodes within the communication step, normal to their surfaces",
@@ -213,7 +216,7 @@ fn forces(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
         let text = if body.free {
             format!("Contact force on {name} along {letter}, all pairs, mean over the communication step")
         } else {
-            format!("Contact force on {name} along fixed {letter}, mean over the communication step")
+            format!("Contact force on {name} along the fixed {letter} axis, mean over the communication step")
         };
         let read = scalar(move |view| view.mean * view.window.bodies[index].force_impulse[axis]);
         table.output(format!("force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
@@ -237,21 +240,22 @@ fn moment(parts: &TableFacts, body: &BodyFacts, axis: usize) -> (String, String)
         (true, _) => (
             row,
             format!(
-                "Moment of the contact forces on {name} about {letter} through the origin, all pairs, mean over the communication step"
+                "Moment of the contact forces on {name} about the {letter} axis through the origin, all pairs, mean \
+                 over the communication step"
             ),
         ),
         (false, 2) => (
             "torque".to_owned(),
             format!(
-                "Torque of the contact forces on {name} about +z through the shaft's centre, conjugate to the rotor angle, mean \
-                 over the communication step"
+                "Torque of the contact forces on {name} about the +z axis through the shaft's centre, conjugate to the \
+                 rotor angle, mean over the communication step"
             ),
         ),
         (false, _) => (
             row,
             format!(
-                "Moment of the contact forces on {name} about fixed {letter} through the shaft's centre at z = 0 of the rotor \
-                 (whirl and axial shift move it), mean over the communication step"
+                "Moment of the contact forces on {name} about the fixed {letter} axis through the shaft's centre at z \
+                 = 0 of the rotor (which moves with whirl and axial shift), mean over the communication step"
             ),
         ),
     }
@@ -263,8 +267,8 @@ fn pair_forces(table: &mut TableBuilder, pair: &PairFacts) {
     let point = if pair.body.free { "the origin" } else { "the shaft's centre" };
     for (axis, letter) in AXES.into_iter().enumerate() {
         let text = format!(
-            "Moment of the contact force on {master} from {surface} about {letter} through {point}, mean over the \
-             communication step"
+            "Moment of the contact force on {master} from {surface} about the {letter} axis through {point}, mean over \
+             the communication step"
         );
         let read = scalar(move |view| view.mean * view.window.pairs[index].moment_impulse[axis]);
         table.output(format!("{surface}.moment_{letter}"), Span::Mean, Some((&TORQUE, 10.0)), text, read);

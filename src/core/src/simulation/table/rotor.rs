@@ -42,7 +42,7 @@ pub fn clearances(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts
 /// Describes clearances where there is nothing to touch.
 fn untouched(parts: &TableFacts, body: &BodyFacts) -> &'static str {
     let paired: usize = parts.plan.pairs_of(body.index).map(|(_, pair)| pair.nodes.len()).sum();
-    if paired < body.rom.contact_nodes.len() { "; 1e9 m at nodes of no contact" } else { "" }
+    if paired < body.rom.contact_nodes.len() { "; 1e9 m at nodes in no contact pair" } else { "" }
 }
 
 fn node_list(body: &BodyFacts) -> String {
@@ -56,15 +56,15 @@ pub fn watched(table: &mut TableBuilder, parts: &TableFacts) -> Result<()> {
     for sector in &parts.settings.outputs.watched_sectors {
         if *sector == 0 || *sector > most {
             let remedy = "Use sector numbers from 1 to the number of sectors of the ROM";
-            return refuse("watched_sectors", format!("sector {sector} of {most}"), remedy.to_owned());
+            return refuse("watched_sectors", format!("sector {sector} is outside 1 to {most}"), remedy.to_owned());
         }
     }
     for body in bodies.iter().filter(|body| !body.free) {
         if let Some(count) =
             parts.settings.outputs.modal_amplitudes.filter(|count| !(1..=body.rom.order()).contains(count))
         {
-            let problem = format!("{count} modes of {}, which has {}", parts.rotor(body), body.rom.order());
-            return refuse("modal_amplitudes", problem, "Ask for 1 up to as many modes as it has".to_owned());
+            let problem = format!("{count} modes requested of {}, which has {}", parts.rotor(body), body.rom.order());
+            return refuse("modal_amplitudes", problem, format!("Request 1 to {} modes", body.rom.order()));
         }
         table.belongs(body.index, parts.of_body(body));
         for sector in &parts.settings.outputs.watched_sectors {
@@ -132,8 +132,9 @@ fn modes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector:
     let Some(count) = parts.settings.outputs.modal_amplitudes else { return };
     let index = body.index;
     let text = format!(
-        "Amplitudes of the lowest {count} modes, of modal mass 1 kg for displacements in m per unit amplitude, positive where the \
-         contact node that a mode moves most goes along its positive direction"
+        "Amplitudes of the lowest {count} modes, normalised to a modal mass of 1 kg with displacements in m per unit \
+         amplitude; positive if the contact node with the largest displacement in the mode moves in its positive \
+         direction"
     );
     let read = each(move |view, mode| view.modal_amplitude(index, sector - 1, mode));
     let row = table.output(format!("blade[{sector}].modal_amplitude"), Span::Point, None, text, read);
@@ -170,7 +171,7 @@ fn stresses(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
         (row.dimension, row.display) = (Some(places), Some(0));
     };
     let read = each(move |view, place| view.von_mises(index, sector - 1, place));
-    add("von_mises_stress".to_owned(), format!("Equivalent stress of von Mises ({list})"), read);
+    add("von_mises_stress".to_owned(), format!("Von Mises equivalent stress ({list})"), read);
     for (component, name) in
         STRESS_COMPONENTS[usize::from(body.rom.frame == DisplacementFrame::Cartesian)].into_iter().enumerate()
     {
@@ -189,7 +190,7 @@ type PerExtent = (&'static str, &'static str, &'static VariableUnit, f64, fn(&Co
 
 const PER_EXTENT: [PerExtent; 2] = [
     ("normal_pressure", "pressure", &PRESSURE, 1e6, |node| node.area),
-    ("normal_line_force", "force per length along the chord", &LINE_LOAD, 1e4, |node| node.length),
+    ("normal_line_force", "force per unit length along the chord", &LINE_LOAD, 1e4, |node| node.length),
 ];
 
 /// Pressure and force per length, of contact patches.
@@ -202,7 +203,7 @@ fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
         let (index, count) = (body.index, extents.len());
         let list = node_list(body);
         let text =
-            format!("Normal contact {told} in the middle of each patch ({list}), mean over the communication step");
+            format!("Normal contact {told} at the centre of each patch ({list}), mean over the communication step");
         let read = each(move |view, node| view.mean * view.normal_impulse(index, node, sector - 1) / extents[node]);
         let row = table.output(format!("blade[{sector}].{name}"), Span::Mean, Some((unit, nominal)), text, read);
         row.dimension = Some(count);
@@ -286,7 +287,7 @@ pub fn watched_rows(
             name: "normal_force_now",
             span: Span::Point,
             unit: force,
-            text: "Normal contact force of the last internal step",
+            text: "Normal contact force in the last internal step",
             needs: [false, true],
             read: each(move |view, node| view.system.structures()[body].multiplier(node, sector)),
         },
@@ -295,7 +296,7 @@ pub fn watched_rows(
             name: "tangential_force_now",
             span: Span::Point,
             unit: force,
-            text: "Friction force of the last internal step",
+            text: "Friction force in the last internal step",
             needs: [true, true],
             read: each(move |view, node| view.tangential_now(body, node, sector)),
         },
@@ -342,13 +343,14 @@ fn nodal_diameters(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFact
     let (index, sectors, rows) = (body.index, body.rom.sectors, body.rom.rows());
     if largest > sectors / 2 {
         let remedy = format!("Use at most {}", sectors / 2);
-        return refuse("nodal_diameters", format!("{largest} with {sectors} sectors"), remedy);
+        return refuse("nodal_diameters", format!("{largest} is too large for {sectors} sectors"), remedy);
     }
     let amplitude = table.output(
         "nodal_diameter_amplitude",
         Span::Point,
         nominal(parts, body),
-        "Amplitude of the radial displacement of the middle contact node, of rows of patches their mean, per nodal diameter 0, 1, 2, …",
+        "Amplitude of the radial displacement of the middle contact node (mean over the rows of patches) per nodal \
+         diameter 0, 1, 2, …",
         array_reader(move |view, out| view.nodal_diameters(index, rows, out)),
     );
     (amplitude.dimension, amplitude.display) = (Some(largest + 1), Some(1));

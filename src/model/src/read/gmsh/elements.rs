@@ -22,7 +22,7 @@ const HEX20: [usize; 20] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17
 const PENTA15: [usize; 15] = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11];
 
 const INCOMPLETE: &str =
-    "Mesh again with Mesh.SecondOrderIncomplete = 1: quadratic elements without nodes on faces and inside";
+    "Mesh again with Mesh.SecondOrderIncomplete = 1: quadratic elements without face and interior nodes";
 const LOWER_ORDER: &str = "Mesh again with Mesh.ElementOrder = 2 or 1";
 
 /// Meaning of an element type (Gmsh reference manual, MSH file format).
@@ -43,7 +43,7 @@ pub(super) fn gmsh_element(kind: i64) -> Option<GmshElement> {
         16 => LowerDimension(8),
         10 => LowerDimension(9),
         7 | 14 | 19 => {
-            Refused("pyramids", "Mesh with tetrahedra, prisms and bricks only: extrude, or leave out the recombination")
+            Refused("pyramids", "Use tetrahedra, prisms and bricks only: extrude the mesh, or do not recombine it")
         }
         12 => Refused("bricks with 27 nodes", INCOMPLETE),
         13 => Refused("prisms with 18 nodes", INCOMPLETE),

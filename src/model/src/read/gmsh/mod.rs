@@ -33,7 +33,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<MeshDraft> {
             "Elements" => reader.elements(&mut numbers)?,
             "PartitionedEntities" => {
                 return Err(numbers
-                    .error("the mesh is partitioned", "Save it with Mesh.PartitionCreateTopology = 0, unpartitioned"));
+                    .error("the mesh is partitioned", "Save it unpartitioned: Mesh.PartitionCreateTopology = 0"));
             }
             _ => {}
         }
@@ -41,7 +41,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<MeshDraft> {
     }
     for section in ["Nodes", "Elements"] {
         if !found.contains(section) {
-            return Err(about(path, format!("there is no section ${section}"), "Write the mesh again, complete"));
+            return Err(about(path, format!("section ${section} is missing"), "Export the complete mesh again"));
         }
     }
     Ok(reader.draft)
@@ -67,30 +67,30 @@ impl<'a> Sections<'a> {
         }
         if sections.take_line() != Some("$MeshFormat") {
             return Err(
-                sections.error("it does not begin with $MeshFormat", "Give a mesh that Gmsh wrote in format 4.1")
+                sections.error("the file does not begin with $MeshFormat", "Give a mesh in Gmsh format 4.1")
             );
         }
         let format = sections.take_line().unwrap_or_default().to_owned();
         let mut words = format.split_whitespace();
         let (version, kind, size) = (words.next(), words.next(), words.next());
         if version != Some("4.1") {
-            let problem = format!("the mesh is of version {}, 4.1 is read", version.unwrap_or("?"));
+            let problem = format!("the mesh has format version {}, but only 4.1 is supported", version.unwrap_or("?"));
             return Err(sections.error(problem, "Save it again with Mesh.MshFileVersion = 4.1"));
         }
         sections.binary = match kind {
             Some("0") => false,
             Some("1") => true,
-            _ => return Err(sections.error(format!("`{format}` is no format line"), "Write the mesh again")),
+            _ => return Err(sections.error(format!("`{format}` is not a format line"), "Export the mesh again")),
         };
         if size != Some("8") {
-            return Err(sections.error("numbers of nodes are not of 8 bytes", "Write it with Gmsh on a 64-bit machine"));
+            return Err(sections.error("node numbers do not have 8 bytes", "Export it with Gmsh on a 64-bit machine"));
         }
         if sections.binary {
             let one = sections.bytes.get(sections.next..sections.next + 4).unwrap_or_default();
             sections.big_endian = match one {
                 [1, 0, 0, 0] => false,
                 [0, 0, 0, 1] => true,
-                _ => return Err(sections.error("the byte order cannot be told", "Write the mesh again")),
+                _ => return Err(sections.error("the byte order cannot be determined", "Export the mesh again")),
             };
             sections.next += 4;
         }
@@ -125,7 +125,7 @@ impl<'a> Sections<'a> {
     fn skip_behind(&mut self, end: &str) -> Result<&'a [u8]> {
         let rest = self.rest();
         let Some(length) = rest.windows(end.len()).position(|window| window == end.as_bytes()) else {
-            return Err(self.error(format!("{end} is missing"), "Write the mesh again, complete"));
+            return Err(self.error(format!("{end} is missing"), "Export the complete mesh again"));
         };
         let inside = &rest[..length];
         self.line += inside.iter().filter(|&&byte| byte == b'\n').count();
@@ -143,11 +143,11 @@ impl<'a> Sections<'a> {
             return if self.rest().is_empty() {
                 Ok(None)
             } else {
-                Err(self.error("no section begins here", "Write the mesh again"))
+                Err(self.error("expected the beginning of a section", "Export the mesh again"))
             };
         };
         let Some(name) = line.strip_prefix('$').filter(|name| !name.is_empty()) else {
-            return Err(self.error(format!("`{line}` is no section"), "Write the mesh again"));
+            return Err(self.error(format!("`{line}` is not a section"), "Export the mesh again"));
         };
         let (name, file, line, offset) = (name.to_owned(), Arc::clone(&self.file), self.line, self.next);
         let inside = self.skip_behind(&format!("$End{name}"))?;
@@ -156,7 +156,7 @@ impl<'a> Sections<'a> {
         }
         match core::str::from_utf8(inside) {
             Ok(rest) => Ok(Some((name, Numbers::Text { file, rest, line }))),
-            Err(_) => Err(SourceLine { file, line }.error(format!("${name} is not text"), "Write the mesh again")),
+            Err(_) => Err(SourceLine { file, line }.error(format!("${name} is not text"), "Export the mesh again")),
         }
     }
 }
@@ -178,7 +178,8 @@ impl GmshReader {
             let (dimension, tag, name) = (parts.next(), parts.next(), parts.next());
             let read = |text: Option<&str>| text.and_then(|text| text.parse::<i32>().ok()).map(i64::from);
             let (Some(dimension), Some(tag), Some(name)) = (read(dimension), read(tag), name) else {
-                return Err(numbers.error(format!("`{line}` is not DIMENSION TAG \"NAME\""), "Write the mesh again"));
+                let problem = format!("`{line}` is not of the form DIMENSION TAG \"NAME\"");
+                return Err(numbers.error(problem, "Export the mesh again"));
             };
             self.names.insert((dimension, tag), name.trim().trim_matches('"').to_owned());
         }
@@ -243,12 +244,12 @@ impl GmshReader {
                 Some(GmshElement::Solid(kind, order)) => (Some(kind), order, order.len()),
                 Some(GmshElement::LowerDimension(nodes)) => (None, &[][..], nodes),
                 Some(GmshElement::Refused(what, remedy)) => {
-                    return Err(numbers.error(format!("{what} are not computed (element type {kind})"), remedy));
+                    return Err(numbers.error(format!("{what} are not supported (element type {kind})"), remedy));
                 }
                 None => {
-                    let problem = format!("element type {kind} is not known");
+                    let problem = format!("element type {kind} is unknown");
                     return Err(
-                        numbers.error(problem, "Mesh with tetrahedra, prisms or bricks of first or second order")
+                        numbers.error(problem, "Use tetrahedra, prisms or bricks of first or second order")
                     );
                 }
             };

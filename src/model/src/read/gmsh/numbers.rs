@@ -65,7 +65,7 @@ impl<'a> Numbers<'a> {
     }
 
     fn ended(&self) -> Error {
-        self.error("the section ends too early, or something that is no number stands in it", "Write the mesh again")
+        self.error("the section ends too early or contains something that is not a number", "Export the mesh again")
     }
 
     /// An `int` of the format.
@@ -91,7 +91,7 @@ impl<'a> Numbers<'a> {
         let value = self.size()?;
         let most = self.at_most() / each.max(1) + 1;
         usize::try_from(value).ok().filter(|&count| count <= most).ok_or_else(|| {
-            self.error(format!("the file announces {value} entries, more than it can hold"), "Write the mesh again")
+            self.error(format!("the file declares {value} entries, more than it can contain"), "Export the mesh again")
         })
     }
 

@@ -92,8 +92,8 @@ pub(super) fn cards(path: &Path, bytes: &[u8], open: Open<'_>) -> Result<Vec<Car
     };
     reader.file(path.to_path_buf(), bytes)?;
     if let Some(place) = reader.before_first_keyword {
-        let problem = "data stands before the first keyword";
-        return Err(place.error(problem, "Is this a CalculiX or Abaqus input file? Its keywords begin with `*`"));
+        let problem = "there is data before the first keyword";
+        return Err(place.error(problem, "Give a CalculiX or Abaqus input file, whose keywords begin with `*`"));
     }
     Ok(reader.cards)
 }
@@ -176,16 +176,16 @@ impl LineReader<'_> {
         let path = beside(&current, written);
         self.count += 1;
         if self.active.contains(&path) || self.active.len() >= LARGEST_DEPTH || self.count > LARGEST_COUNT {
-            let problem = format!("{} is included within itself, or too deep, or too often", path.display());
-            return Err(place.error(problem, "Include every file once"));
+            let problem = format!("{} is included recursively, too deeply or too often", path.display());
+            return Err(place.error(problem, "Include every file only once"));
         }
         let bytes = (self.open)(&path).map_err(|error| {
-            place.error(format!("the included file cannot be read: {error}"), "Keep included files beside this one")
+            place.error(format!("the included file cannot be read: {error}"), "Place included files next to this one")
         })?;
         self.included = self.included.saturating_add(bytes.len());
         if self.included > LARGEST_INCLUDED {
-            let problem = format!("with {} the included files have more than 1 GiB together", path.display());
-            return Err(place.error(problem, "Include every file once, or give a smaller mesh"));
+            let problem = format!("with {}, the included files exceed 1 GiB in total", path.display());
+            return Err(place.error(problem, "Include every file only once, or use a smaller mesh"));
         }
         let mut digest = DefaultHasher::new();
         bytes.hash(&mut digest);
@@ -194,11 +194,11 @@ impl LineReader<'_> {
         }
         if self.repeated > LARGEST_REPEATED {
             let problem = format!(
-                "with {} more than {} MiB are included that were included before",
+                "with {}, more than {} MiB are included repeatedly",
                 path.display(),
                 LARGEST_REPEATED >> 20
             );
-            return Err(place.error(problem, "Include every file once"));
+            return Err(place.error(problem, "Include every file only once"));
         }
         self.file(path, &bytes)
     }

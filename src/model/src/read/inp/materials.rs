@@ -40,10 +40,11 @@ impl DeckMaterial {
     pub(super) fn read(&mut self, card: &Card) -> Result<()> {
         let kind = card.parameter("TYPE")?.map(str::to_uppercase);
         if kind.as_deref().is_some_and(|kind| !matches!(kind, "ISO" | "ISOTROPIC")) || card.has("DEPENDENCIES") {
-            let problem = format!("*{} of material `{}` is not plainly isotropic", card.keyword, self.name);
+            let (keyword, name) = (&card.keyword, &self.name);
+            let problem = format!("*{keyword} of material `{name}` is anisotropic or depends on field variables");
             return Err(card
                 .place
-                .error(problem, "Only isotropic materials are computed: give the matrices of the model"));
+                .error(problem, "Use an isotropic material, or give the matrices of the model"));
         }
         match card.keyword.as_str() {
             "ELASTIC" => self.elastic = Some(TemperatureTable::read(card)?),
@@ -74,7 +75,7 @@ impl<const N: usize> TemperatureTable<N> {
             let values: Option<Vec<f64>> = line.values().map(number).collect();
             let values = values.filter(|values| (N..=N + 1).contains(&values.len())).ok_or_else(|| {
                 let wanted = if N == 2 { "E, ν" } else { "VALUE" };
-                let problem = format!("`{}` is not {wanted}, or {wanted}, TEMPERATURE", line.text);
+                let problem = format!("`{}` is neither {wanted} nor {wanted}, TEMPERATURE", line.text);
                 line.place.error(problem, "Correct the line")
             })?;
             rows.push((core::array::from_fn(|i| values[i]), values.get(N).copied()));
@@ -82,7 +83,7 @@ impl<const N: usize> TemperatureTable<N> {
         let ascending = rows.windows(2).all(|pair| matches!((pair[0].1, pair[1].1), (Some(a), Some(b)) if a < b));
         if rows.is_empty() || !ascending {
             let problem = format!("*{} needs one line, or several with ascending temperatures", card.keyword);
-            return Err(card.place.error(problem, "Correct the lines below it"));
+            return Err(card.place.error(problem, "Correct the lines below the keyword"));
         }
         Ok(Self { rows, place: card.place.clone() })
     }
@@ -93,8 +94,8 @@ impl<const N: usize> TemperatureTable<N> {
             return Ok(*values);
         }
         let Some(temperature) = temperature else {
-            let problem = format!("material `{material}` depends on temperature, in {} lines", self.rows.len());
-            return Err(self.place.error(problem, "Say at which temperature, in the file's unit: --temperature"));
+            let problem = format!("material `{material}` depends on temperature ({} lines)", self.rows.len());
+            return Err(self.place.error(problem, "Give the temperature with --temperature, in the unit of the file"));
         };
         let value = |index: usize| (self.rows[index].0, self.rows[index].1.unwrap_or(0.0));
         let above = self.rows.iter().position(|(_, row)| row.is_some_and(|row| row >= temperature));

@@ -103,14 +103,14 @@ impl InpReader {
         match unread(keyword) {
             UnreadKeyword::Harmless => self.skip(card),
             UnreadKeyword::Changes => {
-                let problem = format!("*{keyword} changes what is computed and is not supported");
+                let problem = format!("*{keyword} changes the model and is not supported");
                 let remedy =
-                    "Remove it if it is not meant here, or give the matrices of the model: --stiffness and --mass";
+                    "Remove it if it is not needed, or give the matrices of the model: --stiffness and --mass";
                 return Err(card.place.error(problem, remedy));
             }
             UnreadKeyword::Unknown => {
-                let problem = format!("keyword *{keyword} is not known");
-                return Err(card.place.error(problem, "Remove it if it changes neither stiffness nor mass"));
+                let problem = format!("keyword *{keyword} is unknown");
+                return Err(card.place.error(problem, "Remove it if it affects neither stiffness nor mass"));
             }
         }
         Ok(())
@@ -121,20 +121,20 @@ impl InpReader {
         match card.data.first() {
             None => Ok(()),
             Some(line) => {
-                let problem = "the instance is moved or turned against its part";
-                Err(line.place.error(problem, "Write the input file without parts and assemblies"))
+                let problem = "the instance is translated or rotated relative to its part";
+                Err(line.place.error(problem, "Export the input file without parts and assemblies"))
             }
         }
     }
 
     fn nodes(&mut self, card: &Card) -> Result<()> {
         if self.in_assembly && self.instances > 0 && self.parts > 0 {
-            let problem = "nodes of the assembly (reference points) stand beside those of the part";
-            return Err(card.place.error(problem, "Remove the reference points, or write the file without parts"));
+            let problem = "the assembly has nodes (reference points) in addition to those of the part";
+            return Err(card.place.error(problem, "Remove the reference points, or export the file without parts"));
         }
         if let Some(system) = card.parameter("SYSTEM")?.filter(|system| !system.eq_ignore_ascii_case("R")) {
-            let problem = format!("coordinates in SYSTEM={system} are not read");
-            return Err(card.place.error(problem, "Write Cartesian coordinates"));
+            let problem = format!("coordinates in SYSTEM={system} are not supported");
+            return Err(card.place.error(problem, "Use Cartesian coordinates"));
         }
         let set = card.parameter("NSET")?.map(str::to_owned);
         for line in &card.data {
@@ -192,7 +192,7 @@ impl InpReader {
             }
             if wanted.is_some_and(|wanted| record.len() != wanted) || record.len() < 2 {
                 let (found, needed) = (record.len().saturating_sub(1), wanted.map_or(1, |wanted| wanted - 1));
-                let problem = format!("element {} ({name}) has {found} nodes where {needed} are needed", record[0]);
+                let problem = format!("element {} ({name}) has {found} nodes instead of {needed}", record[0]);
                 return Err(place.error(problem, "Correct the element or its TYPE"));
             }
             let (number, nodes) = (record[0], record[1..].to_vec());
@@ -209,7 +209,7 @@ impl InpReader {
         match self.materials.last_mut() {
             Some(material) => material.read(card),
             None => {
-                let problem = format!("*{} stands before any *MATERIAL", card.keyword);
+                let problem = format!("*{} appears before any *MATERIAL", card.keyword);
                 Err(card.place.error(problem, "Write *MATERIAL, NAME=... above it"))
             }
         }
@@ -217,7 +217,7 @@ impl InpReader {
 
     fn section(&mut self, card: &Card) -> Result<()> {
         if card.has("COMPOSITE") {
-            return Err(card.place.error("composite sections are not computed", "Give the matrices of the model"));
+            return Err(card.place.error("composite sections are not supported", "Give the matrices of the model"));
         }
         let (set, material) = (card.required("ELSET")?.to_uppercase(), card.required("MATERIAL")?.to_uppercase());
         self.sections.push(InpSection { set, material, place: card.place.clone() });
@@ -233,19 +233,20 @@ impl InpReader {
         };
         self.sets.into_node_sets(&mut self.draft)?;
         for (name, count) in core::mem::take(&mut self.left_out) {
-            self.draft.notes.push(format!("{count} elements {name} are no solids: left out, their sets kept"));
+            let note = format!("{count} {name} elements are not solids: they are ignored, but their sets are kept");
+            self.draft.notes.push(note);
         }
         for name in self.near.keys() {
             let full = name.trim_end_matches(|c: char| c.is_ascii_alphabetic());
             self.draft.warnings.push(format!(
-                "{name} is integrated fully here{}: frequencies come out higher than with reduced integration",
+                "{name} is fully integrated here{}: frequencies are higher than with reduced integration",
                 if name == full { String::new() } else { format!(", as {full}") }
             ));
         }
         if !self.skipped.is_empty() {
             let skipped = self.skipped.iter().map(|(keyword, (_, line))| format!("*{keyword} (line {line})"));
             let skipped: Vec<String> = skipped.collect();
-            self.draft.notes.push(format!("skipped, without effect on stiffness and mass: {}", skipped.join(", ")));
+            self.draft.notes.push(format!("skipped, no effect on stiffness and mass: {}", skipped.join(", ")));
         }
         self.held.sort();
         self.held.dedup();
@@ -258,14 +259,14 @@ impl InpReader {
             let InpSection { set, material, place } = &section;
             let Some(index) = self.materials.iter().position(|known| known.is_named(material)) else {
                 let names: Vec<&str> = self.materials.iter().map(|known| known.name()).collect();
-                let problem = format!("the section names material `{material}`, which is not defined");
-                return Err(place.error(problem, format!("Materials of the file: {}", names.join(", "))));
+                let problem = format!("the section refers to material `{material}`, which is not defined");
+                return Err(place.error(problem, format!("Choose one of these materials: {}", names.join(", "))));
             };
             for number in self.sets.elements.members(set, place, &self.draft)? {
                 let Some(element) = self.draft.element(number) else { continue };
                 if element.material.is_some_and(|other| other != index) {
-                    let problem = format!("element {number} has a second section, with another material");
-                    return Err(place.error(problem, "Give every element one section"));
+                    let problem = format!("element {number} has a second section with a different material");
+                    return Err(place.error(problem, "Give every element only one section"));
                 }
                 element.material = Some(index);
             }
@@ -273,7 +274,7 @@ impl InpReader {
         }
         if self.sections.is_empty() && self.materials.len() == 1 {
             self.draft.notes.push(format!(
-                "there is no *SOLID SECTION: material `{}` is taken for all elements",
+                "there is no *SOLID SECTION: material `{}` is used for all elements",
                 self.materials[0].name()
             ));
             self.draft.elements.iter_mut().for_each(|element| element.material = Some(0));
@@ -288,10 +289,10 @@ fn count(counter: &mut usize, card: &Card, what: &str) -> Result<()> {
     if *counter == 1 {
         return Ok(());
     }
-    let problem = format!("a second {what}: only one is read");
+    let problem = format!("there is a second {what}, but only one is supported");
     Err(card
         .place
-        .error(problem, "Merge the parts into one mesh, or write the input file without parts and assemblies"))
+        .error(problem, "Merge the parts into one mesh, or export the input file without parts and assemblies"))
 }
 
 /// A number of a node or an element.

@@ -50,8 +50,8 @@ impl NamedSets {
     pub(super) fn read(&mut self, card: &Card, set: &str) -> Result<()> {
         let mut members = Vec::new();
         if let Some(elements) = card.parameter("ELSET")?.filter(|_| card.keyword == "NSET") {
-            let problem = format!("node set `{set}` is made of the elements of `{elements}`");
-            let remedy = "Leave it out: every element set is also a set of its nodes";
+            let problem = format!("node set `{set}` is defined by element set `{elements}`");
+            let remedy = "Remove it: every element set is also available as a set of its nodes";
             return Err(card.place.error(problem, remedy));
         }
         for line in &card.data {
@@ -63,7 +63,7 @@ impl NamedSets {
                     _ => (0, 0, 0),
                 };
                 if first == 0 || last < first || step == 0 {
-                    let problem = format!("`{}` is not FIRST, LAST, INCREMENT", line.text);
+                    let problem = format!("`{}` is not of the form FIRST, LAST, INCREMENT", line.text);
                     return Err(line.place.error(problem, "Give whole numbers with LAST ≥ FIRST ≥ 1, INCREMENT ≥ 1"));
                 }
                 members.push(SetMember::Range(first, last, step));
@@ -102,15 +102,15 @@ impl NamedSets {
             let Some(members) = self.sets.get(&name) else {
                 let names: Vec<&str> = self.sets.keys().take(20).map(String::as_str).collect();
                 let problem = format!("set `{name}` is not defined");
-                return Err(place.error(problem, format!("Sets of its kind in the file: {}", names.join(", "))));
+                return Err(place.error(problem, format!("Choose one of these sets: {}", names.join(", "))));
             };
             for member in members {
                 match member {
                     SetMember::Number(number) => _ = found.insert(*number),
                     SetMember::Written(number, place) => {
                         if !exists(*number) {
-                            let problem = format!("set `{name}` names {number}, which is not defined");
-                            return Err(place.error(problem, "Correct the set, or export the mesh again, complete"));
+                            let problem = format!("set `{name}` contains {number}, which is not defined");
+                            return Err(place.error(problem, "Correct the set, or export the complete mesh again"));
                         }
                         found.insert(*number);
                     }
@@ -141,7 +141,7 @@ impl InpSets {
         for name in self.nodes.sets.keys() {
             let members = self.nodes.resolve(name, &nowhere, &draft.numbers, &|number| draft.has_node(number))?;
             if node_sets.get(name).is_some_and(|others| *others != members) {
-                draft.notes.push(format!("`{name}` is a node set and an element set: the node set is taken"));
+                draft.notes.push(format!("`{name}` is a node set and an element set: the node set is used"));
             }
             node_sets.insert(name.clone(), members);
         }

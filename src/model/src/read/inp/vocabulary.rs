@@ -15,7 +15,7 @@ pub(super) enum ElementType {
     Refused(&'static str, &'static str),
 }
 
-const MATRICES: &str = "Write quadratic elements (C3D20, C3D15, C3D10), or give the matrices: --stiffness and --mass";
+const MATRICES: &str = "Use quadratic elements (C3D20, C3D15, C3D10), or give the matrices: --stiffness and --mass";
 
 /// Meaning of an element type, in upper case.
 pub(super) fn element_type(name: &str) -> ElementType {
@@ -31,11 +31,11 @@ pub(super) fn element_type(name: &str) -> ElementType {
         "C3D20R" => Near(ElementKind::Hex20),
         "C3D10M" | "C3D10HS" | "C3D10T" => Near(ElementKind::Tet10),
         "C3D8I" | "C3D8R" => {
-            let reason = "has incompatible modes or reduced integration against shear locking, which are not computed here; \
-                          with full integration instead the bending stiffness would come out far too high";
+            let reason = "uses incompatible modes or reduced integration against shear locking, which are not \
+                          supported; with full integration, the bending stiffness would be far too high";
             Refused(reason, MATRICES)
         }
-        "C3D5" | "C3D13" => Refused("is a pyramid", "Mesh with tetrahedra, prisms and bricks only"),
+        "C3D5" | "C3D13" => Refused("is a pyramid", "Use tetrahedra, prisms and bricks only"),
         _ if ["T2D", "T3D", "B2", "B3", "CPS", "CPE", "CAX", "M3D", "SFM3D", "STRI", "R2D", "R3D"]
             .iter()
             .any(|start| name.starts_with(start)) =>

@@ -44,11 +44,11 @@ pub(super) fn read_matrix(path: &Path, bytes: &[u8]) -> Result<RawMatrix> {
         3 => counted(path, lines),
         5 => named(path, lines),
         _ => {
-            let problem = "it is no matrix: lines of ROW, COLUMN, VALUE or of NODE, DOF, NODE, DOF, VALUE are wanted";
+            let problem = "the file is not a matrix with lines ROW, COLUMN, VALUE or NODE, DOF, NODE, DOF, VALUE";
             Err(about(
                 path,
                 problem,
-                "Give Matrix Market, CalculiX .sti/.mas, or Abaqus MATRIX INPUT or COORDINATE text",
+                "Give a Matrix Market, CalculiX .sti/.mas, or Abaqus MATRIX INPUT or COORDINATE file",
             ))
         }
     }
@@ -59,7 +59,7 @@ fn values(line: &str) -> impl Iterator<Item = &str> {
 }
 
 fn wrong_line(line: &str, place: &SourceLine, wanted: &str) -> crate::Error {
-    place.error(format!("`{line}` is not {wanted}"), "Correct the line, or write the matrix again")
+    place.error(format!("`{line}` is not of the form {wanted}"), "Correct the line, or export the matrix again")
 }
 
 /// NIST, Matrix Market exchange formats: coordinate format.
@@ -76,14 +76,14 @@ fn matrix_market<'a>(path: &Path, mut lines: impl Iterator<Item = (&'a str, Sour
         }
     };
     let mut lines = lines.filter(|(line, _)| !line.is_empty() && !line.starts_with('%'));
-    let (line, place) = lines.next().ok_or_else(|| about(path, "the line of sizes is missing", "Write it again"))?;
+    let (line, place) = lines.next().ok_or_else(|| about(path, "the line of the sizes is missing", "Export it again"))?;
     let sizes: Vec<usize> = values(line).filter_map(|value| value.parse().ok()).collect();
     let &[order, columns, count] = sizes.as_slice() else {
         return Err(wrong_line(line, &place, "ROWS COLUMNS ENTRIES"));
     };
     if order != columns || order == 0 || order > LARGEST_ORDER {
         return Err(
-            place.error(format!("{order} × {columns} is no size of a stiffness or mass"), "Give a square matrix")
+            place.error(format!("a stiffness or mass matrix cannot be {order} × {columns}"), "Give a square matrix")
         );
     }
     let mut entries = Entries::default();
@@ -91,24 +91,24 @@ fn matrix_market<'a>(path: &Path, mut lines: impl Iterator<Item = (&'a str, Sour
     for (line, place) in lines {
         let entry @ (row, column, value) = entry(line, &place)?;
         if row >= order || column >= order {
-            return Err(place.error(format!("row or column lies beyond {order}"), "Write the matrix again"));
+            return Err(place.error(format!("the row or column exceeds {order}"), "Export the matrix again"));
         }
         if value != 0.0 && row != column {
             triangles[usize::from(row > column)] = true;
         }
         if symmetric && triangles == [true; 2] {
             let problem = "a `symmetric` matrix has entries on both sides of the diagonal";
-            return Err(place.error(problem, "Give one triangle, or call it `general`"));
+            return Err(place.error(problem, "Give only one triangle, or declare the matrix `general`"));
         }
         entries.items.push(entry);
     }
     if entries.items.len() != count {
-        let problem = format!("{} entries where {count} are announced", entries.items.len());
-        return Err(about(path, problem, "Write the matrix again, complete"));
+        let problem = format!("it has {} entries, but declares {count}", entries.items.len());
+        return Err(about(path, problem, "Export the complete matrix again"));
     }
     if !symmetric && order > 1 && triangles != [true; 2] && triangles != [false; 2] {
         let problem = "a `general` matrix has entries on one side of the diagonal only";
-        return Err(about(path, problem, "Call it `symmetric`, or give both triangles"));
+        return Err(about(path, problem, "Declare the matrix `symmetric`, or give both triangles"));
     }
     Ok(RawMatrix { entries, labels: Labels::Counted(order) })
 }
@@ -132,8 +132,8 @@ fn counted<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, SourceLine)>) 
     if order > 3 * items.len() {
         return Err(about(
             path,
-            format!("{order} rows with {} entries", items.len()),
-            "Write the matrix again, complete",
+            format!("it has {order} rows, but only {} entries", items.len()),
+            "Export the complete matrix again",
         ));
     }
     check_repeated(path, &items, |index| (index + 1).to_string())?;
@@ -147,8 +147,8 @@ fn check_repeated(path: &Path, items: &[(usize, usize, f64)], name: impl Fn(usiz
     places.sort_unstable();
     match places.windows(2).find(|pair| pair[0] == pair[1]) {
         Some(pair) => {
-            let problem = format!("entry ({}, {}) stands in it twice", name(pair[0].0), name(pair[0].1));
-            Err(about(path, problem, "Write the matrix again, into a new file"))
+            let problem = format!("entry ({}, {}) appears twice", name(pair[0].0), name(pair[0].1));
+            Err(about(path, problem, "Export the matrix again into a new file"))
         }
         None => Ok(()),
     }
@@ -165,9 +165,9 @@ fn named<'a>(path: &Path, lines: impl Iterator<Item = (&'a str, SourceLine)>) ->
         let mut dof = |node: &str, component: &str| -> Result<usize> {
             let node = node.parse::<i64>().map_err(|_| wrong_line(line, &place, "NODE, DOF, NODE, DOF, VALUE"))?;
             let Some(node) = u64::try_from(node).ok().filter(|&node| node > 0) else {
-                let problem = format!("node {node} is an internal one of the code that wrote the matrix");
+                let problem = format!("node {node} is an internal node of the program that wrote the matrix");
                 return Err(
-                    place.error(problem, "Write matrices of plain solid elements, without constraints that add nodes")
+                    place.error(problem, "Export matrices of solid elements only, without constraints that add nodes")
                 );
             };
             let component = component.parse().map_err(|_| wrong_line(line, &place, "NODE, DOF, NODE, DOF, VALUE"))?;
@@ -198,8 +198,8 @@ pub(super) fn read_dofs(path: &Path, bytes: &[u8]) -> Result<Vec<(u64, u64)>> {
     let mut sorted = dofs.clone();
     sorted.sort_unstable();
     if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        let problem = format!("degree of freedom {}.{} stands in it twice", pair[0].0, pair[0].1);
-        return Err(about(path, problem, "Write it again"));
+        let problem = format!("degree of freedom {}.{} appears twice", pair[0].0, pair[0].1);
+        return Err(about(path, problem, "Export the file again"));
     }
     Ok(dofs)
 }

@@ -66,7 +66,7 @@ pub fn read_matrices(files: &MatrixFiles) -> Result<Imported> {
     let absent = absent_nodes(files, &table.numbers, &stiffness)?;
     check_mass(files, &table.numbers, &mass, &absent)?;
     if !absent.is_empty() {
-        notes.push(format!("{} nodes have no dofs in the matrices: they are clamped", absent.len()));
+        notes.push(format!("{} nodes have no dofs in the matrices and are treated as clamped", absent.len()));
     }
     let mut warnings = Vec::from_iter(check_inertia(&files.mass, &mass)?);
     if absent.is_empty() {
@@ -131,7 +131,7 @@ impl<'a> DofRows<'a> {
                 about(
                     path,
                     problem,
-                    "Solid models with displacements 1, 2, 3 only: no rotations, no pressure or temperature",
+                    "Use solid models with displacements 1, 2, 3 only, without rotations, pressure or temperature",
                 )
             })?;
         let index = self.index.get(&node).ok_or_else(|| {
@@ -150,7 +150,7 @@ impl<'a> DofRows<'a> {
             self.kept.clone()
         } else {
             let problem = format!(
-                "{order} rows, but {} have 3·{all} = {} degrees of freedom{}",
+                "it has {order} rows, but the nodes in {} have 3·{all} = {} degrees of freedom{}",
                 self.files.nodes.display(),
                 3 * all,
                 if kept < all {
@@ -160,7 +160,7 @@ impl<'a> DofRows<'a> {
                 }
             );
             let remedy =
-                "Give matrices of all nodes, or of all that --clamp-set does not name, in the order of the node table";
+                "Give matrices of all nodes, or of all nodes outside --clamp-set, in the order of the node table";
             return Err(about(path, problem, remedy));
         };
         let axis = self.files.axis;
@@ -177,8 +177,8 @@ fn located(path: &Path, dofs: Option<&[(u64, u64)]>, rows: &DofRows<'_>) -> Resu
         }
         (Labels::Counted(order), Some(dofs)) => {
             if order != dofs.len() {
-                let problem = format!("{order} rows, but the list of dofs has {}", dofs.len());
-                let remedy = "Give the .dof file of the same run (--dofs), and the matrix whole";
+                let problem = format!("it has {order} rows, but the list of dofs has {}", dofs.len());
+                let remedy = "Give the complete matrix and the .dof file of the same run (--dofs)";
                 return Err(about(path, problem, remedy));
             }
             dofs.iter().map(|&(node, component)| rows.dof(path, node, component)).collect::<Result<Vec<_>>>()?
@@ -239,10 +239,10 @@ fn mirrored(path: &Path, entries: Entries, order: usize, scale: f64) -> Result<(
         if square && low != high && share > ASYMMETRY {
             let (row, column) = (low + 1, high + 1);
             let problem = format!(
-                "it is not symmetric: entry ({row}, {column}) and its mirror image differ by {share:.1e} of the diagonal, counted \
-                 over all {order} degrees of freedom"
+                "it is not symmetric: entry ({row}, {column}) and its mirror image differ by {share:.1e} of the \
+                 diagonal, numbered over all {order} degrees of freedom"
             );
-            let remedy = "Gyroscopic, follower-load and friction terms must be off when it is written";
+            let remedy = "Export it without gyroscopic, follower-load and friction terms";
             return Err(about(path, problem, remedy));
         }
         let value = if square && low != high { 0.5 * (above + below) } else { above + below };
@@ -283,20 +283,20 @@ fn absent_nodes(files: &MatrixFiles, numbers: &[u64], stiffness: &SparseMatrix) 
             absent.push(node);
         } else if present.contains(&false) {
             let problem = format!("node {number} has stiffness in some directions only (x, y, z: {present:?})");
-            let remedy = "Write the matrices without boundary conditions, and clamp whole nodes with --clamp-set";
+            let remedy = "Export the matrices without boundary conditions, and clamp whole nodes with --clamp-set";
             return Err(about(&files.stiffness, problem, remedy));
         }
         if let Some(component) = (0..3).find(|component| diagonal(stiffness, 3 * node + component) < 0.0) {
-            let problem = format!("the diagonal of node {number}, direction {}, is negative", component + 1);
+            let problem = format!("the diagonal entry of node {number}, direction {}, is negative", component + 1);
             return Err(about(
                 &files.stiffness,
                 problem,
-                "A stiffness is positive: are K and M exchanged, or the signs?",
+                "Check whether K and M are swapped or the signs are wrong",
             ));
         }
     }
     if absent.len() == numbers.len() {
-        return Err(about(&files.stiffness, "it has no entry", "Write the matrix again"));
+        return Err(about(&files.stiffness, "it has no entries", "Export the matrix again"));
     }
     Ok(absent)
 }
@@ -312,7 +312,7 @@ fn check_mass(files: &MatrixFiles, numbers: &[u64], mass: &SparseMatrix, absent:
             return Err(about(
                 &files.mass,
                 problem,
-                "Every node that moves needs mass: is it the matrix of the same model?",
+                "Give the mass matrix of the same model: every node that can move needs mass",
             ));
         }
     }
@@ -339,11 +339,14 @@ fn check_inertia(path: &Path, mass: &SparseMatrix) -> Result<Option<String>> {
     let [low, high] = inertia.iter().fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], &x| [low.min(x), high.max(x)]);
     let [x, y, z] = inertia;
     if low <= NO_INERTIA * size {
-        let problem = format!("moving the whole model along x, y, z meets inertias {x:.3e}, {y:.3e}, {z:.3e}: no mass");
-        return Err(about(path, problem, "Are stiffness and mass exchanged?"));
+        let problem = format!("the mass along x, y, z is practically zero ({x:.3e}, {y:.3e}, {z:.3e})");
+        return Err(about(path, problem, "Check whether stiffness and mass are swapped"));
     }
     Ok((high > (1.0 + UNEQUAL) * low).then(|| {
-        format!("the mass along x, y and z differs ({x:.4e}, {y:.4e}, {z:.4e} kg): is it the mass matrix, and of solids only?")
+        format!(
+            "the mass along x, y and z differs ({x:.4e}, {y:.4e}, {z:.4e} kg): check that it is the mass matrix of \
+             solid elements only"
+        )
     }))
 }
 
@@ -375,14 +378,14 @@ fn rigid_motion_warning(nodes: &[[f64; 3]], stiffness: &SparseMatrix) -> Option<
     let (translations, rotations) = (most([0, 1, 2]), most([3, 4, 5]));
     if translations > STRAINED {
         return Some(format!(
-            "moving the whole model strains it (by {translations:.1e}): springs to the ground, or dofs left out? The matrices \
-             are used as they are"
+            "a translation of the whole model strains it (by {translations:.1e}): check for springs to ground and \
+             missing dofs. The matrices are used unchanged"
         ));
     }
     (rotations > STRAINED).then(|| {
         format!(
-            "turning the whole model strains it (by {rotations:.1e}), moving it does not: are the nodes in the order of the \
-             rows, and with the right coordinates?"
+            "a rotation of the whole model strains it (by {rotations:.1e}), but a translation does not: check that the \
+             nodes are in the order of the rows and have the right coordinates"
         )
     })
 }

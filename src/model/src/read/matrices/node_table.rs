@@ -47,7 +47,7 @@ fn of_mesh(path: &Path, bytes: &[u8]) -> Result<NodeTable> {
         nodes.sort_unstable();
         nodes
     };
-    notes.push(format!("nodes and sets are those of {}, in the order of their numbers", path.display()));
+    notes.push(format!("nodes and sets are taken from {}, in the order of the node numbers", path.display()));
     Ok(NodeTable {
         numbers: order.iter().map(|&index| numbered.nodes[index]).collect(),
         positions: order.iter().map(|&index| numbered.mesh.nodes[index]).collect(),
@@ -73,11 +73,11 @@ fn of_table(path: &Path, text: &str) -> Result<NodeTable> {
         let position = fields.get(1..4).and_then(|xyz| xyz.iter().map(|x| number(x)).collect::<Option<Vec<f64>>>());
         let node = fields[0].parse::<u64>().ok();
         let (Some(node), Some(&[x, y, z]), true) = (node, position.as_deref(), fields.len() <= 5) else {
-            let remedy = "Write NODE,X,Y,Z or NODE,X,Y,Z,SETS with the names of sets separated by blanks";
-            return Err(place().error(format!("`{line}` is no line of a node table"), remedy));
+            let remedy = "Write NODE,X,Y,Z or NODE,X,Y,Z,SETS with set names separated by blanks";
+            return Err(place().error(format!("`{line}` is not a line of a node table"), remedy));
         };
         if !seen.insert(node) {
-            return Err(place().error(format!("node {node} stands in the table twice"), "Number the nodes uniquely"));
+            return Err(place().error(format!("node {node} appears twice"), "Give every node a unique number"));
         }
         for name in fields.get(4).unwrap_or(&"").split([' ', ';']).filter(|name| !name.is_empty()) {
             table.sets.entry(name.to_owned()).or_default().push(table.numbers.len());
@@ -86,7 +86,7 @@ fn of_table(path: &Path, text: &str) -> Result<NodeTable> {
         table.positions.push([x, y, z]);
     }
     if table.numbers.is_empty() {
-        return Err(about(path, "it has no node", "Write one line NODE,X,Y,Z[,SETS] for each"));
+        return Err(about(path, "it has no nodes", "Write one line NODE,X,Y,Z[,SETS] per node"));
     }
     Ok(table)
 }

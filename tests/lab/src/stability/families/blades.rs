@@ -88,14 +88,14 @@ fn spin() -> Vec<StabilityCase> {
         let (galerkin, name) = (method.is_galerkin(), method.integration());
         for speed in [1.0, 1300.0, -1300.0, 1900.0] {
             for stiffening in [false, true] {
-                let against = "static growth from K(Ω), at the start and later";
+                let against = "static centrifugal growth from K(Ω), at the start and later";
                 let expected = unless(galerkin, against, ["galerkin", "structure.spin"]);
                 let kind = if stiffening { "softened" } else { "plain" };
                 cases.add(true, format!("spin/growth/{kind}/Ω={speed}/{name}"), expected, move || {
                     grown(method, speed, stiffening)
                 });
             }
-            let against = "free motion by the exponential of the equations in the rotating frame; energy is kept";
+            let against = "free motion from the matrix exponential in the rotating frame; energy is conserved";
             let excluded = galerkin || method.is_massless();
             let expected = unless(excluded, against, [method.scheme.name(), "structure.spin"]);
             cases.add(speed > 1000.0, format!("spin/coriolis/Ω={speed}/{name}"), expected, move || {
@@ -124,8 +124,9 @@ fn grown(method: StabilityMethod, speed: f64, stiffening: bool) -> Result<Vec<Ch
     Ok([
         watch.laws(),
         vec![
-            Check::at_most("displacement at the start from the static one", start, 1e-9),
-            Check::at_most("displacement later from the static one", off(&simulation, &expected), 1e-9),
+            Check::at_most("deviation of the initial displacement from the static one", start, 1e-9),
+            Check::at_most("deviation of the later displacement from the static one", off(&simulation, &expected),
+                1e-9),
         ],
     ]
     .concat())
@@ -167,8 +168,8 @@ fn turned(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
         kept = worse(kept, (real(&simulation, "scheme_energy") / before - 1.0).abs());
     }
     Ok(vec![
-        Check::at_most("displacement from that of the equations", apart, 1e-3),
-        Check::at_most("energy from that at the start", kept, 1e-9),
+        Check::at_most("deviation of the displacement from the matrix exponential", apart, 1e-3),
+        Check::at_most("deviation of the energy from its initial value", kept, 1e-9),
     ])
 }
 
@@ -194,7 +195,7 @@ fn mistuning() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all() {
         for spread in [1e-6, 0.01, 0.3] {
-            let against = "static λ of every blade, with the square of its factor";
+            let against = "static λ of every blade, proportional to the square of its frequency factor";
             let name = format!("mistuning/{spread}/{}", method.name());
             let quick = method.solver == Solver::Lcp && spread > 0.1;
             cases.add(quick, name, Expected::right(against), move || mistuned(method, spread));
@@ -232,7 +233,7 @@ fn mistuned(method: StabilityMethod, spread: f64) -> Result<Vec<Check>> {
     let (simulation, watch) = at_rest(&scene, depth)?;
     let found = |sector: usize| simulation.system().multiplier(0, sector) / (exact * factor(sector).powi(2)) - 1.0;
     let apart = (0..sectors).map(|sector| found(sector).abs()).fold(0.0, worse);
-    let check = Check::at_most("λ from the static solution", apart, near(&scene, depth));
+    let check = Check::at_most("deviation of λ from the static solution", apart, near(&scene, depth));
     Ok([watch.books_of(method.scheme), vec![check]].concat())
 }
 
@@ -242,7 +243,7 @@ fn excitation() -> Vec<StabilityCase> {
         let name = method.integration();
         for order in [0, 1, 3, 7] {
             for ratio in [0.3, 0.97, 1.6] {
-                let against = "amplitude and phase of every blade from the response of its modes";
+                let against = "amplitude and phase of every blade from its modal response";
                 let expected = unless(method.is_galerkin(), against, ["galerkin", "structure.excitation"]);
                 let name = format!("excitation/order={order}/{ratio}ω/{name}");
                 cases.add(order == 3 && ratio > 0.9, name, expected, move || excited(method, order, ratio));
@@ -302,8 +303,8 @@ fn excited(method: StabilityMethod, order: u32, ratio: f64) -> Result<Vec<Check>
     // Quasi-static modes of massless-boundary follow the force one step late.
     let late = if method.is_massless() { rate * STEP } else { 0.0 };
     Ok(vec![
-        Check::at_most("displacement from the response of the modes", apart, 2e-3 + late),
-        Check::at_most("ledger residual", real(&simulation, "energy_residual_relative").abs(), 1e-9),
+        Check::at_most("deviation of the displacement from the modal response", apart, 2e-3 + late),
+        Check::at_most("energy residual", real(&simulation, "energy_residual_relative").abs(), 1e-9),
     ])
 }
 
@@ -313,7 +314,7 @@ fn temperature() -> Vec<StabilityCase> {
         let name = method.integration();
         for degrees in [1e-6, 300.0, -300.0] {
             for softening in [0.0, 4e-4] {
-                let against = "free expansion; λ of the warm blade from its softened flexibility";
+                let against = "free thermal expansion; λ of the warm blade from its softened flexibility";
                 let expected = unless(method.is_galerkin(), against, ["galerkin", "structure.thermal"]);
                 let name = format!("temperature/{degrees:e}/softening={softening}/{name}");
                 cases.add(degrees > 1.0 && softening > 0.0, name, expected, move || warm(method, degrees, softening));
@@ -346,9 +347,9 @@ fn warm(method: StabilityMethod, degrees: f64, softening: f64) -> Result<Vec<Che
         simulation.do_step(simulation.time(), 20.0 * STEP)?;
     }
     Ok(vec![
-        Check::at_most("displacement at the start from the free expansion", start, 1e-9),
-        Check::relative("λ from the static solution", simulation.system().multiplier(0, 0), exact, 1e-6),
-        Check::at_most("ledger residual", real(&simulation, "energy_residual_relative").abs(), 1e-9),
+        Check::at_most("deviation of the initial displacement from the free expansion", start, 1e-9),
+        Check::relative("deviation of λ from the static solution", simulation.system().multiplier(0, 0), exact, 1e-6),
+        Check::at_most("energy residual", real(&simulation, "energy_residual_relative").abs(), 1e-9),
     ])
 }
 
@@ -356,13 +357,13 @@ fn cutting() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all() {
         for energy in [1e5, 1e8, 1e11] {
-            let against = "work u V, cell by cell and in all; wear only grows; signs of the ledger";
+            let against = "work u V, per cell and in total; wear only grows; signs of the energy terms";
             let excluded = method.is_massless() || method.is_galerkin();
             let expected = if method.solver != Solver::Lcp {
                 Expected::refused(["solver", "coating"])
             } else if energy > 1e10 && !excluded {
                 // So hard that the cut drags blades around the axis, or feeds tips that vibrate faster than they slide.
-                let feeds: &[&str] = &["forces of cutting have put"];
+                let feeds: &[&str] = &["cutting forces have added"];
                 Expected::either_as(against, &[&["is displaced by", "around the axis"], feeds])
             } else {
                 unless(excluded, against, [method.scheme.name(), "contact.coating"])
@@ -402,9 +403,10 @@ fn cut(method: StabilityMethod, specific_energy: f64) -> Result<Vec<Check>> {
     Ok([
         watch.laws(),
         vec![
-            Check::so("something was cut, and wear only grows", before > 0.0 && fallen <= 0.0),
-            Check::relative("work from u V", work, specific_energy * before, 1e-9),
-            Check::relative("energy of the cells from the work", real(&simulation, "wear_energy"), work, 1e-9),
+            Check::so("material was cut, and wear only grows", before > 0.0 && fallen <= 0.0),
+            Check::relative("deviation of the work from u V", work, specific_energy * before, 1e-9),
+            Check::relative("deviation of the energy of the cells from the work", real(&simulation, "wear_energy"),
+                work, 1e-9),
         ],
     ]
     .concat())

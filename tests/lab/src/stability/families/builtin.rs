@@ -32,16 +32,16 @@ fn rotor37() -> Vec<StabilityCase> {
         let factors: &[f64] = if method.is_adaptive() { &[1.0] } else { &[0.9, 0.999, 1.001, 1.5, 10.0, 100.0] };
         for factor in factors.iter().copied() {
             let name = format!("rotor37/step-limit/{}/h={factor}", method.name());
-            let against = "static contact of all 36 blades, signs of the ledger";
+            let against = "static contact of all 36 blades, signs of the energy terms";
             let expected = match method.scheme {
                 Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
                 Scheme::MasslessBoundary if factor > 1.0 => Expected::refused(["massless-boundary"]),
                 Scheme::ModalExact if factor > 50.0 => {
-                    Expected::refused(["modal-exact", "flexibility that contact sees"])
+                    Expected::refused(["modal-exact", "contact flexibility"])
                 }
                 // Steps of several periods: film closes all patches, and pulls at those that the static solution has open.
                 Scheme::ModalExact if method.solver == Solver::Film && factor > 5.0 => {
-                    Expected::refused(["film", "pulled at contact node", "lcp"])
+                    Expected::refused(["film", "tensile impulse at contact node", "lcp"])
                 }
                 _ => Expected::right(against),
             };
@@ -63,7 +63,7 @@ fn rotor37() -> Vec<StabilityCase> {
                 let sign = if sense > 0.0 { '+' } else { '−' };
                 let name = format!("rotor37/friction/µ={friction}/{}/{sign}Ω", method.name());
                 // Rejected at the start by µ, or ended in a step because of friction.
-                let against = "the same in a finer run, complementarity";
+                let against = "agreement with a finer run, complementarity";
                 let expected = Expected::either_as(against, &[&["µ"], &["less friction"]]);
                 let work = move |_: &_| CaseEnd::of(rubbed(method, friction, sense));
                 cases.push(StabilityCase::new(name, expected, work).within(300.0));
@@ -74,7 +74,7 @@ fn rotor37() -> Vec<StabilityCase> {
     for method in StabilityMethod::common().filter(|method| method.solver == Solver::Lcp && !method.is_adaptive()) {
         for friction in [0.15, 0.4, 0.8] {
             for step in [5e-7, 1e-6, 2e-6, 4e-6] {
-                let expected = Expected::either_as("the same in a finer run", &[&["time.step"], &["µ below"]]);
+                let expected = Expected::either_as("agreement with a finer run", &[&["time.step"], &["µ below"]]);
                 let name = format!("rotor37/growth/µ={friction}/h={step:e}/{}", method.integration());
                 let work = move |_: &_| CaseEnd::of(grown(method, friction, step));
                 cases.push(StabilityCase::new(name, expected, work).within(300.0));
@@ -95,7 +95,7 @@ fn grown(method: StabilityMethod, friction: f64, step: f64) -> Result<Vec<Check>
 }
 
 fn at_limit(method: StabilityMethod, factor: f64) -> CaseEnd {
-    let Some(rom) = model("rotor37-one-row") else { return CaseEnd::refused("there is no rotor 37") };
+    let Some(rom) = model("rotor37-one-row") else { return CaseEnd::refused("the model of rotor 37 is missing") };
     let fastest = tiprub_core::dynamics::modal::ModalModel::from_rom(&rom, 0.0)
         .map_or(f64::NAN, |model| model.largest_frequency());
     let mut scene = method.on(round(rom));
@@ -104,7 +104,7 @@ fn at_limit(method: StabilityMethod, factor: f64) -> CaseEnd {
         Scheme::MasslessBoundary => massless_step(&scene),
         _ => Some(2.0 / fastest),
     };
-    let Some(limit) = limit else { return CaseEnd::refused("no limit was named") };
+    let Some(limit) = limit else { return CaseEnd::refused("the message names no limit") };
     let press = Press { depth: 2e-5, ..Press::new(with_step(scene, method.step(factor * limit))) };
     CaseEnd::of(press.run())
 }
@@ -112,7 +112,7 @@ fn at_limit(method: StabilityMethod, factor: f64) -> CaseEnd {
 /// At a share of the limit of closed contact that a refusal tells.
 fn share_of_limit(share: f64, damping: f64) -> CaseEnd {
     // With few nodes: lightly damped blades come to rest after a second of steps near the limit.
-    let Some(rom) = model("rotor37-paper") else { return CaseEnd::refused("there is no rotor 37") };
+    let Some(rom) = model("rotor37-paper") else { return CaseEnd::refused("the model of rotor 37 is missing") };
     let method = StabilityMethod { scheme: Scheme::MasslessBoundary, ..StabilityMethod::exact(Solver::Lcp) };
     let mut scene = method.on(round(rom));
     scene.settings.structures[0].damping_ratio = Some(damping);
@@ -122,8 +122,8 @@ fn share_of_limit(share: f64, damping: f64) -> CaseEnd {
         .err()
         .map(|error| error.to_string());
     let limit =
-        refusal.as_deref().and_then(|text| text.split("stable below ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
-    let Some(limit) = limit else { return CaseEnd::refused("no limit was named") };
+        refusal.as_deref().and_then(|text| text.split("stable only below ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
+    let Some(limit) = limit else { return CaseEnd::refused("the message names no limit") };
     let press = Press {
         depth: 2e-5,
         hold: 12e-3 * (0.3 / damping).max(1.0),
@@ -158,8 +158,8 @@ fn against_finer(scene: &Scene, method: StabilityMethod, step: f64, count: usize
     let (coarse, watch) = run(method, step)?;
     let (fine, finer) = run(better, step / parts)?;
     let mut checks = vec![
-        Check::at_most("displacements from the finer run", apart(&coarse, &fine), bound),
-        Check::so("blades touched", watch.contacts > 0 && finer.contacts > 0),
+        Check::at_most("deviation of the displacements from the finer run", apart(&coarse, &fine), bound),
+        Check::so("the blades touched", watch.contacts > 0 && finer.contacts > 0),
         watch.ledger(),
         finer.ledger(),
         Check::so("all outputs finite", watch.finite),
@@ -175,7 +175,7 @@ fn stage() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::common() {
         for friction in [0.0, 0.15, 1.0, 2.0] {
-            let expected = Expected::either("the same in a finer run, complementarity", ["µ"]);
+            let expected = Expected::either("agreement with a finer run, complementarity", ["µ"]);
             let name = format!("stage/oval/µ={friction}/{}", method.name());
             let work = move |_: &_| CaseEnd::of(on_stage(method, friction, 1.35e5));
             cases.push(StabilityCase::new(name, expected, work).within(600.0));
@@ -216,7 +216,7 @@ fn exchanged() -> Vec<StabilityCase> {
         let expected = if swap {
             Expected::refused(["harmonics", "nodal diameter"])
         } else {
-            Expected::right("it starts, and steps")
+            Expected::right("it starts and steps")
         };
         cases.add(true, format!("rom/harmonics-{name}"), expected, move || harmonics(swap));
     }

@@ -32,7 +32,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
             for (kind, turned) in [("straight", 0.0), ("turned", 0.45)] {
                 let released = Released { method, turned, ratio, told: ratio };
                 let name = format!("decay/blade/{kind}/ξ={ratio}/{}", method.name());
-                let expected = Expected::right("decay of every mode from the static place, step by step");
+                let expected = Expected::right("decay of every mode from the static position, step by step");
                 let quick = method.solver == Solver::Lcp && ratio >= 0.05;
                 cases.add(quick, name, expected, move || released.blade());
             }
@@ -188,12 +188,13 @@ impl Released {
             if self.method.is_galerkin() { 1e-6 + 0.1 * near(&scene, step, frequencies[moving - 1]) } else { 1e-6 };
         Ok(vec![
             Check::at_most(
-                "place before the release from the static one",
+                "deviation of the position before the release from the static one",
                 still / DEPTH,
                 1e-9 + 1e-3 * allowed(&scene) / DEPTH,
             ),
-            Check::at_most("displacement from the decay of the modes, per what is left", off, bound),
-            Check::so("something was left to see", n >= 10.0),
+            Check::at_most("deviation of the displacement from the modal decay, relative to the remaining amplitude",
+                off, bound),
+            Check::so("the decay takes at least ten steps", n >= 10.0),
         ])
     }
 }
@@ -254,8 +255,9 @@ pub(crate) fn ring(method: StabilityMethod, order: u32, ratio: f64, told: f64) -
     }
     let energy = real(&simulation, "energy_residual_relative").abs();
     Ok(vec![
-        Check::at_most("amplitude from the decay of the mode, per what is left", off, 1e-6),
-        Check::at_most("amplitude across", across, 1e-6),
-        Check::at_most("ledger residual", energy, 1e-9),
+        Check::at_most("deviation of the amplitude from the modal decay, relative to the remaining amplitude", off,
+            1e-6),
+        Check::at_most("sine amplitude of the nodal diameter", across, 1e-6),
+        Check::at_most("energy residual", energy, 1e-9),
     ])
 }

@@ -32,12 +32,12 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
             for friction in [0.0, 0.3] {
                 let still = Still { method, sectors, friction, coupling: COUPLING };
                 let name = format!("disk/flexibility/{sectors}/µ={friction}/{}", method.name());
-                let expected = Expected::right("static λ and every blade's place from the matrix of the whole disk");
+                let expected = Expected::right("static λ and position of every blade from the matrix of the full disk");
                 cases.add(quick && sectors == 8 && friction > 0.0, name, expected, move || still.run());
             }
             let mirrored = Mirrored { method, sectors, conjugate: true };
             let name = format!("disk/mirrored/{sectors}/{}", method.name());
-            let expected = Expected::right("speed, shape and disk mirrored: the mirrored answer");
+            let expected = Expected::right("mirrored speed, shape and disk give the mirrored result");
             cases.add(quick && sectors == 8, name, expected, move || mirrored.run());
         }
     }
@@ -144,7 +144,7 @@ impl Still {
             (0..3).map(|a| (0..3).map(|b| normal[a] * block[(a, b)] * push[b]).sum::<f64>()).sum()
         });
         let Some(exact) = delassus.lu().solve(&DVector::from_element(count, DEPTH / length)) else {
-            return Ok(vec![Check::so("there is a static solution", false)]);
+            return Ok(vec![Check::so("a static solution exists", false)]);
         };
         let mut force = DVector::zeros(3 * self.sectors);
         for (sector, value) in pressed.iter().zip(exact.iter()) {
@@ -161,12 +161,12 @@ impl Still {
             watch.books_of(self.method.scheme),
             vec![
                 Check::so(
-                    "these blades touch and no others",
+                    "exactly the expected blades touch",
                     system.events().len() == count && exact.iter().all(|v| *v > 0.0),
                 ),
-                Check::at_most("λ from the static solution", off.fold(0.0, worse), bound),
+                Check::at_most("deviation of λ from the static solution", off.fold(0.0, worse), bound),
                 Check::at_most(
-                    "place of any blade from the static one",
+                    "deviation of the blade positions from the static ones",
                     (0..3 * self.sectors).map(|row| moved(row).abs()).fold(0.0, worse) / DEPTH,
                     bound,
                 ),
@@ -233,8 +233,8 @@ impl Mirrored {
         // Blades are solved one after another until gaps hold, to a fraction of the tolerance.
         let bound = 1e-8 + allowed(&self.scene(false)) / GAP;
         Ok(vec![
-            Check::so("blades touched", contacts > if self.method.is_adaptive() { 10 } else { 100 }),
-            Check::at_most("displacements from the mirrored ones", apart(&second, &first), bound),
+            Check::so("the blades touched", contacts > if self.method.is_adaptive() { 10 } else { 100 }),
+            Check::at_most("deviation of the displacements from the mirrored ones", apart(&second, &first), bound),
         ])
     }
 }

@@ -68,7 +68,7 @@ fn flights() -> Vec<StabilityCase> {
         let furthest = 0.999 * FURTHEST / method.step(STEP);
         for speed in [1e-100, 1e-12, 1e-6, 1.0, 1e3, furthest].into_iter().filter(|speed| *speed <= furthest) {
             for mass in [1e-12, 1e-3, 1.0, 1e12] {
-                let expected = Expected::right("x = vt, velocity and energy kept, nothing touched");
+                let expected = Expected::right("x = vt, constant velocity and energy, no contact");
                 let quick = (0.5..2.0).contains(&mass) && speed > 0.5;
                 let name = format!("free/flight/{speed:e}/m={mass:e}/{name}");
                 cases.add(quick, name, expected, move || flight(method, speed, mass));
@@ -98,11 +98,12 @@ fn flight(method: StabilityMethod, speed: f64, mass: f64) -> Result<Vec<Check>> 
     // Adaptive steps round the velocity once per step; recurrences add increments of the displacement.
     let rounding = if method.is_galerkin() { 300.0 * 3.7 * f64::EPSILON } else { 1e-13 };
     Ok(vec![
-        Check::at_most("centre from x = vt", off, 1e-12),
-        Check::at_most("any node from x = vt", nodes, 1e-12),
-        Check::at_most("velocity", apart(vector(&simulation, "body.velocity"), velocity) / size(velocity), rounding),
+        Check::at_most("deviation of the centre from x = vt", off, 1e-12),
+        Check::at_most("largest deviation of a node from x = vt", nodes, 1e-12),
+        Check::at_most("deviation of the velocity", apart(vector(&simulation, "body.velocity"),
+            velocity) / size(velocity), rounding),
         Check::at_most(
-            "kinetic energy",
+            "deviation of the kinetic energy",
             (real(&simulation, "kinetic_energy") - kinetic).abs() / kinetic.max(f64::MIN_POSITIVE),
             1e-12,
         ),
@@ -124,7 +125,7 @@ fn tunnels() -> Vec<StabilityCase> {
                 let velocity = direction.map(|component| component * speed);
                 CaseEnd::of(started(&throw(body, velocity, vec![Plate::left(0.06)])).and_then(|mut simulation| {
                     simulation.do_step(0.0, 10.0 * STEP)?;
-                    Ok(vec![Check::so("it was told", false)])
+                    Ok(vec![Check::so("the step was rejected", false)])
                 }))
             };
             cases.push(StabilityCase::new(format!("free/tunnel/{way}/{speed:e}"), expected, work).quick(true));
@@ -161,7 +162,7 @@ fn impacts() -> Vec<StabilityCase> {
                         continue;
                     }
                     let impact = Impact { method, speed, mass, friction, along, share: 1.0 };
-                    let expected = Expected::right("impulses m v and µ m v, losses, what is left of the velocity");
+                    let expected = Expected::right("impulses m v and µ m v, losses, remaining velocity");
                     let expected = unless_few_modes(method, expected);
                     let name = format!("free/impact/{speed:e}/m={mass:e}/µ={friction}/w={along}/{}", method.name());
                     let quick = (mass - 1.0).abs() < 0.5 && (speed - 1.0).abs() < 0.5 && method.solver != Solver::Film;
@@ -205,20 +206,23 @@ impl Impact {
         let bound = 1e-9 + 1e-16 / (speed * STEP);
         let all = energy(speed) + energy(sideways);
         let mut checks = vec![
-            Check::at_most("velocity after", apart(vector(&simulation, "body.velocity"), after) / speed, bound),
-            Check::at_most("impulse from m v and µ m v", apart(impulse, exact) / (mass * speed), bound),
+            Check::at_most("deviation of the final velocity", apart(vector(&simulation, "body.velocity"),
+                after) / speed, bound),
+            Check::at_most("deviation of the impulse from m v and µ m v", apart(impulse, exact) / (mass * speed),
+                bound),
             Check::at_most(
-                "impact loss from m v²/2",
+                "deviation of the impact loss from m v²/2",
                 (real(&simulation, "impact_loss") - energy(speed)).abs() / all,
                 bound,
             ),
-            Check::at_most("energy left", (real(&simulation, "kinetic_energy") - energy(left)).abs() / all, bound),
+            Check::at_most("deviation of the remaining energy", (real(&simulation,
+                "kinetic_energy") - energy(left)).abs() / all, bound),
             Check::at_most("energy residual", peak, 1e-12),
         ];
         if self.friction > 0.0 {
             let heat = energy(sideways) - energy(left);
             checks.push(Check::at_most(
-                "friction heat",
+                "deviation of the friction heat",
                 (real(&simulation, "friction_loss") - heat).abs() / all,
                 bound,
             ));
@@ -234,9 +238,9 @@ fn rebounds() -> Vec<StabilityCase> {
             for speed in [1e-6, 1.0, 10.0] {
                 // 10 m/s move the rear lump by 10 mm, more than what counts as small.
                 let expected = if speed > 5.0 {
-                    Expected::refused(["moved against each other", "Check positions and velocity"])
+                    Expected::refused(["moved relative to each other", "Check positions and velocity"])
                 } else {
-                    Expected::right("held for half a period of the rear lump, (m₁ + 2m₂)v, m₁v²/2 lost")
+                    Expected::right("contact for half a period of the rear mass, impulse (m₁ + 2m₂)v, loss m₁v²/2")
                 };
                 let expected = unless_few_modes(method, expected);
                 let name = format!("free/rebound/m1:m2={ratio:e}/v={speed:e}/{}", method.name());
@@ -254,10 +258,10 @@ fn bounces() -> Vec<StabilityCase> {
     for method in methods().filter(|method| method.is_galerkin()) {
         for speed in [1e-6, 1e-3, 0.1, 1.0] {
             for friction in [0.0, 0.15] {
-                let against = "held for half a period on the flexibility of the body, 2Mv, nothing lost";
+                let against = "contact for half a period on the flexibility of the body, impulse 2Mv, no loss";
                 // Nothing slides, and lcp knows sliding only.
                 let expected = if friction > 0.0 && method.solver == Solver::Lcp {
-                    Expected::either(against, ["friction has put", "no sticking"])
+                    Expected::either(against, ["friction has added", "not model sticking"])
                 } else {
                     Expected::right(against)
                 };
@@ -292,10 +296,10 @@ fn bounce(method: StabilityMethod, speed: f64, friction: f64) -> Result<Vec<Chec
     let place = -0.37 * speed * LONGEST + speed * (simulation.time() - 0.37 * LONGEST - held);
     let bound = BOUNCED + ROUNDED / deepest;
     Ok(vec![
-        Check::relative("impulse from 2Mv", impulse, 2.0 * mass * speed, bound),
-        Check::relative("velocity after", vector(&simulation, "body.velocity")[0], speed, bound),
+        Check::relative("deviation of the impulse from 2Mv", impulse, 2.0 * mass * speed, bound),
+        Check::relative("deviation of the final velocity", vector(&simulation, "body.velocity")[0], speed, bound),
         Check::at_most(
-            "place after from half a period",
+            "deviation of the final position from that after half a period",
             (vector(&simulation, "body.displacement")[0] - place).abs() / deepest,
             bound,
         ),
@@ -335,11 +339,13 @@ fn rebound(method: StabilityMethod, ratio: f64, speed: f64) -> Result<Vec<Check>
     // Places round to 1e-17 m; the impact lies somewhere within a step.
     let bound = 2.0 * omega * step + 1e-16 / (speed * step);
     Ok(vec![
-        Check::at_most("time of contact from π/ω", (held * omega / std::f64::consts::PI - 1.0).abs(), bound),
-        Check::at_most("impulse from (m₁ + 2m₂)v", (impulse / exact - 1.0).abs(), bound),
-        Check::at_most("velocity after", (vector(&simulation, "body.velocity")[0] / after - 1.0).abs(), bound),
+        Check::at_most("deviation of the contact time from π/ω", (held * omega / std::f64::consts::PI - 1.0).abs(),
+            bound),
+        Check::at_most("deviation of the impulse from (m₁ + 2m₂)v", (impulse / exact - 1.0).abs(), bound),
+        Check::at_most("deviation of the final velocity", (vector(&simulation, "body.velocity")[0] / after - 1.0).abs(),
+            bound),
         Check::at_most(
-            "impact loss from m₁v²/2",
+            "deviation of the impact loss from m₁v²/2",
             (real(&simulation, "impact_loss") - 0.5 * front * speed * speed).abs() / (0.5 * total * speed * speed),
             bound,
         ),

@@ -40,7 +40,7 @@ fn coefficients() -> Vec<StabilityCase> {
                 for model in ["straight", "turned"] {
                     let sign = if sense > 0.0 { "+" } else { "−" };
                     let name = format!("friction/{model}/µ={friction}/{}/{sign}Ω", method.name());
-                    let against = "static sliding contact, torque, signs of the ledger";
+                    let against = "static sliding contact, torque, signs of the energy terms";
                     let expected =
                         if model == "straight" { Expected::right(against) } else { Expected::either(against, ["µ"]) };
                     let scheme = method.scheme == Scheme::ModalExact || method.is_adaptive();
@@ -65,7 +65,7 @@ fn sliding(model: &str, friction: f64, method: StabilityMethod, sense: f64) -> C
         Ok(mut checks) => {
             if model == "turned" {
                 let limit = turned_limit();
-                let text = format!("along −θ, or µ below −w_rr/w_rθ = {limit:.3}: there W > 0");
+                let text = format!("sliding along −θ, or µ below −w_rr/w_rθ = {limit:.3}, where W > 0");
                 checks.push(Check::so(text, sense < 0.0 || friction < limit));
             }
             CaseEnd::answer(checks)
@@ -74,7 +74,7 @@ fn sliding(model: &str, friction: f64, method: StabilityMethod, sense: f64) -> C
             // A refusal is right where W loses its sign statically, or where the scheme or the contact grows.
             let message = error.to_string();
             let lost = sense > 0.0 && friction >= 0.99 * turned_limit();
-            let text = format!("statically lost at µ = {:.3}, or growth is named", turned_limit());
+            let text = format!("static contact lost from µ = {:.3}, or the message names growth", turned_limit());
             let checks = vec![Check::so(text, lost || message.contains("grows") || message.contains("film"))];
             CaseEnd { checks, ..CaseEnd::refused(message) }
         }
@@ -94,7 +94,8 @@ fn speeds() -> Vec<StabilityCase> {
                     slow(
                         solver,
                         speed,
-                        "static normal forces, friction at most µλ, against the slip where tips slide; else a warning",
+                        "static normal forces, friction at most µλ and opposite to the slip of sliding tips; otherwise \
+                         a warning",
                     )
                 };
                 let case = format!("speed/steady/{name}/{:e}", sense * speed);
@@ -105,14 +106,15 @@ fn speeds() -> Vec<StabilityCase> {
         let zero =
             slow(solver, 0.0, "static normal forces, friction at most µλ; with film and lcp a warning of sticking");
         cases.add(lcp, format!("speed/steady/{name}/0"), zero, move || steady(method, 0.0));
-        for (course, text) in [("reversal", "torque of either sense, −µΣλr"), ("jump", "torque unchanged, −µΣλr")]
+        for (course, text) in [("reversal", "torque −µΣλr in both directions of rotation"), ("jump",
+            "unchanged torque −µΣλr")]
         {
             // A speed that passes 0 is one at which tips stick.
             let expected = if course == "reversal" { slow(solver, 0.0, text) } else { Expected::right(text) };
             cases.add(lcp, format!("speed/{course}/{name}"), expected, move || changing(method, course));
         }
         for course in ["reversal", "jump", "ramp", "stop"] {
-            let expected = Expected::right("the same with a fourth of the step, or a sixteenth of the tolerance");
+            let expected = Expected::right("same result with a quarter of the step, or a sixteenth of the tolerance");
             cases.add(lcp && course == "jump", format!("speed/bumps/{course}/{name}"), expected, move || {
                 on_bumps(method, course)
             });
@@ -126,7 +128,7 @@ fn slow(solver: Solver, speed: f64, against: &str) -> Expected {
     if solver == Solver::Coulomb || speed.abs() >= 1.0 {
         return Expected::right(against);
     }
-    Expected::either(against, ["friction has put", "no sticking"])
+    Expected::either(against, ["friction has added", "not model sticking"])
 }
 
 /// A pressed round casing at one speed. The normal forces do not know of it; friction is at most µλ.
@@ -158,11 +160,16 @@ fn steady(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
     checks.push(watch.impact(1e-9));
     checks.push(Check::so("all 12 nodes in contact", system.events().len() == 12));
     for event in system.events().iter().take(1) {
-        checks.push(Check::relative("λ from the static solution", event.normal, exact, 1e-6 + near(&scene)));
-        checks.push(Check::at_most("friction beyond µλ", event.tangential / (0.15 * event.normal) - 1.0, 1e-9));
+        checks.push(Check::relative(
+            "deviation of λ from the static solution",
+            event.normal,
+            exact,
+            1e-6 + near(&scene),
+        ));
+        checks.push(Check::at_most("excess of friction over µλ", event.tangential / (0.15 * event.normal) - 1.0, 1e-9));
         if speed.abs() >= 1.0 {
             let force = event.force[1] / (0.15 * event.normal);
-            checks.push(Check::relative("friction from −µλ", force, -speed.signum(), 1e-9));
+            checks.push(Check::relative("deviation of friction from −µλ", force, -speed.signum(), 1e-9));
         }
     }
     Ok(checks)
@@ -204,8 +211,8 @@ fn changing(method: StabilityMethod, course: &str) -> Result<Vec<Check>> {
     let bound = 1e-6 + near(&scene);
     let mut checks = watch.complementarity();
     checks.push(watch.ledger());
-    checks.push(Check::relative("torque before", torques[0], -1.0, bound));
-    checks.push(Check::relative("torque after", torques[1], after, bound));
+    checks.push(Check::relative("deviation of the torque before", torques[0], -1.0, bound));
+    checks.push(Check::relative("deviation of the torque after", torques[1], after, bound));
     checks.push(watch.heat(1e-6));
     checks.push(watch.impact(1e-9));
     Ok(checks)
@@ -246,8 +253,8 @@ fn on_bumps(method: StabilityMethod, course: &'static str) -> Result<Vec<Check>>
     let (coarse, watch) = run(method, 1e-6)?;
     let (fine, finer) = run(better, 1e-6 / parts)?;
     let mut checks = vec![
-        Check::at_most("displacements from the finer run", apart(&coarse, &fine), 0.05),
-        Check::relative("impulse from the finer run", watch.impulse, finer.impulse, 0.05),
+        Check::at_most("deviation of the displacements from the finer run", apart(&coarse, &fine), 0.05),
+        Check::relative("deviation of the impulse from the finer run", watch.impulse, finer.impulse, 0.05),
         Check::so("the blades touched", watch.contacts > 0 && finer.contacts > 0),
         watch.ledger(),
         finer.ledger(),

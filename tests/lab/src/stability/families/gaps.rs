@@ -25,7 +25,7 @@ fn clearances() -> Vec<StabilityCase> {
     for method in StabilityMethod::common() {
         let (lcp, name) = (method.solver == Solver::Lcp, method.name());
         for gap in [1e-6, 1e-12, 1e-30, 1e-300, f64::MIN_POSITIVE, 5e-324, 0.02] {
-            let against = "static contact, signs of the ledger";
+            let against = "static contact, signs of the energy terms";
             // A tolerance that is a fraction of such clearances is far below the rounding of displacements.
             let expected = if method.is_galerkin() && gap < 1e-11 {
                 Expected::either(against, ["the contact problem", "no solution"])
@@ -92,7 +92,7 @@ fn one_inside(method: StabilityMethod) -> Result<Vec<Check>> {
     let mut simulation = Simulation::new(&scene)?;
     set(&mut simulation, "gap_offset", -2e-5)?;
     simulation.initialise(0.0)?;
-    Ok(vec![Check::so("it started", true)])
+    Ok(vec![Check::so("the simulation started", true)])
 }
 
 fn redundant() -> Vec<StabilityCase> {
@@ -100,7 +100,7 @@ fn redundant() -> Vec<StabilityCase> {
     for copies in [2, 3, 10] {
         for method in StabilityMethod::all() {
             for friction in [0.0, 0.15, 0.5] {
-                let against = "static contact (sum over coincident nodes), signs of the ledger";
+                let against = "static contact (sum over coincident nodes), signs of the energy terms";
                 let expected = if method.is_massless() {
                     Expected::either(against, ["massless-boundary"])
                 } else if method.is_galerkin() {
@@ -142,7 +142,7 @@ fn sectors() -> Vec<StabilityCase> {
                     CaseEnd::of(Press::new(scene).run())
                 };
                 let kind = if neighbour > 0.0 { "coupled" } else { "uncoupled" };
-                let expected = Expected::right("static contact, all sectors alike, no resultant");
+                let expected = Expected::right("static contact, equal in all sectors, no resultant force");
                 let lcp = method.solver == Solver::Lcp;
                 let quick = lcp && count < 5 || (count == 200 && neighbour == 0.0 && lcp && method.is_adaptive());
                 let name = format!("sectors/{count}/{kind}/{}", method.name());
@@ -151,7 +151,7 @@ fn sectors() -> Vec<StabilityCase> {
         }
     }
     for method in StabilityMethod::common() {
-        let expected = Expected::right("no force on it, the others bit by bit as without");
+        let expected = Expected::right("no force on the missing blade, the others bitwise as without it");
         let name = format!("sectors/one-blade-missing/{}", method.name());
         cases.add(method.solver == Solver::Lcp, name, expected, move || missing(method));
     }
@@ -181,10 +181,10 @@ fn missing(method: StabilityMethod) -> Result<Vec<Check>> {
     Ok(vec![
         Check::so("no force on the missing blade", gone.iter().skip(5).step_by(12).all(|force| *force == 0.0)),
         Check::so(
-            "the other blades as without, bit by bit",
+            "the other blades are bitwise as without it",
             others.clone().all(|(_, (a, b))| a.to_bits() == b.to_bits()),
         ),
-        Check::so("they touch", others.into_iter().any(|(_, (a, _))| *a > 0.0)),
+        Check::so("there is contact", others.into_iter().any(|(_, (a, _))| *a > 0.0)),
     ])
 }
 
@@ -196,7 +196,7 @@ fn whole_casing() -> Vec<StabilityCase> {
     for method in StabilityMethod::all() {
         for friction in [0.0, 0.15] {
             for (surface, flexible) in [("rigid", false), ("ring", true)] {
-                let expected = Expected::right("forces of blades and casing in equilibrium, all alike, 36 nodes");
+                let expected = Expected::right("forces of blades and casing in equilibrium, all equal, 36 nodes");
                 let lcp = method.solver == Solver::Lcp && friction > 0.0;
                 let quick = lcp && method.is_adaptive();
                 let name = format!("whole-casing/{surface}/{}/µ={friction}", method.name());
@@ -244,9 +244,10 @@ fn closed_long(method: StabilityMethod, friction: f64, flexible: bool) -> Result
     // Galerkin closes gaps to a fraction of its tolerance.
     let near = 1e-3 * allowed(&scene) / depth;
     let static_bound = near + if flexible { ROUNDNESS / depth } else { 1e-6 };
-    checks.push(Check::at_most("λ from the static solution", off, static_bound));
+    checks.push(Check::at_most("deviation of λ from the static solution", off, static_bound));
     let turning = forces.iter().fold(0.0, |most: f64, force| most.max((force / forces[0] - 1.0).abs()));
-    checks.push(Check::at_most("blades differ", turning, near + if flexible { ROUNDNESS / depth } else { 0.0 }));
+    checks.push(Check::at_most("difference between blades", turning,
+        near + if flexible { ROUNDNESS / depth } else { 0.0 }));
     checks.push(Check::so("all 12 nodes in contact", system.events().len() == 12));
     Ok(checks)
 }
@@ -288,15 +289,15 @@ fn scaled(exponent: i32, method: StabilityMethod, friction: f64) -> Result<Vec<C
     let (bound, most) = if exponent > -440 { (1e-12, 1.0 + 1e-12) } else { (f64::INFINITY, 10.0) };
     let negative = small.iter().fold(0.0, |most: f64, force| most.max(-force));
     Ok(vec![
-        Check::so("they touch", largest > 0.0),
-        Check::at_most("scaled λ differ by", off, bound),
-        Check::so("no adhesion, all finite", negative == 0.0 && small.iter().all(|force| force.is_finite())),
+        Check::so("there is contact", largest > 0.0),
+        Check::at_most("difference of the scaled λ", off, bound),
+        Check::so("no adhesion, all values finite", negative == 0.0 && small.iter().all(|force| force.is_finite())),
         Check::at_most(
-            "largest λ beyond the scaled one",
+            "excess of the largest λ over the scaled one",
             small.iter().fold(0.0, |a: f64, b| a.max(*b)) / largest / scale.max(1e-290),
             most,
         ),
-        Check::at_most("time per step against normal numbers", time / calm.max(LEAST_TIME), 8.0),
+        Check::at_most("time per step relative to normal numbers", time / calm.max(LEAST_TIME), 8.0),
     ])
 }
 

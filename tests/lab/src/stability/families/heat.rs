@@ -35,7 +35,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
         for friction in [1e-6, 0.15, 1.0, 2.0] {
             for speed in [300.0, 1300.0, -1300.0, 1e5] {
                 let heat = HeatedBlades { method, friction, speed, share: 1.0 };
-                let expected = Expected::right("∫ µ λ |v| dt from forces and places, the integral of the power");
+                let expected = Expected::right("∫ µ λ |v| dt from forces and positions, the integral of the power");
                 let name = format!("friction/heat/µ={friction}/Ω={speed}/{}", method.name());
                 let quick = method.solver == Solver::Lcp && (friction - 0.15).abs() < 0.1;
                 cases.add(quick && speed.abs() > 500.0 && speed < 1e4, name, expected, move || heat.run());
@@ -97,10 +97,10 @@ impl HeatedBlades {
         // The product of two means is not the mean of the product: of second order in the communication step.
         let bound = if galerkin { 1e-5 * (length / STEP).powi(2) } else { 1e-9 };
         Ok(vec![
-            Check::so("tips touched, and all slide one way", touched > 100 && reversed < 0.0),
-            Check::relative("friction loss from ∫ µ λ |v| dt", booked, heat, bound),
+            Check::so("the tips touched, and all slide in one direction", touched > 100 && reversed < 0.0),
+            Check::relative("deviation of the friction loss from ∫ µ λ |v| dt", booked, heat, bound),
             Check::relative(
-                "integral of the friction power from it",
+                "deviation of the integral of the friction power from it",
                 power,
                 if galerkin { booked } else { heat },
                 1e-9,

@@ -29,7 +29,7 @@ fn step_limit() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all() {
         for (friction, model) in [(0.0, "tower"), (0.15, "tower"), (0.0, "blade"), (0.15, "blade")] {
-            let against = "static contact, signs of the ledger";
+            let against = "static contact, signs of the energy terms";
             let quick = model == "tower" && friction > 0.0 && method.solver == Solver::Lcp;
             if method.is_adaptive() {
                 // The tolerance in place of the step.
@@ -53,7 +53,7 @@ fn step_limit() -> Vec<StabilityCase> {
                         against,
                         &[
                             &["grows"],
-                            &["film", "pulled at contact node"],
+                            &["film", "tensile impulse at contact node"],
                             &["kinetic and strain energy", "does not resolve"],
                         ],
                     ),
@@ -88,7 +88,7 @@ fn at(method: StabilityMethod, friction: f64, model: &str, factor: f64) -> CaseE
         }
         _ => Some(2.0 / fastest),
     };
-    let Some(limit) = limit else { return CaseEnd::refused("no limit was named") };
+    let Some(limit) = limit else { return CaseEnd::refused("the message names no limit") };
     CaseEnd::of(Press::new(with_step(scene, method.step(factor * limit))).run())
 }
 
@@ -98,7 +98,7 @@ fn ratios() -> Vec<StabilityCase> {
         for method in StabilityMethod::all() {
             for kind in ["stiff node", "light node"] {
                 let name = format!("stiffness/{}/1e{exponent}/{}", kind.replace(' ', "-"), method.name());
-                let against = "static contact, signs of the ledger";
+                let against = "static contact, signs of the energy terms";
                 let expected = if method.is_massless() && kind == "stiff node" && exponent > 4 {
                     Expected::either(against, ["massless-boundary", "modes with inertia"])
                 } else {

@@ -40,11 +40,11 @@ fn balances() -> Vec<StabilityCase> {
             for speed in [0.01, 1.0, 10.0, 100.0] {
                 let balance = Balance { method, friction, speed, share: 1.0 };
                 // 100 m/s dent the plates by more than what counts as small.
-                let against = "momentum and energy kept, forces of pairs add up, contact takes energy";
+                let against = "momentum and energy balance, sum of the pair forces, energy loss in contact";
                 let displaced: &[&str] =
                     &["left_plate, which carries a surface, is displaced", "Check positions and velocity"];
                 // Sliding stops at the impact, which laws without sticking do not describe: they end beyond 1 % of the energy exchanged.
-                let sliding: &[&str] = &["friction has put", "less friction"];
+                let sliding: &[&str] = &["friction has added", "less friction"];
                 let slides = friction >= 1.0 && method.solver != Solver::Coulomb;
                 let expected = match (speed > 50.0, slides) {
                     (true, true) => Expected::refused_as(&[displaced, sliding]),
@@ -96,17 +96,17 @@ impl Balance {
         }
         let curved = real(&simulation, "curvature_work");
         let mut checks = vec![
-            Check::so("both plates were touched or one twice", exchanged > 1.05 * mass * self.speed),
-            Check::at_most("change of momentum from the impulse", off, 1e-12),
-            Check::at_most("forces of pairs from the sum", sums, 1e-12),
+            Check::so("both plates were hit, or one plate twice", exchanged > 1.05 * mass * self.speed),
+            Check::at_most("deviation of the change of momentum from the impulse", off, 1e-12),
+            Check::at_most("deviation of the sum of the pair forces from the total", sums, 1e-12),
             Check::at_most("energy residual", residual, 1e-10),
             Check::so("all outputs finite", finite),
         ];
         if self.method.solver != Solver::Film {
-            checks.push(Check::at_most("impact loss falls by", fallen, 1e-9));
+            checks.push(Check::at_most("decrease of the impact loss", fallen, 1e-9));
         }
         let held = real(&simulation, "kinetic_energy") + real(&simulation, "strain_energy");
-        checks.push(Check::at_most("energy gained beside curvature", (held - curved) / energy - 1.0, 1e-9));
+        checks.push(Check::at_most("energy gain without curvature work", (held - curved) / energy - 1.0, 1e-9));
         Ok(checks)
     }
 }
@@ -115,7 +115,8 @@ fn mirrors() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         for friction in [0.0, 0.15, 0.5] {
-            let expected = unless_few_modes(method, Expected::right("left and right alike, no force across"));
+            let expected = unless_few_modes(method,
+                Expected::right("equal on the left and right, no transverse force"));
             let name = format!("free/symmetric/µ={friction}/{}", method.name());
             let quick = method.scheme == Scheme::ModalExact && method.solver != Solver::Film && friction > 0.2;
             cases.add(quick, name, expected, move || symmetric(method, friction));
@@ -145,9 +146,9 @@ fn symmetric(method: StabilityMethod, friction: f64) -> Result<Vec<Check>> {
     // Gauss-Seidel goes through the contacts one by one and ends at its tolerance.
     let bound = if method.solver == Solver::Coulomb && friction > 0.0 { 1e-7 } else { 1e-9 };
     Ok(vec![
-        Check::so("it was squeezed", pushed > 100.0),
-        Check::at_most("places differ", off / largest, bound),
-        Check::at_most("force across", across / pushed, bound),
+        Check::so("the body was squeezed", pushed > 100.0),
+        Check::at_most("difference of the positions", off / largest, bound),
+        Check::at_most("transverse force", across / pushed, bound),
     ])
 }
 
@@ -165,18 +166,18 @@ fn edges() -> Vec<StabilityCase> {
             ("hits-the-edge", 1e-5, [-4.0, -40.0, 0.0]),
         ] {
             let expected = if front < 0.0 {
-                Expected::refused(["left_", "over the edge", "Extend the contact grid"])
+                Expected::refused(["left_", "has passed the edge", "Extend the contact grid"])
             } else if velocity[0] < 0.0 {
-                Expected::right("an impact: momentum balance, energy only lost")
+                Expected::right("impact: momentum balance, no energy gain")
             } else {
-                Expected::right("passes without a force, velocity kept")
+                Expected::right("passes without a force at constant velocity")
             };
             cases.add(true, format!("free/edge/{what}/{name}"), expected, move || {
                 edge(solver, [0.0, beyond, 0.0], HALF + front, velocity)
             });
         }
         for clearance in [1e-3, 1e-9, 1e-15] {
-            let expected = Expected::right("passes without a force, velocity kept");
+            let expected = Expected::right("passes without a force at constant velocity");
             cases.add(true, format!("free/grazing/{clearance:e}/{name}"), expected, move || {
                 edge(solver, [0.0; 3], HALF + clearance, [0.0, -40.0, 7.0])
             });
@@ -203,9 +204,9 @@ fn edge(solver: Solver, centre: [f64; 3], distance: f64, velocity: [f64; 3]) -> 
     let change: [f64; 3] = std::array::from_fn(|i| 0.3 * (now[i] - velocity[i]));
     let all = 0.3 * size(velocity);
     let mut checks = vec![
-        Check::at_most("change of momentum from the impulse", apart(change, impulse) / all, 1e-12),
+        Check::at_most("deviation of the change of momentum from the impulse", apart(change, impulse) / all, 1e-12),
         Check::at_most("energy residual", residual, 1e-12),
-        Check::at_most("energy gained", size(now) / size(velocity) - 1.0, 1e-12),
+        Check::at_most("energy gain", size(now) / size(velocity) - 1.0, 1e-12),
     ];
     checks.push(if velocity[0] < 0.0 {
         Check::at_most("velocity into the plate", now[0].abs() / size(velocity), 1e-9)
@@ -241,7 +242,7 @@ fn starts() -> Vec<StabilityCase> {
         (
             "held",
             Throw { body: LumpChain { ground: 1e5, ..elastic().body }, ..elastic() },
-            Expected::refused(["the structure is held", "without supports"]),
+            Expected::refused(["the structure is constrained", "without supports"]),
         ),
         ("step-beyond-limit", central(1.001), Expected::refused(["central-difference", "ω_max", "internal step"])),
         ("step-far-beyond-limit", central(30.0), Expected::refused(["central-difference", "ω_max", "internal step"])),
@@ -293,8 +294,8 @@ fn begin(throw: &Throw) -> Result<Vec<Check>> {
     }
     let change = throw.body.mass() * (vector(&simulation, "body.velocity")[0] - throw.velocity[0]);
     Ok(vec![
-        Check::so("it touched", impulse > 0.0),
-        Check::relative("change of momentum from the impulse", change, impulse, 1e-11),
+        Check::so("there is contact", impulse > 0.0),
+        Check::relative("deviation of the change of momentum from the impulse", change, impulse, 1e-11),
         Check::at_most("energy residual", residual, 1e-11),
     ])
 }

@@ -23,7 +23,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
 fn faults() -> Vec<StabilityCase> {
     let method = StabilityMethod::exact(Solver::Lcp);
     let case = |name: &str, work: fn(StabilityMethod) -> tiprub_core::Result<Vec<Check>>| {
-        StabilityCase::new(format!("judge/{name}"), Expected::right("what is not so"), move |_| {
+        StabilityCase::new(format!("judge/{name}"), Expected::right("a wrong result"), move |_| {
             CaseEnd::of(work(method))
         })
     };
@@ -49,7 +49,7 @@ fn faults() -> Vec<StabilityCase> {
 
 /// One way to fail each.
 fn ways() -> Vec<StabilityCase> {
-    let right = || Expected::right("two and two are five");
+    let right = || Expected::right("2 + 2 = 5");
     vec![
         StabilityCase::new("judge/wrong", right(), |_| CaseEnd::answer(vec![Check::relative("2 + 2", 4.0, 5.0, 1e-9)])),
         StabilityCase::new("judge/refused", right(), |_| CaseEnd::refused("no")),
@@ -57,7 +57,7 @@ fn ways() -> Vec<StabilityCase> {
             CaseEnd::answer(vec![Check::so("it ran", true)])
         }),
         StabilityCase::new("judge/unnamed", Expected::refused(["five"]), |_| CaseEnd::refused("no")),
-        StabilityCase::new("judge/panic", right(), |_| panic!("on purpose")),
+        StabilityCase::new("judge/panic", right(), |_| panic!("deliberate panic")),
         StabilityCase::new("judge/abort", right(), |_| std::process::abort()),
         StabilityCase::new("judge/overflow", right(), |_| {
             CaseEnd::answer(vec![Check::at_most("depth", descend(1), 0.0)])

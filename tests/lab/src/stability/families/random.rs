@@ -20,7 +20,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
         // Of a scene, or another way to integrate it with its solver.
         let drawn = method_of(&scene(index).0);
         let method = method.map_or(drawn, |method| StabilityMethod { solver: drawn.solver, ..method });
-        let against = "signs of the ledger, complementarity, the same with a fourth of the step";
+        let against = "signs of the energy terms, complementarity, same result with a quarter of the step";
         let expected = Expected::either_as(
             against,
             &[
@@ -29,7 +29,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
                 &["µ", "Use"],
                 &["internal step", "below"],
                 &["massless-boundary", "film"],
-                &["friction has put", "no sticking"],
+                &["friction has added", "not model sticking"],
                 &["the contact problem", "no solution", "Use less friction"],
             ],
         );
@@ -111,7 +111,7 @@ fn checked(method: StabilityMethod, index: u64) -> Result<Vec<Check>> {
         Check::so("the blades touched", watch.contacts > 0 && finer.contacts > 0),
         // Coarse steps may be coarse; they must come nearer as they get finer.
         Check::at_most(
-            "displacements with h/4 from those with h/16, and against h",
+            "deviation of the displacements with h/4 from those with h/16, compared with h",
             better.min(better / error.max(1e-9) * 0.1),
             if massless { 0.1 } else { 0.05 },
         ),

@@ -26,21 +26,22 @@ fn communication() -> Vec<StabilityCase> {
         let lcp = method.solver == Solver::Lcp;
         for ratio in [1e-3, 0.1, 0.7, 1.0, 2.0, 3.3, 10.0, 1e3] {
             let expected = if ratio < 1.0 {
-                Expected::right("the same with h = H/4")
+                Expected::right("same result with h = H/4")
             } else {
-                Expected::right("the same with H = h, one step at a time")
+                Expected::right("same result with H = h")
             };
             let name = format!("communication/H={ratio}h/{}", method.name());
             let quick = lcp && (method == StabilityMethod::exact(Solver::Lcp) || method.is_galerkin());
             cases.add(quick && ratio > 0.5, name, expected, move || lengths(method, ratio));
         }
-        let expected = Expected::right("the same with even steps a quarter as long; signs of the ledger");
+        let expected = Expected::right("same result with uniform steps of a quarter of the length; signs of the energy \
+                                        terms");
         let name = format!("communication/wild/{}", method.name());
         cases.add(false, name, expected, move || wildly(method));
     }
     for method in StabilityMethod::all_with(Solver::Lcp) {
         let name = method.integration();
-        let expected = Expected::right("energy of free blades without damping, and their phase against ω t");
+        let expected = Expected::right("energy of free undamped blades, and their phase compared with ω t");
         cases.add(false, format!("communication/H=1e6h/{name}"), expected, move || huge(method));
         // Steps of galerkin are counted as they are done.
         let words = ["communicationStepSize", "internal steps"];
@@ -134,7 +135,7 @@ fn lengths(method: StabilityMethod, ratio: f64) -> Result<Vec<Check>> {
         (history(&rub(method, STEP), || STEP)?.0, same)
     };
     let mut checks = vec![
-        Check::at_most("displacements differ", apart(&found, &other), bound),
+        Check::at_most("difference of the displacements", apart(&found, &other), bound),
         Check::so("the blades touched", watch.contacts > 0),
         watch.ledger(),
     ];
@@ -164,7 +165,7 @@ fn short(method: StabilityMethod, length: f64) -> Result<Vec<Check>> {
     }
     Ok(vec![
         Check::at_most(
-            "displacements from ten times as long steps",
+            "deviation from the displacements with steps ten times as long",
             apart(&displacements(&simulation), &displacements(&other)),
             1e-3,
         ),
@@ -178,7 +179,7 @@ fn wildly(method: StabilityMethod) -> Result<Vec<Check>> {
     let (found, watch) = history(&rub(method, STEP), || random.scale(1e-8, 5e-5))?;
     let (even, _) = history(&rub(method, STEP / 4.0), || STEP / 4.0)?;
     let mut checks = vec![
-        Check::at_most("displacements from even steps", apart(&found, &even), 0.05),
+        Check::at_most("deviation from the displacements with uniform steps", apart(&found, &even), 0.05),
         Check::so("the blades touched", watch.contacts > 0),
         watch.ledger(),
     ];
@@ -230,10 +231,10 @@ fn huge(method: StabilityMethod) -> Result<Vec<Check>> {
         twin.do_step(twin.time(), 1e3 * step)?;
     }
     Ok(vec![
-        Check::so("there is energy", before > 0.0),
+        Check::so("the energy is positive", before > 0.0),
         Check::at_most("energy drift over 1e6 steps", (energy(&simulation) / before - 1.0).abs(), 1e-11),
         Check::at_most(
-            "displacements from 1000 steps as long in all",
+            "deviation from the displacements with 1000 steps of the same total length",
             apart(&displacements(&simulation), &displacements(&twin)),
             1e-5,
         ),
@@ -254,7 +255,7 @@ fn long() -> Vec<StabilityCase> {
                 StabilityCase::new(format!("long/{steps:e}-steps/{name}"), expected, work).quick(quick).within(600.0),
             );
         }
-        let expected = Expected::right("energy at most what the casing did; signs of the ledger");
+        let expected = Expected::right("energy at most the work of the casing; signs of the energy terms");
         let work = move |_: &_| CaseEnd::of(chatter(method));
         cases.push(StabilityCase::new(format!("long/chatter/{name}"), expected, work).within(600.0));
     }
@@ -273,7 +274,7 @@ fn drift(method: StabilityMethod, steps: f64) -> Result<(Vec<Check>, String)> {
     let remark = format!("largest drift {most:.1e} over {steps:e} steps of {step:.2e} s, {:.0} ns each", 1e9 * time);
     // Adaptive steps turn each mode by a matrix whose determinant is 1 to rounding, which adds up over 2.5e5 steps of 80 µs.
     let bound = if method.scheme == Scheme::Galerkin { 2.5e5 * f64::EPSILON } else { 1e-11 };
-    Ok((vec![Check::so("there is energy", before > 0.0), Check::at_most("energy drift", most, bound)], remark))
+    Ok((vec![Check::so("the energy is positive", before > 0.0), Check::at_most("energy drift", most, bound)], remark))
 }
 
 /// Blades without damping that bounce in a round casing for long: contact may take energy, never give it.
@@ -294,7 +295,8 @@ fn chatter(method: StabilityMethod) -> Result<Vec<Check>> {
         watch.complementarity(),
         vec![
             watch.ledger(),
-            Check::at_most("energy beyond the work of the casing", energy(&simulation) / supplied - 1.0, bound),
+            Check::at_most("excess of the energy over the work of the casing", energy(&simulation) / supplied - 1.0,
+                bound),
             watch.impact(bound),
         ],
     ]
@@ -305,7 +307,7 @@ fn jumps() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all() {
         for jump in [1e-6, 1e-5, 1e-4, 1e-3, -1e-4] {
-            let expected = Expected::right("impulse = W⁻¹ jump, energy of the casing = impact loss + energy left");
+            let expected = Expected::right("impulse = W⁻¹ jump, work of the casing = impact loss + remaining energy");
             let name = format!("jump/gap-offset/{jump:e}/{}", method.name());
             cases.add(method.solver == Solver::Lcp, name, expected, move || jumped(method, jump));
         }
@@ -339,8 +341,10 @@ fn jumped(method: StabilityMethod, jump: f64) -> Result<Vec<Check>> {
     let displaced = simulation.system().bank().row(0, 1);
     let mut checks = watch.complementarity();
     let near = allowed(&scene);
-    checks.push(Check::relative("λ from jump/W", found, exact, 1e-9 + if jump > 0.0 { near / jump } else { 0.0 }));
-    checks.push(Check::at_most("tip from the casing", (displaced + jump.max(0.0)).abs() / GAP, 1e-9 + near / GAP));
+    checks.push(Check::relative("deviation of λ from jump/W", found, exact,
+        1e-9 + if jump > 0.0 { near / jump } else { 0.0 }));
+    checks.push(Check::at_most("deviation of the tip from the casing", (displaced + jump.max(0.0)).abs() / GAP,
+        1e-9 + near / GAP));
     for _ in 0..500 {
         watch.step(&mut simulation, 2e-6)?;
     }
@@ -348,7 +352,7 @@ fn jumped(method: StabilityMethod, jump: f64) -> Result<Vec<Check>> {
     checks.extend(watch.books_of(method.scheme));
     if jump > 0.0 {
         checks.push(Check::at_most(
-            "energy beyond the work of the casing",
+            "excess of the energy over the work of the casing",
             energy(&simulation) / supplied - 1.0,
             if method.is_massless() { MASSLESS_RETURN } else { 1e-9 },
         ));
@@ -377,17 +381,18 @@ fn pushed(rom: &tiprub_core::Rom, jump: f64, step: f64) -> f64 {
 fn restore() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all() {
-        let expected = Expected::right("the same bits as where it was saved, whatever the parameters there were");
+        let expected = Expected::right("bitwise the same as the saved instance, whatever the parameters of the \
+                                        restoring one");
         let name = format!("restore/other-parameters/{}", method.name());
         cases.add(method.solver == Solver::Lcp, name, expected, move || elsewhere(method));
     }
-    let expected = Expected::right("refused, set back, and then the same bits as of a fresh instance");
+    let expected = Expected::right("rejected, reset, and then bitwise the same as a fresh instance");
     cases.push(StabilityCase::new("restore/refused-scheme", expected, |_| CaseEnd::of(after_refusal())).quick(true));
-    let expected = Expected::right("a warning for the step taken, once; none for the step proposed");
+    let expected = Expected::right("one warning for the step used; none for the proposed step");
     cases.push(
         StabilityCase::new("communication/other-step-than-proposed", expected, |_| CaseEnd::of(told())).quick(true),
     );
-    let expected = Expected::refused(["another scene"]);
+    let expected = Expected::refused(["a different scene"]);
     cases.push(StabilityCase::new("restore/other-scene", expected, |_| CaseEnd::of(other_scene())).quick(true));
     cases
 }
@@ -428,7 +433,7 @@ fn elsewhere(method: StabilityMethod) -> Result<Vec<Check>> {
         other.do_step(other.time(), 3e-5)?;
         same &= bits(&simulation) == bits(&other);
     }
-    Ok(vec![Check::so("all outputs the same bit by bit over 40 steps", same)])
+    Ok(vec![Check::so("all outputs are bitwise equal over 40 steps", same)])
 }
 
 /// A scheme that leaves no mode, asked for and taken back as an FMU does in Initialization Mode.
@@ -454,8 +459,8 @@ fn after_refusal() -> Result<Vec<Check>> {
         }
     }
     Ok(vec![
-        Check::so("massless-boundary is refused", refused),
-        Check::so("the bits of a fresh instance", bits(&simulation) == bits(&fresh)),
+        Check::so("massless-boundary is rejected", refused),
+        Check::so("bitwise the same as a fresh instance", bits(&simulation) == bits(&fresh)),
     ])
 }
 
@@ -475,8 +480,8 @@ fn told() -> Result<Vec<Check>> {
         told.push(simulation.take_notes().len());
     }
     Ok(vec![
-        Check::so("no warning for the step proposed", before == 0),
-        Check::so("one for the first longer step", told == [0, 1, 0, 0]),
+        Check::so("no warning for the proposed step", before == 0),
+        Check::so("one warning for the first longer step", told == [0, 1, 0, 0]),
     ])
 }
 
@@ -488,5 +493,5 @@ fn other_scene() -> Result<Vec<Check>> {
     let mut state = vec![0; first.state_size()];
     first.save_state(&mut state)?;
     second.restore_state(&state)?;
-    Ok(vec![Check::so("it was restored", true)])
+    Ok(vec![Check::so("the state was restored", true)])
 }

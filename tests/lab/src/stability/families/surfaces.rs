@@ -30,9 +30,9 @@ fn edges() -> Vec<StabilityCase> {
         let name = method.integration();
         // Rings reach 7.5 mm beyond the contact nodes, and the surface goes on for 11.25 mm.
         for (shift, expected) in [
-            (0.005, Expected::right("a surface of revolution, signs of the ledger")),
-            (0.017, Expected::right("a surface of revolution, signs of the ledger")),
-            (0.024, Expected::refused(["has left the surface of the casing in z", "of sector", "axial extent"])),
+            (0.005, Expected::right("agreement with a surface of revolution, signs of the energy terms")),
+            (0.017, Expected::right("agreement with a surface of revolution, signs of the energy terms")),
+            (0.024, Expected::refused(["has left the casing surface", "of sector", "axial extent"])),
         ] {
             let quick = method.scheme != Scheme::CentralDifference;
             cases.add(quick, format!("edge/{name}/shift={shift}"), expected, move || over_the_edge(method, shift));
@@ -57,13 +57,13 @@ fn over_the_edge(method: StabilityMethod, shift: f64) -> Result<Vec<Check>> {
     };
     let (impulse, loss, watch) = run(Some(SplineSettings::default()))?;
     let (expected, expected_loss, _) = run(None)?;
-    let mut checks = vec![Check::so("it touched", impulse > 0.0), watch.ledger()];
+    let mut checks = vec![Check::so("there is contact", impulse > 0.0), watch.ledger()];
     checks.push(Check::relative("impulse", impulse, expected, 0.05));
     if method.is_galerkin() {
         // What its impacts lose is an error of the step.
         checks.push(watch.impact(0.0));
     } else {
-        checks.push(Check::at_most("impact loss", (loss - expected_loss).abs() / expected_loss, 0.1));
+        checks.push(Check::at_most("deviation of the impact loss", (loss - expected_loss).abs() / expected_loss, 0.1));
     }
     Ok(checks)
 }
@@ -78,12 +78,12 @@ fn resolution() -> Vec<StabilityCase> {
         }
         for product in [1.0, 3.0, 9.0, 11.0, 30.0, 116.0, 1e4] {
             for friction in [0.0, 0.15] {
-                let against = "signs of the ledger and of energies";
+                let against = "signs of energies and energy terms";
                 let expected = if galerkin {
                     // A step in which the rotor turns several times is refused.
-                    Expected::either(against, ["features of the casing shape", "smaller internal_step_max"])
+                    Expected::either(against, ["features of the casing shape", "internal_step_max (time.step) below"])
                 } else if product < 10.0 {
-                    Expected::either_as(against, &[&["grows"], &["energy that is not there"]])
+                    Expected::either_as(against, &[&["grows"], &["gained spurious energy"]])
                 } else {
                     Expected::refused(["modal-exact", "ω_max·h", "flexibility"])
                 };
@@ -121,7 +121,7 @@ fn curved() -> Vec<StabilityCase> {
     for method in StabilityMethod::common().filter(|method| method.solver == Solver::Lcp) {
         for (what, share) in [("small", 0.02), ("told", 0.2), ("refused", 1.5)] {
             let expected = if share < 1.0 {
-                Expected::right("u²/2r against the clearance")
+                Expected::right("u²/2r relative to the clearance")
             } else {
                 Expected::refused(["around the axis", "u²/2r", "clearance"])
             };
@@ -151,5 +151,7 @@ fn dragged(method: StabilityMethod, share: f64) -> Result<Vec<Check>> {
     }
     let (told, far) = (!simulation.take_notes().is_empty(), moved(&simulation));
     let error = far * far / (2.0 * RADIUS * GAP);
-    Ok(vec![Check::so("it is told from 5 % on", told == (error >= 0.05)), Check::so("it came so far", far >= wanted)])
+    Ok(vec![Check::so("a warning is given from 5 % on", told == (error >= 0.05)),
+        Check::so("the displacement was reached", far >=
+        wanted)])
 }

@@ -133,12 +133,13 @@ impl Travelling {
         let size = discrete.norm();
         let fine = (omega.abs().max(frequency) * step).powi(2);
         let mut checks = vec![
-            Check::at_most("wave from that of the oscillator", beside / exact.norm(), fine / (2.0 * damping)),
-            Check::at_most("other shapes", rest / size, 1e-8),
-            Check::at_most("ledger residual", real(&simulation, "energy_residual_relative").abs(), 1e-9),
+            Check::at_most("deviation of the wave from that of the oscillator", beside / exact.norm(),
+                fine / (2.0 * damping)),
+            Check::at_most("amplitude of other shapes", rest / size, 1e-8),
+            Check::at_most("energy residual", real(&simulation, "energy_residual_relative").abs(), 1e-9),
         ];
         if !self.method.is_galerkin() {
-            checks.push(Check::at_most("wave from that of the recurrence", off / size, 1e-8));
+            checks.push(Check::at_most("deviation of the wave from that of the recurrence", off / size, 1e-8));
         }
         Ok(checks)
     }
@@ -272,13 +273,13 @@ impl PressedRotor {
         let mut checks = vec![Check::so("all blades in contact", open == 0), watch.ledger()];
         let (from_scheme, from_blade) = (off / (stiffness.norm() * amplitude), beside / (own.norm() * amplitude));
         if !galerkin {
-            checks.push(Check::at_most("λ from the dynamic stiffness of the blade", from_scheme, 1e-6));
+            checks.push(Check::at_most("deviation of λ from the dynamic stiffness of the blade", from_scheme, 1e-6));
         }
         // Massless-boundary takes most of the force a step late.
         if !self.method.is_massless() {
             let coarse = BESIDE + (omega * step).powi(2);
             let bound = if self.method.is_adaptive() { BESIDE + 10.0 * allowed(&scene) / amplitude } else { coarse };
-            checks.push(Check::at_most("λ from the blade without any scheme", from_blade, bound));
+            checks.push(Check::at_most("deviation of λ from the exact response of the blade", from_blade, bound));
         }
         Ok(checks)
     }
@@ -366,10 +367,12 @@ impl Flank {
         Ok([
             watch.laws(),
             vec![
-                Check::relative("λ from the static solution", system.multiplier(0, 0), force, bound),
-                Check::at_most("radial place from the static one", (found[0] - radial).abs() / depth, bound),
-                Check::at_most("tangential place from the static one", (found[1] / tangential - 1.0).abs(), bound),
-                Check::relative("tangential force from λ n_t", sideways, force * tilt, bound),
+                Check::relative("deviation of λ from the static solution", system.multiplier(0, 0), force, bound),
+                Check::at_most("deviation of the radial position from the static one",
+                    (found[0] - radial).abs() / depth, bound),
+                Check::at_most("deviation of the tangential position from the static one",
+                    (found[1] / tangential - 1.0).abs(), bound),
+                Check::relative("deviation of the tangential force from λ n_t", sideways, force * tilt, bound),
             ],
         ]
         .concat())

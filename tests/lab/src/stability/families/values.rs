@@ -85,7 +85,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
 }
 
 fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64) -> Vec<StabilityCase> {
-    let against = "as with the nearest ordinary value, or finite and in order; nothing changed by a refusal";
+    let against = "same result as the nearest ordinary value, or finite and consistent; a rejection changes nothing";
     let name = variable.name.clone();
     let word = match name.as_str() {
         "speed" => "speed",
@@ -103,7 +103,7 @@ fn of_variable(scene: &'static str, variable: &Variable, text: &str, value: f64)
             Expected::either(against, ["initial clearance"])
         } else if value.abs() > 1.0 {
             // Large loads let tips vibrate faster than they slide.
-            Expected::either_as(against, &[&[word], &["friction has put", "no sticking"]])
+            Expected::either_as(against, &[&[word], &["friction has added", "not model sticking"]])
         } else {
             Expected::right(against)
         }
@@ -192,7 +192,7 @@ fn by_setter(name: &str, variable: &str, value: f64, during: bool) -> CaseEnd {
             }
             go_on(&mut twin)?;
             checks.push(Check::at_most(
-                format!("outputs differ from those with {plain:.6}"),
+                format!("difference of the outputs from those with {plain:.6}"),
                 differ(&simulation, &twin),
                 1e-6,
             ));
@@ -223,9 +223,9 @@ fn sane(simulation: &Simulation) -> Vec<Check> {
     let scale = ledger.scale().max(f64::MIN_POSITIVE);
     vec![
         Check::so("all outputs finite", finite),
-        Check::at_most("ledger residual", ledger.residual(kinetic + strain).abs() / scale, 1e-9),
-        Check::at_most("impact gain", -ledger.impact_loss.value() / scale, 1e-9),
-        Check::at_most("friction cools", -ledger.friction_loss.value() / scale, 1e-6),
+        Check::at_most("energy residual", ledger.residual(kinetic + strain).abs() / scale, 1e-9),
+        Check::at_most("energy gain in impacts", -ledger.impact_loss.value() / scale, 1e-9),
+        Check::at_most("negative friction heat", -ledger.friction_loss.value() / scale, 1e-6),
     ]
 }
 
@@ -271,7 +271,7 @@ fn refused(
         }
         Ok(bits(&simulation) == bits(&twin))
     })();
-    checks.push(Check::so("goes on bit by bit as if never asked", outcome == Ok(true)));
+    checks.push(Check::so("continues bitwise as if the value had not been set", outcome == Ok(true)));
     CaseEnd { checks, ..CaseEnd::refused(error) }
 }
 
@@ -303,7 +303,8 @@ fn by_import(context: &CaseContext, scene: &str, version: u8, variable: &str, va
             (0..5).try_for_each(|index| session.do_step(f64::from(index) * LENGTH, LENGTH))
         });
         if let Err(refusal) = stepped {
-            return Ok(CaseEnd { checks: vec![Check::so("told through a status", true)], ..CaseEnd::refused(refusal) });
+            return Ok(CaseEnd { checks: vec![Check::so("reported through a status", true)],
+                ..CaseEnd::refused(refusal) });
         }
         let values = session.outputs()?;
         let mut checks = vec![Check::so("all outputs finite", values.iter().all(|value| value.is_finite()))];
@@ -312,11 +313,11 @@ fn by_import(context: &CaseContext, scene: &str, version: u8, variable: &str, va
             Simulation::new(&self::scene(scene)).map_err(|error| tiprub_shell::Failure::from_core("scene", error))?;
         let run = native.table().find(variable).map_or(0, |row| row.reference);
         let ran = native.set_real(run, value).and_then(|()| native.initialise(0.0)).and_then(|()| go_on(&mut native));
-        checks.push(Check::so("runs without FMI as well", ran.is_ok()));
+        checks.push(Check::so("also runs without FMI", ran.is_ok()));
         let expected = tiprub_shell::native::numeric_outputs(&native);
         let same =
             expected.len() == values.len() && expected.iter().zip(&values).all(|(a, b)| a.to_bits() == b.to_bits());
-        checks.push(Check::so("the bits of the run without FMI", same));
+        checks.push(Check::so("bitwise the same as the run without FMI", same));
         Ok(CaseEnd::answer(checks))
     })();
     outcome.unwrap_or_else(CaseEnd::refused)
@@ -358,15 +359,15 @@ fn refusals(field: &str) -> &'static [&'static [&'static str]] {
             &["`contact_meridional_slopes`", "between -1000 and 1000"],
             &["`contact_meridional_slopes`", "their positions rise"],
         ],
-        "rom.map" => &[&["`contact_map`", "beyond ±1e15"], &["µ"], &["small displacements"]],
+        "rom.map" => &[&["`contact_map`", "outside ±1e15"], &["µ"], &["small displacements"]],
         "shape.width" => &[&["surface[1].shape.width", "between 0.001 and 0.25"]],
         "rom.mass" => &[
-            &["`mass`", "beyond ±1e30"],
+            &["`mass`", "outside ±1e30"],
             &["`mass`", "not positive definite"],
             &["`mass` and `stiffness`", "orders of magnitude"],
         ],
         "rom.stiffness" => &[
-            &["`stiffness`", "beyond ±1e30"],
+            &["`stiffness`", "outside ±1e30"],
             &["`mass` and `stiffness`", "orders of magnitude"],
             &["`stiffness`", "not positive semidefinite"],
             &["µ", "no unique solution", "Use no friction"],
@@ -419,7 +420,7 @@ fn settings() -> Vec<StabilityCase> {
     for (field, word, change) in fields {
         for (text, value) in VALUES {
             let expected = if value.is_finite() {
-                Expected::either_as("finite, a ledger that closes", refusals(field))
+                Expected::either_as("finite outputs, closed energy balance", refusals(field))
             } else {
                 Expected::refused([word])
             };
