@@ -82,6 +82,9 @@ trap 'kill "$pytest_job" 2> /dev/null' INT TERM
 section "Rust: cargo test --workspace --release --tests"
 cargo test --workspace --release --tests || failed=1
 
+section "Rust: cargo test --workspace --release --doc"
+cargo test --workspace --release --doc || failed=1
+
 if [ "$failed" -ne 0 ]; then
     echo "the Rust tests failed, see above"
 fi

@@ -6,6 +6,17 @@ use std::path::Path;
 
 /// Open a file to read. Directories are refused, and so are pipes and devices, which may have no end or never begin.
 ///
+/// # Examples
+/// ```
+/// # let directory = tempfile::tempdir()?;
+/// # let path = directory.path().join("scene.toml");
+/// # std::fs::write(&path, "name = \"bench\"")?;
+/// let file = tiprub_format::open_file(&path)?;
+/// assert_eq!(file.metadata()?.len(), 14);
+/// assert!(tiprub_format::open_file(directory.path()).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// No file, or one that cannot be opened.
 pub fn open_file(path: &Path) -> io::Result<File> {
@@ -20,6 +31,17 @@ pub fn open_file(path: &Path) -> io::Result<File> {
 }
 
 /// Contents of a file of at most `most` bytes.
+///
+/// # Examples
+/// ```
+/// # let directory = tempfile::tempdir()?;
+/// # let path = directory.path().join("scene.toml");
+/// # std::fs::write(&path, "name = \"bench\"")?;
+/// let bytes = tiprub_format::read_file(&path, 1 << 20)?;
+/// assert_eq!(bytes, b"name = \"bench\"");
+/// assert!(tiprub_format::read_file(&path, 10).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// As [`open_file`]; more bytes, or ones that cannot be read.

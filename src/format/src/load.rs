@@ -40,6 +40,21 @@ impl RomBytes {
 /// Read a scene file and its ROM files, which are named relative to it. Names after `builtin:` are handed to
 /// `builtin`, which answers `None` for a name it does not know, and otherwise a ROM or why there is none.
 ///
+/// # Examples
+/// ```
+/// # let scene = tiprub_test_models::rub(2);
+///
+/// # let directory = tempfile::tempdir()?;
+/// # for (name, bytes) in tiprub_format::resource_files(&scene, false) {
+/// #     std::fs::write(directory.path().join(name), bytes)?;
+/// # }
+/// # let path = directory.path().join("scene.toml");
+/// // A scene without built-in models.
+/// let scene = tiprub_format::load_scene(&path, &|_name| None)?;
+/// assert_eq!(scene.roms.len(), scene.settings.structures.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`Error::File`] for files that cannot be read, else as [`parse_scene`] and [`read_rom`].
 pub fn load_scene(path: &Path, builtin: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
@@ -67,6 +82,18 @@ fn scene_text(path: &Path) -> Result<String> {
 }
 
 /// Read a scene file, without the ROM files.
+///
+/// # Examples
+/// ```
+/// # let scene = tiprub_test_models::rub(2);
+///
+/// # let directory = tempfile::tempdir()?;
+/// # let path = directory.path().join("scene.toml");
+/// # std::fs::write(&path, tiprub_format::write_scene(&scene.settings))?;
+/// let settings = tiprub_format::load_settings(&path)?;
+/// println!("{} structures", settings.structures.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read, else as [`parse_scene`].

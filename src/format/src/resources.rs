@@ -39,6 +39,13 @@ pub struct Resources {
 }
 
 /// Largest size (bytes) of a file of this name inside `resources/`; none of a file that is not read.
+///
+/// # Examples
+/// ```
+/// assert!(tiprub_format::largest_resource("scene.toml").is_some());
+/// assert!(tiprub_format::largest_resource("readme.txt").is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn largest_resource(name: &str) -> Option<u64> {
     match name {
         SCENE_FILE => Some(LARGEST_SCENE),
@@ -57,6 +64,17 @@ struct PackageFile {
 
 /// The files of `resources/`, in fixed order with fixed content for a given scene: the scene (each `rom` replaced by
 /// the file name beside it), one ROM file per structure with what this scene needs of it, the packaging choices.
+///
+/// # Examples
+/// ```
+/// # let scene = tiprub_test_models::rub(2);
+///
+/// # let directory = tempfile::tempdir()?;
+/// for (name, bytes) in tiprub_format::resource_files(&scene, false) {
+///     std::fs::write(directory.path().join(name), bytes)?;
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn resource_files(scene: &Scene, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)> {
     let mut settings = scene.settings.clone();
     for index in 0..settings.structures.len() {
@@ -92,6 +110,16 @@ pub(crate) fn check_directory(directory: &Path) -> Result<()> {
 }
 
 /// The ROMs of a scene as an FMU holds them: without what this scene does not use.
+///
+/// # Examples
+/// ```
+/// # let scene = tiprub_test_models::rub(2);
+///
+/// // This scene has no effects of spin: the packed ROM has no spin matrices.
+/// let roms = tiprub_format::packed_roms(&scene);
+/// assert!(roms[0].extras.spin.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn packed_roms(scene: &Scene) -> Vec<Rom> {
     let structures = scene.settings.structures.iter().zip(&scene.roms);
     structures.map(|(structure, rom)| Rom { extras: needed(structure, rom, &scene.settings), ..rom.clone() }).collect()
@@ -142,6 +170,16 @@ fn rom_file_name(scene: &Scene, index: usize) -> String {
 
 /// The instantiation token of a set of resource files: `{8-4-4-4-12}` hexadecimal digits of a SHA-256 over the release
 /// of this library and over names and contents, so that a description never meets other resources or another release.
+///
+/// # Examples
+/// ```
+/// # let scene = tiprub_test_models::rub(2);
+///
+/// let files = tiprub_format::resource_files(&scene, false);
+/// let token = tiprub_format::instantiation_token(&files);
+/// assert!(token.starts_with('{') && token.len() == 38);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn instantiation_token(files: &[(String, Vec<u8>)]) -> String {
     let mut hash = Sha256::new();
     let mut item = |bytes: &[u8]| {
@@ -165,6 +203,20 @@ pub fn instantiation_token(files: &[(String, Vec<u8>)]) -> String {
 }
 
 /// Read the `resources/` directory of an unpacked FMU.
+///
+/// # Examples
+/// ```
+/// # let scene = tiprub_test_models::rub(2);
+///
+/// # let directory = tempfile::tempdir()?;
+/// # for (name, bytes) in tiprub_format::resource_files(&scene, false) {
+/// #     std::fs::write(directory.path().join(name), bytes)?;
+/// # }
+/// let resources = tiprub_format::load_resources(directory.path())?;
+/// let mut simulation = tiprub_core::Simulation::new(&resources.scene)?;
+/// simulation.initialise(0.0)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::File`] with the path of a file that is missing, unreadable or from another release; else as

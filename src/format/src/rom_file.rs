@@ -28,6 +28,16 @@ pub(crate) type Metadata = BTreeMap<String, String>;
 
 /// Read a ROM from the bytes of a ROM file; `origin` names the file in messages.
 ///
+/// # Examples
+/// ```
+/// # let blade = tiprub_test_models::blade(1);
+///
+/// # let bytes = tiprub_format::write_rom(&blade);
+/// let rom = tiprub_format::read_rom(&bytes, "blade.rom.safetensors")?;
+/// println!("{} reduced coordinates", rom.order());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Rom`] naming `origin`, the array or metadata entry, expected and found, and the remedy. The ROM returned
 /// has passed [`Rom::validate`].
@@ -340,6 +350,15 @@ fn little_endian(values: &[f64]) -> Vec<u8> {
 ///
 /// A ROM that does not pass [`Rom::validate`], or whose contact node names are not distinct identifiers, gives a file
 /// that [`read_rom`] refuses.
+///
+/// # Examples
+/// ```
+/// # let blade = tiprub_test_models::blade(1);
+///
+/// let bytes = tiprub_format::write_rom(&blade);
+/// assert_eq!(tiprub_format::read_rom(&bytes, "blade")?, blade);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_rom(rom: &Rom) -> Vec<u8> {
     let arrays = rom_arrays(rom);
     let mut metadata = rom_metadata(rom, &arrays);

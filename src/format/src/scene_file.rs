@@ -15,6 +15,39 @@ const STEP: &str = "time.step";
 
 /// Read a scene; `origin` names the file in messages. If the text names no scheme, that of the settings without their ROMs is chosen.
 ///
+/// # Examples
+/// ```
+/// let text = r#"
+/// name = "bench"
+///
+/// [[structure]]
+/// name = "blade"
+/// rom = "blade.rom.safetensors"
+/// motion = "rotating"
+/// speed = 100.0
+///
+/// [[surface]]
+/// name = "casing"
+///
+/// [surface.shape]
+/// kind = "circular"
+///
+/// [[contact]]
+/// master = "blade"
+/// slave = "casing"
+/// gap = 1e-4
+///
+/// [experiment]
+/// start = 0.0
+/// stop = 0.01
+/// communication_step = 1e-4
+/// "#;
+///
+/// let settings = tiprub_format::parse_scene(text, "bench.toml")?;
+/// assert_eq!(settings.contacts[0].gap, 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Scene`] with line and column, the field path, what is wrong and the remedy: wrong syntax, unknown keys,
 /// missing keys, values of the wrong type, and whatever [`SceneSettings::validate`] refuses.
@@ -28,6 +61,40 @@ pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
 
 /// Read a scene with its ROMs, which `rom` returns by the place of their structure and its settings. If the text names no scheme, it is
 /// chosen here with the ROMs, and all that runs, studies or packages the scene has this choice.
+///
+/// # Examples
+/// ```
+/// # let text = r#"
+/// # name = "bench"
+/// #
+/// # [[structure]]
+/// # name = "blade"
+/// # rom = "blade.rom.safetensors"
+/// # motion = "rotating"
+/// # speed = 100.0
+/// #
+/// # [[surface]]
+/// # name = "casing"
+/// #
+/// # [surface.shape]
+/// # kind = "circular"
+/// #
+/// # [[contact]]
+/// # master = "blade"
+/// # slave = "casing"
+/// # gap = 1e-4
+/// #
+/// # [experiment]
+/// # start = 0.0
+/// # stop = 0.01
+/// # communication_step = 1e-4
+/// # "#;
+/// # let blade = tiprub_test_models::blade(1);
+///
+/// let scene = tiprub_format::read_scene(text, "bench.toml", |_index, _structure| Ok::<_, tiprub_format::Error>(blade.clone()))?;
+/// assert_eq!(scene.roms[0].name, blade.name);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// As [`parse_scene`], and those of `rom`.
@@ -98,6 +165,14 @@ fn choose_scheme(settings: &mut SceneSettings, roms: &[Rom], document: &Document
 }
 
 /// Line and column, from 1, of the key at this path (indices from 1) in the text of a scene; `None` where it is not there.
+///
+/// # Examples
+/// ```
+/// let text = "[time]\nstep = 1e-6\n";
+/// assert_eq!(tiprub_format::position_of(text, "time.step"), Some((2, 1)));
+/// assert_eq!(tiprub_format::position_of(text, "time.scheme"), None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn position_of(text: &str, path: &str) -> Option<(usize, usize)> {
     let document = DeTable::parse(text).ok()?;
     Document { text, origin: "", root: document.get_ref() }.position(path)
@@ -119,11 +194,28 @@ fn apply_preset(settings: &mut SceneSettings, document: &Document) {
 }
 
 /// Returns the name of the built-in model of a structure, `None` if it names a ROM file.
+///
+/// # Examples
+/// ```
+/// # use tiprub_core::settings::StructureSettings;
+/// let structure = StructureSettings { rom: "builtin:rotor37".into(), ..StructureSettings::default() };
+/// assert_eq!(tiprub_format::builtin_model(&structure), Some("rotor37"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn builtin_model(structure: &StructureSettings) -> Option<&str> {
     structure.rom.strip_prefix(BUILTIN_PREFIX)
 }
 
 /// A scene as TOML; reading it back gives the same settings, bit for bit.
+///
+/// # Examples
+/// ```
+/// # let scene = tiprub_test_models::rub(2);
+///
+/// let text = tiprub_format::write_scene(&scene.settings);
+/// assert_eq!(tiprub_format::parse_scene(&text, "copy")?, scene.settings);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Panics
 /// If a whole number exceeds the range of TOML, 2⁶³ − 1: no such number passes [`SceneSettings::validate`].

@@ -30,11 +30,35 @@ pub struct ThermalResources {
 }
 
 /// The files of `resources/` of a thermal FMU, in fixed order with fixed content for a given model.
+///
+/// # Examples
+/// ```
+/// # let model = tiprub_test_models::wall();
+///
+/// # let directory = tempfile::tempdir()?;
+/// for (name, bytes) in tiprub_format::thermal_resource_files(&model, false) {
+///     std::fs::write(directory.path().join(name), bytes)?;
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn thermal_resource_files(model: &ConductionModel, fmi3_arrays: bool) -> Vec<(String, Vec<u8>)> {
     vec![(THERMAL_FILE.to_owned(), write_thermal(model)), package_file(fmi3_arrays)]
 }
 
 /// Read the `resources/` directory of an unpacked thermal FMU.
+///
+/// # Examples
+/// ```
+/// # let model = tiprub_test_models::wall();
+///
+/// # let directory = tempfile::tempdir()?;
+/// # for (name, bytes) in tiprub_format::thermal_resource_files(&model, false) {
+/// #     std::fs::write(directory.path().join(name), bytes)?;
+/// # }
+/// let resources = tiprub_format::load_thermal_resources(directory.path())?;
+/// assert_eq!(resources.model, model);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::File`] for a file that is missing, unreadable or from another release; else as [`read_thermal`].
@@ -62,6 +86,15 @@ fn matrices(model: &ConductionModel) -> [(&'static str, &DMatrix<f64>); 7] {
 }
 
 /// The bytes of a thermal model; equal models give equal bytes.
+///
+/// # Examples
+/// ```
+/// # let model = tiprub_test_models::wall();
+///
+/// let bytes = tiprub_format::write_thermal(&model);
+/// assert_eq!(tiprub_format::read_thermal(&bytes, "wall")?, model);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_thermal(model: &ConductionModel) -> Vec<u8> {
     let mut arrays: Arrays =
         matrices(model).into_iter().map(|(name, values)| (name.to_owned(), matrix(values))).collect();
@@ -83,6 +116,16 @@ pub fn write_thermal(model: &ConductionModel) -> Vec<u8> {
 }
 
 /// Read a thermal model; `origin` names the file in messages.
+///
+/// # Examples
+/// ```
+/// # let model = tiprub_test_models::wall();
+///
+/// # let bytes = tiprub_format::write_thermal(&model);
+/// let model = tiprub_format::read_thermal(&bytes, "casing.thermal.safetensors")?;
+/// println!("{} patches", model.patches.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::Rom`] naming `origin`, the array or metadata entry, and the remedy. The model has passed [`ConductionModel::validate`].

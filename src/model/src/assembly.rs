@@ -67,6 +67,28 @@ pub(crate) fn for_each_block(pattern: &Pattern, nodes: &[usize], mut visit: impl
 
 /// Assemble K and M.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+///
+/// let matrices = tiprub_model::assembly::assemble(&mesh, &steel, &tiprub_model::progress::silent)?;
+/// assert_eq!(matrices.mass.order(), 48);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Invalid`] for an unsound mesh or material, [`Error::NegativeJacobian`] naming the element.
 pub fn assemble(mesh: &Mesh, material: &Material, listener: Listener<'_>) -> Result<Assembled> {
@@ -74,6 +96,29 @@ pub fn assemble(mesh: &Mesh, material: &Material, listener: Listener<'_>) -> Res
 }
 
 /// As [`assemble`], with hex8 elements in the given formulation.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+///
+/// # use tiprub_model::element::Formulation;
+/// let matrices = tiprub_model::assembly::assemble_with(&mesh, &steel, Formulation::default(), &tiprub_model::progress::silent)?;
+/// assert_eq!(matrices.stiffness.order(), 48);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// The errors of [`assemble`].
@@ -129,6 +174,28 @@ pub fn assemble_with(
 
 /// Lumped mass of every node (kg), for explicit time stepping of the full model; see `lumped_mass`.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+///
+/// let masses = tiprub_model::assembly::lumped_masses(&mesh, steel.density)?;
+/// assert!((masses.iter().sum::<f64>() - 2.4e-5 * steel.density).abs() < 1e-9);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Invalid`] for an unsound mesh, [`Error::NegativeJacobian`] naming the element.
 pub fn lumped_masses(mesh: &Mesh, density: f64) -> Result<Vec<f64>> {
@@ -142,6 +209,12 @@ pub fn lumped_masses(mesh: &Mesh, density: f64) -> Result<Vec<f64>> {
 }
 
 /// The dofs that remain when some nodes are clamped, ascending.
+///
+/// # Examples
+/// ```
+/// assert_eq!(tiprub_model::assembly::free_dofs(2, &[0]), [3, 4, 5]);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 pub fn free_dofs(node_count: usize, clamped: &[usize]) -> Vec<usize> {
     let mut fixed = vec![false; node_count];
     for &node in clamped {

@@ -29,6 +29,29 @@ pub struct FeModel {
 impl FeModel {
     /// Assemble a mesh of one material.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+    /// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+    /// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+    /// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+    /// # let cube = |i: usize| Element {
+    /// #     kind: ElementKind::Hex8,
+    /// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+    /// # };
+    /// # let mesh = Mesh {
+    /// #     nodes: (0..16).map(place).collect(),
+    /// #     elements: (0..3).map(cube).collect(),
+    /// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+    /// # };
+    /// # let steel = Material::steel();
+    ///
+    /// # use tiprub_model::{FeModel, progress::silent};
+    /// let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?;
+    /// assert_eq!(model.stiffness.order(), 48);
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// The errors of [`assemble`].
     pub fn assembled(mesh: Mesh, material: &Material, origin: String, listener: Listener<'_>) -> Result<Self> {
@@ -45,6 +68,31 @@ impl FeModel {
 
     /// The same model with its mass on the nodes, see [`lumped_masses`].
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+    /// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+    /// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+    /// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+    /// # let cube = |i: usize| Element {
+    /// #     kind: ElementKind::Hex8,
+    /// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+    /// # };
+    /// # let mesh = Mesh {
+    /// #     nodes: (0..16).map(place).collect(),
+    /// #     elements: (0..3).map(cube).collect(),
+    /// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+    /// # };
+    /// # let steel = Material::steel();
+    ///
+    /// # use tiprub_model::{FeModel, progress::silent};
+    /// let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?.lumped()?;
+    /// // The mass of 3 cubes, three times on the diagonal.
+    /// let mass = 3.0 * 0.02_f64.powi(3) * steel.density;
+    /// assert!((model.mass.trace() - 3.0 * mass).abs() < 1e-12);
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// [`Error::Invalid`] for a model without a mesh of one material; those of [`lumped_masses`].
     pub fn lumped(mut self) -> Result<Self> {
@@ -58,6 +106,29 @@ impl FeModel {
     }
 
     /// The nodes of a named set; upper and lower case may differ where only one set then fits.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+    /// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+    /// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+    /// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+    /// # let cube = |i: usize| Element {
+    /// #     kind: ElementKind::Hex8,
+    /// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+    /// # };
+    /// # let mesh = Mesh {
+    /// #     nodes: (0..16).map(place).collect(),
+    /// #     elements: (0..3).map(cube).collect(),
+    /// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+    /// # };
+    /// # let steel = Material::steel();
+    ///
+    /// # use tiprub_model::{FeModel, progress::silent};
+    /// let model = FeModel::assembled(mesh, &steel, String::new(), &silent)?;
+    /// assert_eq!(model.set("root")?.len(), 4);
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
     ///
     /// # Errors
     /// [`Error::Invalid`] listing the sets there are.

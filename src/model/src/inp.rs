@@ -19,6 +19,28 @@ pub struct CyclicSymmetry<'a> {
 ///
 /// Numbers carry 13 significant digits: CalculiX reads at most 20 characters each. Every node set of the mesh is written; the nodes of `clamped` (a set name, if any) are fixed in all directions.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+///
+/// let text = tiprub_model::inp::calculix_input(&mesh, &steel, Some("ROOT"), 4)?;
+/// assert!(text.contains("*FREQUENCY"));
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Invalid`] when the set does not exist or the mesh is not sound.
 pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, frequencies: usize) -> Result<String> {

@@ -34,6 +34,12 @@ impl Material {
 
     /// Plain carbon steel: E = 210 GPa, ν = 0.3, ρ = 7850 kg/m³ (EN 1993-1-1, 3.2.6); α = 11.7e-6 1/K (low-carbon steel
     /// AISI 1020, 0 to 100 °C, ASM Metals Handbook).
+    ///
+    /// # Examples
+    /// ```
+    /// assert_eq!(tiprub_model::Material::steel().poisson_ratio, 0.3);
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
     pub fn steel() -> Self {
         Self { name: "steel".into(), young_modulus: 210e9, poisson_ratio: 0.3, density: 7850.0, expansion: 11.7e-6 }
     }
@@ -50,6 +56,13 @@ impl Material {
     }
 
     /// Lamé's constants (λ, µ) in Pa.
+    ///
+    /// # Examples
+    /// ```
+    /// let (lambda, mu) = tiprub_model::Material::steel().lame();
+    /// assert!(lambda > mu);
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
     pub fn lame(&self) -> (f64, f64) {
         let (e, nu) = (self.young_modulus, self.poisson_ratio);
         (e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu)))

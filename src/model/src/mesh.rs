@@ -26,11 +26,53 @@ pub struct Mesh {
 
 impl Mesh {
     /// Coordinates of an element's nodes in the element's order (m).
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+    /// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+    /// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+    /// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+    /// # let cube = |i: usize| Element {
+    /// #     kind: ElementKind::Hex8,
+    /// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+    /// # };
+    /// # let mesh = Mesh {
+    /// #     nodes: (0..16).map(place).collect(),
+    /// #     elements: (0..3).map(cube).collect(),
+    /// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+    /// # };
+    ///
+    /// let corners = mesh.coordinates(&mesh.elements[0]);
+    /// assert_eq!(corners.len(), 8);
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
     pub fn coordinates(&self, element: &Element) -> Vec<[f64; 3]> {
         element.nodes.iter().map(|&node| self.nodes[node]).collect()
     }
 
     /// The nodes of a named set.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+    /// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+    /// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+    /// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+    /// # let cube = |i: usize| Element {
+    /// #     kind: ElementKind::Hex8,
+    /// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+    /// # };
+    /// # let mesh = Mesh {
+    /// #     nodes: (0..16).map(place).collect(),
+    /// #     elements: (0..3).map(cube).collect(),
+    /// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+    /// # };
+    ///
+    /// assert_eq!(mesh.set("TIP")?, [12, 13, 14, 15]);
+    /// assert!(mesh.set("HUB").is_err());
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
     ///
     /// # Errors
     /// [`Error::Invalid`] listing the sets there are.
@@ -46,6 +88,26 @@ impl Mesh {
     }
 
     /// Check node counts and indices of the elements, coordinates, and that every node belongs to an element.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+    /// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+    /// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+    /// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+    /// # let cube = |i: usize| Element {
+    /// #     kind: ElementKind::Hex8,
+    /// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+    /// # };
+    /// # let mesh = Mesh {
+    /// #     nodes: (0..16).map(place).collect(),
+    /// #     elements: (0..3).map(cube).collect(),
+    /// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+    /// # };
+    ///
+    /// mesh.validate()?;
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the element, node or set.
@@ -83,6 +145,27 @@ impl Mesh {
     }
 
     /// The same mesh with quadratic elements: a node is added in the middle of every edge of a linear element.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+    /// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+    /// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+    /// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+    /// # let cube = |i: usize| Element {
+    /// #     kind: ElementKind::Hex8,
+    /// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+    /// # };
+    /// # let mesh = Mesh {
+    /// #     nodes: (0..16).map(place).collect(),
+    /// #     elements: (0..3).map(cube).collect(),
+    /// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+    /// # };
+    ///
+    /// let quadratic = mesh.quadratic();
+    /// assert_eq!(quadratic.elements[0].nodes.len(), 20);
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
     #[must_use]
     pub fn quadratic(&self) -> Self {
         let mut mesh = self.clone();
@@ -109,6 +192,27 @@ impl Mesh {
 /// Corner nodes of the outer faces, three or four per face, counter-clockwise seen from outside.
 ///
 /// A face is an outer one when it belongs to a single element.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// // Three cubes in a row have 14 outer faces.
+/// assert_eq!(tiprub_model::surface_quads(&mesh).len(), 14);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 pub fn surface_quads(mesh: &Mesh) -> Vec<Vec<usize>> {
     let mut count: HashMap<Vec<usize>, usize> = HashMap::new();
     let faces: Vec<Vec<usize>> = mesh

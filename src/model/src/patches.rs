@@ -32,11 +32,54 @@ const DEPENDENT: f64 = 1e-9;
 const GAUSS: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
 
 /// Number of places along the chord at which a set has nodes, and so its largest number of patches.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// assert_eq!(tiprub_model::patches::places_along_chord(&mesh, mesh.set("TIP")?), 2);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 pub fn places_along_chord(mesh: &Mesh, set: &[usize]) -> usize {
     Places::new(&mesh.nodes, set).stations()
 }
 
 /// `count` patches along the chord of the tip whose nodes are `set`, by growing z as contact nodes are; `name` of each.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// let name = |patch: usize| format!("patch_{}", patch + 1);
+/// let patches = tiprub_model::patches::contact_patches(&mesh, mesh.set("TIP")?, 2, name)?;
+/// let area: f64 = patches.iter().map(|patch| patch.area).sum();
+/// assert!((area - 4e-4).abs() < 1e-5);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::Invalid`] for no patches, more than the tip has nodes along its chord, or a set without a whole outer face of an element.
@@ -56,6 +99,28 @@ pub fn contact_patches(
 /// w_p = ∫ h_k χ_l N_p dA / ∫ h_k χ_l dA. Hat functions h_l across would leave the outermost rows within the tip, two of them at its thirds.
 /// Their duals χ_l with ∫ χ_l h_m = δ_lm ∫ h_l add up to one as they do, and rows stand where the hats have their peaks: the outermost are the
 /// sides of the tip. A tip that stays straight across its thickness stays outside of all that two rows stay outside of.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// let name = |patch: usize| format!("patch_{}", patch + 1);
+/// let patches = tiprub_model::patches::tip_patches(&mesh, mesh.set("TIP")?, [2, 2], name)?;
+/// assert_eq!(patches.len(), 4);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// The errors of [`contact_patches`]; no rows, or more than the nodes of the tip tell apart.

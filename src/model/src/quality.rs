@@ -40,6 +40,27 @@ pub fn quality(kind: ElementKind, coordinates: &[[f64; 3]]) -> ElementQuality {
 }
 
 /// The worst of both figures over all elements.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// let quality = tiprub_model::quality::worst_quality(&mesh);
+/// println!("{quality:?}");
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 pub fn worst_quality(mesh: &Mesh) -> ElementQuality {
     let all = mesh.elements.iter().map(|element| quality(element.kind, &mesh.coordinates(element)));
     all.fold(ElementQuality { scaled_jacobian: 1.0, jacobian_ratio: 1.0 }, |worst, one| ElementQuality {

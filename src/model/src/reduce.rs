@@ -115,6 +115,43 @@ pub struct Reduction {
 /// The reduced coordinates are the displacements of the contact nodes in `options.frame`, node by node, then the
 /// fixed-interface modes; so `contact_map` is \[I 0\]. A structure without clamped nodes keeps its rigid-body modes.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+/// # let options = tiprub_model::reduce::ReductionOptions {
+/// #     name: "bar".into(),
+/// #     kind: tiprub_model::reduce::ReductionKind::FreeInterface,
+/// #     modes: 4,
+/// #     checked_modes: 4,
+/// #     sectors: 1,
+/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     watched: Vec::new(),
+/// #     stress: Default::default(),
+/// #     damping_ratio: 0.005,
+/// # };
+///
+/// # use tiprub_model::{progress::silent, read::{ContactChoice, choose_contact_nodes}};
+/// let clamped = mesh.set("ROOT")?.to_vec();
+/// let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice { count: Some(2), names: Vec::new() })?;
+/// let reduction = tiprub_model::reduce(mesh, &steel, &clamped, &tip, &options, &silent)?;
+/// assert_eq!(reduction.rom.contact_nodes.len(), 2);
+/// println!("first natural frequency: {:.1} Hz", reduction.rom.checks.full_frequencies[0]);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Invalid`] for contact nodes that are clamped, repeated or on the axis; and whatever assembly, eigenvalue
 /// iteration and the ROM's own validation refuse.
@@ -135,6 +172,44 @@ pub fn reduce(
 ///
 /// With a `largest_speed` (rad/s) the effects of spin up to it are added, in [`tiprub_core::rom::RomExtras::spin`], see [`crate::spin`]; the
 /// rest of the ROM stays the same, bit for bit.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+/// # let options = tiprub_model::reduce::ReductionOptions {
+/// #     name: "bar".into(),
+/// #     kind: tiprub_model::reduce::ReductionKind::FreeInterface,
+/// #     modes: 4,
+/// #     checked_modes: 4,
+/// #     sectors: 1,
+/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     watched: Vec::new(),
+/// #     stress: Default::default(),
+/// #     damping_ratio: 0.005,
+/// # };
+///
+/// # use tiprub_model::{FeModel, progress::silent, read::{ContactChoice, choose_contact_nodes}};
+/// let clamped = mesh.set("ROOT")?.to_vec();
+/// let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice::default())?;
+/// let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?;
+/// // With the effects of spin up to 1000 rad/s.
+/// let reduction = tiprub_model::reduce_model(model, &clamped, &tip, &options, Some(1000.0), &silent)?;
+/// assert!(reduction.rom.extras.spin.is_some());
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// The errors of [`reduce`]; [`Error::Invalid`] for a speed that is not a finite number above zero, for effects of spin without a mesh or
@@ -263,6 +338,32 @@ impl FullModes {
 }
 
 /// Lowest modes of a structure; `free` when it can move as a rigid body, which needs a negative shift.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+///
+/// # use tiprub_model::{FeModel, assembly::free_dofs, progress::silent, sparse::principal_pair};
+/// let free = free_dofs(mesh.nodes.len(), mesh.set("ROOT")?);
+/// let model = FeModel::assembled(mesh, &steel, String::new(), &silent)?;
+/// let (stiffness, mass) = principal_pair(&model.stiffness, &model.mass, &free);
+/// let full = tiprub_model::reduce::full_modes(&stiffness, &mass, false, 3, &silent)?;
+/// assert_eq!(full.modes.frequencies().len(), 3);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::NotPositiveDefinite`] when a structure said to be supported is not; and those of [`lowest_modes`].

@@ -39,12 +39,91 @@ pub(crate) fn centrifugal_load(model: &FeModel, free: &[usize]) -> Mat<f64> {
 }
 
 /// Stiffness of a reduced model at a speed (rad/s): K₀ + Ω²K₁ + Ω⁴K₂.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+/// # let options = tiprub_model::reduce::ReductionOptions {
+/// #     name: "bar".into(),
+/// #     kind: tiprub_model::reduce::ReductionKind::FreeInterface,
+/// #     modes: 4,
+/// #     checked_modes: 4,
+/// #     sectors: 1,
+/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     watched: Vec::new(),
+/// #     stress: Default::default(),
+/// #     damping_ratio: 0.005,
+/// # };
+/// # use tiprub_model::{FeModel, progress::silent, read::{ContactChoice, choose_contact_nodes}};
+/// # let clamped = mesh.set("ROOT")?.to_vec();
+/// # let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice::default())?;
+/// # let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?;
+/// # let rom = tiprub_model::reduce_model(model, &clamped, &tip, &options, Some(1000.0), &silent)?.rom;
+///
+/// let spin = rom.extras.spin.as_ref().expect("spin matrices");
+/// let stiffness = tiprub_model::spin::stiffness_at(&rom.stiffness, spin, 500.0);
+/// assert_eq!(stiffness.nrows(), rom.order());
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 pub fn stiffness_at(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> DMatrix<f64> {
     let square = speed * speed;
     resting + &spin.stiffness_speed2 * square + &spin.stiffness_speed4 * (square * square)
 }
 
 /// Static growth of a reduced model at a speed (rad/s): K(Ω)⁻¹ (Ω²c + Ω⁴c₂), in reduced coordinates.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+/// # let options = tiprub_model::reduce::ReductionOptions {
+/// #     name: "bar".into(),
+/// #     kind: tiprub_model::reduce::ReductionKind::FreeInterface,
+/// #     modes: 4,
+/// #     checked_modes: 4,
+/// #     sectors: 1,
+/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     watched: Vec::new(),
+/// #     stress: Default::default(),
+/// #     damping_ratio: 0.005,
+/// # };
+/// # use tiprub_model::{FeModel, progress::silent, read::{ContactChoice, choose_contact_nodes}};
+/// # let clamped = mesh.set("ROOT")?.to_vec();
+/// # let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice::default())?;
+/// # let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?;
+/// # let rom = tiprub_model::reduce_model(model, &clamped, &tip, &options, Some(1000.0), &silent)?.rom;
+///
+/// let spin = rom.extras.spin.as_ref().expect("spin matrices");
+/// let growth = tiprub_model::spin::static_growth(&rom.stiffness, spin, 500.0)?;
+/// // Radial displacement of the first contact node.
+/// assert!((&rom.contact_map * growth)[0] > 0.0);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::NotPositiveDefinite`] when K(Ω) is not, as at speeds far beyond the fitted ones.
@@ -64,6 +143,45 @@ pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<
 
 /// Natural frequencies (Hz) at a speed (rad/s), ascending, with or without the Coriolis force, undamped.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+/// # let options = tiprub_model::reduce::ReductionOptions {
+/// #     name: "bar".into(),
+/// #     kind: tiprub_model::reduce::ReductionKind::FreeInterface,
+/// #     modes: 4,
+/// #     checked_modes: 4,
+/// #     sectors: 1,
+/// #     frame: tiprub_core::rom::DisplacementFrame::Cylindrical,
+/// #     watched: Vec::new(),
+/// #     stress: Default::default(),
+/// #     damping_ratio: 0.005,
+/// # };
+/// # use tiprub_model::{FeModel, progress::silent, read::{ContactChoice, choose_contact_nodes}};
+/// # let clamped = mesh.set("ROOT")?.to_vec();
+/// # let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice::default())?;
+/// # let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?;
+/// # let rom = tiprub_model::reduce_model(model, &clamped, &tip, &options, Some(1000.0), &silent)?.rom;
+///
+/// // Rotation stiffens a clamped blade.
+/// let [resting, turning] = [0.0, 1000.0].map(|speed| tiprub_model::spin::frequencies_at(&rom, speed, false));
+/// assert!(turning?[0] > resting?[0]);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Invalid`] for a ROM without spin matrices, [`Error::NotPositiveDefinite`] for a mass matrix that is none.
 pub fn frequencies_at(rom: &Rom, speed: f64, coriolis: bool) -> Result<Vec<f64>> {
@@ -80,6 +198,13 @@ pub fn frequencies_at(rom: &Rom, speed: f64, coriolis: bool) -> Result<Vec<f64>>
 ///
 /// With Λ = diag(ω) the motion is d/dt (Λq, q̇) = A (Λq, q̇), A = \[0 Λ; -Λ -g\] skew-symmetric: its eigenvalues are ±iω,
 /// so those of AᵀA are the squares, each twice.
+///
+/// # Examples
+/// ```
+/// let frequencies = tiprub_model::spin::gyroscopic_frequencies(&[1.0, 4.0], &nalgebra::DMatrix::zeros(2, 2));
+/// assert!((frequencies[0] - 0.5 / std::f64::consts::PI).abs() < 1e-12);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 pub fn gyroscopic_frequencies(squares: &[f64], gyroscopic: &DMatrix<f64>) -> Vec<f64> {
     let order = squares.len();
     let mut system = DMatrix::zeros(2 * order, 2 * order);

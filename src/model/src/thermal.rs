@@ -25,6 +25,13 @@ const EDGE: f64 = 1e-9;
 
 /// Equal patches, `around` × `along`, over a whole turn from θ = 0 and the axial positions `axial` (m); those of one
 /// ring follow each other.
+///
+/// # Examples
+/// ```
+/// let patches = tiprub_model::thermal::equal_patches(12, 2, [0.0, 0.1]);
+/// assert_eq!(patches.len(), 24);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 pub fn equal_patches(around: usize, along: usize, axial: [f64; 2]) -> Vec<ThermalPatch> {
     let part = |[from, to]: [f64; 2], index: usize, count: usize| {
         [index, index + 1].map(|edge| if edge == count { to } else { from + (to - from) * edge as f64 / count as f64 })
@@ -35,6 +42,27 @@ pub fn equal_patches(around: usize, along: usize, axial: [f64; 2]) -> Vec<Therma
 }
 
 /// The patch that holds all of a mesh.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// let patch = tiprub_model::thermal::whole_mesh(&mesh);
+/// assert!(patch.axial[0] < 0.0 && patch.axial[1] > 0.02);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 pub fn whole_mesh(mesh: &Mesh) -> ThermalPatch {
     let axial = mesh.nodes.iter().map(|node| node[2]);
     let (low, high) = axial.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
@@ -44,6 +72,27 @@ pub fn whole_mesh(mesh: &Mesh) -> ThermalPatch {
 }
 
 /// The patch of every element: the one that its centroid (mean of its corners) lies in.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// let patch = tiprub_model::thermal::whole_mesh(&mesh);
+/// assert_eq!(tiprub_model::thermal::patch_of_elements(&mesh, &[patch])?, [Some(0); 3]);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::Invalid`] for a patch without elements and for patches that overlap.
@@ -148,6 +197,31 @@ pub(crate) fn patches_of_points(
 
 /// Nodal forces per kelvin of each patch, dofs (3·node + component) × patches (N/K). Elements across the border of a patch belong to it with
 /// the integration points that lie in it, so that the loads of patches that fill the mesh add up to that of the whole.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+///
+/// let patch = tiprub_model::thermal::whole_mesh(&mesh);
+/// let loads = tiprub_model::thermal::patch_loads(&mesh, &steel, &[patch])?;
+/// // Thermal loads are in equilibrium.
+/// let along_x: f64 = (0..16).map(|node| loads[(3 * node, 0)]).sum();
+/// assert!(along_x.abs() < 1e-6 * loads.norm_max());
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// The errors of [`patch_of_elements`]; [`Error::NegativeJacobian`].

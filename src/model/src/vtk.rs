@@ -34,11 +34,53 @@ pub enum Values {
 
 impl NodalField {
     /// A vector at every node.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+    /// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+    /// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+    /// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+    /// # let cube = |i: usize| Element {
+    /// #     kind: ElementKind::Hex8,
+    /// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+    /// # };
+    /// # let mesh = Mesh {
+    /// #     nodes: (0..16).map(place).collect(),
+    /// #     elements: (0..3).map(cube).collect(),
+    /// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+    /// # };
+    ///
+    /// let field = tiprub_model::vtk::NodalField::vectors("position", mesh.nodes.clone());
+    /// assert!(tiprub_model::vtk::write(&mesh, &[field]).is_ok());
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
     pub fn vectors(name: impl Into<String>, values: Vec<[f64; 3]>) -> Self {
         Self { name: name.into(), values: Values::Vectors(values) }
     }
 
     /// A number at every node.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+    /// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+    /// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+    /// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+    /// # let cube = |i: usize| Element {
+    /// #     kind: ElementKind::Hex8,
+    /// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+    /// # };
+    /// # let mesh = Mesh {
+    /// #     nodes: (0..16).map(place).collect(),
+    /// #     elements: (0..3).map(cube).collect(),
+    /// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+    /// # };
+    ///
+    /// let field = tiprub_model::vtk::NodalField::scalars("z", mesh.nodes.iter().map(|node| node[2]).collect());
+    /// assert!(tiprub_model::vtk::write(&mesh, &[field]).is_ok());
+    /// # Ok::<(), tiprub_model::Error>(())
+    /// ```
     pub fn scalars(name: impl Into<String>, values: Vec<f64>) -> Self {
         Self { name: name.into(), values: Values::Scalars(values) }
     }
@@ -57,6 +99,29 @@ impl NodalField {
 }
 
 /// The file's bytes: nodes, elements, every node set as a field `set_<name>` of 0 and 1, and the fields.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// # use tiprub_model::vtk::{NodalField, write};
+/// let radius = mesh.nodes.iter().map(|[x, y, _]| x.hypot(*y)).collect();
+/// let bytes = write(&mesh, &[NodalField::scalars("radius", radius)])?;
+/// assert!(bytes.starts_with(b"<?xml"));
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::Invalid`] for an unsound mesh, a field with another number of values than the mesh has nodes, and names that
@@ -99,6 +164,27 @@ pub fn write(mesh: &Mesh, fields: &[NodalField]) -> Result<Vec<u8>> {
 }
 
 /// The mesh of a whole disk: copies of a sector turned about z, sector by sector; nodes on the faces are there twice.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// let disk = tiprub_model::vtk::disk(&mesh, 36);
+/// assert_eq!(disk.elements.len(), 36 * mesh.elements.len());
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 pub fn disk(sector: &Mesh, sectors: usize) -> Mesh {
     let count = sector.nodes.len();
     let mut disk = Mesh::default();

@@ -10,6 +10,17 @@ use crate::table::Item;
 impl ThermalSimulation {
     /// Read one element of a real variable; inputs and parameters give back what was set.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// println!("{}", simulation.real(gas)?);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Unknown reference, or not a real.
     pub fn real(&self, reference: u32) -> Result<f64> {
@@ -18,6 +29,18 @@ impl ThermalSimulation {
     }
 
     /// Read an item of an enumeration.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// // This unit has real variables only.
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// assert!(simulation.integer(gas).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Unknown reference, or not an enumeration.
@@ -29,6 +52,18 @@ impl ThermalSimulation {
 
     /// Read a boolean: there is none.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// // This unit has real variables only.
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// assert!(simulation.boolean(gas).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Always.
     pub fn boolean(&self, reference: u32) -> Result<bool> {
@@ -36,6 +71,18 @@ impl ThermalSimulation {
     }
 
     /// Read a text.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// // This unit has real variables only.
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// assert!(simulation.string(gas).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Unknown reference, or not a text.
@@ -78,6 +125,18 @@ impl ThermalSimulation {
 
     /// Set one element of a real input or parameter; a derivative given before is over.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// simulation.set_real(gas, 300.0)?;
+    /// assert!(simulation.set_real(gas, f64::NAN).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Unknown reference, wrong kind, not settable, out of range; nothing is changed then.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
@@ -103,6 +162,17 @@ impl ThermalSimulation {
 
     /// Set an item of an enumeration.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// assert!(simulation.set_integer(gas, 300).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`ThermalSimulation::set_real`].
     pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
@@ -127,6 +197,17 @@ impl ThermalSimulation {
 
     /// Set a boolean: there is none.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// assert!(simulation.set_boolean(gas, true).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Always.
     pub fn set_boolean(&mut self, reference: u32, _value: bool) -> Result<()> {
@@ -134,6 +215,17 @@ impl ThermalSimulation {
     }
 
     /// Set a text: none can be.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// assert!(simulation.set_string(gas, "hot").is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Always.
@@ -143,6 +235,19 @@ impl ThermalSimulation {
     }
 
     /// First time derivative of heat or of a temperature of gas or air, until it is set again.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// // The gas grows hotter by 2 K/s over the step.
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// simulation.set_input_derivative(gas, 1, 2.0)?;
+    /// simulation.do_step(0.0, 10.0)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Another variable, an order other than 1, not finite.
@@ -171,6 +276,18 @@ impl ThermalSimulation {
 
     /// First time derivative of a continuous real output at the last communication point, under the inputs reached there; of means
     /// over the step from their middle to there.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let temperature = simulation.table().find("temperature_mean").expect("an output").reference;
+    /// simulation.do_step(0.0, 10.0)?;
+    /// println!("{} K/s", simulation.output_derivative(temperature, 1)?);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Another variable, an order other than 1.

@@ -45,21 +45,52 @@ pub struct ConductionModel {
 
 impl ConductionModel {
     /// Number of coordinates.
+    ///
+    /// # Examples
+    /// ```
+    /// # let model = tiprub_test_models::wall();
+    /// println!("{} coordinates", model.order());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn order(&self) -> usize {
         self.conduction.nrows()
     }
 
     /// h A of the gas at a factor of 1 (W/K): xᵀ H_g x of the uniform temperature of 1 K.
+    ///
+    /// # Examples
+    /// ```
+    /// # let model = tiprub_test_models::wall();
+    /// // A wall of 50 J/K with a film of 0.02 1/s.
+    /// assert!((model.gas_conductance() - 1.0).abs() < 1e-12);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn gas_conductance(&self) -> f64 {
         self.heat_capacity * self.gas_convection[(0, 0)]
     }
 
     /// The same of the air.
+    ///
+    /// # Examples
+    /// ```
+    /// # let model = tiprub_test_models::wall();
+    /// assert!(model.ambient_conductance() < model.gas_conductance());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn ambient_conductance(&self) -> f64 {
         self.heat_capacity * self.ambient_convection[(0, 0)]
     }
 
     /// Check sizes and what the simulation relies on.
+    ///
+    /// # Examples
+    /// ```
+    /// # let model = tiprub_test_models::wall();
+    /// model.validate()?;
+    /// let broken = tiprub_thermal::ConductionModel { heat_capacity: -1.0, ..model };
+    /// assert!(broken.validate().is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the array.

@@ -48,6 +48,17 @@ pub struct ThermalSimulation {
 impl ThermalSimulation {
     /// Start values are in place, nothing is computed yet.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// let mut simulation = ThermalSimulation::new(model)?;
+    /// simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 60.0)?;
+    /// assert_eq!(simulation.time(), 60.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// The errors of [`ConductionModel::validate`].
     pub fn new(model: ConductionModel) -> Result<Self> {
@@ -79,26 +90,81 @@ impl ThermalSimulation {
     }
 
     /// The variable table.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// for variable in simulation.table().variables() {
+    ///     println!("{} ({})", variable.name, variable.description);
+    /// }
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn table(&self) -> &VariableTable {
         &self.table
     }
 
     /// The model.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// println!("{} J/K", simulation.model().heat_capacity);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn model(&self) -> &ConductionModel {
         &self.model
     }
 
     /// Time of the last communication point (s).
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 10.0)?;
+    /// assert_eq!(simulation.time(), 10.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn time(&self) -> f64 {
         self.state.time
     }
 
     /// 1/λ of all coordinates (s), the slowest first, at the convection factors of the last step; infinite of what lasts for ever.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let slowest = simulation.time_constants().into_iter().fold(0.0, f64::max);
+    /// println!("steady after about {:.0} s", 5.0 * slowest);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn time_constants(&self) -> Vec<f64> {
         self.operator.rates.iter().map(|rate| 1.0 / rate).collect()
     }
 
     /// Back to the start values.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 10.0)?;
+    /// simulation.reset();
+    /// simulation.initialise(0.0)?;
+    /// assert_eq!(simulation.time(), 0.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn reset(&mut self) {
         self.state = ThermalState::new(self.model.patches.len(), self.model.order());
         self.under_way = None;
@@ -115,6 +181,17 @@ impl ThermalSimulation {
     }
 
     /// Set the temperatures to the start.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// let start = simulation.table().find("initial_temperature").expect("a parameter").reference;
+    /// simulation.set_real(start, 80.0)?;
+    /// simulation.initialise(0.0)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// A start time out of range; a steady start without any cooling.
@@ -211,6 +288,18 @@ impl ThermalSimulation {
 
     /// Begin a communication step of length `step_size` (s) from `current_time` (s).
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.begin_step(0.0, 10.0)?;
+    /// while !simulation.advance()?.finished {}
+    /// assert_eq!(simulation.time(), 10.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Not at a communication point, another time than the simulation's, a length out of range, or inputs that leave their range
     /// within it.
@@ -264,11 +353,35 @@ impl ThermalSimulation {
     }
 
     /// Warnings since this was asked the last time.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 10.0)?;
+    /// for note in simulation.take_notes() {
+    ///     println!("{note}");
+    /// }
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn take_notes(&mut self) -> Vec<Warning> {
         std::mem::take(&mut self.notes)
     }
 
     /// Solve the communication step that was begun.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.begin_step(0.0, 10.0)?;
+    /// assert!(simulation.advance()?.finished);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// None was begun; the state is not finite any more.
@@ -322,6 +435,18 @@ impl ThermalSimulation {
 
     /// A whole communication step.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// simulation.set_real(gas, 300.0)?;
+    /// simulation.do_step(0.0, 10.0)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`ThermalSimulation::begin_step`] and [`ThermalSimulation::advance`].
     pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
@@ -330,6 +455,17 @@ impl ThermalSimulation {
     }
 
     /// Whether a step was begun and not solved.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.begin_step(0.0, 10.0)?;
+    /// assert!(simulation.is_stepping());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn is_stepping(&self) -> bool {
         self.under_way.is_some()
     }

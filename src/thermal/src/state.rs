@@ -79,16 +79,51 @@ pub struct ThermalInputs {
 
 impl ThermalSimulation {
     /// Returns the inputs over time, derivatives included.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let before = simulation.courses();
+    /// simulation.restore_courses(before);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn courses(&self) -> ThermalInputs {
         ThermalInputs { heat: self.state.heat.clone(), films: self.state.films }
     }
 
     /// Back to what the inputs did at the same instant.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let gas = simulation.table().find("gas_temperature").expect("an input").reference;
+    /// let before = simulation.courses();
+    /// simulation.set_input_derivative(gas, 1, 2.0)?;
+    /// simulation.restore_courses(before);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn restore_courses(&mut self, courses: ThermalInputs) {
         (self.state.heat, self.state.films) = (courses.heat, courses.films);
     }
 
     /// Size of a saved state (bytes).
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let buffer = vec![0; simulation.state_size()];
+    /// assert!(!buffer.is_empty());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn state_size(&self) -> usize {
         let mut writer = StateWriter::new(&mut []);
         self.state.save(&mut writer);
@@ -96,6 +131,17 @@ impl ThermalSimulation {
     }
 
     /// Save the state into exactly [`ThermalSimulation::state_size`] bytes.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let mut state = vec![0; simulation.state_size()];
+    /// simulation.save_state(&mut state)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Another length.
@@ -108,6 +154,20 @@ impl ThermalSimulation {
     }
 
     /// Restore a saved state; nothing is changed on an error.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let mut state = vec![0; simulation.state_size()];
+    /// simulation.save_state(&mut state)?;
+    /// simulation.do_step(0.0, 10.0)?;
+    /// simulation.restore_state(&state)?;
+    /// assert_eq!(simulation.time(), 0.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Another length, another model, or content that no state has.

@@ -46,6 +46,22 @@ impl ThermalSimulation {
     /// Derivatives of outputs at the end of the last step by inputs over it, in the direction `seed`: of heat held over the step, of
     /// temperatures as they ran. Exact.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_thermal::ThermalSimulation;
+    /// # let model = tiprub_test_models::wall();
+    /// # let mut simulation = ThermalSimulation::new(model)?;
+    /// # simulation.initialise(0.0)?;
+    /// let reference = |name: &str| simulation.table().find(name).expect("a variable").reference;
+    /// let (heat, stored) = (reference("casing_heat"), reference("stored_heat"));
+    /// simulation.do_step(0.0, 10.0)?;
+    /// let mut sensitivity = [0.0];
+    /// simulation.step_derivative(&[stored], &[heat], &[1.0], &mut sensitivity)?;
+    /// // A watt over ten seconds brings 10 J, less what the films take.
+    /// assert!(sensitivity[0] > 0.0 && sensitivity[0] < 10.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// No step was done since initialisation; other variables than real outputs and inputs that act linearly; a seed that is not finite.
     pub fn step_derivative(

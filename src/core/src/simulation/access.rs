@@ -8,6 +8,17 @@ use crate::{Error, Result, shown};
 impl Simulation {
     /// Read one element of a real variable (inputs and parameters give back what was set).
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let torque = simulation.table().find("torque").expect("an output").reference;
+    /// assert_eq!(simulation.real(torque)?, 0.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Unknown reference, or not a real.
     pub fn real(&self, reference: u32) -> Result<f64> {
@@ -16,6 +27,17 @@ impl Simulation {
     }
 
     /// Read an integer or enumeration variable.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let contacts = simulation.table().find("contact_count").expect("an output").reference;
+    /// assert_eq!(simulation.integer(contacts)?, 0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Unknown reference, or neither integer nor enumeration.
@@ -27,6 +49,17 @@ impl Simulation {
 
     /// Read a boolean variable.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let touching = simulation.table().find("in_contact").expect("an output").reference;
+    /// assert!(!simulation.boolean(touching)?);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Unknown reference, or not a boolean.
     pub fn boolean(&self, reference: u32) -> Result<bool> {
@@ -35,6 +68,19 @@ impl Simulation {
     }
 
     /// Read a string variable.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let name = simulation.table().variables().iter().find(|variable| variable.kind == tiprub_core::variables::DataType::String);
+    /// if let Some(name) = name {
+    ///     println!("{}", simulation.string(name.reference)?);
+    /// }
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Unknown reference, or not a string.
@@ -82,6 +128,18 @@ impl Simulation {
     /// derivative given for the same input. What moves or loads something reaches the value at the end of the
     /// communication step under way or next, from where it is; with `input_interpolation` = hold it is there at once.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let speed = simulation.table().find("speed").expect("an input").reference;
+    /// simulation.set_real(speed, 1310.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Unknown reference, wrong kind, not settable, non-finite, out of range; nothing is changed then.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
@@ -105,6 +163,18 @@ impl Simulation {
 
     /// Whether [`Simulation::set_real`] would accept the value, apart from stability limits.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let speed = simulation.table().find("speed").expect("an input").reference;
+    /// assert!(simulation.check_real(speed, 1310.0).is_ok());
+    /// assert!(simulation.check_real(speed, f64::NAN).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`Simulation::set_real`].
     pub fn check_real(&self, reference: u32, value: f64) -> Result<()> {
@@ -116,6 +186,16 @@ impl Simulation {
 
     /// Set an integer or enumeration parameter. Another bound on the number of steps holds from the next communication step on.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// let most = simulation.table().find("steps_at_most").expect("a parameter").reference;
+    /// simulation.set_integer(most, 1000)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`Simulation::set_real`].
     pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<()> {
@@ -126,6 +206,17 @@ impl Simulation {
     }
 
     /// Whether [`Simulation::set_integer`] would accept the value.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// let most = simulation.table().find("steps_at_most").expect("a parameter").reference;
+    /// assert!(simulation.check_integer(most, 1000).is_ok());
+    /// assert!(simulation.check_integer(most, -1).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// As [`Simulation::set_real`].
@@ -148,6 +239,18 @@ impl Simulation {
 
     /// Set a boolean parameter.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// // Boolean variables are outputs; none can be set.
+    /// let touching = simulation.table().find("in_contact").expect("an output").reference;
+    /// assert!(simulation.set_boolean(touching, true).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`Simulation::set_real`].
     pub fn set_boolean(&mut self, reference: u32, value: bool) -> Result<()> {
@@ -159,6 +262,17 @@ impl Simulation {
 
     /// Set a string parameter. The table has none, so this always explains why not.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let speed = simulation.table().find("speed").expect("an input").reference;
+    /// assert!(simulation.set_string(speed, "fast").is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`Simulation::set_real`].
     pub fn set_string(&mut self, reference: u32, _value: &str) -> Result<()> {
@@ -169,6 +283,20 @@ impl Simulation {
 
     /// First time derivative of a continuous real input, valid from now until the input is set again: with the value it
     /// says where a ramp is at the end of the communication step.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// // The speed grows by 5000 rad/s per second over the step.
+    /// let speed = simulation.table().find("speed").expect("an input").reference;
+    /// simulation.set_real(speed, 1300.0)?;
+    /// simulation.set_input_derivative(speed, 1, 5000.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Unknown reference, not a continuous real input, order other than 1, non-finite.
@@ -235,6 +363,18 @@ impl Simulation {
 
     /// Whether [`Simulation::set_input_derivative`] would accept the value.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let speed = simulation.table().find("speed").expect("an input").reference;
+    /// assert!(simulation.check_input_derivative(speed, 1, 5000.0).is_ok());
+    /// assert!(simulation.check_input_derivative(speed, 2, 5000.0).is_err());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// As there.
     pub fn check_input_derivative(&self, reference: u32, order: i32, value: f64) -> Result<()> {
@@ -261,6 +401,18 @@ impl Simulation {
     ///
     /// Clearances and the rotor angle give their own rate; the others the change since the communication point
     /// before (for means: between the middles of the last two steps). 0 before there are two points.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let angle = simulation.table().find("rotor_angle").expect("an output").reference;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// assert!((simulation.output_derivative(angle, 1)? - 1300.0).abs() < 1e-6);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Unknown reference, not a continuous real output, order other than 1.

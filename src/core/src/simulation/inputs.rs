@@ -214,11 +214,38 @@ pub struct InputCourses {
 
 impl Simulation {
     /// Returns the inputs over time, derivatives included.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let speed = simulation.table().find("speed").expect("an input").reference;
+    /// let before = simulation.courses();
+    /// simulation.set_real(speed, 1310.0)?;
+    /// simulation.set_real(speed, 1300.0)?;
+    /// simulation.restore_courses(before);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn courses(&self) -> InputCourses {
         InputCourses { inputs: self.inputs.clone(), rotors: self.rotors.clone() }
     }
 
     /// Back to what the inputs did at the same instant; values as read are set back by [`Simulation::set_real`] before.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let speed = simulation.table().find("speed").expect("an input").reference;
+    /// let before = simulation.courses();
+    /// simulation.set_input_derivative(speed, 1, 5000.0)?;
+    /// simulation.restore_courses(before);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn restore_courses(&mut self, courses: InputCourses) {
         (self.inputs, self.rotors) = (courses.inputs, courses.rotors);
     }

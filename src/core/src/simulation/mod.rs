@@ -179,6 +179,17 @@ struct SetEnergy {
 impl Simulation {
     /// Compile a scene. Start values are in place, nothing is computed yet.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// assert_eq!(simulation.time(), 1e-4);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Invalid settings or ROM, refused combinations.
     pub fn new(scene: &Scene) -> Result<Self> {
@@ -238,16 +249,48 @@ impl Simulation {
     }
 
     /// The variable table.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// let speed = simulation.table().find("speed").expect("a rotor has a speed");
+    /// assert_eq!(simulation.real(speed.reference)?, 1300.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn table(&self) -> &VariableTable {
         &self.table
     }
 
     /// The stepped system, for studies that look deeper than the outputs.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// assert_eq!(simulation.system().structures()[0].modes().sectors(), 2);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn system(&self) -> &System {
         &self.system
     }
 
     /// Check parameters against stability and solvability limits and set the state to the start.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// simulation.initialise(0.0)?;
+    /// // Parameters that are rejected leave an instance that can be given others.
+    /// let damping = simulation.table().find("damping_ratio").expect("a parameter").reference;
+    /// simulation.set_real(damping, 0.01)?;
+    /// simulation.initialise(0.0)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Refusals with numbers and remedy; the instance can be given other parameters and asked again.
@@ -401,17 +444,54 @@ impl Simulation {
     }
 
     /// Warnings collected by the last [`Simulation::initialise`] (unresolved modes and the like).
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// for warning in simulation.warnings() {
+    ///     println!("{warning}");
+    /// }
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
     /// Warnings that came up since the start or the last call, for the step taken: of another step size than the scene
     /// proposes, of another sense of rotation, of tips too fast, of other friction. Each is told once.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// for note in simulation.take_notes() {
+    ///     println!("{note}");
+    /// }
+    /// assert!(simulation.take_notes().is_empty());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn take_notes(&mut self) -> Vec<Warning> {
         std::mem::take(&mut self.notes)
     }
 
     /// Current time (s): the end of the last finished (or early-returned) step.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 2.5e-4)?;
+    /// assert_eq!(simulation.time(), 2.5e-4);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn time(&self) -> f64 {
         self.time
     }
@@ -452,6 +532,19 @@ impl Simulation {
     }
 
     /// Factor on the casing shape of the first pair at the internal time reached (-), ramp included.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// // The bumps of this casing grow in over the first millisecond.
+    /// assert_eq!(simulation.shape_factor(), 0.0);
+    /// simulation.do_step(0.0, 1e-3)?;
+    /// assert_eq!(simulation.shape_factor(), 1.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn shape_factor(&self) -> f64 {
         let (offset, done) = (self.offset_now(), self.communication.done);
         self.inputs.pairs[0].shape_factor.at(offset) * self.ramp(0, self.communication.time(done))
@@ -473,6 +566,19 @@ impl Simulation {
     }
 
     /// Back to the state after [`Simulation::new`]: start values everywhere.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// simulation.reset();
+    /// simulation.initialise(0.0)?;
+    /// assert_eq!(simulation.time(), 0.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn reset(&mut self) {
         self.values.fill(0.0);
         self.previous.fill(0.0);

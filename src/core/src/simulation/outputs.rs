@@ -66,6 +66,20 @@ pub struct OutputView<'a> {
 impl Simulation {
     /// Bring the outputs up to the internal time reached (means cover the part of the step done), for an importer that
     /// looks inside a communication step. At communication points they are up to date, and this does nothing.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let angle = simulation.table().find("rotor_angle").expect("an output").reference;
+    /// simulation.begin_step(0.0, 1e-4)?;
+    /// simulation.advance()?;
+    /// simulation.update_outputs();
+    /// assert!(simulation.real(angle)? > 0.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn update_outputs(&mut self) {
         if self.phase == SimulationPhase::Stepping {
             self.compute_outputs();
@@ -339,6 +353,17 @@ impl OutputView<'_> {
 impl Simulation {
     /// Displacements of the points that ROMs have beside their contact nodes (m): structure by structure, point by point, axis by
     /// axis, sector by sector. They belong to the internal point reached.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// // This blade has no watched points beside its contact nodes.
+    /// assert!(simulation.watched_displacements().is_empty());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn watched_displacements(&self) -> Vec<f64> {
         let bodies = self.compiled.bodies.iter().enumerate();
         let rows = bodies.flat_map(|(body, parts)| (0..parts.watched.nrows()).map(move |row| (body, row)));

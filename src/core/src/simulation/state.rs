@@ -68,6 +68,17 @@ fn damaged<T>(problem: &str) -> Result<T> {
 
 impl Simulation {
     /// Size of a saved state in bytes (constant for a given scene).
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let buffer = vec![0; simulation.state_size()];
+    /// assert!(!buffer.is_empty());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn state_size(&self) -> usize {
         self.state_size
     }
@@ -79,6 +90,17 @@ impl Simulation {
     }
 
     /// Write everything that determines the future into `buffer` (exactly [`Simulation::state_size`] bytes).
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let mut state = vec![0; simulation.state_size()];
+    /// simulation.save_state(&mut state)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Buffer of the wrong length.
@@ -92,6 +114,20 @@ impl Simulation {
     }
 
     /// Restore a saved state; on error nothing is changed.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let mut state = vec![0; simulation.state_size()];
+    /// simulation.save_state(&mut state)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// simulation.restore_state(&state)?;
+    /// assert_eq!(simulation.time(), 0.0);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Wrong length, wrong scene, damaged: a checksum that does not match, or content that no state has.

@@ -19,6 +19,19 @@ impl Simulation {
     }
 
     /// Whether a communication step is under way.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.begin_step(0.0, 1e-4)?;
+    /// assert!(simulation.is_stepping());
+    /// while !simulation.advance()?.finished {}
+    /// assert!(!simulation.is_stepping());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn is_stepping(&self) -> bool {
         self.phase == SimulationPhase::Stepping
     }
@@ -118,6 +131,18 @@ impl Simulation {
     /// After the start of a communication step, for who does not look at internal steps: fly over all of them but the last, where sectors
     /// take steps of their own, rest, and nothing comes near. The last is taken as ever, so that rates at its end are those of an
     /// internal step. Else this does nothing.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.begin_step(0.0, 1e-4)?;
+    /// simulation.fly_ahead();
+    /// while !simulation.advance()?.finished {}
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn fly_ahead(&mut self) {
         let last = self.communication.count.saturating_sub(1);
         if !self.is_stepping() || !self.is_marched() || self.communication.done > 0 || last < 2 {

@@ -12,6 +12,18 @@ const CURVED_SHARE: f64 = 0.05;
 impl Simulation {
     /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.begin_step(0.0, 1e-4)?;
+    /// while !simulation.advance()?.finished {}
+    /// assert_eq!(simulation.time(), 1e-4);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Step size not positive and finite, or `current_time` further than 1e-3·H from [`Simulation::time`];
     /// [`Error::Exhausted`] where it takes more internal steps than are allowed.
@@ -20,6 +32,30 @@ impl Simulation {
     }
 
     /// The same, but the step may end where the internal steps allowed are used up ([`Simulation::end_step_early`]).
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let most = simulation.table().find("steps_at_most").expect("a parameter").reference;
+    /// simulation.set_integer(most, 10)?;
+    /// simulation.begin_partial_step(0.0, 1e-4)?;
+    /// let ended_early = loop {
+    ///     match simulation.advance() {
+    ///         Ok(progress) if progress.finished => break false,
+    ///         Ok(_) => {}
+    ///         Err(tiprub_core::Error::Exhausted { .. }) => break true,
+    ///         Err(error) => return Err(error),
+    ///     }
+    /// };
+    /// if ended_early {
+    ///     simulation.end_step_early()?;
+    /// }
+    /// assert!(simulation.time() < 1e-4);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// As [`Simulation::begin_step`].
@@ -225,6 +261,21 @@ impl Simulation {
 
     /// March one internal step of the communication step begun. Inputs may be set between calls.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.begin_step(0.0, 1e-4)?;
+    /// let mut steps = 1;
+    /// while !simulation.advance()?.finished {
+    ///     steps += 1;
+    /// }
+    /// assert_eq!(steps, 100);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Non-finite state; the simulation must then be reset or restored. [`Error::Exhausted`] where the internal steps allowed are used
     /// up: the simulation is then as if the communication step had not begun, or, where it may end early, where the last internal step
@@ -353,6 +404,19 @@ impl Simulation {
 
     /// End the communication step here, before its end (early return): outputs cover the part done.
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.begin_step(0.0, 1e-4)?;
+    /// let progress = simulation.advance()?;
+    /// simulation.end_step_early()?;
+    /// assert_eq!(simulation.time(), progress.time);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// No step under way, no internal step done yet, or a non-finite state.
     pub fn end_step_early(&mut self) -> Result<()> {
@@ -368,6 +432,20 @@ impl Simulation {
     }
 
     /// `begin_step`, [`Simulation::fly_ahead`], then `advance` to the end.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// let clearance = simulation.table().find("clearance_minimum").expect("an output").reference;
+    /// for step in 0..10 {
+    ///     simulation.do_step(f64::from(step) * 1e-4, 1e-4)?;
+    ///     println!("{:.3e} m", simulation.real(clearance)?);
+    /// }
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// As those two.

@@ -60,6 +60,18 @@ impl StepReplay {
 
 impl Simulation {
     /// Whether derivatives over steps can be asked for: the parameter `step_derivatives`.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// let derivatives = simulation.table().find("step_derivatives").expect("a parameter").reference;
+    /// assert!(!simulation.is_differentiated());
+    /// simulation.set_integer(derivatives, 2)?;
+    /// assert!(simulation.is_differentiated());
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn is_differentiated(&self) -> bool {
         self.value_of(Quantity::StepDerivatives, 0) > 1.5
     }
@@ -83,6 +95,23 @@ impl Simulation {
     ///
     /// It marches the step again in a copy of the simulation, as a rule once with galerkin and twice with other schemes; the simulation itself
     /// stays as it is.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// let derivatives = simulation.table().find("step_derivatives").expect("a parameter").reference;
+    /// simulation.set_integer(derivatives, 2)?;
+    /// simulation.initialise(0.0)?;
+    /// simulation.do_step(0.0, 1e-4)?;
+    /// let [speed, angle] = ["speed", "rotor_angle"].map(|name| simulation.table().find(name).expect("a variable").reference);
+    /// let mut sensitivity = [0.0];
+    /// simulation.step_derivative(&[angle], &[speed], &[1.0], &mut sensitivity)?;
+    /// // The speed ramps to its new value over the step: the angle grows by half of it times the step.
+    /// assert!((sensitivity[0] - 0.5e-4).abs() < 1e-9);
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Derivatives not asked for before initialisation; no communication step done, or one that inputs were set in, ended early, or a state

@@ -72,6 +72,23 @@ pub struct CasingOptions {
 
 /// Build, reduce and check a ring.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{casing::{CasingOptions, ContactRings, RingCounts}, progress::silent};
+/// # let whole = CasingOptions::default();
+/// let options = CasingOptions {
+///     counts: RingCounts { around: 24, ..whole.counts },
+///     rings: ContactRings { around: 12, ..whole.rings },
+///     fixed_interface_modes: 20,
+///     modes: 10,
+///     checked_modes: 4,
+///     ..whole
+/// };
+/// let reduction = tiprub_model::reduce_ring(&options, &silent)?;
+/// assert!(reduction.rom.extras.grid.is_some());
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Invalid`](crate::Error::Invalid) for lengths, counts and contact rings that do not fit each other, and those of [`reduce_casing`].
 pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Reduction> {
@@ -99,6 +116,14 @@ pub fn reduce_ring(options: &CasingOptions, listener: Listener<'_>) -> Result<Re
 pub const CLAMPED: &str = "clamped";
 
 /// Mesh of the ring, with the clamped nodes as a set of their own.
+///
+/// # Examples
+/// ```
+/// # use tiprub_model::casing::{CLAMPED, CasingOptions, supported_ring};
+/// let ring = supported_ring(&CasingOptions::default())?;
+/// assert!(!ring.mesh.set(CLAMPED)?.is_empty());
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// The errors of [`ring_mesh`]; a contact ring on a clamped face cannot be, since contact rings lie inside the casing.

@@ -52,6 +52,33 @@ pub struct CasingReductionOptions {
 /// outside all `patches` stay at the reference temperature; with no patches the ROM has no thermal loads. The ROM's
 /// coordinates are modes: M = I, K = Λ, frame cylindrical.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{casing::{CLAMPED, CasingOptions, CasingReductionOptions, ContactRings, RingCounts, supported_ring}, progress::silent};
+/// # let whole = CasingOptions::default();
+/// let options = CasingOptions {
+///     counts: RingCounts { around: 24, ..whole.counts },
+///     rings: ContactRings { around: 12, ..whole.rings },
+///     fixed_interface_modes: 20,
+///     modes: 10,
+///     checked_modes: 4,
+///     ..whole
+/// };
+/// let ring = supported_ring(&options)?;
+/// let clamped = ring.mesh.set(CLAMPED)?.to_vec();
+/// let reduction = CasingReductionOptions {
+///     name: "casing".into(),
+///     formulation: Default::default(),
+///     fixed_interface_modes: 20,
+///     modes: 10,
+///     checked_modes: 4,
+///     damping_ratio: 0.005,
+/// };
+/// let casing = tiprub_model::reduce_casing(ring.mesh, &options.material, &clamped, &ring.grid, &[], &reduction, &silent)?;
+/// assert!(casing.rom.extras.grid.is_some());
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Invalid`](crate::Error::Invalid) for contact nodes that are clamped, repeated, on the axis or no grid, and for patches without
 /// elements or with common ones; and whatever assembly, eigenvalue iteration and the ROM's own validation refuse.

@@ -20,6 +20,29 @@ pub struct ContactChoice {
 
 /// Contact nodes of a set by growing z (of equal z: by angle), with slopes dr/dz of the set's contour.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+///
+/// # use tiprub_model::read::{ContactChoice, choose_contact_nodes};
+/// let choice = ContactChoice { count: None, names: vec!["front".into(), "rear".into()] };
+/// let points = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &choice)?;
+/// assert_eq!(points[0].name, "front");
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Invalid`] for an empty set, more nodes than it has, or names that are not as many.
 pub fn choose_contact_nodes(nodes: &[[f64; 3]], set: &[usize], choice: &ContactChoice) -> Result<Vec<ContactPoint>> {

@@ -153,6 +153,32 @@ fn mesh_format(path: &Path, bytes: &[u8]) -> Result<MeshFormat> {
 
 /// Read a mesh and assemble its matrices.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, Mesh, element::ElementKind, mesh::Element};
+/// # // Three cubes of 20 mm in a row along x, from a radius of 0.3 m; all nodes of ROOT are at the inner end.
+/// # let at = |i: usize, j: usize, k: usize| 4 * i + 2 * j + k;
+/// # let place = |n: usize| [0.3 + 0.02 * (n / 4) as f64, 0.02 * (n / 2 % 2) as f64 - 0.01, 0.02 * (n % 2) as f64];
+/// # let cube = |i: usize| Element {
+/// #     kind: ElementKind::Hex8,
+/// #     nodes: [0, 1].into_iter().flat_map(|k| [at(i, 0, k), at(i + 1, 0, k), at(i + 1, 1, k), at(i, 1, k)]).collect(),
+/// # };
+/// # let mesh = Mesh {
+/// #     nodes: (0..16).map(place).collect(),
+/// #     elements: (0..3).map(cube).collect(),
+/// #     sets: [("ROOT".to_owned(), (0..4).collect()), ("TIP".to_owned(), (12..16).collect())].into(),
+/// # };
+/// # let steel = Material::steel();
+///
+/// # use tiprub_model::{progress::silent, read::{MeshOptions, read_mesh}};
+/// # let directory = tempfile::tempdir().expect("a directory");
+/// # let path = directory.path().join("bar.inp");
+/// # std::fs::write(&path, tiprub_model::inp::calculix_input(&mesh, &steel, Some("ROOT"), 4)?).expect("a file");
+/// let imported = read_mesh(&path, &MeshOptions::default(), &silent)?;
+/// assert_eq!(imported.model.set("TIP")?.len(), 4);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read, [`Error::Read`] with file and line for anything in it that is not
 /// understood or not supported, [`Error::Invalid`] for a missing material, and those of assembly with the file's numbers.
@@ -181,6 +207,14 @@ fn mesh_file(path: &Path, bytes: &[u8], temperature: Option<f64>, open: source::
 
 /// Read a mesh that is in memory, without assembling it: nodes, elements and sets, in the file's unit of length. Other
 /// files that it includes are not opened.
+///
+/// # Examples
+/// ```
+/// let text = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n*ELEMENT, TYPE=C3D4, ELSET=ALL\n1, 1, 2, 3, 4\n";
+/// let mesh = tiprub_model::read::parse_mesh("tet.inp", text.as_bytes())?;
+/// assert_eq!((mesh.nodes.len(), mesh.elements.len()), (4, 1));
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::Read`] with file and line.

@@ -140,6 +140,15 @@ impl Rotor37Options {
 
 /// Build, reduce and check the blade: hub section clamped, contact nodes on the tip's mid-thickness line.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Rotor37Options, progress::silent};
+/// // The method of the paper: three contact nodes at the tip.
+/// let reduction = tiprub_model::reduce_rotor37(&Rotor37Options::paper(), &silent)?;
+/// assert_eq!(reduction.rom.contact_nodes.len(), 3);
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Invalid`](crate::Error::Invalid) for counts that are too small or more contact nodes than the mesh has, and
 /// those of [`reduce_model`].
