@@ -114,8 +114,11 @@ pub(crate) struct OracleWatch {
     acts_later: bool,
     /// The losses of a step are counted before the instantaneous energy, a mean over two steps, has decreased.
     loses_later: bool,
-    /// Bound of the energy of the instant at the last communication point (J).
+    /// Fixed steps: the instantaneous energy is a mean over two steps, so that the loss of an impact is counted before the energy has decreased.
+    averages: bool,
+    /// Bound of the energy of the instant, and impact losses, at the last communication point (J).
     bound_before: f64,
+    loss_before: f64,
     /// Energy of the instant that is to be explained at the next communication point: excess, energy, bound (J), time (s).
     pending: Option<[f64; 4]>,
     /// Largest energy beyond its bound: excess, energy, bound (J), time (s).
@@ -150,7 +153,9 @@ impl OracleWatch {
             residual: 0.0,
             acts_later: trial.scene.settings.time.scheme == Scheme::MasslessBoundary,
             loses_later: trial.scene.settings.time.scheme == Scheme::CentralDifference,
+            averages: trial.scene.settings.time.scheme != Scheme::Galerkin,
             bound_before: 0.0,
+            loss_before: 0.0,
             pending: None,
             excess: None,
             infinite: None,
@@ -188,7 +193,10 @@ impl OracleWatch {
             self.residual = self.residual.max(ledger.residual(conserved).abs() / self.scale);
         }
         let supplied = ledger.initial + ledger.supplied() + ledger.curvature_work.value();
-        let bound = self.factor * (supplied - ledger.impact_loss.value()).max(conserved).max(0.0)
+        let loss = ledger.impact_loss.value();
+        let loss_before = std::mem::replace(&mut self.loss_before, loss);
+        let counted = if self.averages { loss.min(loss_before) } else { loss };
+        let bound = self.factor * (supplied - counted).max(conserved).max(0.0)
             + if self.acts_later { INSTANT_LATER } else { INSTANT } * self.scale;
         let last = std::mem::replace(&mut self.bound_before, bound);
         let bound = if self.loses_later { bound.max(last) } else { bound };
@@ -338,8 +346,9 @@ pub(crate) fn names(error: &Error) -> Option<Finding> {
         Error::Invalid { what, problem, remedy } => (what.as_str(), problem, remedy),
         Error::Unstable { problem, remedy } | Error::Exhausted { problem, remedy } => ("run", problem, remedy),
         Error::NonFinite { .. } => return finding("the state became non-finite"),
-        Error::UnknownReference { .. } | Error::State { .. } => return
-            finding("it is an unexpected kind of error for a scene"),
+        Error::UnknownReference { .. } | Error::State { .. } => {
+            return finding("it is an unexpected kind of error for a scene");
+        }
     };
     if what.trim().is_empty() || problem.trim().is_empty() {
         return finding("it does not name the place or the problem");
@@ -363,8 +372,11 @@ pub(crate) fn ends(message: &str) -> Option<Finding> {
         return finding("it does not contain the time");
     }
     let remedy = message.rsplit_once(". ").map_or("", |(_, remedy)| remedy);
-    if !remedy.starts_with(|letter: char| letter.is_ascii_uppercase()) { finding("it contains no remedy") } else { None
-        }
+    if !remedy.starts_with(|letter: char| letter.is_ascii_uppercase()) {
+        finding("it contains no remedy")
+    } else {
+        None
+    }
 }
 
 /// The law that a scene is solved by.
