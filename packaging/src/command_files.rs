@@ -105,8 +105,7 @@ fn study(argument: &str, out: &Path, more: Vec<NamedFile>) -> Result<()> {
     let files: Vec<Identity> = files.filter_map(|path| identity(&path)).collect();
     for input in scene(argument).into_iter().chain(more) {
         if identity(&input.path).is_some_and(|place| files.contains(&place)) {
-            let problem =
-                format!("contains {} {}, which the study may overwrite", input.role, input.path.display());
+            let problem = format!("contains {} {}, which the study may overwrite", input.role, input.path.display());
             return Err(Failure::usage(format!("--out {}", out.display()), problem, "Give another directory"));
         }
     }

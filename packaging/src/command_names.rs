@@ -106,10 +106,8 @@ fn no_model(name: &str, models: &[String]) -> Failure {
     let near = models.iter().map(|model| (strsim::jaro_winkler(name, model), model));
     let near = near.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
     let hint = near.map_or(String::new(), |(_, model)| format!("Did you mean `{model}`? "));
-    let remedy = format!(
-        "{hint}Choose {}; for your own mesh (.inp or .msh), use `tiprub reduce blade FILE`",
-        listed(models)
-    );
+    let remedy =
+        format!("{hint}Choose {}; for your own mesh (.inp or .msh), use `tiprub reduce blade FILE`", listed(models));
     Failure::usage(format!("reduce {name}"), "no such kind of model", remedy)
 }
 

@@ -129,7 +129,11 @@ pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) 
     }
     if found.is_empty() {
         let problem = format!("the given files contain no {}", unit.names().1);
-        return Err(Failure::new("FMU library", problem, "Build it with packaging/libraries.sh and give --library DIR"));
+        return Err(Failure::new(
+            "FMU library",
+            problem,
+            "Build it with packaging/libraries.sh and give --library DIR",
+        ));
     }
     check_platforms(&arguments.platform, found.keys().copied().collect())?;
     Ok(found

@@ -163,7 +163,6 @@ fn end_of_item(tokens: &[TokenTree], index: usize) -> usize {
     tokens[index..].iter().position(ends).map_or(tokens.len(), |end| index + end + 1)
 }
 
-
 /// Words that users stumbled over, and what to write instead.
 const BANNED: [(&str, &str); 20] = [
     ("told", "reported"),

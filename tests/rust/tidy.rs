@@ -140,7 +140,8 @@ fn public_entry_points_have_examples() {
     for name in ["input", "load", "resources", "rom_file", "scene_file", "thermal_file"] {
         texts.push(("format", file(&format!("src/format/src/{name}.rs"))));
     }
-    let model = ["reduce", "mesh", "fe_model", "read/mod", "inp", "thermal", "assembly", "casing/mod", "casing/reduction"];
+    let model =
+        ["reduce", "mesh", "fe_model", "read/mod", "inp", "thermal", "assembly", "casing/mod", "casing/reduction"];
     for name in model {
         texts.push(("model", file(&format!("src/model/src/{name}.rs"))));
     }

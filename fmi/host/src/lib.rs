@@ -219,9 +219,7 @@ impl UnpackedFmu {
         match self.description.fmi_version.as_str() {
             "2.0" => Ok(Box::new(fmi2::Fmi2Slave::new(self)?)),
             "3.0" => Ok(Box::new(fmi3::Fmi3Slave::new(self)?)),
-            other => {
-                Err(Failure::new("FMU", format!("FMI version {other} is not supported"), "Use FMI 2.0 or 3.0"))
-            }
+            other => Err(Failure::new("FMU", format!("FMI version {other} is not supported"), "Use FMI 2.0 or 3.0")),
         }
     }
 }

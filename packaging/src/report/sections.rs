@@ -133,11 +133,12 @@ pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, Stri
 fn error_study() -> NumberedFigure {
     // The picture has its own paper and its own legend.
     let body = format!("<div class=\"scroll adapts\">{ERROR_PICTURE}</div>");
-    let caption = "Error against run time of adaptive steps, fixed steps and the paper's method for a light rub of the \
+    let caption =
+        "Error against run time of adaptive steps, fixed steps and the paper's method for a light rub of the \
                    built-in rotor 37, measured once (docs/error-study.md of the sources). The demo does not repeat \
                    this study. To run it on this machine, use <code>tiprub study error builtin:rotor37</code>; with \
                    <code>--quick</code> it takes minutes."
-        .to_owned();
+            .to_owned();
     NumberedFigure { body, caption }
 }
 

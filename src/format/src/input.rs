@@ -48,8 +48,7 @@ pub fn open_file(path: &Path) -> io::Result<File> {
 pub fn read_file(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open_file(path)?;
     let length = file.metadata()?.len();
-    let too_large =
-        || io::Error::new(ErrorKind::FileTooLarge, format!("it exceeds the limit of {most} bytes"));
+    let too_large = || io::Error::new(ErrorKind::FileTooLarge, format!("it exceeds the limit of {most} bytes"));
     if length > most {
         return Err(too_large());
     }

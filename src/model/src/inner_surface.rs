@@ -430,11 +430,7 @@ impl<'a> InnerSurface<'a> {
                 "it is not centred on the z axis: its centre is at x = {x:.6} m, y = {y:.6} m, with a mean radius of \
                  {radius:.6} m"
             );
-            return Err(Error::invalid(
-                WHAT,
-                problem,
-                "Move the model onto the axis of the engine, or check --axis",
-            ));
+            return Err(Error::invalid(WHAT, problem, "Move the model onto the axis of the engine, or check --axis"));
         }
         Ok(())
     }

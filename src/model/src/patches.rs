@@ -229,8 +229,7 @@ pub fn face_patches(
         places.sort_by(f64::total_cmp);
         let stations = 1 + places.windows(2).filter(|pair| pair[1] - pair[0] > SAME_PLACE * (high - low)).count();
         if !(1..=stations).contains(&counts[axis]) {
-            let problem =
-                format!("{} in a direction in which the face has {stations} node positions", counts[axis]);
+            let problem = format!("{} in a direction in which the face has {stations} node positions", counts[axis]);
             return Err(Error::invalid(
                 "number of contact patches",
                 problem,

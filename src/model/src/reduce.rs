@@ -305,7 +305,11 @@ fn spinning_states(
 ) -> Result<SpinningStates> {
     let Some((mesh, material)) = &model.mesh else {
         let problem = "the model has no mesh with a single material";
-        return Err(Error::invalid("effects of spin", problem, "Omit them, or give a mesh file with a single material"));
+        return Err(Error::invalid(
+            "effects of spin",
+            problem,
+            "Omit them, or give a mesh file with a single material",
+        ));
     };
     let assembled = Assembled { stiffness: model.stiffness.clone(), mass: model.mass.clone() };
     let body = Rotating::new(mesh, material, &assembled, free, stiffness)?;

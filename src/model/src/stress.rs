@@ -128,7 +128,11 @@ fn all_places(
     let mut names: Vec<&str> = places.iter().map(|(name, _)| name.as_str()).collect();
     names.sort_unstable();
     if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Error::invalid(format!("place of stress `{}`", pair[0]), "it appears twice", "List each only once"));
+        return Err(Error::invalid(
+            format!("place of stress `{}`", pair[0]),
+            "it appears twice",
+            "List each only once",
+        ));
     }
     Ok(places)
 }

@@ -54,8 +54,7 @@ pub fn one_rotor_and_friction(settings: &SceneSettings) -> Result<()> {
 }
 
 fn several(settings: &SceneSettings, problem: String) -> Failure {
-    let remedy =
-        "Give a scene with only one rotor or pair; `tiprub study error` and `tiprub run` support several";
+    let remedy = "Give a scene with only one rotor or pair; `tiprub study error` and `tiprub run` support several";
     Failure::usage(format!("scene `{}`", settings.name), problem, remedy)
 }
 

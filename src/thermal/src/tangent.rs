@@ -87,10 +87,7 @@ impl ThermalSimulation {
                 Item::Heat => heat[element] += seed,
                 Item::Film(index) => films[index] += seed,
                 _ => {
-                    return Err(refused(
-                        variable,
-                        "only heat and the gas and air temperatures act linearly",
-                    ));
+                    return Err(refused(variable, "only heat and the gas and air temperatures act linearly"));
                 }
             }
         }

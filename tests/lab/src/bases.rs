@@ -269,9 +269,15 @@ fn figure(all: &[BasisModel], bases: &[BasisChoice]) -> Result<StudyFigure> {
     let line = |basis: &BasisChoice| of(*basis).map(|one| (one.modes as f64, one.same.log10())).collect();
     let series = bases.iter().map(|basis| Series::line(basis.name(), line(basis))).collect();
     let plot = Plot { marked: true, ..Plot::new("modes", "log10 of the displacement error", series) };
-    let mut sheet =
-        Sheet::new(["basis", "modes", "flexibility", "response", "rub", "rub, massless-boundary",
-            "rub, against patches"]);
+    let mut sheet = Sheet::new([
+        "basis",
+        "modes",
+        "flexibility",
+        "response",
+        "rub",
+        "rub, massless-boundary",
+        "rub, against patches",
+    ]);
     for (index, basis) in bases.iter().enumerate() {
         let row = |one: &BasisModel| {
             vec![index as f64, one.modes as f64, one.flexibility, one.response, one.same, one.massless, one.patches]
@@ -280,8 +286,8 @@ fn figure(all: &[BasisModel], bases: &[BasisChoice]) -> Result<StudyFigure> {
     }
     Ok(StudyFigure {
         name: "modes",
-        caption:
-            "Displacement error of a light rub, relative to the model with the same contact and the most modes.".into(),
+        caption: "Displacement error of a light rub, relative to the model with the same contact and the most modes."
+            .into(),
         picture: Picture::plot(&plot)?,
         sheet,
     })
@@ -323,8 +329,11 @@ fn statements(all: &[BasisModel], bases: &[BasisChoice], covered: usize) -> Vec<
             pairs().filter(|(held, _)| held.modes >= covered).all(|(held, free)| free.response < held.response),
             told(&|one| one.response),
         ),
-        Statement::tested("With the most modes, free-interface modes also have a smaller error in a light rub", smaller,
-            told(&|one| one.same)),
+        Statement::tested(
+            "With the most modes, free-interface modes also have a smaller error in a light rub",
+            smaller,
+            told(&|one| one.same),
+        ),
         Statement::tested(
             "With the most modes and no inertia at the contact (massless-boundary), free-interface modes have a \
              smaller error",

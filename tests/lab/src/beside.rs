@@ -72,8 +72,12 @@ pub(crate) fn blades_of(scene: &Scene) -> Result<BladeScene> {
         Shape::TwoLobe { depth, width, phase } => {
             ([2.0 * contact.nominal_gap() * depth, width, surface.ramp_time], phase)
         }
-        _ => return Err(refused("surface.shape",
-            "the independent solver supports only circular casings and two bumps")),
+        _ => {
+            return Err(refused(
+                "surface.shape",
+                "the independent solver supports only circular casings and two bumps",
+            ));
+        }
     };
     let meridional = f64::from(u8::from(contact.meridian == Meridian::Contour));
     let tips = rom.contact_nodes.iter().map(|node| RubTip {
@@ -175,8 +179,8 @@ pub(crate) fn study(arguments: &BesideArguments, console: &Console) -> Result<St
     let samples =
         (1..=most).take_while(|sample| f64::from(*sample) * interval <= experiment.stop * (1.0 + 1e-9)).count();
     let samples = u32::try_from(samples).unwrap_or(most).max(1);
-    let failed = |what: &str, why: String| Failure::new(what.to_owned(), why,
-        "Choose a step with which the scene runs");
+    let failed =
+        |what: &str, why: String| Failure::new(what.to_owned(), why, "Choose a step with which the scene runs");
     let own = product(&scene, 1, samples).map_err(|error| failed("simulation", error.to_string()))?;
     let half =
         product(&scene, 2, samples).map_err(|error| failed("simulation with half the step", error.to_string()))?;
@@ -186,9 +190,10 @@ pub(crate) fn study(arguments: &BesideArguments, console: &Console) -> Result<St
     for (done, share) in (0..).zip(SHARES) {
         task.at(done);
         let step = longest / f64::from(share);
-        witnesses
-            .push((step, witness(&blades, interval, step, samples).map_err(|error| failed("independent solver",
-                error))?));
+        witnesses.push((
+            step,
+            witness(&blades, interval, step, samples).map_err(|error| failed("independent solver", error))?,
+        ));
     }
     Ok(report(&scene, (&own, &half), &witnesses, interval))
 }
@@ -215,8 +220,10 @@ fn report(
          the independent solver by {:.1e}, {:.1e}",
         between[0], between[1], own_halved[0], own_halved[1], halved[0], halved[1]
     );
-    let expected = format!("tiprub and the independent solver differ by at most {MARGIN} times the change due to \
-                            halving their steps");
+    let expected = format!(
+        "tiprub and the independent solver differ by at most {MARGIN} times the change due to \
+                            halving their steps"
+    );
     let meets = match with_mass {
         true => Statement::tested(expected, between[0] <= allowed[0] && between[1] <= allowed[1], found),
         false => Statement::remark(

@@ -110,8 +110,8 @@ impl Criterion {
             ),
             None => format!("still {last:.3} % with the largest number of component modes"),
         };
-        let expected = format!("each of the {MODES} lowest modes is below {} % with enough component modes",
-            self.limit);
+        let expected =
+            format!("each of the {MODES} lowest modes is below {} % with enough component modes", self.limit);
         Statement::tested(format!("{}: {expected}", self.title), self.enough(rows).is_some(), found)
     }
 }

@@ -349,8 +349,10 @@ fn statements(runs: &CouplingRuns) -> Vec<Statement> {
         [CouplingMethod::FixedPoint, CouplingMethod::Newton, CouplingMethod::Differences].map(unsolved);
     vec![
         Statement::tested(
-            format!("{name}: Newton's method with derivatives over the step converges in 99 of 100 steps, and no run \
-                     fails"),
+            format!(
+                "{name}: Newton's method with derivatives over the step converges in 99 of 100 steps, and no run \
+                     fails"
+            ),
             100 * newton.0 <= steps_of_all() && !newton.1.contains("failed"),
             format!("{}; fixed point: {}; differences of 1 µm: {}", newton.1, fixed.1, differences.1),
         ),

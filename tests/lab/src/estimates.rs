@@ -195,8 +195,10 @@ fn statement(all: &[Compared], direction: usize) -> Statement {
     let within = |(a, b): &&(f64, f64)| a.max(*b).max(NONE) <= FACTOR * a.min(*b).max(NONE);
     let right = given.iter().filter(within).count();
     Statement::tested(
-        format!("{}: nine of ten estimates agree with the true error within a factor of {FACTOR}",
-            DIRECTIONS[direction]),
+        format!(
+            "{}: nine of ten estimates agree with the true error within a factor of {FACTOR}",
+            DIRECTIONS[direction]
+        ),
         !given.is_empty() && 10 * right >= 9 * given.len(),
         format!("{right} of {}; {} rubs have no estimate", given.len(), compared.count() - given.len()),
     )
@@ -236,8 +238,8 @@ fn figure(all: &[Compared]) -> Result<StudyFigure> {
         Series::line(*name, points.collect())
     });
     let plot = Plot { marked: true, ..Plot::new("log10 of the true error", "log10 of the estimate", series.collect()) };
-    let mut sheet = Sheet::new(["scene", "direction (0 steps, 1 modes, 2 patches, 3 and 4 mesh)", "estimate",
-        "true error"]);
+    let mut sheet =
+        Sheet::new(["scene", "direction (0 steps, 1 modes, 2 patches, 3 and 4 mesh)", "estimate", "true error"]);
     for one in all {
         let [estimate, truth] = [one.estimate, one.truth].map(|value| value.unwrap_or(f64::NAN));
         sheet.rows.push(vec![one.scene as f64, one.direction as f64, estimate, truth]);

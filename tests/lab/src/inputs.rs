@@ -263,9 +263,13 @@ fn figure(course: &InputCase, runs: &InputRuns) -> Result<StudyFigure> {
         height: 260,
         ..Plot::new("log10 of the communication step (s)", "peak node force (N)", series.collect())
     };
-    let mut sheet =
-        Sheet::new(["method (0 ramp, 1 derivatives, 2 hold)", "H (s)", "force (N)", "torque (N.m)",
-            "mean torque (N.m)"]);
+    let mut sheet = Sheet::new([
+        "method (0 ramp, 1 derivatives, 2 hold)",
+        "H (s)",
+        "force (N)",
+        "torque (N.m)",
+        "mean torque (N.m)",
+    ]);
     for (way, found) in (0_u8..).zip(&runs.by_way) {
         for (step, one) in STEPS.iter().zip(found) {
             sheet.rows.push(vec![f64::from(way), *step, one.force, one.torque, one.mean]);
@@ -332,14 +336,15 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
              and as values that are held. The fine run uses derivatives and a communication step of {:e} s, which \
              equals the internal step.{}",
             STEPS[0],
-            if arguments.quick { " Quick form: blades with three modes, an elastic ring without a mesh." } else { ""
-                }
+            if arguments.quick { " Quick form: blades with three modes, an elastic ring without a mesh." } else { "" }
         ),
         facts: vec![
             ("duration of each run".into(), format!("{length} s")),
             ("internal step".into(), format!("{:e} s", STEPS[0])),
-            ("whirl".into(), format!("circle with a radius of {} m at {} rad/s, reached in {} s", WHIRL.0, WHIRL.1,
-                WHIRL.2)),
+            (
+                "whirl".into(),
+                format!("circle with a radius of {} m at {} rad/s, reached in {} s", WHIRL.0, WHIRL.1, WHIRL.2),
+            ),
             ("torque".into(), format!("peak of the averages over {PART:e} s")),
         ],
         statements: pairs().flat_map(|(course, runs)| statements(course, runs)).collect(),

@@ -171,18 +171,24 @@ pub(crate) fn study(arguments: &RefinementArguments, console: &Console) -> Resul
         facts: tiprub_study::machine::facts(),
         statements: cases.iter().flat_map(statements).collect(),
         figures,
-        results: json!(cases.iter().map(|case| json!({
-            "scene": case.name, "seconds": case.seconds,
-            "found": case.found.as_ref().ok().map(page::results), "refused": case.found.as_ref().err(),
-        })).collect::<Vec<_>>()),
+        results: json!(
+            cases
+                .iter()
+                .map(|case| json!({
+                    "scene": case.name, "seconds": case.seconds,
+                    "found": case.found.as_ref().ok().map(page::results), "refused": case.found.as_ref().err(),
+                }))
+                .collect::<Vec<_>>()
+        ),
         files: vec![("tables.md".into(), "all tables in Markdown".into(), markdown(&cases).into_bytes())],
     })
 }
 
 fn statements(case: &RefinementCase) -> Vec<Statement> {
     match &case.found {
-        Err(why) => vec![Statement::remark(&case.title, format!("does not run (ended after {:.0} s): {why}",
-            case.seconds))],
+        Err(why) => {
+            vec![Statement::remark(&case.title, format!("does not run (ended after {:.0} s): {why}", case.seconds))]
+        }
         Ok(found) => {
             let all = page::statements(found).into_iter();
             all.map(|one| Statement { expected: format!("{}: {}", case.title, one.expected), ..one }).collect()
@@ -419,9 +425,10 @@ fn picture(
         marked: true,
         ..Plot::new(label, format!("error of {quantity}"), series)
     };
-    let caption =
-        format!("Error of {quantity} relative to the limit, against {label}. Scenes are numbered from 0 in the order \
-                 of the legend.");
+    let caption = format!(
+        "Error of {quantity} relative to the limit, against {label}. Scenes are numbered from 0 in the order \
+                 of the legend."
+    );
     Ok(Some(StudyFigure { name, caption, picture: Picture::plot(&plot)?, sheet }))
 }
 

@@ -132,7 +132,8 @@ fn short_steps_are_warned_of_once_through_both_faces() {
     let path = thermal();
     let (two, three) = (fmi2::load(&path), fmi3::load(&path));
     let resources = UnpackedResources::of_thermal(&ConductionModel { element_time: 0.5, ..model() }, false);
-    let told = |log: String| log.matches("shorter than the 0.500 s that heat needs to diffuse through an element").count();
+    let told =
+        |log: String| log.matches("shorter than the 0.500 s that heat needs to diffuse through an element").count();
     for _instance in 0..2 {
         let (old, new) =
             (fmi2::Fmi2TestSlave::initialised(&two, &resources), fmi3::Fmi3TestSlave::new(&three, &resources));

@@ -273,12 +273,10 @@ impl Slave {
         }
         let input = variable.causality == Causality::Input;
         match self.phase {
-            InstancePhase::Stepping { .. } if !input && variable.variability != Variability::Tunable => {
-                Some(
-                    "is a fixed parameter and cannot be set after initialisation. Set it earlier, or reset the instance"
-                        .into(),
-                )
-            }
+            InstancePhase::Stepping { .. } if !input && variable.variability != Variability::Tunable => Some(
+                "is a fixed parameter and cannot be set after initialisation. Set it earlier, or reset the instance"
+                    .into(),
+            ),
             InstancePhase::Updating { .. } if !input || variable.variability != Variability::Continuous => {
                 Some("is not a continuous input. Set it at a communication point".into())
             }

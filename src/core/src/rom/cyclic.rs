@@ -97,9 +97,7 @@ impl Rom {
             if 2 * nodal_diameter == self.sectors && imaginary > 1e-8 * largest {
                 return refuse(
                     name,
-                    format!(
-                        "imaginary part {imaginary:.3e}, but arrays of the nodal diameter sectors/2 must be real"
-                    ),
+                    format!("imaginary part {imaginary:.3e}, but arrays of the nodal diameter sectors/2 must be real"),
                 );
             }
         }

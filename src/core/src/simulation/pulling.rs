@@ -63,8 +63,7 @@ impl Simulation {
             }
             if share >= TOLD && !std::mem::replace(&mut self.told.pulls[structure], true) {
                 let problem = self.pulls(structure, node, share);
-                let then =
-                    if is_paper { String::new() } else { format!(". The run ends at {:.0} %", 100.0 * REFUSED) };
+                let then = if is_paper { String::new() } else { format!(". The run ends at {:.0} %", 100.0 * REFUSED) };
                 let problem = format!("up to t = {} s, {problem}{then}", shown_time(time));
                 self.note(Warning::new(Topic::FilmPulls, problem, self.against_pulling(structure)));
             }

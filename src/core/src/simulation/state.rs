@@ -264,11 +264,7 @@ impl Simulation {
         let divided = (0.0..=f64::MAX).contains(&length)
             && (lead.step - internal).abs() <= 2.0 * same * internal
             && lead.step <= largest * (1.0 + 2.0 * same);
-        if counted && within && divided {
-            Ok(())
-        } else {
-            damaged("its times and step counters contradict each other")
-        }
+        if counted && within && divided { Ok(()) } else { damaged("its times and step counters contradict each other") }
     }
 
     /// Values that could have been set, and outputs that could have been read.

@@ -395,8 +395,7 @@ impl Simulation {
                 most.error,
                 100.0 * most.share()
             );
-            let remedy =
-                "Check loads and clearance; the error grows with the square of the displacement, and the run ends at \
+            let remedy = "Check loads and clearance; the error grows with the square of the displacement, and the run ends at \
                  100 %";
             self.note(Warning::new(Topic::LargeDisplacement, problem, remedy));
         }

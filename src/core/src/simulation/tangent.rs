@@ -221,10 +221,7 @@ impl Simulation {
     /// March the last communication step in `twin`, with inputs moved by `moved` times `seed`.
     fn march_again(&mut self, twin: &mut Self, inputs: &[u32], seed: &[f64], moved: f64) -> Result<()> {
         let lost = |error: Error| Error::Unstable {
-            problem: format!(
-                "the communication step to t = {} s cannot be repeated: {error}",
-                shown_time(self.time)
-            ),
+            problem: format!("the communication step to t = {} s cannot be repeated: {error}", shown_time(self.time)),
             remedy: "Do not request derivatives over this step".to_owned(),
         };
         if self.tangent.follows {

@@ -196,10 +196,18 @@ fn warns_of_growth_under_a_cut_when_it_ends_a_run() {
         let mut run = started(&scene);
         let told = |part: &str| run.warnings().iter().any(|warning| warning.contains(part));
         assert!(told("cutting is physically unstable") && !told("0.0000 kHz"), "{:?}", run.warnings());
-        assert_eq!(told("with a coating that the blades cut: the sliding law"), speed.abs() < 1.0, "{:?}", run.warnings());
+        assert_eq!(
+            told("with a coating that the blades cut: the sliding law"),
+            speed.abs() < 1.0,
+            "{:?}",
+            run.warnings()
+        );
         move_on(&mut run, "casing_radius_change", 0.0, -0.5);
         let ended = (0..400).find_map(|_| run.do_step(run.time(), 1e-5).err()).unwrap().to_string();
-        assert!(ended.contains("cutting is physically unstable") && ended.contains("deflection in one direction"), "{ended}");
+        assert!(
+            ended.contains("cutting is physically unstable") && ended.contains("deflection in one direction"),
+            "{ended}"
+        );
     }
 }
 

@@ -268,7 +268,10 @@ fn friction_that_puts_energy_in_ends_the_run() {
             simulation.do_step(simulation.time(), H).err()
         });
         let told = ended.map(|error| error.to_string()).unwrap_or_default();
-        assert!(told.contains("friction has added") && told.contains("not model sticking"), "{rigid} {tolerance}: {told}");
+        assert!(
+            told.contains("friction has added") && told.contains("not model sticking"),
+            "{rigid} {tolerance}: {told}"
+        );
     }
 }
 

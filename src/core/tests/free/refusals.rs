@@ -46,9 +46,7 @@ fn scenes_that_make_no_sense_are_refused_with_the_reason() {
         ("all_sectors", |scene| scene.settings.outputs.all_sectors = true),
         ("nodal_diameters", |scene| scene.settings.outputs.nodal_diameters = Some(0)),
         ("an open contact grid in its ROM", |scene| scene.roms[1].extras.grid = None),
-        ("coincide", |scene| {
-            scene.roms[1].contact_nodes[1].position = scene.roms[1].contact_nodes[0].position
-        }),
+        ("coincide", |scene| scene.roms[1].contact_nodes[1].position = scene.roms[1].contact_nodes[0].position),
         ("velocity: needs `motion = \"free\"`", |scene| scene.settings.structures[1].velocity = [1.0, 0.0, 0.0]),
         ("whirl: needs `motion = \"rotating\"`", |scene| scene.settings.structures[0].whirl = true),
         ("is not part of any contact", |scene| scene.settings.surfaces[1].structure = Some("left_plate".into())),
@@ -141,7 +139,10 @@ fn rejects_a_body_that_is_too_fast_for_the_step() {
         scene.settings.accept_implausible = true;
         let mut simulation = started(&with(scene, 0.0, Solver::Lcp, Scheme::ModalExact));
         let error = simulation.do_step(0.0, 1e-5).unwrap_err().to_string();
-        assert!(error.contains("could pass through a surface undetected") && error.contains("smaller internal step"), "{error}");
+        assert!(
+            error.contains("could pass through a surface undetected") && error.contains("smaller internal step"),
+            "{error}"
+        );
     }
     // A tenth of the block in one step is the limit.
     let mut slow = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.5)], false, [3900.0, 0.0, 0.0]);

@@ -51,7 +51,10 @@ fn friction_that_feeds_a_vibration_ends_the_run() {
             before = before.max(heat);
         });
         let told = outcome.unwrap_err().to_string();
-        assert!(told.contains("friction has added") && told.contains("solver coulomb"), "{scheme:?}, {solver:?}: {told}");
+        assert!(
+            told.contains("friction has added") && told.contains("solver coulomb"),
+            "{scheme:?}, {solver:?}: {told}"
+        );
     }
 }
 

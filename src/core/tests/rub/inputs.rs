@@ -373,7 +373,8 @@ fn a_scene_without_such_inputs_has_no_choice_of_them() {
     assert!(has(&held(scene)));
     for row in Simulation::new(&rich()).unwrap().table().variables() {
         let moves = row.causality == tiprub_core::variables::Causality::Input || row.name == "gap_offset";
-        let says = row.description.contains("reached at the end of the communication step") || row.description.contains("constant over a");
+        let says = row.description.contains("reached at the end of the communication step")
+            || row.description.contains("constant over a");
         assert_eq!(moves, says, "{}: {}", row.name, row.description);
     }
 }

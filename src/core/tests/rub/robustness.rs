@@ -127,9 +127,7 @@ fn node_over_the_edge_and_back_rubs_as_on_a_wide_surface() {
         assert!((found - expected).abs() < 0.02 * expected, "{found:e} for {expected:e}");
     }
     let refusal = run(Some(SplineSettings::default()), 0.022).unwrap_err().to_string();
-    for word in
-        ["edge of sector", "has left the casing surface", "at t = ", "Use a casing whose contact grid"]
-    {
+    for word in ["edge of sector", "has left the casing surface", "at t = ", "Use a casing whose contact grid"] {
         assert!(refusal.contains(word), "{refusal}");
     }
 }
@@ -367,7 +365,8 @@ fn runs_with_more_contact_nodes_than_modes() {
                     set(&mut simulation, "casing_radius_change", -inward);
                     if let Err(error) = simulation.do_step(simulation.time(), 1e-5) {
                         // A solution there is, but one that pulls.
-                        let pulled = solver == Solver::Film && error.to_string().contains("film has applied a tensile impulse");
+                        let pulled =
+                            solver == Solver::Film && error.to_string().contains("film has applied a tensile impulse");
                         assert!(pulled, "{name}, {index}: {error}");
                         break;
                     }

@@ -36,8 +36,7 @@ impl RomReader<'_> {
                 0 => format!("nodal diameter {number}, but {sectors} sector(s) have none above 0"),
                 _ => format!("nodal diameter {number}, but {sectors} sectors have numbered arrays for 1 to {largest}"),
             };
-            let remedy =
-                "Correct the number in the array name or metadata `sectors`; the arrays of nodal diameter 0 have no \
+            let remedy = "Correct the number in the array name or metadata `sectors`; the arrays of nodal diameter 0 have no \
                  number";
             return Err(self.error(format!("array `{}`", held.unwrap_or(given)), problem, remedy));
         }

@@ -323,7 +323,10 @@ fn values_that_cannot_be_are_refused() {
     refused(|file| file.array("coriolis").1[0] += 1.0, &["array `coriolis`: not skew-symmetric"]);
     refused(|file| file.array("centrifugal_load").1[0] = f64::NAN, &["array `centrifugal_load`"]);
     refused(|file| file.array("thermal_loads").1[0] = f64::INFINITY, &["array `thermal_loads`"]);
-    refused(|file| file.array("thermal_patches").1[5] = -9.0, &["array `thermal_patches`, patch 2", "do not define a patch"]);
+    refused(
+        |file| file.array("thermal_patches").1[5] = -9.0,
+        &["array `thermal_patches`, patch 2", "do not define a patch"],
+    );
     for speed in ["0", "-1", "inf", "NaN"] {
         let change = |file: &mut Loose| drop(file.entries.insert("largest_speed".into(), speed.into()));
         refused(change, &["ROM metadata `largest_speed`", "not a finite positive speed"]);

@@ -150,8 +150,7 @@ fn a_rotating_structure_carries_no_load_or_surface() {
     };
     let remedy = "set motion = \"still\"";
     refused(rotate, &["structure[2].load: needs `motion = \"still\"`", remedy]);
-    let parts =
-        ["surface[1].structure: needs a structure with `motion = \"still\"`", "Name a stationary structure"];
+    let parts = ["surface[1].structure: needs a structure with `motion = \"still\"`", "Name a stationary structure"];
     refused(|scene| scene.surfaces[0].structure = Some("rotor".into()), &parts);
     let parts = ["surface[1].structure: `rign` is not defined", "Use one of: ring"];
     refused(|scene| scene.surfaces[0].structure = Some("rign".into()), &parts);

@@ -158,13 +158,8 @@ pub fn reduce_casing(
 
 /// A grid whose points follow from each other.
 fn too_fine(grid: &GridNodes) -> Error {
-    let problem =
-        format!("the mesh is too coarse to move {} x {} points independently", grid.around, grid.along());
-    Error::invalid(
-        "contact grid of the casing",
-        problem,
-        "Use fewer points around or fewer rings, or refine the mesh",
-    )
+    let problem = format!("the mesh is too coarse to move {} x {} points independently", grid.around, grid.along());
+    Error::invalid("contact grid of the casing", problem, "Use fewer points around or fewer rings, or refine the mesh")
 }
 
 /// Rows of the contact nodes' dofs among the free ones; none is clamped.

@@ -58,8 +58,7 @@ impl Surfaces {
         }
         let [gas, _] = &surfaces.sides;
         if gas.is_empty() || surfaces.heated.is_empty() {
-            let which =
-                if gas.is_empty() { "no face of the mesh faces the axis" } else { "there is no gas-side face" };
+            let which = if gas.is_empty() { "no face of the mesh faces the axis" } else { "there is no gas-side face" };
             let problem = format!("{which} between z = {} m and {} m", heated[0], heated[1]);
             let remedy = "Give axial positions within the casing, whose axis must be z";
             return Err(Error::invalid("thermal model, heated surface", problem, remedy));

@@ -147,8 +147,7 @@ fn with_file_number(error: Error, numbers: &[u64], file: &str) -> Error {
                 numbers[element - 1],
                 kind.calculix_name()
             ),
-            remedy: "Remesh this region; quadratic elements fold where the mesh is too coarse for the curvature"
-                .into(),
+            remedy: "Remesh this region; quadratic elements fold where the mesh is too coarse for the curvature".into(),
         },
         other => other,
     }

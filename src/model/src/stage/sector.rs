@@ -100,7 +100,11 @@ impl SectorOptions {
             }
         }
         if chord % 2 != 0 {
-            return refuse("chord", format!("{chord} is odd"), "Give an even number: contact is evaluated at mid-chord");
+            return refuse(
+                "chord",
+                format!("{chord} is odd"),
+                "Give an even number: contact is evaluated at mid-chord",
+            );
         }
         let columns = counts.columns();
         if web[0] % 2 != 0 || web[0] + 2 * bore[0] > columns {

@@ -18,8 +18,7 @@ use crate::{Picture, Sheet, Statement, Study, StudyFigure, estimate};
 /// Largest change by the next refinement that is called small.
 const SMALL: f64 = 0.05;
 
-const HOW_TO_READ: &str =
-    "One setting is refined at a time, and all others stay as in the scene. A change is the difference between a run \
+const HOW_TO_READ: &str = "One setting is refined at a time, and all others stay as in the scene. A change is the difference between a run \
      and the next finer run of the same direction, relative to the larger value. Changes are given for the \
      displacements of all contact nodes at all communication points (L2, without rigid-body motion of free bodies), \
      the normal impulse and the friction work over the window, the largest normal force averaged over a communication \

@@ -141,7 +141,8 @@ impl<'a> Refiner<'a> {
         let (modes, nodes) = self.own_counts();
         let Meshed { rom: again, nodes: of_mesh } = self.reduced(source, None, [modes, nodes])?;
         let differs = |problem: String| {
-            let remedy = "Give the mesh and the options that the ROM was reduced with (sets, material, units, axis, sectors)";
+            let remedy =
+                "Give the mesh and the options that the ROM was reduced with (sets, material, units, axis, sectors)";
             Err(Failure::new(
                 "--mesh",
                 format!("the mesh does not reproduce the ROM `{}` of the scene: {problem}", rom.name),
@@ -365,9 +366,10 @@ impl<'a> Refiner<'a> {
                     found.push(self.reduced(source, Some(other), [modes, nodes])?);
                 }
                 if found.is_empty() {
-                    direction.missing = "the mesh error requires other meshes of the same blade: give coarser or finer ones with \
+                    direction.missing =
+                        "the mesh error requires other meshes of the same blade: give coarser or finer ones with \
                                          --other-mesh FILE"
-                        .into();
+                            .into();
                     return Ok(direction);
                 }
             }

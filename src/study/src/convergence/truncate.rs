@@ -137,10 +137,8 @@ fn free_basis<T: ComplexField<RealField = f64>>(
 ) -> Result<DMatrix<T>, String> {
     let (order, rows) = (mass.nrows(), map.nrows());
     let kept = order.checked_sub(rows + less).ok_or("no mode would be left at one of the nodal diameters")?;
-    let flexibility = stiffness
-        .clone()
-        .try_inverse()
-        .ok_or("the structure moves as a rigid body and has no static response")?;
+    let flexibility =
+        stiffness.clone().try_inverse().ok_or("the structure moves as a rigid body and has no static response")?;
     let mut basis = DMatrix::zeros(order, rows + kept);
     // Of the size of modes, so that neither drowns the other.
     let responses = flexibility * map.adjoint();

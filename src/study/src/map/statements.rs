@@ -69,8 +69,10 @@ fn contact(map: &Map) -> Vec<Statement> {
     let contact = &map.setup.scene.settings.contacts[0];
     let gap = contact.sector_gaps.iter().copied().reduce(f64::min).unwrap_or(contact.gap);
     let expected = "No node penetrates by more than a thousandth of the clearance";
-    let found =
-        format!("largest value at any internal step of any window: {depth:.2e} m, {:.1e} of the clearance", depth / gap);
+    let found = format!(
+        "largest value at any internal step of any window: {depth:.2e} m, {:.1e} of the clearance",
+        depth / gap
+    );
     // Gaps count from the surface as it was before anything wore off.
     let penetration = if contact.coating.is_some() {
         Statement::remark("Largest depth of a node below the unworn surface of the coating", found)

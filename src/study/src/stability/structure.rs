@@ -307,7 +307,9 @@ impl<'a> SingleStructure<'a> {
         let mut usable = f64::INFINITY;
         for model in &self.models {
             if model.dynamic_modes(scheme) == 0 {
-                return Err("the scheme makes three modes per contact node quasi-static, and no mode is left".to_owned());
+                return Err(
+                    "the scheme makes three modes per contact node quasi-static, and no mode is left".to_owned()
+                );
             }
             let copies = model.contact_modes.nrows() / (3 * self.rom.contact_nodes.len());
             let normals = self.closed[0].repeat(copies).into_iter().map(|(normal, _)| normal).collect();

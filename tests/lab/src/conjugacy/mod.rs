@@ -144,18 +144,27 @@ fn statements(rows: &[ConjugacyRow]) -> Vec<Statement> {
     let curved = |step: usize| worst(rows, |row| if massless(row) { 0.0 } else { row.seen[step].curvature.abs() });
     vec![
         Statement::tested("every run has contacts", touching > 0, format!("at least {touching} per run")),
-        below("moment about the axis of a frictionless round surface of revolution, relative to |F| r", 1e-14,
-            round(false)),
+        below(
+            "moment about the axis of a frictionless round surface of revolution, relative to |F| r",
+            1e-14,
+            round(false),
+        ),
         below("the same moment for a spline through 60 points of a circle, relative to |F| r", 1e-5, round(true)),
         below(
             "sum of the integral of torque times speed and the shaft work, relative to the total work",
             1e-13,
             worst(rows, |row| row.seen[0].shaft),
         ),
-        below("residual of the energy balance, relative to the total work", 1e-13, worst(rows,
-            |row| row.seen[0].balance)),
-        below("imbalance of the forces on master and slave, relative to |F|", 1e-14, worst(rows,
-            |row| row.seen[0].force)),
+        below(
+            "residual of the energy balance, relative to the total work",
+            1e-13,
+            worst(rows, |row| row.seen[0].balance),
+        ),
+        below(
+            "imbalance of the forces on master and slave, relative to |F|",
+            1e-14,
+            worst(rows, |row| row.seen[0].force),
+        ),
         below(
             "imbalance of the moments on master and slave about one point, for slaves with control points, relative to \
              |F| r",

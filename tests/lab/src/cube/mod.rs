@@ -149,8 +149,7 @@ fn report(scene: &Scene, flown: &[Flown], sizes: &SizeStudy, patches: &PatchStud
     }
     figures.push(figures::agreement(&main.pairs)?);
     let facts = machine::facts().into_iter().map(|(name, value)| format!("* {name}: {value}\n"));
-    let mut tables =
-        vec![format!("# A cube between two rings: all pairs of methods\n\n{}", facts.collect::<String>())];
+    let mut tables = vec![format!("# A cube between two rings: all pairs of methods\n\n{}", facts.collect::<String>())];
     let flights =
         flown.iter().map(|flown| format!("## {}\n\n{}", flown.title(), pairs::markdown(&flown.outcomes, &flown.pairs)));
     tables.extend(flights);

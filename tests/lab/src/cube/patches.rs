@@ -94,8 +94,10 @@ impl PatchStudy {
         let apart: Vec<f64> = self.0.iter().flat_map(|one| one.apart).collect();
         let residual = self.0.iter().map(|one| one.residual).fold(0.0, f64::max);
         let mut found = vec![Statement::tested(
-            format!("With patches, left and right are equal to {SYMMETRIC:e}, and the energy balance closes to \
-                     {LEDGER:e}"),
+            format!(
+                "With patches, left and right are equal to {SYMMETRIC:e}, and the energy balance closes to \
+                     {LEDGER:e}"
+            ),
             apart.iter().all(|apart| *apart < SYMMETRIC) && residual < LEDGER,
             format!("largest difference {:.0e}, residual {residual:.0e}", apart.iter().fold(0.0_f64, |a, b| a.max(*b))),
         )];
@@ -181,8 +183,7 @@ impl PatchRuns<'_> {
     }
 
     fn beside_getfem(&self, patches: Option<usize>) -> Result<[f64; 2]> {
-        let theirs =
-            outside::read(GETFEM, self.fast.speed).map_err(|error| Failure::from_below("lab cube", error))?;
+        let theirs = outside::read(GETFEM, self.fast.speed).map_err(|error| Failure::from_below("lab cube", error))?;
         let end = theirs.times[theirs.times.len() - 1];
         let mut scene = self.with(5, patches, MassMatrix::Consistent)?;
         for side in RingSide::BOTH {

@@ -186,9 +186,11 @@ impl ErrorCase for Bars {
                                       1991); linear elements, lumped mass. Compared with the exact solution: relative \
                                       displacement of the ends, force and release."
                 .into(),
-            BarProblem::Bouncing => "A bar bounces on rigid ground under gravity (D. Doyen, A. Ern, S. Piperno, 2011), one period with two \
+            BarProblem::Bouncing => {
+                "A bar bounces on rigid ground under gravity (D. Doyen, A. Ern, S. Piperno, 2011), one period with two \
                                   contacts; linear elements, lumped mass. Compared with the exact series solution."
-                .into(),
+                    .into()
+            }
             BarProblem::Shaken { .. } => "A bar clamped at its top and excited without a change of contact.".into(),
         }
     }

@@ -53,8 +53,9 @@ impl<'a, S: ReducedScene> OutsideRun<'a, S> {
                 Box::new(Augmented::new(scene, step, NewmarkOptions { penalty: 10.0 * stiffness, tolerance, margin }))
             }
             Competitor::Penalty(times) => Box::new(Penalty::new(scene, step, f64::from(times) * stiffness)?),
-            Competitor::Core(..) | Competitor::Full(_) => return
-                Err("this method is not in the reference crate".into()),
+            Competitor::Core(..) | Competitor::Full(_) => {
+                return Err("this method is not in the reference crate".into());
+            }
         };
         Ok(Self { scene, method, step, steps: 0, division })
     }

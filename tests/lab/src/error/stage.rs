@@ -45,8 +45,8 @@ pub(crate) fn stage(quick: bool, cache: &RomCache, console: &Console) -> Result<
         let mut scene = coarse.clone();
         scene.roms[0] = disk(modes, cache, console)?;
         scene.settings.surfaces[0].ramp_time = RAMP;
-        let outside = outside(&scene).ok_or_else(|| Failure::new("stage",
-            "the disk has no positive definite mass matrix", ""))?;
+        let outside = outside(&scene)
+            .ok_or_else(|| Failure::new("stage", "the disk has no positive definite mass matrix", ""))?;
         sizes.push((modes, scene, outside));
     }
     let description = "56 coupled sectors (coarse mesh) in an elastic casing that becomes oval until the blades touch \

@@ -94,9 +94,9 @@ fn load(arguments: &RandomArguments, console: &Console, directory: &Path) -> Res
     let libraries = library::load(library::LibraryUnit::Scene, &chosen, console)?;
     let here = tiprub_fmi_host::Platform::here();
     let fitting = libraries.into_iter().find(|library| Some(library.platform) == here);
-    let fitting =
-        fitting.ok_or_else(|| Failure::new("FMU library", "there is no library for this platform",
-            "Choose a library with `--library`"))?;
+    let fitting = fitting.ok_or_else(|| {
+        Failure::new("FMU library", "there is no library for this platform", "Choose a library with `--library`")
+    })?;
     let path = directory.join("tiprub_fmi");
     output_file::write(&path, fitting.bytes)?;
     LibraryFaces::load(&path)

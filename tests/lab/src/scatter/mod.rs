@@ -262,7 +262,8 @@ fn statements(
     vec![
         Statement::tested(
             "The error is within half the tolerance for half of the random rubs, and within three times the tolerance \
-             for 95 %".to_owned(),
+             for 95 %"
+                .to_owned(),
             worst[0] < 0.5 && worst[1] < 3.0,
             format!("median {:.2}, 95 % {:.2} at the worst tolerance", worst[0], worst[1]),
         ),
@@ -342,8 +343,10 @@ fn tables(
             &kept,
         ),
         table(&["degree", "µ", "problems", "initially unsolved", "finally unsolved"], &problems),
-        table(&["without contact, in one step", "without contact, by spans",
-            "with a rub"], &[long.map(|time| format!("{time:.3} ms")).to_vec()]),
+        table(
+            &["without contact, in one step", "without contact, by spans", "with a rub"],
+            &[long.map(|time| format!("{time:.3} ms")).to_vec()],
+        ),
         table(&["degree", "µ", "problems", "no solution", "several"], &solutions),
         table(
             &[

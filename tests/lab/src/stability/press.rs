@@ -137,8 +137,11 @@ impl Press {
             checks.push(Check::at_most("resultant force", force / total, 1e-9 + precise));
         }
         let torque = real(simulation, "torque") + contact.friction * sense * total * RADIUS;
-        checks.push(Check::at_most("deviation of the torque from −µΣλr", (torque / (total * RADIUS)).abs(),
-            10.0 * tolerance));
+        checks.push(Check::at_most(
+            "deviation of the torque from −µΣλr",
+            (torque / (total * RADIUS)).abs(),
+            10.0 * tolerance,
+        ));
         checks
     }
 }

@@ -169,8 +169,11 @@ fn flexibility(scene: &Scene) -> Result<f64> {
     for reference in (first..).take(count) {
         largest = largest.max(simulation.real(reference).map_err(in_scene)?.abs());
     }
-    if largest > 0.0 { Ok(largest / amplitude) } else { Err(Failure::new("casing",
-        "the load does not deform the casing", "")) }
+    if largest > 0.0 {
+        Ok(largest / amplitude)
+    } else {
+        Err(Failure::new("casing", "the load does not deform the casing", ""))
+    }
 }
 
 /// The study: load the models, run all speeds in all casings, draw.

@@ -262,7 +262,8 @@ fn figure(windows: &[WearWindow]) -> Result<StudyFigure> {
     Ok(StudyFigure {
         name: "lobes",
         caption: "Dominant order of the wear added in a window of revolutions against the tip vibrations per \
-                  revolution in it, while the casing closes.".into(),
+                  revolution in it, while the casing closes."
+            .into(),
         picture: Picture::plot(&Plot::new("vibrations per revolution", "lobes of the new wear", series))?,
         sheet,
     })
@@ -296,8 +297,9 @@ fn statements(windows: &[WearWindow]) -> Vec<Statement> {
         ),
         Statement::remark(
             "Final tip vibrations, nearest to the second mode without contact",
-            last.map(|window| format!("{:.3} times the second mode",
-                window.swings_over_second())).collect::<Vec<_>>().join(", "),
+            last.map(|window| format!("{:.3} times the second mode", window.swings_over_second()))
+                .collect::<Vec<_>>()
+                .join(", "),
         ),
     ]
 }

@@ -317,8 +317,8 @@ struct WitnessRuns {
 impl WitnessRuns {
     /// The witness with this contact and the shortest steps.
     fn witness(&self, touching: Touching) -> Result<&RunSummary> {
-        let missing = || Failure::new("lab witness", format!("there is no full-model run with {}", touching.name()),
-            "");
+        let missing =
+            || Failure::new("lab witness", format!("there is no full-model run with {}", touching.name()), "");
         self.witnesses.iter().rev().find(|((other, _), _)| *other == touching).map(|(_, run)| run).ok_or_else(missing)
     }
 
@@ -431,9 +431,9 @@ fn figure(runs: &WitnessRuns, size: &WitnessSize) -> Result<StudyFigure> {
     }
     Ok(StudyFigure {
         name: "trailing-edge",
-        caption:
-            "The blade passes the bumps: full finite-element model, default reduced model, and the paper's \
-             model.".into(),
+        caption: "The blade passes the bumps: full finite-element model, default reduced model, and the paper's \
+             model."
+            .into(),
         picture: Picture::plot(&plot)?,
         sheet,
     })
@@ -472,8 +472,11 @@ fn statements(rows: &[WitnessRow], runs: &WitnessRuns) -> Result<Vec<Statement>>
             "With more modes, the reduced model converges to the full model with the same patches, within the step \
              error of the full model",
             more.displacement() < default.displacement() && more.displacement() < 1.5 * fine.displacement(),
-            format!("displacements differ by {}, with fewer modes by {}", percent(more.displacement()),
-                percent(default.displacement())),
+            format!(
+                "displacements differ by {}, with fewer modes by {}",
+                percent(more.displacement()),
+                percent(default.displacement())
+            ),
         ),
         Statement::tested(
             "Two rows of patches at the sides of the tip represent contact at its sides: the impulse error is less \

@@ -119,8 +119,9 @@ impl WitnessScene {
             let off = |node: &[f64; 3]| (0..3).map(|i| (node[i] - place[i]).powi(2)).sum::<f64>();
             let all = mesh.nodes.iter().enumerate();
             let node = all.min_by(|a, b| off(a.1).total_cmp(&off(b.1))).map_or(0, |(node, _)| node);
-            gauges.push(Gauge::at(mesh, &self.material, node).map_err(|error| failure("stress gauge of the blade",
-                error))?);
+            gauges.push(
+                Gauge::at(mesh, &self.material, node).map_err(|error| failure("stress gauge of the blade", error))?,
+            );
         }
         Ok((points.iter().map(|point| point.name.clone()).collect(), gauges))
     }
@@ -397,8 +398,11 @@ fn statements(found: &StressResult) -> Vec<Statement> {
         Statement::tested(
             "The default model gives the largest von Mises stress of the rub within 5 %",
             ships.most < 0.05,
-            format!("{} at the place with the largest stress, {} at the worst place", percent(ships.most),
-                percent(ships.worst)),
+            format!(
+                "{} at the place with the largest stress, {} at the worst place",
+                percent(ships.most),
+                percent(ships.worst)
+            ),
         ),
     ]
 }

@@ -61,7 +61,8 @@ impl Trial {
     ) {
         let (basis, count) = (&level.basis, level.basis.count());
         self.impulses.fill(0.0);
-        (verdict.switches, verdict.switched, verdict.near, verdict.error, verdict.depth) = (false, 0.0, false, 0.0, 0.0);
+        (verdict.switches, verdict.switched, verdict.near, verdict.error, verdict.depth) =
+            (false, 0.0, false, 0.0, 0.0);
         self.depths.fill(0.0);
         let mut pushed = false;
         for node in 0..self.nodes() {

@@ -42,9 +42,8 @@ pub(super) const INITIAL_SECTOR: Fact =
     fact("structure.initial.sector", "", |at| at.structure().initial.iter().any(|one| one.sector.is_some()));
 pub(super) const ROM_AROUND: Fact =
     fact("structure.rom", "a structure around an axis", |at| at.meets(|motion| motion != BodyMotion::Free));
-pub(super) const ROM_FREE: Fact = fact("structure.rom", "a free structure or one that it meets", |at| {
-    at.meets(|motion| motion == BodyMotion::Free)
-});
+pub(super) const ROM_FREE: Fact =
+    fact("structure.rom", "a free structure or one that it meets", |at| at.meets(|motion| motion == BodyMotion::Free));
 
 pub(super) const SHAPE: Fact = fact("surface.shape", "", |at| at.surface().shape != Shape::default());
 pub(super) const MOVING: Fact = fact("surface.moving", "", |at| at.surface().moving);

@@ -292,12 +292,16 @@ impl Checking<'_> {
             };
             let contact = self.contact(nodes, sign);
             let remedy = "Use less friction, a more compliant casing, or a coating";
-            Warning::new(Topic::LockUp, format!("sliding contact locks up above µ* = {least:.3}{rate}: {contact}"), remedy)
-                .with_text(format!(
-                    "sliding contact locks up: above µ* = {least:.3} ({contact}) the tip is driven into the casing \
+            Warning::new(
+                Topic::LockUp,
+                format!("sliding contact locks up above µ* = {least:.3}{rate}: {contact}"),
+                remedy,
+            )
+            .with_text(format!(
+                "sliding contact locks up: above µ* = {least:.3} ({contact}) the tip is driven into the casing \
                      faster than the casing yields, and the contact force grows without limit{rate}. This instability \
                      is a physical property of the model, so a shorter step does not help. {remedy}"
-                ))
+            ))
         });
         let flutter = physics.flutter.as_ref().map(|Flutter { found, nodes, with_mass, share }| {
             let contact = self.contact(nodes, sign);
@@ -360,8 +364,7 @@ impl Checking<'_> {
 fn confirmed(found: &Fastest, with_mass: Option<&Fastest>) -> String {
     match with_mass {
         Some(other) if other.rate < ALIKE * found.rate && found.rate < ALIKE * other.rate => {
-            " (the same with and without the mass of the contact nodes, so more modes will hardly change it)"
-                .to_owned()
+            " (the same with and without the mass of the contact nodes, so more modes will hardly change it)".to_owned()
         }
         Some(other) => format!(
             " (without the mass of the contact nodes; {:.2e} 1/s with it, so more modes may change it)",

@@ -16,8 +16,7 @@ pub fn inputs(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
         let row = table.moving_input(quantity, name, Some(&FORCE), excitation.amplitude, text);
         row.nominal = Some(1.0);
         (row.min, row.max) = (Some(-ranges::EXCITATION), Some(ranges::EXCITATION));
-        let text =
-            "Phase of the excitation: the load on blade j of N is amplitude cos(order (rotor angle + 2 pi (j - 1)/N) - \
+        let text = "Phase of the excitation: the load on blade j of N is amplitude cos(order (rotor angle + 2 pi (j - 1)/N) - \
              phase)";
         let (name, quantity) = ("excitation_phase", Quantity::Excitation(1));
         table.moving_input(quantity, name, Some(&ANGLE), excitation.phase, text).display = Some(0);

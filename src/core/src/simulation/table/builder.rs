@@ -202,8 +202,7 @@ impl TableBuilder {
     /// Adds the interpolation of inputs between communication points.
     pub fn input_interpolation(&mut self, settings: &SceneSettings) {
         let start = settings.time.input_interpolation as i32 + 1;
-        let text =
-            "Interpolation of gap_offset and of all motion and load inputs between communication points; speed is \
+        let text = "Interpolation of gap_offset and of all motion and load inputs between communication points; speed is \
              always held";
         self.choice(Quantity::InputInterpolation, "input_interpolation", &INPUT_INTERPOLATIONS, start, text);
     }

@@ -74,9 +74,13 @@ const ENERGIES: [Energy; 19] = [
          difference of second order in the step",
         |view| view.conserved,
     ),
-    ("damping_loss", Span::Total, Quantity::DampingLoss, "Energy dissipated by modal damping since the start", |view| {
-        view.ledger().damping_loss.value()
-    }),
+    (
+        "damping_loss",
+        Span::Total,
+        Quantity::DampingLoss,
+        "Energy dissipated by modal damping since the start",
+        |view| view.ledger().damping_loss.value(),
+    ),
     ("friction_loss", Span::Total, Quantity::FrictionLoss, "Energy dissipated by friction since the start", |view| {
         view.ledger().friction_loss.value()
     }),

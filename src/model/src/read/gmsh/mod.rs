@@ -32,8 +32,9 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<MeshDraft> {
             "Nodes" => reader.nodes(&mut numbers)?,
             "Elements" => reader.elements(&mut numbers)?,
             "PartitionedEntities" => {
-                return Err(numbers
-                    .error("the mesh is partitioned", "Save it unpartitioned: Mesh.PartitionCreateTopology = 0"));
+                return Err(
+                    numbers.error("the mesh is partitioned", "Save it unpartitioned: Mesh.PartitionCreateTopology = 0")
+                );
             }
             _ => {}
         }
@@ -66,9 +67,7 @@ impl<'a> Sections<'a> {
             sections.skip_behind("$EndComments")?;
         }
         if sections.take_line() != Some("$MeshFormat") {
-            return Err(
-                sections.error("the file does not begin with $MeshFormat", "Give a mesh in Gmsh format 4.1")
-            );
+            return Err(sections.error("the file does not begin with $MeshFormat", "Give a mesh in Gmsh format 4.1"));
         }
         let format = sections.take_line().unwrap_or_default().to_owned();
         let mut words = format.split_whitespace();
@@ -248,9 +247,7 @@ impl GmshReader {
                 }
                 None => {
                     let problem = format!("element type {kind} is unknown");
-                    return Err(
-                        numbers.error(problem, "Use tetrahedra, prisms or bricks of first or second order")
-                    );
+                    return Err(numbers.error(problem, "Use tetrahedra, prisms or bricks of first or second order"));
                 }
             };
             let count = numbers.count(nodes + 1)?;

@@ -42,9 +42,7 @@ impl DeckMaterial {
         if kind.as_deref().is_some_and(|kind| !matches!(kind, "ISO" | "ISOTROPIC")) || card.has("DEPENDENCIES") {
             let (keyword, name) = (&card.keyword, &self.name);
             let problem = format!("*{keyword} of material `{name}` is anisotropic or depends on field variables");
-            return Err(card
-                .place
-                .error(problem, "Use an isotropic material, or give the matrices of the model"));
+            return Err(card.place.error(problem, "Use an isotropic material, or give the matrices of the model"));
         }
         match card.keyword.as_str() {
             "ELASTIC" => self.elastic = Some(TemperatureTable::read(card)?),

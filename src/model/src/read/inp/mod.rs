@@ -104,8 +104,7 @@ impl InpReader {
             UnreadKeyword::Harmless => self.skip(card),
             UnreadKeyword::Changes => {
                 let problem = format!("*{keyword} changes the model and is not supported");
-                let remedy =
-                    "Remove it if it is not needed, or give the matrices of the model: --stiffness and --mass";
+                let remedy = "Remove it if it is not needed, or give the matrices of the model: --stiffness and --mass";
                 return Err(card.place.error(problem, remedy));
             }
             UnreadKeyword::Unknown => {

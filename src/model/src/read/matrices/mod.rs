@@ -288,11 +288,7 @@ fn absent_nodes(files: &MatrixFiles, numbers: &[u64], stiffness: &SparseMatrix) 
         }
         if let Some(component) = (0..3).find(|component| diagonal(stiffness, 3 * node + component) < 0.0) {
             let problem = format!("the diagonal entry of node {number}, direction {}, is negative", component + 1);
-            return Err(about(
-                &files.stiffness,
-                problem,
-                "Check whether K and M are swapped or the signs are wrong",
-            ));
+            return Err(about(&files.stiffness, problem, "Check whether K and M are swapped or the signs are wrong"));
         }
     }
     if absent.len() == numbers.len() {

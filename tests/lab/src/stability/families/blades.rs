@@ -125,8 +125,11 @@ fn grown(method: StabilityMethod, speed: f64, stiffening: bool) -> Result<Vec<Ch
         watch.laws(),
         vec![
             Check::at_most("deviation of the initial displacement from the static one", start, 1e-9),
-            Check::at_most("deviation of the later displacement from the static one", off(&simulation, &expected),
-                1e-9),
+            Check::at_most(
+                "deviation of the later displacement from the static one",
+                off(&simulation, &expected),
+                1e-9,
+            ),
         ],
     ]
     .concat())
@@ -405,8 +408,12 @@ fn cut(method: StabilityMethod, specific_energy: f64) -> Result<Vec<Check>> {
         vec![
             Check::so("material was cut, and wear only grows", before > 0.0 && fallen <= 0.0),
             Check::relative("deviation of the work from u V", work, specific_energy * before, 1e-9),
-            Check::relative("deviation of the energy of the cells from the work", real(&simulation, "wear_energy"),
-                work, 1e-9),
+            Check::relative(
+                "deviation of the energy of the cells from the work",
+                real(&simulation, "wear_energy"),
+                work,
+                1e-9,
+            ),
         ],
     ]
     .concat())

@@ -36,9 +36,7 @@ fn rotor37() -> Vec<StabilityCase> {
             let expected = match method.scheme {
                 Scheme::CentralDifference if factor > 1.0 => Expected::refused(["central-difference", "ω_max"]),
                 Scheme::MasslessBoundary if factor > 1.0 => Expected::refused(["massless-boundary"]),
-                Scheme::ModalExact if factor > 50.0 => {
-                    Expected::refused(["modal-exact", "contact flexibility"])
-                }
+                Scheme::ModalExact if factor > 50.0 => Expected::refused(["modal-exact", "contact flexibility"]),
                 // Steps of several periods: film closes all patches, and pulls at those that the static solution has open.
                 Scheme::ModalExact if method.solver == Solver::Film && factor > 5.0 => {
                     Expected::refused(["film", "tensile impulse at contact node", "lcp"])
@@ -121,8 +119,9 @@ fn share_of_limit(share: f64, damping: f64) -> CaseEnd {
         .and_then(|mut simulation| simulation.initialise(0.0))
         .err()
         .map(|error| error.to_string());
-    let limit =
-        refusal.as_deref().and_then(|text| text.split("stable only below ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
+    let limit = refusal
+        .as_deref()
+        .and_then(|text| text.split("stable only below ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
     let Some(limit) = limit else { return CaseEnd::refused("the message names no limit") };
     let press = Press {
         depth: 2e-5,

@@ -192,8 +192,11 @@ impl Released {
                 still / DEPTH,
                 1e-9 + 1e-3 * allowed(&scene) / DEPTH,
             ),
-            Check::at_most("deviation of the displacement from the modal decay, relative to the remaining amplitude",
-                off, bound),
+            Check::at_most(
+                "deviation of the displacement from the modal decay, relative to the remaining amplitude",
+                off,
+                bound,
+            ),
             Check::so("the decay takes at least ten steps", n >= 10.0),
         ])
     }
@@ -255,8 +258,11 @@ pub(crate) fn ring(method: StabilityMethod, order: u32, ratio: f64, told: f64) -
     }
     let energy = real(&simulation, "energy_residual_relative").abs();
     Ok(vec![
-        Check::at_most("deviation of the amplitude from the modal decay, relative to the remaining amplitude", off,
-            1e-6),
+        Check::at_most(
+            "deviation of the amplitude from the modal decay, relative to the remaining amplitude",
+            off,
+            1e-6,
+        ),
         Check::at_most("sine amplitude of the nodal diameter", across, 1e-6),
         Check::at_most("energy residual", energy, 1e-9),
     ])

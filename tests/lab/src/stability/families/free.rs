@@ -100,8 +100,11 @@ fn flight(method: StabilityMethod, speed: f64, mass: f64) -> Result<Vec<Check>> 
     Ok(vec![
         Check::at_most("deviation of the centre from x = vt", off, 1e-12),
         Check::at_most("largest deviation of a node from x = vt", nodes, 1e-12),
-        Check::at_most("deviation of the velocity", apart(vector(&simulation, "body.velocity"),
-            velocity) / size(velocity), rounding),
+        Check::at_most(
+            "deviation of the velocity",
+            apart(vector(&simulation, "body.velocity"), velocity) / size(velocity),
+            rounding,
+        ),
         Check::at_most(
             "deviation of the kinetic energy",
             (real(&simulation, "kinetic_energy") - kinetic).abs() / kinetic.max(f64::MIN_POSITIVE),
@@ -206,17 +209,26 @@ impl Impact {
         let bound = 1e-9 + 1e-16 / (speed * STEP);
         let all = energy(speed) + energy(sideways);
         let mut checks = vec![
-            Check::at_most("deviation of the final velocity", apart(vector(&simulation, "body.velocity"),
-                after) / speed, bound),
-            Check::at_most("deviation of the impulse from m v and µ m v", apart(impulse, exact) / (mass * speed),
-                bound),
+            Check::at_most(
+                "deviation of the final velocity",
+                apart(vector(&simulation, "body.velocity"), after) / speed,
+                bound,
+            ),
+            Check::at_most(
+                "deviation of the impulse from m v and µ m v",
+                apart(impulse, exact) / (mass * speed),
+                bound,
+            ),
             Check::at_most(
                 "deviation of the impact loss from m v²/2",
                 (real(&simulation, "impact_loss") - energy(speed)).abs() / all,
                 bound,
             ),
-            Check::at_most("deviation of the remaining energy", (real(&simulation,
-                "kinetic_energy") - energy(left)).abs() / all, bound),
+            Check::at_most(
+                "deviation of the remaining energy",
+                (real(&simulation, "kinetic_energy") - energy(left)).abs() / all,
+                bound,
+            ),
             Check::at_most("energy residual", peak, 1e-12),
         ];
         if self.friction > 0.0 {
@@ -339,11 +351,17 @@ fn rebound(method: StabilityMethod, ratio: f64, speed: f64) -> Result<Vec<Check>
     // Places round to 1e-17 m; the impact lies somewhere within a step.
     let bound = 2.0 * omega * step + 1e-16 / (speed * step);
     Ok(vec![
-        Check::at_most("deviation of the contact time from π/ω", (held * omega / std::f64::consts::PI - 1.0).abs(),
-            bound),
+        Check::at_most(
+            "deviation of the contact time from π/ω",
+            (held * omega / std::f64::consts::PI - 1.0).abs(),
+            bound,
+        ),
         Check::at_most("deviation of the impulse from (m₁ + 2m₂)v", (impulse / exact - 1.0).abs(), bound),
-        Check::at_most("deviation of the final velocity", (vector(&simulation, "body.velocity")[0] / after - 1.0).abs(),
-            bound),
+        Check::at_most(
+            "deviation of the final velocity",
+            (vector(&simulation, "body.velocity")[0] / after - 1.0).abs(),
+            bound,
+        ),
         Check::at_most(
             "deviation of the impact loss from m₁v²/2",
             (real(&simulation, "impact_loss") - 0.5 * front * speed * speed).abs() / (0.5 * total * speed * speed),

@@ -106,8 +106,8 @@ fn speeds() -> Vec<StabilityCase> {
         let zero =
             slow(solver, 0.0, "static normal forces, friction at most µλ; with film and lcp a warning of sticking");
         cases.add(lcp, format!("speed/steady/{name}/0"), zero, move || steady(method, 0.0));
-        for (course, text) in [("reversal", "torque −µΣλr in both directions of rotation"), ("jump",
-            "unchanged torque −µΣλr")]
+        for (course, text) in
+            [("reversal", "torque −µΣλr in both directions of rotation"), ("jump", "unchanged torque −µΣλr")]
         {
             // A speed that passes 0 is one at which tips stick.
             let expected = if course == "reversal" { slow(solver, 0.0, text) } else { Expected::right(text) };

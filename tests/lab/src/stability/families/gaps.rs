@@ -246,8 +246,11 @@ fn closed_long(method: StabilityMethod, friction: f64, flexible: bool) -> Result
     let static_bound = near + if flexible { ROUNDNESS / depth } else { 1e-6 };
     checks.push(Check::at_most("deviation of λ from the static solution", off, static_bound));
     let turning = forces.iter().fold(0.0, |most: f64, force| most.max((force / forces[0] - 1.0).abs()));
-    checks.push(Check::at_most("difference between blades", turning,
-        near + if flexible { ROUNDNESS / depth } else { 0.0 }));
+    checks.push(Check::at_most(
+        "difference between blades",
+        turning,
+        near + if flexible { ROUNDNESS / depth } else { 0.0 },
+    ));
     checks.push(Check::so("all 12 nodes in contact", system.events().len() == 12));
     Ok(checks)
 }

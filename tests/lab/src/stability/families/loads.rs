@@ -76,8 +76,10 @@ fn loads() -> Vec<StabilityCase> {
     }
     for method in StabilityMethod::all_with(Solver::Lcp) {
         for step in ["load", "heat"] {
-            let expected = Expected::right("twice the static displacement after a sudden load, undamped; energy \
-                                            balance");
+            let expected = Expected::right(
+                "twice the static displacement after a sudden load, undamped; energy \
+                                            balance",
+            );
             let name = format!("loads/sudden-{step}/{}", method.integration());
             cases.add(true, name, expected, move || sudden(method, step));
         }
@@ -100,8 +102,11 @@ fn nodal(method: StabilityMethod, order: u32, size: f64) -> Result<Vec<Check>> {
     let exact = 0.25 * size * PI * RADIUS / (omega * omega);
     let energy = real(&simulation, "kinetic_energy");
     Ok(vec![
-        Check::at_most("deviation of the amplitude from the static one",
-            (found - exact).abs() / exact.abs().max(1e-290), 1e-9),
+        Check::at_most(
+            "deviation of the amplitude from the static one",
+            (found - exact).abs() / exact.abs().max(1e-290),
+            1e-9,
+        ),
         Check::at_most("amplitude of other shapes", off / exact.abs().max(1e-290), 1e-9),
         Check::at_most("kinetic energy at rest", energy / real(&simulation, "strain_energy").max(1e-290), 1e-18),
     ])
@@ -157,8 +162,13 @@ fn sudden(method: StabilityMethod, what: &str) -> Result<Vec<Check>> {
     }
     let mut checks = watch.laws();
     let energy = real(&simulation, "scheme_energy");
-    checks.push(Check::relative("deviation of the energy from the work of the \
-                                 load", energy, real(&simulation, "load_work"), 1e-9));
+    checks.push(Check::relative(
+        "deviation of the energy from the work of the \
+                                 load",
+        energy,
+        real(&simulation, "load_work"),
+        1e-9,
+    ));
     checks.push(Check::so("the load did work", work > 0.0));
     if what == "load" {
         checks.push(Check::relative(
@@ -262,8 +272,11 @@ fn worn(mut scene: Scene, coating: CoatingSettings) -> Result<Vec<Check>> {
         Check::so("wear only grows", fallen <= 0.0),
         Check::at_most("deficit of the wear energy below Y V", (yields * before - energy) / most.max(1e-300), 1e-9),
         Check::at_most("excess of the wear energy over (Y + K ε) V", (energy - most) / most.max(1e-300), 1e-9),
-        Check::at_most("penetration beyond the coating", (deepest - coating.thickness) / (GAP + coating.thickness),
-            1e-9),
+        Check::at_most(
+            "penetration beyond the coating",
+            (deepest - coating.thickness) / (GAP + coating.thickness),
+            1e-9,
+        ),
         if yields + coating.hardening > 0.0 {
             Check::so("the blades touched", watch.contacts > 0)
         } else {

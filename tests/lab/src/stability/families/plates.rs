@@ -115,8 +115,8 @@ fn mirrors() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in methods() {
         for friction in [0.0, 0.15, 0.5] {
-            let expected = unless_few_modes(method,
-                Expected::right("equal on the left and right, no transverse force"));
+            let expected =
+                unless_few_modes(method, Expected::right("equal on the left and right, no transverse force"));
             let name = format!("free/symmetric/µ={friction}/{}", method.name());
             let quick = method.scheme == Scheme::ModalExact && method.solver != Solver::Film && friction > 0.2;
             cases.add(quick, name, expected, move || symmetric(method, friction));

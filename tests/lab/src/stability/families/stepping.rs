@@ -34,8 +34,10 @@ fn communication() -> Vec<StabilityCase> {
             let quick = lcp && (method == StabilityMethod::exact(Solver::Lcp) || method.is_galerkin());
             cases.add(quick && ratio > 0.5, name, expected, move || lengths(method, ratio));
         }
-        let expected = Expected::right("same result with uniform steps of a quarter of the length; signs of the energy \
-                                        terms");
+        let expected = Expected::right(
+            "same result with uniform steps of a quarter of the length; signs of the energy \
+                                        terms",
+        );
         let name = format!("communication/wild/{}", method.name());
         cases.add(false, name, expected, move || wildly(method));
     }
@@ -295,8 +297,11 @@ fn chatter(method: StabilityMethod) -> Result<Vec<Check>> {
         watch.complementarity(),
         vec![
             watch.ledger(),
-            Check::at_most("excess of the energy over the work of the casing", energy(&simulation) / supplied - 1.0,
-                bound),
+            Check::at_most(
+                "excess of the energy over the work of the casing",
+                energy(&simulation) / supplied - 1.0,
+                bound,
+            ),
             watch.impact(bound),
         ],
     ]
@@ -341,10 +346,17 @@ fn jumped(method: StabilityMethod, jump: f64) -> Result<Vec<Check>> {
     let displaced = simulation.system().bank().row(0, 1);
     let mut checks = watch.complementarity();
     let near = allowed(&scene);
-    checks.push(Check::relative("deviation of λ from jump/W", found, exact,
-        1e-9 + if jump > 0.0 { near / jump } else { 0.0 }));
-    checks.push(Check::at_most("deviation of the tip from the casing", (displaced + jump.max(0.0)).abs() / GAP,
-        1e-9 + near / GAP));
+    checks.push(Check::relative(
+        "deviation of λ from jump/W",
+        found,
+        exact,
+        1e-9 + if jump > 0.0 { near / jump } else { 0.0 },
+    ));
+    checks.push(Check::at_most(
+        "deviation of the tip from the casing",
+        (displaced + jump.max(0.0)).abs() / GAP,
+        1e-9 + near / GAP,
+    ));
     for _ in 0..500 {
         watch.step(&mut simulation, 2e-6)?;
     }
@@ -381,8 +393,10 @@ fn pushed(rom: &tiprub_core::Rom, jump: f64, step: f64) -> f64 {
 fn restore() -> Vec<StabilityCase> {
     let mut cases = Vec::new();
     for method in StabilityMethod::all() {
-        let expected = Expected::right("bitwise the same as the saved instance, whatever the parameters of the \
-                                        restoring one");
+        let expected = Expected::right(
+            "bitwise the same as the saved instance, whatever the parameters of the \
+                                        restoring one",
+        );
         let name = format!("restore/other-parameters/{}", method.name());
         cases.add(method.solver == Solver::Lcp, name, expected, move || elsewhere(method));
     }

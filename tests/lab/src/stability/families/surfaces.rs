@@ -151,7 +151,8 @@ fn dragged(method: StabilityMethod, share: f64) -> Result<Vec<Check>> {
     }
     let (told, far) = (!simulation.take_notes().is_empty(), moved(&simulation));
     let error = far * far / (2.0 * RADIUS * GAP);
-    Ok(vec![Check::so("a warning is given from 5 % on", told == (error >= 0.05)),
-        Check::so("the displacement was reached", far >=
-        wanted)])
+    Ok(vec![
+        Check::so("a warning is given from 5 % on", told == (error >= 0.05)),
+        Check::so("the displacement was reached", far >= wanted),
+    ])
 }

@@ -133,8 +133,11 @@ impl Travelling {
         let size = discrete.norm();
         let fine = (omega.abs().max(frequency) * step).powi(2);
         let mut checks = vec![
-            Check::at_most("deviation of the wave from that of the oscillator", beside / exact.norm(),
-                fine / (2.0 * damping)),
+            Check::at_most(
+                "deviation of the wave from that of the oscillator",
+                beside / exact.norm(),
+                fine / (2.0 * damping),
+            ),
             Check::at_most("amplitude of other shapes", rest / size, 1e-8),
             Check::at_most("energy residual", real(&simulation, "energy_residual_relative").abs(), 1e-9),
         ];
@@ -368,10 +371,16 @@ impl Flank {
             watch.laws(),
             vec![
                 Check::relative("deviation of λ from the static solution", system.multiplier(0, 0), force, bound),
-                Check::at_most("deviation of the radial position from the static one",
-                    (found[0] - radial).abs() / depth, bound),
-                Check::at_most("deviation of the tangential position from the static one",
-                    (found[1] / tangential - 1.0).abs(), bound),
+                Check::at_most(
+                    "deviation of the radial position from the static one",
+                    (found[0] - radial).abs() / depth,
+                    bound,
+                ),
+                Check::at_most(
+                    "deviation of the tangential position from the static one",
+                    (found[1] / tangential - 1.0).abs(),
+                    bound,
+                ),
                 Check::relative("deviation of the tangential force from λ n_t", sideways, force * tilt, bound),
             ],
         ]

@@ -303,8 +303,10 @@ fn by_import(context: &CaseContext, scene: &str, version: u8, variable: &str, va
             (0..5).try_for_each(|index| session.do_step(f64::from(index) * LENGTH, LENGTH))
         });
         if let Err(refusal) = stepped {
-            return Ok(CaseEnd { checks: vec![Check::so("reported through a status", true)],
-                ..CaseEnd::refused(refusal) });
+            return Ok(CaseEnd {
+                checks: vec![Check::so("reported through a status", true)],
+                ..CaseEnd::refused(refusal)
+            });
         }
         let values = session.outputs()?;
         let mut checks = vec![Check::so("all outputs finite", values.iter().all(|value| value.is_finite()))];
