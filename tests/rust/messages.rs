@@ -273,6 +273,11 @@ fn strings_of_one_call_are_one_message_and_tests_are_left_out() {
     let texts: Vec<&str> = found.iter().map(|one| one.text.trim()).collect();
     assert_eq!(
         texts,
-        ["is out of range | Give a smaller value", "Help of an option.", "More words of help", "the last words"]
+        [
+            "key `{key}` | is out of range | Give a smaller value",
+            "Help of an option.",
+            "More words of help",
+            "the last words"
+        ]
     );
 }

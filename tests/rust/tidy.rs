@@ -100,7 +100,8 @@ fn the_library_is_only_a_shared_library() {
 
 /// Text of the blocks `impl <name> {` of a file.
 fn implementations(text: &str, name: &str) -> String {
-    let blocks = text.split(&format!("\nimpl {name} {{\n")).skip(1);
+    let start = format!("\nimpl {name} {{\n");
+    let blocks = text.split(start.as_str()).skip(1);
     blocks.map(|block| block.split("\n}\n").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
 }
 

@@ -84,6 +84,9 @@ pub fn parse_scene(text: &str, origin: &str) -> Result<SceneSettings> {
 /// # slave = "casing"
 /// # gap = 1e-4
 /// #
+/// # [time]
+/// # step = 1e-6
+/// #
 /// # [experiment]
 /// # start = 0.0
 /// # stop = 0.01

@@ -54,6 +54,16 @@ pub fn calculix_input(mesh: &Mesh, material: &Material, clamped: Option<&str>, f
 /// CalculiX lists every frequency twice, also where the mode is single (no or half as many diameters as sectors); so
 /// twice as many are asked for. Clamped nodes are left out of the faces: CalculiX refuses to tie them.
 ///
+/// # Examples
+/// ```
+/// # use tiprub_model::{Material, inp::{CyclicSymmetry, calculix_cyclic_input}, stage};
+/// let sector = stage::sector_mesh(&stage::SectorOptions::coarse())?;
+/// let symmetry = CyclicSymmetry { faces: ["CYCLIC_LOW", "CYCLIC_HIGH"], sectors: 56, nodal_diameters: &[0, 2, 5] };
+/// let text = calculix_cyclic_input(&sector.mesh, &Material::titanium(), Some("CLAMPED"), &symmetry, 4)?;
+/// assert!(text.contains("*CYCLIC SYMMETRY MODEL"));
+/// # Ok::<(), tiprub_model::Error>(())
+/// ```
+///
 /// # Errors
 /// The errors of [`calculix_input`]; [`Error::Invalid`] for a nodal diameter above half the number of sectors.
 pub fn calculix_cyclic_input(

@@ -234,6 +234,12 @@ pub fn surface_quads(mesh: &Mesh) -> Vec<Vec<usize>> {
 }
 
 /// Sets with as many nodes as they have, for messages.
+///
+/// # Examples
+/// ```
+/// let sets = [("TIP".to_owned(), vec![4, 5]), ("ROOT".to_owned(), vec![0])].into();
+/// assert_eq!(tiprub_model::mesh::set_counts(&sets), "ROOT (1), TIP (2)");
+/// ```
 pub fn set_counts(sets: &BTreeMap<String, Vec<usize>>) -> String {
     let counts: Vec<String> = sets.iter().map(|(name, nodes)| format!("{name} ({})", nodes.len())).collect();
     counts.join(", ")

@@ -203,7 +203,7 @@ pub fn reduce(
 ///
 /// # use tiprub_model::{FeModel, progress::silent, read::{ContactChoice, choose_contact_nodes}};
 /// let clamped = mesh.set("ROOT")?.to_vec();
-/// let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice::default())?;
+/// let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice { count: Some(1), names: Vec::new() })?;
 /// let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?;
 /// // With the effects of spin up to 1000 rad/s.
 /// let reduction = tiprub_model::reduce_model(model, &clamped, &tip, &options, Some(1000.0), &silent)?;

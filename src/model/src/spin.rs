@@ -69,7 +69,7 @@ pub(crate) fn centrifugal_load(model: &FeModel, free: &[usize]) -> Mat<f64> {
 /// # };
 /// # use tiprub_model::{FeModel, progress::silent, read::{ContactChoice, choose_contact_nodes}};
 /// # let clamped = mesh.set("ROOT")?.to_vec();
-/// # let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice::default())?;
+/// # let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice { count: Some(1), names: Vec::new() })?;
 /// # let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?;
 /// # let rom = tiprub_model::reduce_model(model, &clamped, &tip, &options, Some(1000.0), &silent)?.rom;
 ///
@@ -114,7 +114,7 @@ pub fn stiffness_at(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> DMatrix<
 /// # };
 /// # use tiprub_model::{FeModel, progress::silent, read::{ContactChoice, choose_contact_nodes}};
 /// # let clamped = mesh.set("ROOT")?.to_vec();
-/// # let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice::default())?;
+/// # let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice { count: Some(1), names: Vec::new() })?;
 /// # let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?;
 /// # let rom = tiprub_model::reduce_model(model, &clamped, &tip, &options, Some(1000.0), &silent)?.rom;
 ///
@@ -172,7 +172,7 @@ pub fn static_growth(resting: &DMatrix<f64>, spin: &Spin, speed: f64) -> Result<
 /// # };
 /// # use tiprub_model::{FeModel, progress::silent, read::{ContactChoice, choose_contact_nodes}};
 /// # let clamped = mesh.set("ROOT")?.to_vec();
-/// # let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice::default())?;
+/// # let tip = choose_contact_nodes(&mesh.nodes, mesh.set("TIP")?, &ContactChoice { count: Some(1), names: Vec::new() })?;
 /// # let model = FeModel::assembled(mesh, &steel, "three cubes".into(), &silent)?;
 /// # let rom = tiprub_model::reduce_model(model, &clamped, &tip, &options, Some(1000.0), &silent)?.rom;
 ///

@@ -191,8 +191,8 @@ impl Simulation {
     /// # use tiprub_core::Simulation;
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
-    /// let most = simulation.table().find("steps_at_most").expect("a parameter").reference;
-    /// simulation.set_integer(most, 1000)?;
+    /// let derivatives = simulation.table().find("step_derivatives").expect("a parameter").reference;
+    /// simulation.set_integer(derivatives, 2)?;
     /// # Ok::<(), tiprub_core::Error>(())
     /// ```
     ///
@@ -212,9 +212,9 @@ impl Simulation {
     /// # use tiprub_core::Simulation;
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
-    /// let most = simulation.table().find("steps_at_most").expect("a parameter").reference;
-    /// assert!(simulation.check_integer(most, 1000).is_ok());
-    /// assert!(simulation.check_integer(most, -1).is_err());
+    /// let derivatives = simulation.table().find("step_derivatives").expect("a parameter").reference;
+    /// assert!(simulation.check_integer(derivatives, 2).is_ok());
+    /// assert!(simulation.check_integer(derivatives, 3).is_err());
     /// # Ok::<(), tiprub_core::Error>(())
     /// ```
     ///

@@ -123,7 +123,7 @@ impl Simulation {
     ///
     /// # Errors
     /// Naming the output. The state is not to be gone on with.
-    pub fn check_outputs(&self, time: f64) -> Result<()> {
+    pub(super) fn check_outputs(&self, time: f64) -> Result<()> {
         for variable in self.table.variables().iter().filter(|row| row.causality == Causality::Output) {
             let start = variable.reference as usize;
             let values = &self.values[start..start + variable.len()];

@@ -284,11 +284,10 @@ impl Simulation {
     /// # use tiprub_core::Simulation;
     /// # let scene = tiprub_test_models::rub(2);
     /// # let mut simulation = Simulation::new(&scene)?;
-    /// simulation.initialise(0.0)?;
-    /// // Parameters that are rejected leave an instance that can be given others.
     /// let damping = simulation.table().find("damping_ratio").expect("a parameter").reference;
     /// simulation.set_real(damping, 0.01)?;
     /// simulation.initialise(0.0)?;
+    /// assert_eq!(simulation.time(), 0.0);
     /// # Ok::<(), tiprub_core::Error>(())
     /// ```
     ///

@@ -36,11 +36,10 @@ impl Simulation {
     /// # Examples
     /// ```
     /// # use tiprub_core::Simulation;
-    /// # let scene = tiprub_test_models::rub(2);
-    /// # let mut simulation = Simulation::new(&scene)?;
-    /// # simulation.initialise(0.0)?;
-    /// let most = simulation.table().find("steps_at_most").expect("a parameter").reference;
-    /// simulation.set_integer(most, 10)?;
+    /// # let mut scene = tiprub_test_models::rub(2);
+    /// scene.settings.time.steps_at_most = Some(10);
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// simulation.initialise(0.0)?;
     /// simulation.begin_partial_step(0.0, 1e-4)?;
     /// let ended_early = loop {
     ///     match simulation.advance() {

@@ -108,8 +108,8 @@ impl Simulation {
     /// let [speed, angle] = ["speed", "rotor_angle"].map(|name| simulation.table().find(name).expect("a variable").reference);
     /// let mut sensitivity = [0.0];
     /// simulation.step_derivative(&[angle], &[speed], &[1.0], &mut sensitivity)?;
-    /// // The speed ramps to its new value over the step: the angle grows by half of it times the step.
-    /// assert!((sensitivity[0] - 0.5e-4).abs() < 1e-9);
+    /// // The speed acts over the whole step of 0.1 ms.
+    /// assert!((sensitivity[0] - 1e-4).abs() < 1e-9);
     /// # Ok::<(), tiprub_core::Error>(())
     /// ```
     ///

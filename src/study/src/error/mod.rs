@@ -285,8 +285,8 @@ fn caption(case: &dyn ErrorCase, found: &Measured, kind: ErrorKind, chart: &Erro
     let mut limits = away(case.tolerant().family(), "massless-boundary") + &away(EquationFamily::STICKING, "coulomb");
     if let Some(apart) = own.massless_apart {
         limits.push_str(&format!(
-            " galerkin converges to the solution of massless-boundary: two fine runs differ by {apart:.1e}. Every \
-             method is compared with the converged solution of its own model."
+            " galerkin converges to the solution of massless-boundary: two fine runs differ by {apart:.1e}. Each \
+             method is compared with the converged solution of the same model."
         ));
     }
     let refused = found.rows.iter().filter(|row| row.outcome.is_err()).count();

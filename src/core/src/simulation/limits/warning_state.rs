@@ -200,6 +200,19 @@ impl Simulation {
 
     /// Returns the warnings of sliding contact in the opposite sense of rotation, which the warnings of the start leave out. Empty before
     /// [`Simulation::initialise`], and for coupled sectors, where the search takes as long again.
+    ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// assert!(simulation.if_reversed().is_empty());
+    /// simulation.initialise(0.0)?;
+    /// for warning in simulation.if_reversed() {
+    ///     println!("if reversed: {warning}");
+    /// }
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
     pub fn if_reversed(&self) -> Vec<Warning> {
         let Some(limits) = &self.limits else { return Vec::new() };
         let mut found = Vec::new();
