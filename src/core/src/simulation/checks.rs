@@ -121,9 +121,22 @@ impl Simulation {
 
     /// No output is handed out that is no number: outputs at `time` (s).
     ///
+    /// # Examples
+    /// ```
+    /// # use tiprub_core::Simulation;
+    /// # let scene = tiprub_test_models::rub(2);
+    /// # let mut simulation = Simulation::new(&scene)?;
+    /// # simulation.initialise(0.0)?;
+    /// simulation.begin_step(0.0, 1e-4)?;
+    /// simulation.advance()?;
+    /// simulation.update_outputs();
+    /// simulation.check_outputs(1e-4)?;
+    /// # Ok::<(), tiprub_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// Naming the output. The state is not to be gone on with.
-    pub(super) fn check_outputs(&self, time: f64) -> Result<()> {
+    pub fn check_outputs(&self, time: f64) -> Result<()> {
         for variable in self.table.variables().iter().filter(|row| row.causality == Causality::Output) {
             let start = variable.reference as usize;
             let values = &self.values[start..start + variable.len()];
