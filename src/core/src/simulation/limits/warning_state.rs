@@ -75,8 +75,8 @@ impl Simulation {
                     if self.warning_of_step(kind, of, expected).is_some() { expected } else { 0.0 };
             }
         }
-        let mut doubts: Vec<Warning> = self.compiled.slips().iter().map(Slip::warning).collect();
-        doubts.extend(self.compiled.idle_patches());
+        let mut uncertain_warnings: Vec<Warning> = self.compiled.slips().iter().map(Slip::warning).collect();
+        uncertain_warnings.extend(self.compiled.idle_patches());
         for (body, speed) in self.speeds().into_iter().enumerate() {
             let mut warning_state = [false; 2];
             senses_of(parameters.speeds[body]).for_each(|sense| warning_state[sense] = true);
@@ -85,9 +85,9 @@ impl Simulation {
             let fast = self.compiled.slip_of_speed(body, speed);
             let fastest = plausibility::fastest(self.compiled.body(body).1);
             self.warning_state.fastest[body] = if fast.is_some() { f64::INFINITY } else { fastest };
-            doubts.extend(fast.iter().map(Slip::warning));
+            uncertain_warnings.extend(fast.iter().map(Slip::warning));
         }
-        self.warnings.extend(doubts);
+        self.warnings.extend(uncertain_warnings);
     }
 
     /// Returns the warnings for a structure whose contact slides in the sense of this sign.
