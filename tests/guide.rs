@@ -13,10 +13,10 @@ thread_local! {
 }
 
 /// Print a line and keep it for [`hold`].
-macro_rules! told {
+macro_rules! print_row {
     ($($argument:tt)*) => { $crate::guide::tell(format!($($argument)*)) };
 }
-pub(crate) use told;
+pub(crate) use print_row;
 
 /// Rounding of the last digits of a sum differs from compiler to compiler: numbers below this are held to be as small.
 const ROUNDING: f64 = 1e-10;
@@ -154,14 +154,14 @@ pub fn missing<'a>(block: &'a str, found: &[String]) -> Vec<&'a str> {
 pub fn hold(command: &str) {
     let own: Vec<_> = blocks().into_iter().filter(|block| block.1 == command).collect();
     assert!(!own.is_empty(), "no chapter has a block from `{command}`");
-    TOLD.with_borrow(|told| {
+    TOLD.with_borrow(|reported| {
         for (page, _, block) in own {
-            let missing = missing(&block, told);
+            let missing = missing(&block, reported);
             assert!(
                 missing.is_empty(),
                 "{page}: `{command}` does not find\n{}\nbut\n{}",
                 missing.join("\n"),
-                told.join("\n")
+                reported.join("\n")
             );
         }
     });

@@ -150,8 +150,8 @@ fn failure(error: &clap::Error, program: &str) -> Option<Failure> {
             text(ContextKind::ValidSubcommand).map_or(String::new(), |known| format!("Choose one of {known}. "));
         return Some(Failure::usage(what, "a command is missing", format!("{known}{help}")));
     }
-    let told = error.render().to_string();
-    let problem = told.split("\n\nUsage:").next().unwrap_or(&told).trim().trim_start_matches("error: ");
+    let reported = error.render().to_string();
+    let problem = reported.split("\n\nUsage:").next().unwrap_or(&reported).trim().trim_start_matches("error: ");
     // Hints of clap stand behind an empty line.
     let (problem, hints) = problem.split_once("\n\n").unwrap_or((problem, ""));
     let hints = hints.lines().map(|line| line.trim().trim_start_matches("tip: ").trim_end_matches('.'));

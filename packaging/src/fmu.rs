@@ -221,10 +221,10 @@ pub fn contents(
 ) -> Vec<ArchiveEntry> {
     let identifier = description.identifier;
     let name = format!("documentation/{identifier}_ref.csv");
-    let told = reference.map(|(_, steps)| {
+    let reported = reference.map(|(_, steps)| {
         format!("All outputs of the default experiment, for at most its first {steps} communication steps")
     });
-    let result = told.as_deref().map(|told| (name.as_str(), "text/csv", "result", told));
+    let result = reported.as_deref().map(|reported| (name.as_str(), "text/csv", "result", reported));
     let page = (
         "documentation/index.html",
         "text/html",

@@ -271,10 +271,10 @@ impl RomFacts {
 
     /// "0.080 (closed at tip_2, nodal diameter 0, sliding in +θ); 0.310 (closed at tip_1, nodal diameter 0, sliding in −θ)".
     pub(crate) fn digging_text(&self) -> String {
-        let told = |Digging { friction, closed, sense }: &Digging| {
+        let reported = |Digging { friction, closed, sense }: &Digging| {
             format!("{friction:.3} (closed at {closed}, sliding in {})", ["+θ", "−θ"][*sense])
         };
-        let senses: Vec<String> = self.lock_up.iter().flatten().map(told).collect();
+        let senses: Vec<String> = self.lock_up.iter().flatten().map(reported).collect();
         if senses.is_empty() { "none".to_owned() } else { senses.join("; ") }
     }
 

@@ -8,7 +8,7 @@ mod guide;
 
 use std::{collections::BTreeSet, fs, path::Path, process::Command};
 
-use guide::{blocks, holds, missing, numbers, pages, told};
+use guide::{blocks, holds, missing, numbers, pages, print_row};
 
 /// Output of `tiprub ...`, line by line.
 fn run(command: &str) -> Vec<String> {
@@ -93,7 +93,7 @@ fn the_first_run_at_halved_steps() {
         let sum = number("largest total normal force of all contact nodes, mean over a communication step:");
         let node = number("largest normal force on a single contact node in an internal step:");
         let [heat, curvature] = ["friction_loss", "curvature_work"].map(number);
-        told!("| {step} | {sum} | {node} | {heat} | {curvature} |");
+        print_row!("| {step} | {sum} | {node} | {heat} | {curvature} |");
     }
     guide::hold("cargo test -p tiprub --test guide halved");
 }
@@ -119,7 +119,7 @@ fn the_first_run_with_points_and_patches() {
                 let at = rows[0].split(',').position(|known| known == name).unwrap();
                 rows.last().unwrap().split(',').nth(at).unwrap().parse::<f64>().unwrap()
             };
-            told!("| {count} {what} | {} | {} |", last("strain_energy"), last("friction_loss"));
+            print_row!("| {count} {what} | {} | {} |", last("strain_energy"), last("friction_loss"));
         }
     }
     guide::hold("cargo test -p tiprub --test guide patches");

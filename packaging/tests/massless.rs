@@ -3,7 +3,7 @@
 #[path = "../../tests/guide.rs"]
 mod guide;
 
-use guide::told;
+use guide::print_row;
 use tiprub_core::{
     Scene, Simulation,
     dynamics::modal::ModalModel,
@@ -46,9 +46,9 @@ fn massless_contact_nodes_agree_and_take_longer_steps() {
     });
     let check = MasslessCheck { model: &model, normals: normals.collect(), slaves: Vec::new() };
     let (limit, central) = (check.limit(1e-3).unwrap().closed, central_difference_limit(&model));
-    told!("| limit of massless-boundary in closed contact | {:.2} |", 1e6 * limit);
-    told!("| of which 0.8 is accepted | {:.2} |", 0.8e6 * limit);
-    told!("| limit of central differences | {:.4} |", 1e6 * central);
+    print_row!("| limit of massless-boundary in closed contact | {:.2} |", 1e6 * limit);
+    print_row!("| of which 0.8 is accepted | {:.2} |", 0.8e6 * limit);
+    print_row!("| limit of central differences | {:.4} |", 1e6 * central);
     assert!(limit > central);
 
     let mut scene = tiprub_gallery::scene_source::rotor37_scene_with(rom).unwrap();
@@ -68,7 +68,7 @@ fn massless_contact_nodes_agree_and_take_longer_steps() {
         (Scheme::MasslessBoundary, 1.5e-5),
     ] {
         let found = run(&scene, scheme, step);
-        told!(
+        print_row!(
             "| {scheme:?} | {} | {:.2} % | {:+.2} % | {:.3} mJ, of {:.1} mJ with mass |",
             1e6 * step,
             100.0 * apart(&fine.0, &found.0),

@@ -105,11 +105,11 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         let outputs = outputs(&run.recording.names, run.recording.row(rows - 1));
         format!("\n{outputs}\n{}", summary(&json, &extremes, &run.warnings) + &lines(&estimates))
     } else {
-        let told =
+        let reported =
             if estimates.is_empty() { String::new() } else { format!("\n{}", estimate::errors_text(&estimates)) };
         let hint =
             if arguments.estimate { "" } else { "\nto estimate the errors of this run with coarser runs: --estimate" };
-        format!("{}{told}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))
+        format!("{}{reported}{hint}", where_the_rest_is(&json, !run.warnings.is_empty()))
     };
     let (text, rest) = if to_stdout { (run.recording.to_csv(), String::new()) } else { (answer::text(&answer), rest) };
     if !estimates.is_empty() {

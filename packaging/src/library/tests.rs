@@ -112,10 +112,10 @@ fn a_library_of_another_release_is_refused_by_name_and_version() {
     let root = tempfile::tempdir().unwrap();
     let path = root.path().join("old.so");
     let other = LIBRARY_RELEASE.replacen(env!("CARGO_PKG_VERSION"), "9.8.7", 1);
-    for (told, named) in [(other.as_str(), other.as_str()), ("", "contains no release number")] {
+    for (reported, named) in [(other.as_str(), other.as_str()), ("", "contains no release number")] {
         let mut bytes = elf(62);
         bytes.truncate(64);
-        std::fs::write(&path, [&bytes, FUNCTIONS, told.as_bytes()].concat()).unwrap();
+        std::fs::write(&path, [&bytes, FUNCTIONS, reported.as_bytes()].concat()).unwrap();
         let refused =
             load(LibraryUnit::Scene, &arguments(std::slice::from_ref(&path), &[]), &Console::new(true, false))
                 .unwrap_err();

@@ -50,19 +50,19 @@ const SMALL_SET: usize = 12;
 /// Sets that are missing or do not fit each other.
 pub fn tips(
     imported: &Imported,
-    asked: &ModelOptions,
+    options: &ModelOptions,
     tips: &TipOptions,
     sector: Option<&SectorArguments>,
 ) -> Result<Chosen> {
-    let clamped = clamped_nodes(imported, &asked.clamp_set)?;
+    let clamped = clamped_nodes(imported, &options.clamp_set)?;
     let faces = sector.map(|sector| pair_faces(imported, sector)).transpose()?;
     let mut fixed = clamped.clone();
     if let Some((boundary, _)) = &faces {
         fixed.extend(boundary.pairs.iter().flatten());
         fixed.sort_unstable();
     }
-    let (free, by_number, tip) = candidates(imported, asked, &fixed)?;
-    let names_nodes = asked.contact_set.is_some() && (by_number || free.len() <= SMALL_SET);
+    let (free, by_number, tip) = candidates(imported, options, &fixed)?;
+    let names_nodes = options.contact_set.is_some() && (by_number || free.len() <= SMALL_SET);
     let mesh = imported.model.mesh.as_ref().map(|(mesh, _)| mesh);
     let default_mesh = mesh.filter(|_| !names_nodes && tips.contact_nodes.is_none());
     let patch_count =
@@ -88,7 +88,7 @@ pub fn tips(
         let choice = ContactChoice { count, names: tips.contact_names.clone() };
         choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?
     };
-    let is_tip = asked.contact_set.is_some() && (tips.contact_patches.is_some() || !names_nodes);
+    let is_tip = options.contact_set.is_some() && (tips.contact_patches.is_some() || !names_nodes);
     let tip_set = if is_tip { free } else { Vec::new() };
     let root = mesh.map_or(Vec::new(), find_root);
     Ok(Chosen { stress: StressPlaces::default(), clamped, contact, faces, grid: None, tip, tip_set, root })
@@ -98,11 +98,11 @@ pub fn tips(
 type Candidates = (Vec<usize>, bool, Option<(FoundTip, bool)>);
 
 /// Returns the nodes of the contact set, or of the tip if there is no set.
-fn candidates(imported: &Imported, asked: &ModelOptions, fixed: &[usize]) -> Result<Candidates> {
+fn candidates(imported: &Imported, options: &ModelOptions, fixed: &[usize]) -> Result<Candidates> {
     let mesh = imported.model.mesh.as_ref().map(|(mesh, _)| mesh);
     let found = mesh.map(|mesh| find_tip(mesh, fixed).map_err(failure)).transpose();
-    if asked.contact_set.is_some() {
-        let (free, by_number) = free_contact_nodes(imported, asked, fixed)?;
+    if options.contact_set.is_some() {
+        let (free, by_number) = free_contact_nodes(imported, options, fixed)?;
         return Ok((free, by_number, found.ok().flatten().map(|tip| (tip, false))));
     }
     let tip = found?.ok_or_else(|| missing(imported, "--contact-set"))?;
@@ -160,9 +160,9 @@ const MOST_PLACES: usize = 1000;
 ///
 /// # Errors
 /// Sets that are missing or large.
-pub fn stress(imported: &Imported, asked: &BladeOptions) -> Result<StressPlaces> {
-    let mut places = StressPlaces { nodes: Vec::new(), modes: asked.stress_modes.unwrap_or(0) };
-    if let Some(name) = &asked.stress_set {
+pub fn stress(imported: &Imported, options: &BladeOptions) -> Result<StressPlaces> {
+    let mut places = StressPlaces { nodes: Vec::new(), modes: options.stress_modes.unwrap_or(0) };
+    if let Some(name) = &options.stress_set {
         let (nodes, _) = nodes_of(imported, name, "--stress-set")?;
         if nodes.len() > MOST_PLACES {
             let problem = format!("the set has {} nodes, but at most {MOST_PLACES} are allowed", nodes.len());
@@ -178,13 +178,13 @@ pub fn stress(imported: &Imported, asked: &BladeOptions) -> Result<StressPlaces>
 ///
 /// # Errors
 /// Sets that are missing, and a grid that they do not hold.
-pub fn grid(imported: &Imported, asked: &CasingMeshArguments) -> Result<Chosen> {
-    let name = named_set(imported, asked.model.contact_set.as_deref(), "--contact-set")?;
-    let clamped = clamped_nodes(imported, &asked.model.clamp_set)?;
-    free_contact_nodes(imported, &asked.model, &clamped)?;
+pub fn grid(imported: &Imported, options: &CasingMeshArguments) -> Result<Chosen> {
+    let name = named_set(imported, options.model.contact_set.as_deref(), "--contact-set")?;
+    let clamped = clamped_nodes(imported, &options.model.clamp_set)?;
+    free_contact_nodes(imported, &options.model, &clamped)?;
     let (set, _) = nodes_of(imported, name, "--contact-set")?;
     let Some((mesh, _)) = &imported.model.mesh else { return Err(super::no_mesh()) };
-    let grid = GridNodes::chosen(mesh, (&set, &clamped), asked.contact_grid, asked.contact_axial).map_err(failure)?;
+    let grid = GridNodes::chosen(mesh, (&set, &clamped), options.contact_grid, options.contact_axial).map_err(failure)?;
     Ok(Chosen {
         stress: StressPlaces::default(),
         clamped,
@@ -198,8 +198,8 @@ pub fn grid(imported: &Imported, asked: &CasingMeshArguments) -> Result<Chosen> 
 }
 
 /// Contact nodes that are not among the `fixed` ones, and whether they were given by number.
-fn free_contact_nodes(imported: &Imported, asked: &ModelOptions, fixed: &[usize]) -> Result<(Vec<usize>, bool)> {
-    let name = named_set(imported, asked.contact_set.as_deref(), "--contact-set")?;
+fn free_contact_nodes(imported: &Imported, options: &ModelOptions, fixed: &[usize]) -> Result<(Vec<usize>, bool)> {
+    let name = named_set(imported, options.contact_set.as_deref(), "--contact-set")?;
     let (nodes, by_number) = nodes_of(imported, name, "--contact-set")?;
     let free: Vec<usize> = nodes.into_iter().filter(|node| fixed.binary_search(node).is_err()).collect();
     if free.is_empty() {
@@ -209,12 +209,12 @@ fn free_contact_nodes(imported: &Imported, asked: &ModelOptions, fixed: &[usize]
     Ok((free, by_number))
 }
 
-fn pair_faces(imported: &Imported, asked: &SectorArguments) -> Result<(CyclicBoundary, PairingReport)> {
+fn pair_faces(imported: &Imported, options: &SectorArguments) -> Result<(CyclicBoundary, PairingReport)> {
     let nodes = &imported.model.nodes;
     let radius = nodes.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);
-    let tolerance = asked.cyclic_tolerance.unwrap_or(FACE_TOLERANCE * radius);
-    let (low, high) = (set(imported, &asked.cyclic_low)?, set(imported, &asked.cyclic_high)?);
-    CyclicBoundary::pair(nodes, low, high, asked.sectors as usize, tolerance).map_err(failure)
+    let tolerance = options.cyclic_tolerance.unwrap_or(FACE_TOLERANCE * radius);
+    let (low, high) = (set(imported, &options.cyclic_low)?, set(imported, &options.cyclic_high)?);
+    CyclicBoundary::pair(nodes, low, high, options.sectors as usize, tolerance).map_err(failure)
 }
 
 fn sets_of(imported: &Imported) -> String {

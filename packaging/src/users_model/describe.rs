@@ -14,7 +14,7 @@ use super::choose::Chosen;
 use crate::own_arguments::ModelOptions;
 
 /// Describes the input and the choices, for people and for programs.
-pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (String, Value) {
+pub fn describe(imported: &Imported, options: &ModelOptions, chosen: &Chosen) -> (String, Value) {
     let model = &imported.model;
     let [low, high] = bounding_box(&model.nodes);
     let mass = total_mass(model);
@@ -38,7 +38,7 @@ pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (
         set_counts(&model.sets)
     );
     let _ = write!(text, "\n  clamped                   {} nodes", chosen.clamped.len());
-    text.push_str(&contact(imported, asked, chosen));
+    text.push_str(&contact(imported, options, chosen));
     if let Some((boundary, report)) = &chosen.faces {
         let PairingReport { largest_mismatch, typical_mismatch, .. } = report;
         let (pairs, pitch) = (boundary.pairs.len(), boundary.pitch().to_degrees());
@@ -79,9 +79,9 @@ pub fn describe(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> (
 }
 
 /// Contact nodes or patches, each with its node in the file; of a grid its size; the tip, where it was found.
-fn contact(imported: &Imported, asked: &ModelOptions, chosen: &Chosen) -> String {
+fn contact(imported: &Imported, options: &ModelOptions, chosen: &Chosen) -> String {
     let mut text = String::new();
-    let contact_set = asked.contact_set.as_deref().unwrap_or("the detected tip");
+    let contact_set = options.contact_set.as_deref().unwrap_or("the detected tip");
     if let Some((tip, true)) = &chosen.tip {
         let FoundTip { faces, nodes, chord, radius: [low, high], axial: [from, to], .. } = tip;
         let _ = write!(

@@ -14,14 +14,14 @@ use crate::own_arguments::{ModelOptions, UnitChoice};
 const USUAL_FREQUENCIES: [f64; 2] = [1.0, 1e6];
 
 /// Rejects values that cannot be meant, unless the units are said to be SI; asks about unusual values.
-pub fn judge(imported: &Imported, asked: &ModelOptions) -> Result<Vec<String>> {
+pub fn judge(imported: &Imported, options: &ModelOptions) -> Result<Vec<String>> {
     let found = plausibility(&imported.model, &imported.materials);
     let question = |list: &[String]| format!("{}: is this intended?", list.join("; "));
     let mut warnings = Vec::new();
     if !found.impossible.is_empty() {
-        if asked.units != Some(UnitChoice::Metre) {
-            let remedy = match asked.units {
-                _ if asked.young.is_some() && found.impossible.iter().all(|text| text.starts_with("material")) => {
+        if options.units != Some(UnitChoice::Metre) {
+            let remedy = match options.units {
+                _ if options.young.is_some() && found.impossible.iter().all(|text| text.starts_with("material")) => {
                     "Give --young and --density in SI units, Pa and kg/m³, whatever the units of the file"
                 }
                 None => {
@@ -96,10 +96,10 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
 }
 
 /// Sets that hold a part of what the mesh shows to be the tip and the root.
-pub fn set_warnings(asked: &ModelOptions, chosen: &Chosen) -> Vec<String> {
+pub fn set_warnings(options: &ModelOptions, chosen: &Chosen) -> Vec<String> {
     let within = |set: &[usize], whole: &[usize]| whole.iter().filter(|node| set.binary_search(node).is_ok()).count();
     let mut warnings = Vec::new();
-    if let (Some(name), Some((tip, _)), false) = (&asked.contact_set, &chosen.tip, chosen.tip_set.is_empty()) {
+    if let (Some(name), Some((tip, _)), false) = (&options.contact_set, &chosen.tip, chosen.tip_set.is_empty()) {
         let (on_tip, all, own) = (within(&chosen.tip_set, &tip.nodes), tip.nodes.len(), chosen.tip_set.len());
         if on_tip < all {
             warnings.push(format!(
@@ -118,7 +118,7 @@ pub fn set_warnings(asked: &ModelOptions, chosen: &Chosen) -> Vec<String> {
         warnings.push(format!(
             "{} has {held} of the {all} nodes of the innermost faces, and the other nodes of the root are free: is \
              this intended?",
-            asked.clamp_set.join(", ")
+            options.clamp_set.join(", ")
         ));
     }
     warnings

@@ -55,17 +55,17 @@ const FACES: [&str; 2] = ["CYCLIC_LOW", "CYCLIC_HIGH"];
 /// Files and sets, naming file, line and remedy; and whatever the reduction refuses.
 pub fn blade(
     file: Option<&Path>,
-    asked: &BladeOptions,
+    options: &BladeOptions,
     (tips, kept): (&TipOptions, KeptOptions),
     console: &Console,
 ) -> Result<ReducedModel> {
-    let source = asked.source(file, kept);
+    let source = options.source(file, kept);
     let imported = import(&source, console)?;
     let choose = |imported: &Imported| {
-        Ok(Chosen { stress: choose::stress(imported, asked)?, ..choose::tips(imported, source.model, tips, None)? })
+        Ok(Chosen { stress: choose::stress(imported, options)?, ..choose::tips(imported, source.model, tips, None)? })
     };
     reduce_clamped(&source, imported, choose, |model, chosen, clamped| {
-        Ok(ReducedModel::general(general(&source, asked, model, chosen, console)?, clamped))
+        Ok(ReducedModel::general(general(&source, options, model, chosen, console)?, clamped))
     })
 }
 
@@ -110,12 +110,12 @@ impl refine::RomSource for BladeSource<'_> {
 ///
 /// # Errors
 /// As [`blade`].
-pub fn sector(asked: &SectorArguments, console: &Console) -> Result<ReducedModel> {
-    let source = asked.source();
+pub fn sector(options: &SectorArguments, console: &Console) -> Result<ReducedModel> {
+    let source = options.source();
     let imported = import(&source, console)?;
-    let choose = |imported: &Imported| choose::tips(imported, source.model, &asked.tips, Some(asked));
+    let choose = |imported: &Imported| choose::tips(imported, source.model, &options.tips, Some(options));
     reduce_clamped(&source, imported, choose, |model, chosen, clamped| {
-        cyclic((&source, asked), model, chosen, clamped, console)
+        cyclic((&source, options), model, chosen, clamped, console)
     })
 }
 
@@ -123,16 +123,16 @@ pub fn sector(asked: &SectorArguments, console: &Console) -> Result<ReducedModel
 ///
 /// # Errors
 /// As [`blade`]; a mesh of several materials.
-pub fn casing(asked: &CasingMeshArguments, console: &Console) -> Result<ReducedModel> {
-    let source = asked.source();
+pub fn casing(options: &CasingMeshArguments, console: &Console) -> Result<ReducedModel> {
+    let source = options.source();
     let imported = import(&source, console)?;
     let materials = imported.materials.len();
-    let choose = |imported: &Imported| choose::grid(imported, asked);
+    let choose = |imported: &Imported| choose::grid(imported, options);
     reduce_clamped(&source, imported, choose, |model, chosen, clamped| {
         if materials != 1 {
             return Err(no_mesh());
         }
-        Ok(ReducedModel::general(ring(&source, asked, model, chosen, console)?, clamped))
+        Ok(ReducedModel::general(ring(&source, options, model, chosen, console)?, clamped))
     })
 }
 
@@ -140,12 +140,12 @@ pub fn casing(asked: &CasingMeshArguments, console: &Console) -> Result<ReducedM
 ///
 /// # Errors
 /// As [`blade`]; a mesh of several materials.
-pub fn conducting(file: &Path, asked: &ModelOptions, console: &Console) -> Result<ConductingMesh> {
-    let imported = import(&MeshSource::mesh(file, asked), console)?;
+pub fn conducting(file: &Path, options: &ModelOptions, console: &Console) -> Result<ConductingMesh> {
+    let imported = import(&MeshSource::mesh(file, options), console)?;
     let mut warnings = imported.warnings.clone();
-    warnings.extend(judge::judge(&imported, asked)?);
+    warnings.extend(judge::judge(&imported, options)?);
     let set =
-        asked.contact_set.as_deref().map(|name| choose::nodes_of(&imported, name, "--contact-set")).transpose()?;
+        options.contact_set.as_deref().map(|name| choose::nodes_of(&imported, name, "--contact-set")).transpose()?;
     let Some((mesh, material)) = imported.model.mesh else { return Err(no_mesh()) };
     Ok(ConductingMesh { mesh, material, set: set.map(|(nodes, _)| nodes), warnings })
 }
@@ -198,7 +198,7 @@ fn reduce_clamped(
 
 fn general(
     source: &MeshSource,
-    asked: &BladeOptions,
+    options: &BladeOptions,
     model: FeModel,
     chosen: &Chosen,
     console: &Console,
@@ -207,10 +207,10 @@ fn general(
     let title = format!("Reducing {name}");
     let options = ReductionOptions {
         name,
-        kind: KindChoice::kind(asked.kind, has_patches(chosen)),
+        kind: KindChoice::kind(options.kind, has_patches(chosen)),
         modes: source.kept.modes.unwrap_or_else(|| default_modes(&model, has_patches(chosen))),
         checked_modes: CHECKED_MODES,
-        sectors: asked.sectors.unwrap_or(1) as usize,
+        sectors: options.sectors.unwrap_or(1) as usize,
         frame: DisplacementFrame::Cylindrical,
         watched: choose::watched(&model, &chosen.contact)?,
         stress: chosen.stress.clone(),
@@ -220,7 +220,7 @@ fn general(
     with_progress(&title, console, &|listener| {
         // The matrices are handed over, not copied.
         let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is already reduced", ""))?;
-        reduce_model(model, &chosen.clamped, &chosen.contact, &options, asked.spin, listener)
+        reduce_model(model, &chosen.clamped, &chosen.contact, &options, options.spin, listener)
     })
 }
 
@@ -230,15 +230,15 @@ fn default_modes(model: &FeModel, patches: bool) -> usize {
 
 fn ring(
     source: &MeshSource,
-    asked: &CasingMeshArguments,
+    options: &CasingMeshArguments,
     model: FeModel,
     chosen: &Chosen,
     console: &Console,
 ) -> Result<Reduction> {
     let (Some((mesh, mut material)), Some(grid)) = (model.mesh, &chosen.grid) else { return Err(no_mesh()) };
-    material.expansion = asked.expansion.unwrap_or(material.expansion);
+    material.expansion = options.expansion.unwrap_or(material.expansion);
     let [low, high] = bounding_box(&mesh.nodes);
-    let [around, along] = asked.patches.unwrap_or([0, 0]);
+    let [around, along] = options.patches.unwrap_or([0, 0]);
     let patches = equal_patches(around, along, [low[2], high[2]]);
     let name = source.name();
     let title = format!("Reducing {name}");
@@ -246,7 +246,7 @@ fn ring(
     let options = CasingReductionOptions {
         name,
         formulation: Formulation::Displacement,
-        fixed_interface_modes: asked.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes),
+        fixed_interface_modes: options.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes),
         modes: source.kept.modes.unwrap_or(defaults.modes),
         checked_modes: CHECKED_MODES,
         damping_ratio: source.kept.damping.unwrap_or(DAMPING),
@@ -263,7 +263,7 @@ fn has_patches(chosen: &Chosen) -> bool {
 }
 
 fn cyclic(
-    (source, asked): (&MeshSource, &SectorArguments),
+    (source, options): (&MeshSource, &SectorArguments),
     model: FeModel,
     chosen: &Chosen,
     clamped: Option<&str>,
@@ -276,7 +276,7 @@ fn cyclic(
     let title = format!("Reducing {name}");
     let options = CyclicOptions {
         name,
-        kind: KindChoice::kind(asked.kind, has_patches(chosen)),
+        kind: KindChoice::kind(options.kind, has_patches(chosen)),
         modes: ModeSelection::Families(source.kept.modes.unwrap_or(MODES)),
         checked_modes: CHECKED_MODES,
         damping_ratio: source.kept.damping.unwrap_or(DAMPING),
@@ -297,14 +297,14 @@ fn cyclic(
 }
 
 fn import(source: &MeshSource, console: &Console) -> Result<Imported> {
-    let (asked, material) = (source.model, source.material());
+    let (options, material) = (source.model, source.material());
     let matrices = source.matrices.and_then(|own| Some((own, own.stiffness.as_ref()?, own.mass.as_ref()?)));
     let Some((matrices, stiffness, mass)) = matrices else {
         let Some(path) = source.file else {
             return Err(Failure::usage("FILE", "no file is given", "Give a mesh file, or --stiffness and --mass"));
         };
         let options =
-            MeshOptions { units: asked.units(), axis: asked.axis(), material, temperature: asked.temperature };
+            MeshOptions { units: options.units(), axis: options.axis(), material, temperature: options.temperature };
         let title = format!("Reading {}", path.display());
         return with_progress(&title, console, &|listener| read_mesh(path, &options, listener));
     };
@@ -317,9 +317,9 @@ fn import(source: &MeshSource, console: &Console) -> Result<Imported> {
         mass: mass.clone(),
         nodes: nodes.to_path_buf(),
         dofs: matrices.dofs.clone(),
-        units: asked.units(),
-        axis: asked.axis(),
-        left_out: asked.clamp_set.clone(),
+        units: options.units(),
+        axis: options.axis(),
+        left_out: options.clamp_set.clone(),
     };
     console.print_progress(format_args!("Reading {} and {}", stiffness.display(), mass.display()));
     read_matrices(&files).map_err(failure)

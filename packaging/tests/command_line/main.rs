@@ -11,6 +11,6 @@ mod project;
 mod reduce;
 mod report;
 mod run;
-mod told;
+mod reported;
 mod usage;
 mod users_models;

@@ -104,7 +104,7 @@ fn scalars_and_dates_are_packed_as_asked() {
 #[test]
 fn a_fixed_internal_step_is_told_where_it_is_true() {
     let project = Project::new();
-    let told = |step: &str, communication_step: &str| {
+    let reported = |step: &str, communication_step: &str| {
         let scene: Vec<String> = SCENE
             .lines()
             .map(|line| match line.split('=').next().unwrap().trim() {
@@ -119,10 +119,10 @@ fn a_fixed_internal_step_is_told_where_it_is_true() {
         let xml = std::io::read_to_string(archive.by_index(0).unwrap()).unwrap();
         xml.split("fixedInternalStepSize=\"").nth(1).map(|rest| rest.split('"').next().unwrap().to_owned())
     };
-    assert_eq!(told("1e-6", "1e-5").as_deref(), Some("1e-6"));
-    assert_eq!(told("1e-6", "1e-6").as_deref(), Some("1e-6"));
+    assert_eq!(reported("1e-6", "1e-5").as_deref(), Some("1e-6"));
+    assert_eq!(reported("1e-6", "1e-6").as_deref(), Some("1e-6"));
     for (step, communication_step) in [("3e-7", "1e-5"), ("1e-6", "2.5e-6"), ("2e-6", "1e-6")] {
-        assert_eq!(told(step, communication_step), None, "{step} in {communication_step}");
+        assert_eq!(reported(step, communication_step), None, "{step} in {communication_step}");
     }
 }
 

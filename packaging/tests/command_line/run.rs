@@ -54,9 +54,9 @@ fn the_summary_of_a_run_tells_its_extremes() {
     let at = force["time"].as_f64().unwrap();
     let there = total.iter().find(|row| row.0.to_bits() == at.to_bits()).unwrap();
     assert!((there.1 - largest(total.clone())).abs() <= 1e-9 * there.1, "{there:?}");
-    let told = text.split("over the run:").nth(1).unwrap();
-    assert!(told.contains(&format!(" N at t = {at} s")) && told.contains("smallest clearance: "), "{text}");
-    assert!(told.contains("largest number of contact nodes touching at a communication point: "), "{text}");
+    let reported = text.split("over the run:").nth(1).unwrap();
+    assert!(reported.contains(&format!(" N at t = {at} s")) && reported.contains("smallest clearance: "), "{text}");
+    assert!(reported.contains("largest number of contact nodes touching at a communication point: "), "{text}");
 }
 
 /// Five lines before all else, the same with and without `--all`, and then where the rest is.
@@ -73,8 +73,8 @@ fn a_run_answers_first_in_five_lines() {
     assert!(long.contains("at the end:\n") && long.contains("rotor_angle"), "{long}");
     let (names, rows) = columns(&fs::read_to_string(project.path("out.csv")).unwrap());
     let heat = rows.last().unwrap()[names.iter().position(|name| name == "friction_loss").unwrap()];
-    let told: f64 = first(&short)[1].split_whitespace().nth(1).unwrap().parse().unwrap();
-    assert!(heat > 0.0 && (told - heat).abs() <= 5e-6 * heat, "{told} {heat}");
+    let reported: f64 = first(&short)[1].split_whitespace().nth(1).unwrap().parse().unwrap();
+    assert!(heat > 0.0 && (reported - heat).abs() <= 5e-6 * heat, "{reported} {heat}");
 }
 
 #[test]
@@ -88,8 +88,8 @@ fn results_that_nobody_takes_are_no_success() {
     };
     let run = "exec \"$0\" run scene.toml --quiet --csv -";
     let closed = command(&format!("{run} >&-")).output().unwrap();
-    let told = String::from_utf8_lossy(&closed.stderr).into_owned();
-    assert!(closed.status.code() == Some(1) && told.starts_with("error: stdout: is closed"), "{told}");
+    let reported = String::from_utf8_lossy(&closed.stderr).into_owned();
+    assert!(closed.status.code() == Some(1) && reported.starts_with("error: stdout: is closed"), "{reported}");
     let mut left = command(run).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(left.stdout.take());
     let left = left.wait_with_output().unwrap();
@@ -132,7 +132,7 @@ fn inputs_over_time_are_followed_without_delay() {
     };
     let away = csv("time,gap_offset\n0,0\n0.01,2e-3\n").1;
     assert!(least(&away) > least(&plain.1) + 1e-3, "{} {}", least(&away), least(&plain.1));
-    for (inputs, more, told) in [
+    for (inputs, more, reported) in [
         ("time,sped\n0,1\n", &[][..], "inputs.csv, `sped`: no such variable. Did you mean `speed`?"),
         ("time,torque\n0,1\n", &[], "inputs.csv, `torque`: it cannot change during a run"),
         ("time,speed\n0,100\n0.01,1e9\n", &[], "variable `speed`: its derivative"),
@@ -145,7 +145,7 @@ fn inputs_over_time_are_followed_without_delay() {
         fs::write(project.path("inputs.csv"), inputs).unwrap();
         let output = project.run(&[&["run", "scene.toml", "--quiet", "--inputs", "inputs.csv"], more].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();
-        assert!(!output.status.success() && stderr.contains(told), "{inputs}: {stderr}");
+        assert!(!output.status.success() && stderr.contains(reported), "{inputs}: {stderr}");
     }
 }
 
@@ -180,8 +180,8 @@ fn a_run_is_warned_for_the_step_it_takes() {
         stderr.lines().filter(|line| line.contains("not resolved")).map(str::to_owned).collect::<Vec<_>>()
     };
     assert_eq!(warnings(&[]), Vec::<String>::new());
-    let told = warnings(&["--step", "2.5e-3"]);
-    assert!(told.len() == 1 && told[0].contains("2.500e-3"), "{told:?}");
+    let reported = warnings(&["--step", "2.5e-3"]);
+    assert!(reported.len() == 1 && reported[0].contains("2.500e-3"), "{reported:?}");
 }
 
 #[test]

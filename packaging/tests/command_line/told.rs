@@ -29,14 +29,14 @@ fn warnings_are_on_stderr_even_when_quiet_and_in_json() {
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         let json = if arguments[0] == "inspect" { &json["scene"] } else { &json };
         let details = json["warning_details"].as_array().unwrap();
-        let told: Vec<String> = details
+        let reported: Vec<String> = details
             .iter()
             .map(|one| {
                 let text = |key: &str| one[key].as_str().unwrap();
                 format!("{} [{}] {}\n    {}", text("level"), text("id"), text("problem"), text("remedy"))
             })
             .collect();
-        assert_eq!(told, shown, "{arguments:?}");
+        assert_eq!(reported, shown, "{arguments:?}");
         assert_eq!(json["warnings"].as_array().unwrap().len(), 2, "{arguments:?}");
     }
 }
@@ -102,8 +102,8 @@ fn slips_are_refused_by_every_command_unless_they_are_meant() {
         let meant = if line.contains("fmu") { words } else { [&words[..], &["--accept-implausible"]].concat() };
         let output = project.run(&meant);
         let stderr = String::from_utf8(output.stderr).unwrap();
-        let told: Vec<_> = stderr.lines().filter(|text| text.contains("[implausible]")).collect();
-        assert!(output.status.success() && told.len() == 1 && told[0].contains("4297 m/s"), "{line}: {stderr}");
+        let reported: Vec<_> = stderr.lines().filter(|text| text.contains("[implausible]")).collect();
+        assert!(output.status.success() && reported.len() == 1 && reported[0].contains("4297 m/s"), "{line}: {stderr}");
     }
     // A ROM by hand in millimetres.
     let path = project.path("small.rom.safetensors");
@@ -167,7 +167,7 @@ fn what_comes_up_in_a_run_is_told_once() {
     fs::write(project.path("scene.toml"), scene).unwrap();
     let output = project.run(&["run", "scene.toml", "--json", "--quiet"]);
     let stderr = String::from_utf8(output.stderr.clone()).unwrap();
-    let told: Vec<&str> = stderr.lines().filter(|line| line.contains("have missed the tolerance")).collect();
-    assert!(output.status.success() && told.len() == 1, "{stderr}");
+    let reported: Vec<&str> = stderr.lines().filter(|line| line.contains("have missed the tolerance")).collect();
+    assert!(output.status.success() && reported.len() == 1, "{stderr}");
     assert_eq!(json(&output)["warnings"].as_array().unwrap().len(), warnings(&stderr).len(), "{stderr}");
 }

@@ -99,8 +99,8 @@ fn numbers_in_errors_are_short() {
         ("ramp_time = 0.02", "ramp_time = 1e300", "1e300"),
     ] {
         fs::write(project.path("wrong.toml"), SCENE.replacen(from, to, 1)).unwrap();
-        let told = project.fail(&["run", "wrong.toml"], 1);
-        assert!(told.contains(number) && told.len() < 300, "{told}");
+        let reported = project.fail(&["run", "wrong.toml"], 1);
+        assert!(reported.contains(number) && reported.len() < 300, "{reported}");
     }
     for (arguments, number) in [
         (["--set", "damping_ratio=1e300"], "1e300"),
@@ -109,8 +109,8 @@ fn numbers_in_errors_are_short() {
         (["--stop", "-1e300"], "-1e300"),
         (["--step", "-1e300"], "-1e300"),
     ] {
-        let told = project.fail(&[&["run", "scene.toml"], &arguments[..]].concat(), 2);
-        assert!(told.contains(number) && told.len() < 300, "{told}");
+        let reported = project.fail(&[&["run", "scene.toml"], &arguments[..]].concat(), 2);
+        assert!(reported.contains(number) && reported.len() < 300, "{reported}");
     }
 }
 

@@ -3,7 +3,7 @@
 mod sets;
 mod tips;
 
-use crate::guide::told;
+use crate::guide::print_row;
 use std::{
     f64::consts::TAU,
     fs,
@@ -91,10 +91,10 @@ fn command() -> String {
 #[test]
 fn a_mesh_of_gmsh_becomes_a_running_scene_as_the_guide_tells() {
     let project = ModelProject::new(&["blade_hex20.inp"]);
-    let told = project.succeed(&command());
-    assert_eq!(told["rom"]["sectors"], 36);
-    assert_eq!(told["model"]["sets"]["TIP"], 53);
-    assert!((told["model"]["mass"].as_f64().unwrap() - 0.0771).abs() < 1e-4);
+    let reported = project.succeed(&command());
+    assert_eq!(reported["rom"]["sectors"], 36);
+    assert_eq!(reported["model"]["sets"]["TIP"], 53);
+    assert!((reported["model"]["mass"].as_f64().unwrap() - 0.0771).abs() < 1e-4);
     // Seven patches are as wide as the six elements along the tip allow, in two rows at its sides.
     let rom = project.rom("blade.rom.safetensors");
     assert_eq!((rom.contact_nodes.len(), rom.rows()), (14, 2));
@@ -158,8 +158,8 @@ fn gmsh_sector_has_the_frequencies_of_calculix() {
     let line = "reduce sector sector.msh --contact-set TIP --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --young 210e9 --poisson 0.3 --density 7850 --contact-nodes 3 --modes 12 \
                 --inp sector_out.inp --vtk sector.vtu";
-    let told = project.succeed(line);
-    let faces = &told["model"]["faces"];
+    let reported = project.succeed(line);
+    let faces = &reported["model"]["faces"];
     assert!(faces["largest_mismatch"].as_f64().unwrap() < 1e-12 && faces["swapped"] == false, "{faces}");
     let rom = project.rom("sector.rom.safetensors");
     assert_eq!((rom.sectors, rom.extras.harmonics.len()), (12, 6));
@@ -219,7 +219,7 @@ fn patches_of_other_elements_are_as_soft() {
     let all = |contact: &str| files.each_ref().map(|file| radial(file, contact));
     let (nodes, patches) = (all("--contact-nodes 5"), all("--contact-patches 5 --contact-rows 1"));
     for (kind, (node, patch)) in kinds.iter().zip(nodes.into_iter().zip(patches)) {
-        told!("| {kind} | {node} | {patch} |");
+        print_row!("| {kind} | {node} | {patch} |");
     }
     let apart = |values: [f64; 3]| {
         values.iter().fold(0.0, |a: f64, b| a.max(*b)) / values.iter().fold(f64::INFINITY, |a, b| a.min(*b)) - 1.0
@@ -232,10 +232,10 @@ fn patches_of_other_elements_are_as_soft() {
 fn effects_of_spin_are_computed_for_a_mesh_of_ones_own() {
     let project = ModelProject::new(&["blade_tet10.msh"]);
     let line = "reduce blade blade_tet10.msh --contact-set TIP --clamp-set ROOT --units mm-t-s --material titanium --spin 1500";
-    let told = project.succeed(line);
-    assert_eq!(told["rom"]["spin"]["largest_speed"], 1500.0);
-    let check = &told["spin"][1];
-    let (rest, spinning) = (told["rom"]["checks"][0]["full_hz"].as_f64().unwrap(), &check["full_frequencies"][0]);
+    let reported = project.succeed(line);
+    assert_eq!(reported["rom"]["spin"]["largest_speed"], 1500.0);
+    let check = &reported["spin"][1];
+    let (rest, spinning) = (reported["rom"]["checks"][0]["full_hz"].as_f64().unwrap(), &check["full_frequencies"][0]);
     assert!(spinning.as_f64().unwrap() > 1.005 * rest, "{spinning} {rest}");
 }
 
@@ -312,8 +312,8 @@ fn a_casing_of_ones_own_is_the_casing_that_ships() {
     let file = format!(
         "reduce casing-mesh ring.inp --contact-set INNER --clamp-set CLAMPED --contact-axial 0.0026:0.038 {common}"
     );
-    let told = project.succeed(&format!("{file} -o own.rom.safetensors"));
-    assert_eq!(told["model"]["contact_nodes"].as_array().unwrap().len(), 24);
+    let reported = project.succeed(&format!("{file} -o own.rom.safetensors"));
+    assert_eq!(reported["model"]["contact_nodes"].as_array().unwrap().len(), 24);
     let (ships, own) = (project.rom("ships.rom.safetensors"), project.rom("own.rom.safetensors"));
     assert_eq!(own.extras.grid, ships.extras.grid);
     for (own, ships) in own.contact_nodes.iter().zip(&ships.contact_nodes) {
@@ -398,9 +398,9 @@ fn accepts_contact_node_numbers_and_rejects_wrong_tips_and_axes() {
     let project = ModelProject::new(&["blade_hex8.inp"]);
     let line =
         "reduce blade blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";
-    let told = project.succeed(&format!("{line} --contact-set TIP --contact-nodes 3 -o set.rom.safetensors"));
+    let reported = project.succeed(&format!("{line} --contact-set TIP --contact-nodes 3 -o set.rom.safetensors"));
     let numbers: Vec<String> =
-        told["model"]["contact_nodes"].as_array().unwrap().iter().map(|node| node["node"].to_string()).collect();
+        reported["model"]["contact_nodes"].as_array().unwrap().iter().map(|node| node["node"].to_string()).collect();
     project.succeed(&format!("{line} --contact-set {} -o numbers.rom.safetensors", numbers.join(",")));
     let [by_set, by_number] = ["set", "numbers"].map(|name| project.rom(&format!("{name}.rom.safetensors")));
     assert_eq!(by_set.contact_map, by_number.contact_map);

@@ -195,8 +195,8 @@ fn totals(total: &Value, cheapest: &str) {
 }
 
 /// Of a ROM from a file no finer model is known: no error of it is a total one, and what the ROM says of itself stands beside.
-fn errors_of_a_file(root: &Path, told: &str) {
-    let json: Value = serde_json::from_str(told).unwrap();
+fn errors_of_a_file(root: &Path, reported: &str) {
+    let json: Value = serde_json::from_str(reported).unwrap();
     let of = &json["results"]["own_model"];
     assert_eq!([&of["refined"], &of["not_refined"]], [&json!(["steps"]), &json!(["modes", "nodes", "mesh"])], "{of:#}");
     assert!(of["truth"].as_str().unwrap().contains("the model of the scene") && of["readable"].is_null(), "{of:#}");
@@ -276,14 +276,14 @@ fn the_study_of_stability_answers_as_runs_do() {
     assert_eq!(points.len(), 8);
     for point in points {
         let [friction, speed, step] = ["friction", "speed", "internal_step"].map(|name| number(point, name));
-        let told = three_steps(root.path(), [friction, speed, step], "modal-exact + lcp");
+        let reported = three_steps(root.path(), [friction, speed, step], "modal-exact + lcp");
         match point["refusal"].as_str() {
             // What and where stand apart in JSON.
             Some(text) => {
-                let told = told["error"]["problem"].as_str().unwrap();
-                assert!(text.starts_with(told), "{text} {told}");
+                let reported = reported["error"]["problem"].as_str().unwrap();
+                assert!(text.starts_with(reported), "{text} {reported}");
             }
-            None => assert_eq!(told["warnings"], point["warnings"], "{point:#}"),
+            None => assert_eq!(reported["warnings"], point["warnings"], "{point:#}"),
         }
     }
     let answers: Vec<&str> = points.iter().map(|point| point["answer"].as_str().unwrap()).collect();
@@ -298,8 +298,8 @@ fn the_study_of_stability_answers_as_runs_do() {
         }
         for (factor, accepted) in [(0.999, true), (1.02, false)] {
             let step = factor * number(limit, "step");
-            let told = three_steps(root.path(), [0.15, 1800.0, step], limit["method"].as_str().unwrap());
-            assert_eq!(told["error"].is_null(), accepted, "{limit:#} {told:#}");
+            let reported = three_steps(root.path(), [0.15, 1800.0, step], limit["method"].as_str().unwrap());
+            assert_eq!(reported["error"].is_null(), accepted, "{limit:#} {reported:#}");
         }
     }
     for row in columns(&root.path().join("out/answers.csv")).1 {
@@ -373,8 +373,8 @@ fn convergence_study_reports_what_it_cannot_refine() {
     assert_eq!(scope["coarser_only"], json!(["modes of rotor"]));
     assert_eq!(scope["not_refined"], json!(["contact nodes of rotor", "mesh of rotor"]));
     let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
-    let told = "finer levels: internal step; coarser levels only: modes of rotor; not refined: contact nodes of rotor, mesh of rotor";
-    assert!(page.contains(told) && !page.to_lowercase().contains("total"), "{told}");
+    let reported = "finer levels: internal step; coarser levels only: modes of rotor; not refined: contact nodes of rotor, mesh of rotor";
+    assert!(page.contains(reported) && !page.to_lowercase().contains("total"), "{reported}");
     // Nothing to write is told, where nothing was found; directories of files are made, as those of all outputs are.
     let (text, _) = tiprub(
         root.path(),
@@ -465,22 +465,22 @@ fn what_the_mesh_leaves_is_found_and_goes_with_the_rom() {
     // What falls from level to level has a limit, and the scene is farther from it than from the finest mesh.
     assert_eq!(found.is_some(), changes[0] > 1.2 * changes[1], "{mesh:#}");
     assert!(found.is_none_or(|found| found > changes[1]), "{mesh:#}");
-    let told = |command: &[&str]| tiprub(root.path(), "", command).0;
-    let inspected: Value = serde_json::from_str(&told(&["inspect", "known.rom.safetensors", "--json"])).unwrap();
+    let reported = |command: &[&str]| tiprub(root.path(), "", command).0;
+    let inspected: Value = serde_json::from_str(&reported(&["inspect", "known.rom.safetensors", "--json"])).unwrap();
     let errors = &inspected["rom"]["rub_errors"];
     assert_eq!(errors["mesh"].as_f64(), found, "{errors}");
     assert!(errors["found_on"].as_str().unwrap().starts_with("rotor37_rub_one_row, "), "{errors}");
     fs::write(root.path().join("known.toml"), around("known.rom.safetensors")).unwrap();
-    let run = told(&["run", "known.toml", "--stop", "1e-4", "--quiet"]);
+    let run = reported(&["run", "known.toml", "--stop", "1e-4", "--quiet"]);
     let last = run.lines().rfind(|line| line.starts_with("estimated error")).unwrap();
     let mesh = found.map_or("mesh unknown".to_owned(), |found| format!("mesh {:.2} %", 100.0 * found));
     assert!(last.contains("steps unknown") && last.contains(&mesh), "{run}");
     // A ROM that nobody asked about tells nothing, and is the file that it was.
-    assert!(!told(&["run", "own.toml", "--stop", "1e-4", "--quiet"]).contains("estimated error"));
+    assert!(!reported(&["run", "own.toml", "--stop", "1e-4", "--quiet"]).contains("estimated error"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
     errors_of_a_file(
         root.path(),
-        &told(&["study", "error", "known.toml", "--quick", "--json", "--quiet", "--window", "2e-3"]),
+        &reported(&["study", "error", "known.toml", "--quick", "--json", "--quiet", "--window", "2e-3"]),
     );
     let again = ["study", "convergence", "own.toml", "--quick", "--into", "known.rom.safetensors"];
     let output = command.current_dir(root.path()).args(again).output().unwrap();
@@ -514,23 +514,23 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
     let refuse = |arguments: &[&str], code: i32| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
         let output = command.current_dir(root.path()).env("TIPRUB_CACHE", "").args(arguments).output().unwrap();
-        let told = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(code), "{told}");
-        assert!(!told.contains("Reducing"), "{told}");
+        let reported = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{reported}");
+        assert!(!reported.contains("Reducing"), "{reported}");
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
-        told
+        reported
     };
     for name in ["map", "error", "stability", "convergence"] {
-        let told = refuse(&["study", name, "builtin:rotor37", "--quick", "--out", "file/out"], 1);
-        assert!(told.contains("file/out: cannot create the directory"), "{told}");
+        let reported = refuse(&["study", name, "builtin:rotor37", "--quick", "--out", "file/out"], 1);
+        assert!(reported.contains("file/out: cannot create the directory"), "{reported}");
     }
-    let told = refuse(&["study", "convergence", "builtin:rotor37", "--quick", "--into", "file/at.rom"], 1);
-    assert!(told.contains("file: cannot create the directory"), "{told}");
-    let told = refuse(&["study", "map", "builtin:cube-between-rings"], 2);
-    assert!(told.contains("`cube` is a free body") && told.contains("rotating master"), "{told}");
+    let reported = refuse(&["study", "convergence", "builtin:rotor37", "--quick", "--into", "file/at.rom"], 1);
+    assert!(reported.contains("file: cannot create the directory"), "{reported}");
+    let reported = refuse(&["study", "map", "builtin:cube-between-rings"], 2);
+    assert!(reported.contains("`cube` is a free body") && reported.contains("rotating master"), "{reported}");
     assert!(refuse(&["study", "tip"], 2).contains("Choose `map`, `error`"));
-    let told = refuse(&["study", "error", "builtin:rotor37", "--set", "scheme=film"], 2);
-    assert!(told.contains("--set scheme: the study varies this setting itself"), "{told}");
+    let reported = refuse(&["study", "error", "builtin:rotor37", "--set", "scheme=film"], 2);
+    assert!(reported.contains("--set scheme: the study varies this setting itself"), "{reported}");
 }
 
 #[test]

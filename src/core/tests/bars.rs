@@ -5,7 +5,7 @@ mod guide;
 #[path = "common/rods.rs"]
 mod rods;
 
-use guide::told;
+use guide::print_row;
 use rods::{NEARLY_NONE, SCHEMES, SOLVERS, StraightRod, ascending, quiet_step};
 use tiprub_core::dynamics::modal::{ModalModel, NodePair};
 use tiprub_core::gaps::{FixedGap, GapLaw, PrescribedMotion};
@@ -99,18 +99,18 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> BarRun {
 fn two_bars_meet_and_part_as_plane_waves_say() {
     let exact = carpenter::exact();
     let [touch, release] = [exact.touch, exact.release].map(|time| 1e6 * time);
-    told!("| exact | | {:.1} | {touch:.2} | {release:.2} | {:.4} | 0 |", exact.force, exact.impulse);
-    told!(
+    print_row!("| exact | | {:.1} | {touch:.2} | {release:.2} | {:.4} | 0 |", exact.force, exact.impulse);
+    print_row!(
         "| scheme | solver | elements | force | touch (µs) | release (µs) | impulse (N·s) | loss (%) | loss · 2n | ledger |"
     );
-    told!("|---|---|---|---|---|---|---|---|---|---|");
+    print_row!("|---|---|---|---|---|---|---|---|---|---|");
     for scheme in SCHEMES {
         // With one contact node all solvers have one problem to solve: the others are looked at on the coarsest mesh.
         for (solver, meshes) in SOLVERS.map(|solver| (solver, if solver == Solver::Lcp { 4 } else { 1 })) {
             for elements in [20, 40, 80, 200].into_iter().take(meshes) {
                 let found = collide(elements, scheme, solver);
                 let BarRun { force, touch, release, impulse, energy_loss, residual, momentum } = found;
-                told!(
+                print_row!(
                     "| {scheme:?} | {solver:?} | {elements} | {force:.1} | {:.2} | {:.2} | {impulse:.4} | {:.4} | {:.2} | {residual:.1e} |",
                     touch * 1e6,
                     release * 1e6,

@@ -7,7 +7,7 @@
 #[path = "../../../tests/guide.rs"]
 mod guide;
 
-use guide::told;
+use guide::print_row;
 use nalgebra::DMatrix;
 use tiprub_core::dynamics::bank::BankOptions;
 use tiprub_core::dynamics::modal::ModalModel;
@@ -96,7 +96,7 @@ fn stick_slip_matches_the_closed_form() {
                 (at(4) - at(2) - slide_time - stick_time) / (slide_time + stick_time),
                 (largest - amplitude) / amplitude,
             ];
-            told!(
+            print_row!(
                 "{scheme:?} h = {} µs: first slip, slide, stick, period, amplitude off by {}; ledger {:.1e}",
                 1e6 * step,
                 found.map(|error| format!("{error:.1e}")).join(", "),
@@ -122,7 +122,7 @@ fn block_swings_about_the_friction_force() {
     let (low, high) =
         record.position[steps / 2..].iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
     let (middle, swing) = (0.5 * (low + high), 0.5 * (high - low));
-    told!("middle off by {:.1e}, swing by {:.1e}", middle / rest - 1.0, swing / (BELT / OMEGA) - 1.0);
+    print_row!("middle off by {:.1e}, swing by {:.1e}", middle / rest - 1.0, swing / (BELT / OMEGA) - 1.0);
     assert!((middle / rest - 1.0).abs() < 1e-3);
     assert!((swing / (BELT / OMEGA) - 1.0).abs() < 5e-3);
 }
@@ -166,7 +166,7 @@ fn adaptive_tolerance_matches_stick_slip_closed_form() {
     let (longest, count) = (2e-3, 500);
     let block = ThrownBlock { mass: MASS, omega: OMEGA, flexibility: FLEXIBILITY, friction: FORCE, velocity: THROWN };
     let exact = block.motion(longest, count);
-    told!("it stops {} times", exact.stops);
+    print_row!("it stops {} times", exact.stops);
     for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
         let mut system = by_tolerance(tolerance, longest);
         let mut worst = 0.0_f64;
@@ -179,7 +179,7 @@ fn adaptive_tolerance_matches_stick_slip_closed_form() {
         let (kinetic, strain) = system.energies();
         let residual = system.ledger().residual(kinetic + strain).abs() / system.ledger().scale();
         let (steps, trials) = (effort.steps, effort.trials);
-        told!(
+        print_row!(
             "tolerance {tolerance:.0e}: error {:.2} of it after {count} longest steps, {steps} steps, {trials} trials",
             error / tolerance
         );

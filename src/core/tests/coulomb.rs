@@ -167,7 +167,7 @@ fn random_problem(lcg: &mut Lcg, contacts: usize, kind: usize) -> (DMatrix<f64>,
 
 #[test]
 fn random_problems_are_all_solved() {
-    let (mut lcg, mut told) = (Lcg(20), 0.0_f64);
+    let (mut lcg, mut reported) = (Lcg(20), 0.0_f64);
     for case in 0..1000 {
         let (kind, contacts) = (case % 8, 1 + lcg.below(30));
         let contacts = if kind == 1 { contacts.next_multiple_of(3) } else { contacts };
@@ -187,14 +187,14 @@ fn random_problems_are_all_solved() {
         let what = format!("case {case}, kind {kind}, {contacts} contacts, friction {common}");
         assert!(outcome.solved && outcome.residual <= 1e-12, "{what}: {outcome:?}");
         assert!(worst <= 2e-12, "{what}: violation {worst:e}");
-        told = told.max(outcome.residual);
+        reported = reported.max(outcome.residual);
         let sum = |row: usize| free[row] + (0..3 * contacts).map(|j| w[(row, j)] * solver.reactions[j]).sum::<f64>();
         for row in 0..3 * contacts {
             let terms: f64 = (0..3 * contacts).map(|j| (w[(row, j)] * solver.reactions[j]).abs()).sum();
             assert!((solver.relative[row] - sum(row)).abs() <= 1e-13 * (terms + free[row].abs()), "{what}");
         }
     }
-    assert!(told > 1e-17, "residuals of 1000 problems are not all exactly zero: {told:e}");
+    assert!(reported > 1e-17, "residuals of 1000 problems are not all exactly zero: {reported:e}");
 }
 
 /// One row of the reference file.

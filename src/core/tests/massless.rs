@@ -5,7 +5,7 @@ mod guide;
 #[path = "common/rods.rs"]
 mod rods;
 
-use guide::told;
+use guide::print_row;
 use nalgebra::DMatrix;
 use rods::{NEARLY_NONE, StraightRod};
 use tiprub_core::dynamics::modal::ModalModel;
@@ -41,7 +41,7 @@ fn system(model: &ModalModel, scheme: Scheme, step: f64) -> System {
 #[test]
 fn a_bar_bounces_off_without_impact_loss() {
     let exact = carpenter::exact();
-    told!("exact: {:.2} to {:.2} us, {:.4} N.s, loss 0", 1e6 * exact.touch, 1e6 * exact.release, exact.impulse);
+    print_row!("exact: {:.2} to {:.2} us, {:.4} N.s, loss 0", 1e6 * exact.touch, 1e6 * exact.release, exact.impulse);
     // With 1e-4 of its mass one mode stands for the flexibility of the end node alone.
     for (scheme, end_mass, losses) in
         [(Scheme::MasslessBoundary, NEARLY_NONE, [0.0, 1e-3]), (Scheme::ModalExact, 1.0, [5e-3, 0.02])]
@@ -67,7 +67,7 @@ fn a_bar_bounces_off_without_impact_loss() {
         }
         let (kinetic, strain) = system.energies();
         let loss = 1.0 - (kinetic + strain) / (before.0 + before.1);
-        told!(
+        print_row!(
             "{scheme:?}: contact {:.2} to {:.2} us, impulse {impulse:.4} N.s, loss {loss:.2e}, booked {:.2e}, ledger {:.1e}",
             touched * 1e6,
             released * 1e6,
@@ -90,7 +90,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
     model.damping_ratios.fill(damping_ratio);
     let check = MasslessCheck { model: &model, normals: vec![[-1.0, 0.0, 0.0]], slaves: Vec::new() };
     let limit = check.limit(1.0).unwrap().closed;
-    told!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
+    print_row!("ξ = {damping_ratio}: limit {limit:.3e} s, {:.2} of 2/ω_max", limit * model.largest_frequency() / 2.0);
     let law = FixedGap { normals: vec![[-1.0, 0.0, 0.0]], gaps: vec![-1e-4], sliding: vec![[0.0; 3]] };
     let settings = SystemSettings { scheme: Scheme::MasslessBoundary, solver: Solver::Lcp, ledger: true };
     let mut pressed = System::new(&model, 1, GapLaw::Fixed(law), 0.0, settings);
@@ -118,7 +118,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
 #[test]
 fn closed_contact_is_stable_up_to_the_limit_and_not_beyond() {
     let (stable, unstable) = (pressed(0.0, 0.8).0, pressed(0.0, 1.1).0);
-    told!("largest energy {stable:.1e} J below, {unstable:.1e} J above");
+    print_row!("largest energy {stable:.1e} J below, {unstable:.1e} J above");
     assert!(unstable > 1e3 * stable && pressed(0.05, 0.7).1 < 1e-9 && pressed(0.05, 1.05).1 > 1e-3);
 }
 
@@ -144,7 +144,7 @@ fn damping_is_part_of_the_limit() {
             if root < 0.0 { mode.beta.sqrt() } else { 0.5 * (sum.abs() + root.sqrt()) }
         };
         let (below, above) = (radius(0.99 * limit), radius(1.01 * limit));
-        told!("ξ = {damping_ratio}: limit {limit:.3e} s, largest root {below:.4} below, {above:.4} above");
+        print_row!("ξ = {damping_ratio}: limit {limit:.3e} s, largest root {below:.4} below, {above:.4} above");
         assert!(below < 1.0 + 1e-12 && above > 1.0, "ξ = {damping_ratio}");
     }
 }
@@ -192,7 +192,7 @@ fn a_flexible_slave_is_part_of_the_limit() {
             assert!((halves / limit - 1.0).abs() < 1e-9, "{halves} and {limit}");
             let first = (1..).map(|i| 1e-3 * f64::from(i)).find(|step| joined([own, slave], [1.0, seen], *step) > 1e3);
             let first = first.unwrap();
-            told!(
+            print_row!(
                 "ω = {own} against {slave}, seen {seen}: limit {limit:.3} s, unstable from {first:.3} s, {alone:.3} s alone"
             );
             assert!(limit < alone && limit < first + 1e-3 && limit > 0.95 * first, "{limit} of {first}");
@@ -238,7 +238,7 @@ fn friction_opposes_sliding_however_short_the_step_is() {
             }
             system.bank().row(1, 0)
         });
-        told!("{solver:?}: {ends:?}");
+        print_row!("{solver:?}: {ends:?}");
         assert!(ends[0].abs() > 1e-6 && (ends[1] - ends[2]).abs() < 0.2 * (ends[0] - ends[2]).abs(), "{ends:?}");
     }
 }

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use guide::told;
+use guide::print_row;
 use tiprub_core::rom::DisplacementFrame;
 use tiprub_core::settings::StructureSettings;
 use tiprub_core::{Rom, Scene, Simulation};
@@ -129,7 +129,7 @@ fn the_hot_running_clearance_is_that_of_the_closed_forms() {
         let expected = GAP - growth - expansion + opening;
         let found = clearance(&scene, speed, temperatures);
         let (millimetres, error) = ([expected, found].map(|value| 1e3 * value), 1e9 * (found - expected));
-        told!(
+        print_row!(
             "| {state} | {speed} | {} | {} | {:.4} | {:.4} | {error:.2} |",
             temperatures[0],
             temperatures[1],

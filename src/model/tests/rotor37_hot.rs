@@ -1,6 +1,6 @@
 //! Hot running clearance of rotor 37 against CalculiX: the blade turns, warms up and softens, and the gap at its tip closes.
 
-use guide::told;
+use guide::print_row;
 use tiprub_core::rom::ContactNode;
 use tiprub_core::settings::{Meridian, SpinSettings};
 use tiprub_core::{Rom, Scene, Simulation};
@@ -87,7 +87,7 @@ fn the_hot_running_clearance_of_rotor37_is_that_of_calculix() {
                 found.iter().zip(&expected).map(|(found, expected)| 1e6 * (found - expected).abs()).fold(0.0, f64::max);
             let change = [0, NODES / 2, NODES - 1].map(|node| 1e6 * (expected[node] - cold[node]));
             let [leading, middle, trailing] = change;
-            told!("| {analysis} | {state} | {leading:.1} | {middle:.1} | {trailing:.1} | {off:.2} |");
+            print_row!("| {analysis} | {state} | {leading:.1} | {middle:.1} | {trailing:.1} | {off:.2} |");
             // Directions of the linear growth are those of the fit at speed; what heat and speed do together is left out.
             let most = if state == "warm" || (stiffening && state == "spin") { 0.12 } else { 2.0 };
             assert!(off < most, "{analysis} {state}: {off} µm");

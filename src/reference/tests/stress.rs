@@ -21,15 +21,15 @@ fn recorded() -> Vec<StressRow> {
 #[test]
 fn stress_of_a_pushed_blade_is_that_of_calculix() {
     let blade = PushedBlade::new().unwrap();
-    let told = blade.unit_stresses().unwrap();
+    let reported = blade.unit_stresses().unwrap();
     let rows = recorded();
     assert_eq!(
         rows.iter().map(|row| row.0).collect::<Vec<_>>(),
         PushedBlade::places().map(|one| one.1).collect::<Vec<_>>()
     );
-    let largest = told.iter().map(|(_, stress)| equivalent(*stress)).fold(0.0, f64::max);
-    let farthest = told.iter().flat_map(|(moved, _)| moved).fold(0.0, |most: f64, one| most.max(one.abs()));
-    for ((node, moved, same, own), (ours, stress)) in rows.into_iter().zip(&told) {
+    let largest = reported.iter().map(|(_, stress)| equivalent(*stress)).fold(0.0, f64::max);
+    let farthest = reported.iter().flat_map(|(moved, _)| moved).fold(0.0, |most: f64, one| most.max(one.abs()));
+    for ((node, moved, same, own), (ours, stress)) in rows.into_iter().zip(&reported) {
         let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
         let [same, own] = [same, own].map(|stress| blade.turned(node, stress));
         println!(

@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_told_with_its_line() {
-        for (text, told) in [
+        for (text, reported) in [
             ("", "its first line \"\" is not a header"),
             ("t,a\n0,1\n", "its first line \"t,a\" is not a header"),
             ("time\n0\n", "its first line \"time\" is not a header"),
@@ -292,7 +292,7 @@ mod tests {
             ("time,a\n0,1\n1\n", "1 fields"),
         ] {
             let failure = parsed(text).unwrap_err().to_string();
-            assert!(failure.contains(told), "{text:?}: {failure}");
+            assert!(failure.contains(reported), "{text:?}: {failure}");
         }
     }
 }

@@ -322,26 +322,26 @@ mod tests {
         let all = [Estimate::unknown("modes", "refused"), known.clone(), Estimate::unknown("mesh", "no other")];
         let all = all.map(|estimate| estimate.or_of(&rom));
         assert_eq!(all[1], known, "what the run tells stays");
-        let told = errors_text(&all);
+        let reported = errors_text(&all);
         assert!(
-            told.ends_with("modes unknown, patches along the chord 1.00 %; from the ROM, for a light rub: mesh 5.00 %"),
-            "{told}"
+            reported.ends_with("modes unknown, patches along the chord 1.00 %; from the ROM, for a light rub: mesh 5.00 %"),
+            "{reported}"
         );
-        let told = super::errors_text(&of_rom(&rom));
+        let reported = super::errors_text(&of_rom(&rom));
         assert!(
-            told.contains(
+            reported.contains(
                 "steps unknown, modes unknown, rows of patches across the thickness unknown; from the ROM, for a light \
                  rub: patches along the chord 2.00 %, mesh 5.00 %"
             ),
-            "{told}"
+            "{reported}"
         );
         rom.checks.rub_errors = Some(RubErrors { rows: Some(0.28), ..RubErrors::default() });
-        let told = super::errors_text(&of_rom(&rom));
+        let reported = super::errors_text(&of_rom(&rom));
         assert!(
-            told.ends_with(
+            reported.ends_with(
                 "mesh unknown; from the ROM, for an unnamed rub: rows of patches across the thickness 28.00 %"
             ),
-            "{told}"
+            "{reported}"
         );
         rom.checks.rub_errors = Some(RubErrors { found_on: "nothing".into(), ..RubErrors::default() });
         assert!(of_rom(&rom).is_empty());

@@ -223,8 +223,8 @@ fn heat_from_gas_and_air_is_what_their_films_let_through() {
         before = after;
     }
     for ((sum, name), start) in sums.into_iter().zip(["gas_heat", "ambient_heat"]).zip(start) {
-        let told = get(&simulation, name) - start;
-        assert!((sum - told).abs() < 1e-8 * told.abs(), "{name}: {told} against {sum}");
+        let reported = get(&simulation, name) - start;
+        assert!((sum - reported).abs() < 1e-8 * reported.abs(), "{name}: {reported} against {sum}");
     }
 }
 

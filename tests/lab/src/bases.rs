@@ -301,7 +301,7 @@ fn statements(all: &[BasisModel], bases: &[BasisChoice], covered: usize) -> Vec<
         })
     };
     let flexibility = all.iter().map(|one| one.flexibility).fold(0.0, f64::max);
-    let told = |value: &dyn Fn(&BasisModel) -> f64| {
+    let reported = |value: &dyn Fn(&BasisModel) -> f64| {
         let each = pairs().map(|(held, free)| format!("{:.1e} / {:.1e}", value(held), value(free)));
         each.collect::<Vec<_>>().join("; ")
     };
@@ -327,12 +327,12 @@ fn statements(all: &[BasisModel], bases: &[BasisChoice], covered: usize) -> Vec<
                  number of fixed-interface modes"
             ),
             pairs().filter(|(held, _)| held.modes >= covered).all(|(held, free)| free.response < held.response),
-            told(&|one| one.response),
+            reported(&|one| one.response),
         ),
         Statement::tested(
             "With the most modes, free-interface modes also have a smaller error in a light rub",
             smaller,
-            told(&|one| one.same),
+            reported(&|one| one.same),
         ),
         Statement::tested(
             "With the most modes and no inertia at the contact (massless-boundary), free-interface modes have a \
@@ -341,7 +341,7 @@ fn statements(all: &[BasisModel], bases: &[BasisChoice], covered: usize) -> Vec<
                 (Some(held), Some(free)) => free.massless < held.massless,
                 _ => false,
             }),
-            told(&|one| one.massless),
+            reported(&|one| one.massless),
         ),
         Statement::remark("Largest steps of massless-boundary with closed contact", steps.join("; ")),
     ]

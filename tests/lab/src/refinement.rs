@@ -202,13 +202,13 @@ const HEADINGS: [&str; 7] =
 
 /// "1.2 %"; in brackets how far it is from the finest level, where no limit is read.
 fn percent(error: Option<f64>, to_finest: Option<f64>) -> String {
-    let told = |error: f64| match 100.0 * error {
+    let reported = |error: f64| match 100.0 * error {
         small if small < 0.095 => format!("{small:.3} %"),
         other => format!("{other:.2} %"),
     };
     match (error, to_finest) {
-        (Some(error), _) => told(error),
-        (None, Some(other)) if other > 0.0 => format!("({})", told(other)),
+        (Some(error), _) => reported(error),
+        (None, Some(other)) if other > 0.0 => format!("({})", reported(other)),
         (None, _) => "-".into(),
     }
 }

@@ -57,10 +57,10 @@ fn the_judge_sees_every_way_to_fail() {
     let root = tempfile::tempdir().unwrap();
     // What is not sound is a failure of the command, with the table written all the same.
     let failure = stability(root.path(), &["--case", "judge/"], 1);
-    let told = failure.to_string();
+    let reported = failure.to_string();
     assert!(
-        told.contains("21 of 21 cases are neither right nor refused") && told.contains("WRONG judge/wrong"),
-        "{told}"
+        reported.contains("21 of 21 cases are neither right nor refused") && reported.contains("WRONG judge/wrong"),
+        "{reported}"
     );
     let written = std::fs::read_to_string(root.path().join("out").join("results.json")).unwrap();
     let json: Value = serde_json::from_str(&written).unwrap();
@@ -103,8 +103,8 @@ fn the_judge_sees_every_way_to_fail() {
         ("momentum-1e-9", "change of momentum from the impulse"),
     ] {
         assert_eq!(verdict(name), "WRONG", "{name}");
-        let told = happened(name);
-        assert!(told.contains(check) && !told.contains("refused") && !told.contains("not fulfilled"), "{name}: {told}");
+        let reported = happened(name);
+        assert!(reported.contains(check) && !reported.contains("refused") && !reported.contains("not fulfilled"), "{name}: {reported}");
     }
 }
 
@@ -117,16 +117,16 @@ fn wrong_places_for_results_are_told_before_the_first_case() {
     let refuse = |arguments: &[&str], code: i32| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
         let output = command.current_dir(root.path()).arg("stability").args(arguments).output().unwrap();
-        let told = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(code), "{told}");
-        assert!(!path("out").exists() && !told.contains("Stability"), "{told}");
-        told
+        let reported = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{reported}");
+        assert!(!path("out").exists() && !reported.contains("Stability"), "{reported}");
+        reported
     };
-    let told = refuse(&["--case", "judge/hang", "--out", "file/out"], 1);
-    assert!(told.contains("file/out: cannot create the directory"), "{told}");
+    let reported = refuse(&["--case", "judge/hang", "--out", "file/out"], 1);
+    assert!(reported.contains("file/out: cannot create the directory"), "{reported}");
     // Nothing is written over what is read.
     std::fs::create_dir(path("results")).unwrap();
     std::fs::write(path("results/index.html"), "").unwrap();
-    let told = refuse(&["--out", "results", "--library", "results/index.html"], 2);
-    assert!(told.contains("is the same file as"), "{told}");
+    let reported = refuse(&["--out", "results", "--library", "results/index.html"], 2);
+    assert!(reported.contains("is the same file as"), "{reported}");
 }

@@ -241,11 +241,11 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
     let refuse = |arguments: &[&str], code: i32| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
         let output = command.current_dir(root.path()).env("TIPRUB_CACHE", "").args(arguments).output().unwrap();
-        let told = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(code), "{told}");
-        assert!(!told.contains("Reducing"), "{told}");
+        let reported = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{reported}");
+        assert!(!reported.contains("Reducing"), "{reported}");
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "something stays");
-        told
+        reported
     };
     for name in [
         "convergence",
@@ -261,8 +261,8 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
         "scatter",
         "wear",
     ] {
-        let told = refuse(&[name, "--quick", "--out", "file/out"], 1);
-        assert!(told.contains("file/out: cannot create the directory"), "{told}");
+        let reported = refuse(&[name, "--quick", "--out", "file/out"], 1);
+        assert!(reported.contains("file/out: cannot create the directory"), "{reported}");
     }
 }
 
@@ -358,8 +358,8 @@ fn any_scene_of_blades_meets_a_witness_of_its_own() {
     let whirl = file("whirl", "whirl = true", "gap = 3.56e-4");
     let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
     let output = command.current_dir(root.path()).args(["beside", &whirl, "--out", "none"]).output().unwrap();
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success() && told.contains("whirl") && told.contains("a moving shaft"), "{told}");
+    let reported = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && reported.contains("whirl") && reported.contains("a moving shaft"), "{reported}");
 }
 
 #[test]

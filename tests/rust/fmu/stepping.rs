@@ -371,13 +371,13 @@ fn what_holds_for_the_step_taken_is_logged_once() {
     let api = fmi2::load(&shipped());
     let resources = UnpackedResources::of(&scene, false);
     let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
-    let told = || slave.log().matches("not resolved").count();
-    assert_eq!(told(), 0);
+    let reported = || slave.log().matches("not resolved").count();
+    assert_eq!(reported(), 0);
     let mut time = 0.0;
     let counts = [2e-5, 1.5e-4, 1.5e-4, 2e-5, 1.5e-4].map(|length| {
         assert_eq!(slave.step(time, length), OK, "{}", slave.log());
         time += length;
-        told()
+        reported()
     });
     assert_eq!(counts, [0, 1, 0, 0, 0]);
 }

@@ -132,7 +132,7 @@ fn short_steps_are_warned_of_once_through_both_faces() {
     let path = thermal();
     let (two, three) = (fmi2::load(&path), fmi3::load(&path));
     let resources = UnpackedResources::of_thermal(&ConductionModel { element_time: 0.5, ..model() }, false);
-    let told =
+    let reported =
         |log: String| log.matches("shorter than the 0.500 s that heat needs to diffuse through an element").count();
     for _instance in 0..2 {
         let (old, new) =
@@ -140,12 +140,12 @@ fn short_steps_are_warned_of_once_through_both_faces() {
         new.initialise();
         old.expect(old.step(0.0, 0.6));
         new.expect(new.step(0.0, 0.6).status);
-        assert_eq!((told(old.log()), told(new.log())), (0, 0));
+        assert_eq!((reported(old.log()), reported(new.log())), (0, 0));
         for (step, expected) in [(0, 1), (1, 0)] {
             let time = 0.6 + 0.1 * f64::from(step);
             old.expect(old.step(time, 0.1));
             new.expect(new.step(time, 0.1).status);
-            assert_eq!((told(old.log()), told(new.log())), (expected, expected), "step {step}");
+            assert_eq!((reported(old.log()), reported(new.log())), (expected, expected), "step {step}");
         }
     }
 }

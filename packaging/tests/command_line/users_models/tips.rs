@@ -42,7 +42,7 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     );
     let run = project.succeed("run scene.toml --stop 0.003");
     assert!(run["last"]["friction_loss"].as_f64().unwrap() > 100.0, "{run:#}");
-    for (line, told) in [
+    for (line, reported) in [
         ("reduce rotor37 --contact-patches 4 --contact-nodes 3", "cannot be used with"),
         ("reduce rotor37 --mesh 6x1x6 --contact-patches 40 --contact-rows 1", "40 is outside 1..=16"),
         (
@@ -50,8 +50,8 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
             "1 names for 2 contact patches",
         ),
     ] {
-        let code = if told.contains("cannot") || told.contains("names") { 2 } else { 1 };
-        assert!(project.fail(line, code).contains(told), "{line}: {}", project.fail(line, code));
+        let code = if reported.contains("cannot") || reported.contains("names") { 2 } else { 1 };
+        assert!(project.fail(line, code).contains(reported), "{line}: {}", project.fail(line, code));
     }
 }
 
@@ -69,13 +69,13 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
     let by_number = format!("reduce blade blade.inp --contact-set {first} --clamp-set HUB");
     let [own, read] = ["own.rom.safetensors", "read.rom.safetensors"].map(|name| project.rom(name));
     assert_eq!([own.rows(), read.rows()], [2, 2]);
-    for (contact, told) in
+    for (contact, reported) in
         [("", "rows across the thickness 2\n"), ("--contact-rows 1", "1: the sides of the tip do not touch")]
     {
         let line = format!("{common} --contact-patches 4 {contact} --force -o told.rom.safetensors");
         let output = project.run(&line);
         let text = String::from_utf8(output.stdout).unwrap();
-        assert!(text.contains(told), "{line}: {text}");
+        assert!(text.contains(reported), "{line}: {text}");
     }
     for (own, read) in own.contact_nodes.iter().zip(&read.contact_nodes) {
         assert_eq!(own.name, read.name);
@@ -107,9 +107,9 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
             .replace("galerkin", "modal-exact")
             .replace("8.0e-5", "5.0e-7"),
     );
-    let told = project.fail("run coated.toml --stop 0.001", 1);
-    assert!(told.contains("contact[1].coating: excludes a ROM with several rows of contact patches"), "{told}");
-    for (line, told, code) in [
+    let reported = project.fail("run coated.toml --stop 0.001", 1);
+    assert!(reported.contains("contact[1].coating: excludes a ROM with several rows of contact patches"), "{reported}");
+    for (line, reported, code) in [
         ("reduce rotor37 --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
         ("reduce stage --contact-rows 2 --contact-nodes 3".to_owned(), "cannot be used with", 2),
         (format!("{by_number} --contact-rows 2 -o no.rom"), "Give the number of patches along the chord", 2),
@@ -120,7 +120,7 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
         ),
         ("reduce rotor37 --mesh 6x1x4 --contact-patches 4 --contact-rows 0".to_owned(), "0 rows of 4 patches", 1),
     ] {
-        assert!(project.fail(&line, code).contains(told), "{line}: {}", project.fail(&line, code));
+        assert!(project.fail(&line, code).contains(reported), "{line}: {}", project.fail(&line, code));
     }
 }
 
@@ -165,10 +165,10 @@ fn the_tip_of_a_mesh_is_found_and_told() {
             project.succeed(&format!("{line} --contact-set TIP {numbers} -o named.rom.safetensors"));
             assert!(project.rom("found.rom.safetensors") == project.rom("named.rom.safetensors"), "{file} {numbers}");
         }
-        let told = String::from_utf8(project.run(&format!("{line} -o text.rom.safetensors")).stdout).unwrap();
+        let reported = String::from_utf8(project.run(&format!("{line} -o text.rom.safetensors")).stdout).unwrap();
         let patches = format!("contact patches           {count} from the detected tip");
         let wanted = ["detected tip", "faces, ", "chord 0.032", &patches];
-        assert!(wanted.iter().all(|part| told.contains(part)), "{told}");
+        assert!(wanted.iter().all(|part| reported.contains(part)), "{reported}");
     }
 }
 
@@ -193,10 +193,10 @@ fn contact_at_points_of_a_fine_tip_is_warned_of() {
         ("blade_hex20.inp --contact-patches 7 --contact-rows 3", None),
         ("blade_hex20.inp --contact-patches 7 --contact-rows 4", Some("4 rows of contact patches across 2 elements")),
     ] {
-        let told = warned(line);
+        let reported = warned(line);
         match wanted {
-            Some(part) => assert!(told.contains(part), "{line}: {told}"),
-            None => assert!(!told.contains("contact at") && !told.contains("contact patches"), "{line}: {told}"),
+            Some(part) => assert!(reported.contains(part), "{line}: {reported}"),
+            None => assert!(!reported.contains("contact at") && !reported.contains("contact patches"), "{line}: {reported}"),
         }
     }
     let own = |patches: usize| -> String {
@@ -255,12 +255,12 @@ fn a_second_surface_as_far_out_is_told_of() {
     let inside = reduce(3.0);
     assert!(!inside["warnings"].to_string().contains("as far out"), "{inside:#}");
     let guide = guide();
-    for told in [
+    for reported in [
         "besides the detected tip, 12 faces that are not connected to it are as far out",
         "contact at a single node of a tip about 6 element edges long",
         "9 contact patches along about 6 element edges",
     ] {
-        assert!(guide.contains(told), "{told}");
+        assert!(guide.contains(reported), "{reported}");
     }
 }
 

@@ -26,7 +26,7 @@ pub struct SpanStep {
 /// A system that is integrated with adaptive steps.
 pub trait AdaptiveStepper {
     /// Energy left by contacts that opened and closed (J), and level of the next step; both go on from step to step.
-    fn pace(&mut self) -> (&mut f64, &mut usize);
+    fn step_control(&mut self) -> (&mut f64, &mut usize);
 
     /// Largest energy up to now, that of the start of the step included (J).
     fn largest_energy(&mut self) -> f64;
@@ -55,7 +55,7 @@ pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Eff
     const WHOLE: u64 = 1 << HALVINGS;
     let (count, mut done) = (body.count(), 0_u64);
     while done < WHOLE {
-        let level = *body.pace().1;
+        let level = *body.step_control().1;
         // The shortest may take two.
         let next = count * if level == HALVINGS { 2 } else { 1 };
         if effort.tried().saturating_add(next) > demand.most {
@@ -65,7 +65,7 @@ pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Eff
         let step = SpanStep { level, from: share(done, WHOLE), length: share(units, WHOLE) };
         if body.fly(step) {
             (effort.steps, effort.flights, done) = (effort.steps + count, effort.flights + count, done + units);
-            *body.pace().1 -= usize::from(level > 0 && done.is_multiple_of(2 * units));
+            *body.step_control().1 -= usize::from(level > 0 && done.is_multiple_of(2 * units));
             continue;
         }
         let (verdict, kind) = attempt(body, step, effort);
@@ -73,11 +73,11 @@ pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Eff
             || (kind == ForceInterpolation::Polynomial
                 && (verdict.misses(demand.tolerance)
                     || (verdict.near && body.length(level) > SHORTEST_LOOK)
-                    || (verdict.switches && verdict.switched > *body.pace().0)
+                    || (verdict.switches && verdict.switched > *body.step_control().0)
                     || (verdict.switched < 0.0
-                        && (level < SAVED && *body.pace().0 > 0.0 || overflows(body, -verdict.switched)))));
+                        && (level < SAVED && *body.step_control().0 > 0.0 || overflows(body, -verdict.switched)))));
         if refused && level < HALVINGS {
-            *body.pace().1 += 1;
+            *body.step_control().1 += 1;
             continue;
         }
         if !verdict.solved {
@@ -85,11 +85,11 @@ pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Eff
         }
         effort.missed += count * u64::from(verdict.misses(demand.tolerance));
         let left = body.take(step, kind, &verdict);
-        *body.pace().0 += left;
+        *body.step_control().0 += left;
         (effort.steps, done) = (effort.steps + count, done + units);
         let even = done.is_multiple_of(2 * units);
         if level > 0 && even && kind == ForceInterpolation::Polynomial && verdict.error < LENGTHEN * demand.tolerance {
-            *body.pace().1 -= 1;
+            *body.step_control().1 -= 1;
         }
     }
     Ok(())
@@ -98,7 +98,7 @@ pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Eff
 /// Whether the bank would hold more than it may with `paid` (J) paid in. Where there was no energy yet, nobody knows what is much.
 fn overflows(body: &mut impl AdaptiveStepper, paid: f64) -> bool {
     let largest = body.largest_energy();
-    largest > 0.0 && *body.pace().0 + paid > FULL * largest
+    largest > 0.0 && *body.step_control().0 + paid > FULL * largest
 }
 
 /// Try one step; the shortest with a constant force where a polynomial cannot be taken.
@@ -112,7 +112,7 @@ fn attempt(body: &mut impl AdaptiveStepper, step: SpanStep, effort: &mut Effort)
         verdict
     };
     let verdict = run(body, ForceInterpolation::Polynomial);
-    let affordable = verdict.solved && !(verdict.switches && verdict.switched > *body.pace().0);
+    let affordable = verdict.solved && !(verdict.switches && verdict.switched > *body.step_control().0);
     if step.level < HALVINGS || affordable {
         return (verdict, ForceInterpolation::Polynomial);
     }

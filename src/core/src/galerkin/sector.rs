@@ -242,7 +242,7 @@ struct SingleSector<'a, W> {
 }
 
 impl<W: Witness> AdaptiveStepper for SingleSector<'_, W> {
-    fn pace(&mut self) -> (&mut f64, &mut usize) {
+    fn step_control(&mut self) -> (&mut f64, &mut usize) {
         (&mut self.state.bank, &mut self.state.level)
     }
 
@@ -283,7 +283,7 @@ impl<W: Witness> AdaptiveStepper for SingleSector<'_, W> {
         }
         witness.record_flight(advance.freely(table, state));
         trial.forget();
-        state.looked = false;
+        state.gaps_known = false;
         true
     }
 

@@ -20,7 +20,7 @@ pub struct SectorState {
     /// Slopes of the forces over the last step (N/s), where contacts may stick; else empty.
     pub slopes: Vec<f64>,
     /// Whether gaps and normals are those of now: nobody looked at the end of free flight.
-    pub looked: bool,
+    pub gaps_known: bool,
     /// Energy that contacts which opened or closed have left to those to come (J).
     pub bank: f64,
     /// Largest energy that has been asked for (J).
@@ -40,7 +40,7 @@ impl SectorState {
             gaps: vec![f64::INFINITY; nodes],
             normals: vec![0.0; 3 * nodes],
             slopes: Vec::new(),
-            looked: true,
+            gaps_known: true,
             bank: 0.0,
             largest: 0.0,
             level: 0,

@@ -22,7 +22,7 @@ const CURVATURE_OF_ALL: f64 = 0.1;
 impl Simulation {
     /// Tell of the first curvature work that is large beside the net work of inputs.
     pub(super) fn note_curvature(&mut self, time: f64) {
-        if self.told.curvature {
+        if self.warning_state.curvature {
             return;
         }
         let found = self.system.ledgers().iter().enumerate().find_map(|(set, ledger)| Some((set, misled(ledger)?)));
@@ -35,7 +35,7 @@ impl Simulation {
             shown_time(time),
             self.of_set(set)
         );
-        self.told.curvature = true;
+        self.warning_state.curvature = true;
         self.note(Warning::new(Topic::CurvatureWork, problem, "Use a smaller internal step"));
     }
 

@@ -52,7 +52,7 @@ pub struct Inputs {
     /// One per structure that carries surfaces.
     pub carriers: Vec<CarrierInputs>,
     /// Shortest time that ramps take from here (s), see [`Inputs::reach`].
-    pub pace: f64,
+    pub extrapolation: f64,
     /// When ramps under way end: offset from the start of the communication step (s).
     pub until: f64,
 }
@@ -60,7 +60,7 @@ pub struct Inputs {
 persist_fields!(RotorInputs { speed, spin, shaft, excitation, temperature });
 persist_fields!(PairInputs { gap_offset, shape_factor, shape_rotation, radius_change });
 persist_fields!(CarrierInputs { load_amplitude, load_phase, temperatures });
-persist_fields!(Inputs { rotors, pairs, carriers, pace, until });
+persist_fields!(Inputs { rotors, pairs, carriers, extrapolation, until });
 
 impl RotorInputs {
     fn moving(&self) -> impl Iterator<Item = &Input> {
@@ -157,13 +157,13 @@ impl Inputs {
     /// twice as long is not applied within this one, where it would act as an impact. A step of a nanosecond after one of ten microseconds continues
     /// with the rate of change it finds; the remaining delay shrinks by half of the time that passes.
     pub fn extrapolation_time(&self, length: f64) -> f64 {
-        if self.pace <= QUICKER * length { length } else { self.pace }
+        if self.extrapolation <= QUICKER * length { length } else { self.extrapolation }
     }
 
     /// A run starts: no step came before.
     pub fn start(&mut self) {
         self.rotors.iter_mut().for_each(|rotor| rotor.spin = rotor.speed);
-        (self.pace, self.until) = (0.0, 0.0);
+        (self.extrapolation, self.until) = (0.0, 0.0);
     }
 
     /// A communication step of length `length` begins.
@@ -183,7 +183,7 @@ impl Inputs {
             rotor.speed.shift(length);
             rotor.spin.shift(length);
         }
-        self.pace = if self.until > length { self.until - 0.5 * length } else { length };
+        self.extrapolation = if self.until > length { self.until - 0.5 * length } else { length };
     }
 
     /// Nothing will move in a step of length `length`.
@@ -197,7 +197,7 @@ impl Inputs {
     pub fn clear(&mut self) {
         self.moving_mut().for_each(|input| *input = Input::default());
         self.rotors.iter_mut().for_each(|rotor| (rotor.speed, rotor.spin) = Default::default());
-        (self.pace, self.until) = (0.0, 0.0);
+        (self.extrapolation, self.until) = (0.0, 0.0);
         for pair in &mut self.pairs {
             pair.shape_factor.value = 1.0;
             pair.shape_factor.take();

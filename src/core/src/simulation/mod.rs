@@ -146,7 +146,7 @@ pub struct Simulation {
     /// Warnings since the last [`Simulation::take_notes`].
     notes: Vec<Warning>,
     /// Warnings given since the start.
-    told: limits::WarningState,
+    warning_state: limits::WarningState,
     /// Parameters that the system was prepared for.
     prepared: Option<limits::Parameters>,
     /// Limits found for the parameters checked last.
@@ -232,7 +232,7 @@ impl Simulation {
             phase: SimulationPhase::Created,
             warnings: Vec::new(),
             notes: Vec::new(),
-            told: limits::WarningState::new(bodies, carriers),
+            warning_state: limits::WarningState::new(bodies, carriers),
             prepared: None,
             limits: None,
             state_size: 0,

@@ -47,8 +47,8 @@ impl Simulation {
                     return Err(self.fail(StepFailure::LeftInside { structure, node, share }, time));
                 }
                 let least = if goes_on { INSIDE } else { INSIDE_TOLD };
-                if share >= least.max(DEEPER * self.told.inside[structure]) {
-                    self.told.inside[structure] = share;
+                if share >= least.max(DEEPER * self.warning_state.inside[structure]) {
+                    self.warning_state.inside[structure] = share;
                     let problem = self.left_inside(structure, node, share);
                     let then =
                         if goes_on { String::new() } else { format!(". The run ends at {:.0} %", 100.0 * INSIDE) };
@@ -61,7 +61,7 @@ impl Simulation {
             if share >= REFUSED && !is_paper {
                 return Err(self.fail(StepFailure::Pulls { structure, node, share }, time));
             }
-            if share >= TOLD && !std::mem::replace(&mut self.told.pulls[structure], true) {
+            if share >= TOLD && !std::mem::replace(&mut self.warning_state.pulls[structure], true) {
                 let problem = self.pulls(structure, node, share);
                 let then = if is_paper { String::new() } else { format!(". The run ends at {:.0} %", 100.0 * REFUSED) };
                 let problem = format!("up to t = {} s, {problem}{then}", shown_time(time));

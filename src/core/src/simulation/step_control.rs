@@ -109,7 +109,7 @@ impl Simulation {
     /// Tell of the first communication step in which a shortest step missed the tolerance.
     pub(super) fn note_missed(&mut self, time: f64) {
         let effort = self.system.effort();
-        if effort.missed == 0 || std::mem::replace(&mut self.told.missed, true) {
+        if effort.missed == 0 || std::mem::replace(&mut self.warning_state.missed, true) {
             return;
         }
         let problem = format!(

@@ -139,7 +139,7 @@ impl Simulation {
                 self.compiled.check_temperature(body, until).map_err(now)?;
             }
             let fastest = if first.abs() > last.abs() { first } else { last };
-            if fastest.abs() > self.told.fastest[body] {
+            if fastest.abs() > self.warning_state.fastest[body] {
                 self.compiled.check_tip_speed(body, fastest).map_err(now)?;
             }
             self.check_step_size(body, step, [first, last, rotor.spin.at(0.0)], reached.min(until)).map_err(now)?;
@@ -377,13 +377,13 @@ impl Simulation {
     /// Tell of the first displacement of each structure that linear kinematics describes badly.
     fn note_curved(&mut self, time: f64) {
         for body in 0..self.rotors.len() {
-            if self.told.curved[body] {
+            if self.warning_state.curved[body] {
                 continue;
             }
             let Some(most) = self.system.most_curved_of(body).filter(|most| most.share() >= CURVED_SHARE) else {
                 continue;
             };
-            self.told.curved[body] = true;
+            self.warning_state.curved[body] = true;
             let problem = format!(
                 "at t = {} s, contact node {} of {} is displaced by {:.3e} m around the axis: gaps are linear in \
                  displacements, which neglects u²/2r = {:.2e} m, {:.0} % of the clearance",

@@ -355,8 +355,8 @@ mod tests {
             ..model(&[1000.0], &[[0.0; 3]], 0.0)
         };
         let senses = [vec![vec![radial()[0]; 2]]];
-        let told = check_solvable_together(&[model], Scheme::ModalExact, 1e-5, 0.3, &senses).unwrap_err().to_string();
-        assert!(told.contains("no friction coefficient is safe"), "{told}");
+        let reported = check_solvable_together(&[model], Scheme::ModalExact, 1e-5, 0.3, &senses).unwrap_err().to_string();
+        assert!(reported.contains("no friction coefficient is safe"), "{reported}");
     }
 
     /// A definite symmetric part spares the minors: what it lets pass they do, and they alone decide on the rest.

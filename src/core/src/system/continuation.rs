@@ -48,7 +48,7 @@ impl System {
                 self.counted.ledgers[set].step_change.add(change);
                 self.counted.ledgers[set].turnover.add(change.abs());
             }
-            self.together.iter_mut().for_each(|together| together.set_span(step));
+            self.coupled_sets.iter_mut().for_each(|coupled_sets| coupled_sets.set_span(step));
         } else {
             self.set_first_step(step);
         }
@@ -58,7 +58,7 @@ impl System {
     pub fn set_first_step(&mut self, step: f64) {
         let scheme = self.settings.scheme;
         self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
-        self.together.iter_mut().for_each(|together| together.set_span(step));
+        self.coupled_sets.iter_mut().for_each(|coupled_sets| coupled_sets.set_span(step));
     }
 
     /// Kinetic and strain energy of all structures at this instant (J): ½q̇ᵀMq̇ with the velocity of the instant, ½qᵀKq. Between
@@ -234,7 +234,7 @@ impl System {
             structure.restore(reader);
         }
         if step > 0.0 {
-            self.together.iter_mut().for_each(|together| together.set_span(step));
+            self.coupled_sets.iter_mut().for_each(|coupled_sets| coupled_sets.set_span(step));
         }
         self.pairs.iter_mut().for_each(|pair| pair.state_mut().restore(reader));
         self.groups.iter_mut().for_each(|group| group.law_mut().restore(reader));

@@ -96,7 +96,7 @@ impl System {
     /// Make room for marching spans up to `longest` (s) within `tolerance` of the smallest clearance of each structure; only before
     /// [`System::start`]. Allocates.
     pub fn prepare_spans(&mut self, longest: f64, tolerance: f64) {
-        self.together.clear();
+        self.coupled_sets.clear();
         for structure in &mut self.structures {
             (structure.galerkin, structure.lowest_in_span) = (None, Vec::new());
         }
@@ -114,7 +114,7 @@ impl System {
             if members.iter().any(moved_by_all) || self.pairs.iter().filter(own).any(|pair| pair.carrier().is_some()) {
                 let tolerance = clearance(&mut self.pairs.iter().filter(own));
                 let parts = (&self.structures[..], &self.pairs[..]);
-                self.together.push(CoupledSet::new(set, &members, parts, (longest, sticks), tolerance));
+                self.coupled_sets.push(CoupledSet::new(set, &members, parts, (longest, sticks), tolerance));
             } else {
                 for index in members {
                     let own = || self.pairs.iter().filter(|pair| pair.structure() == index);
@@ -162,9 +162,9 @@ impl System {
             self.structures[index].galerkin = Some(galerkin);
             outcome?;
         }
-        let mut together = std::mem::take(&mut self.together);
-        let outcome = together.iter_mut().try_for_each(|together| self.march_together(together, span));
-        self.together = together;
+        let mut coupled_sets = std::mem::take(&mut self.coupled_sets);
+        let outcome = coupled_sets.iter_mut().try_for_each(|coupled_sets| self.march_together(coupled_sets, span));
+        self.coupled_sets = coupled_sets;
         outcome?;
         self.check_travel()?;
         self.find_gaps(true);
@@ -187,7 +187,7 @@ impl System {
         let Self { structures, pairs, events, counted, .. } = self;
         let structure = &mut structures[index];
         structure.begin_span();
-        galerkin.record.set_out(pairs, span);
+        galerkin.record.begin_courses(pairs, span);
         let factorisations = counted.effort.factorisations;
         for sector in 0..structure.modes().sectors() {
             structure.march_sector((index, sector), galerkin, pairs, &mut counted.effort)?;
@@ -199,23 +199,23 @@ impl System {
     }
 
     /// Sectors that step together.
-    fn march_together(&mut self, together: &mut CoupledSet, span: f64) -> Result<(), StepFailure> {
+    fn march_together(&mut self, coupled_sets: &mut CoupledSet, span: f64) -> Result<(), StepFailure> {
         let Self { structures, pairs, events, counted, sets, .. } = self;
-        sets.members(together.set).iter().for_each(|one| structures[*one].begin_span());
-        together.sectors.iter_mut().for_each(|one| one.record.set_out(pairs, span));
-        let demand = StepGoal { most: self.most_tried, ..together.demand };
+        sets.members(coupled_sets.set).iter().for_each(|one| structures[*one].begin_span());
+        coupled_sets.sectors.iter_mut().for_each(|one| one.record.begin_courses(pairs, span));
+        let demand = StepGoal { most: self.most_tried, ..coupled_sets.demand };
         let factorisations = counted.effort.factorisations;
-        let mut marching = together.begin(structures, pairs);
+        let mut marching = coupled_sets.begin(structures, pairs);
         let outcome = march(&mut marching, demand, &mut counted.effort);
         let load_work = marching.finish();
         counted.factorisations += counted.effort.factorisations - factorisations;
-        together.sectors.iter().try_for_each(|one| one.record.check((one.structure, one.sector)))?;
-        outcome.map_err(|stopped| together.failure(stopped))?;
-        let ledger = &mut counted.ledgers[together.set];
+        coupled_sets.sectors.iter().try_for_each(|one| one.record.check((one.structure, one.sector)))?;
+        outcome.map_err(|stopped| coupled_sets.failure(stopped))?;
+        let ledger = &mut counted.ledgers[coupled_sets.set];
         ledger.load_work.add(load_work);
         ledger.turnover.add(load_work.abs());
-        for one in &together.sectors {
-            enter_work(&mut counted.ledgers[together.set], &one.record.work);
+        for one in &coupled_sets.sectors {
+            enter_work(&mut counted.ledgers[coupled_sets.set], &one.record.work);
             let structure = &structures[one.structure];
             enter_events(structure, (one.structure, one.sector), &one.record, span, &mut events.now);
         }
@@ -301,18 +301,18 @@ impl Structure {
         let tables = &tables[bank.set_number(sector)];
         bank.read_sector(sector, &mut state.position, &mut state.velocity);
         self.read_contacts(sector, state);
-        (state.bank, state.largest) = (self.pace.bank[sector], self.pace.largest[sector]);
-        state.level = self.pace.level_of(sector);
+        (state.bank, state.largest) = (self.step_control.bank[sector], self.step_control.largest[sector]);
+        state.level = self.step_control.level_of(sector);
         let places = &self.history.geometry.before;
         let gaps = &self.history.gap.before;
         record.begin(|node| places.place_at(node * lanes + sector), |node| gaps[node * lanes + sector]);
-        let mut facing = ObstacleView { ground: None, pairs, pair_of: &self.pair_of, lanes, sector, record };
-        let outcome = marcher.march(tables, state, &mut facing, *demand, effort);
+        let mut obstacle = ObstacleView { carriers: None, pairs, pair_of: &self.pair_of, lanes, sector, record };
+        let outcome = marcher.march(tables, state, &mut obstacle, *demand, effort);
         record.check((number, sector))?;
         let entered = marcher.entered();
         outcome.map_err(|stopped| failure(stopped, (number, sector), entered))?;
-        (self.pace.bank[sector], self.pace.largest[sector]) = (state.bank, state.largest);
-        self.pace.level[sector] = state.level as u64;
+        (self.step_control.bank[sector], self.step_control.largest[sector]) = (state.bank, state.largest);
+        self.step_control.level[sector] = state.level as u64;
         self.write_contacts(sector, state, |node| record.tallies[node].lowest);
         if let Sectors::Uncoupled(bank) = self.modes_mut() {
             let moved = marcher.displacements(tables, state);

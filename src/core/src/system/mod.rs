@@ -99,7 +99,7 @@ pub struct System {
     pub(crate) groups: Vec<ContactGroup>,
     sets: StructureSets,
     /// Sets whose sectors are marched together.
-    together: Vec<CoupledSet>,
+    coupled_sets: Vec<CoupledSet>,
     pub(crate) settings: SystemSettings,
     pub(crate) events: Two<Vec<ContactEvent>>,
     pub(crate) counted: RunTotals,
@@ -158,7 +158,7 @@ impl System {
             events: Two { now: room(), before: room() },
             counted: RunTotals::new(vec![Ledger::default(); sets.count()]),
             mechanical: vec![0.0; sets.count()],
-            together: Vec::new(),
+            coupled_sets: Vec::new(),
             most_tried: u64::MAX,
             sets,
             structures,
@@ -392,8 +392,8 @@ fn contact_reaches(structures: &[Structure], pairs: &[ContactPair], sets: &Struc
         let carried = pairs.iter().any(|pair| members.contains(&pair.structure()) && pair.carrier().is_some());
         // Sectors turn against what stands still; a single structure is one sector with all of its contacts at once.
         let open = pairs.iter().any(|pair| pair.structure() == first && matches!(pair.gap(), GapLaw::Open(_)));
-        let together = carried || structures[first].modes().coupled().is_some() || open;
-        Some((if together { Reach::All } else { Reach::Sector }, members))
+        let coupled_sets = carried || structures[first].modes().coupled().is_some() || open;
+        Some((if coupled_sets { Reach::All } else { Reach::Sector }, members))
     };
     (0..sets.count()).filter_map(|set| reach(touching(set))).collect()
 }

@@ -16,7 +16,7 @@ use crate::gaps::{PrescribedMotion, dot};
 
 /// Contacts of a trial are solved this often before their directions of sliding stay as they are: a node that next to does not slide would
 /// turn them from one time to the next.
-const LOOKS: usize = 3;
+const SOLUTIONS: usize = 3;
 
 /// Structures that carry the surfaces a sector faces, over a step of a level.
 pub struct CarriersInStep<'a> {
@@ -31,7 +31,7 @@ pub struct CarriersInStep<'a> {
 /// A sector of a structure facing its surfaces.
 pub struct ObstacleView<'a> {
     /// Structures that carry the surfaces, if any.
-    pub ground: Option<CarriersInStep<'a>>,
+    pub carriers: Option<CarriersInStep<'a>>,
     pub pairs: &'a mut [ContactPair],
     /// Pair of each node.
     pub pair_of: &'a [Option<usize>],
@@ -43,33 +43,33 @@ pub struct ObstacleView<'a> {
 
 impl ObstacleView<'_> {
     /// Reads a value from the structure that carries a surface, at the place of a node and at a point of the step.
-    fn on_ground<T>(
+    fn on_carrier<T>(
         &self,
         (node, point): (usize, usize),
         when: SurfacePlace,
-        tell: impl Fn(&CarrierIntegrator, Spot) -> T,
+        read: impl Fn(&CarrierIntegrator, Spot) -> T,
     ) -> Option<T> {
-        let ground = self.ground.as_ref()?;
+        let carriers = self.carriers.as_ref()?;
         let pair = self.pair_of[node]?;
-        let casing = ground.casing_of[pair]?;
+        let casing = carriers.casing_of[pair]?;
         let index = node * self.lanes + self.sector;
         let spot = self.record.spot((node, point), (pair, &self.pairs[pair]), index, when)?;
-        Some(tell(&ground.casings[casing], spot))
+        Some(read(&carriers.casings[casing], spot))
     }
 
     /// The same, of what is told to it.
-    pub fn with_carrier_mut(&mut self, node: usize, point: usize, tell: impl FnOnce(&mut CarrierIntegrator, Spot)) {
-        let (Some(ground), Some(pair)) = (&mut self.ground, self.pair_of[node]) else { return };
-        let Some(casing) = ground.casing_of[pair] else { return };
+    pub fn with_carrier_mut(&mut self, node: usize, point: usize, read: impl FnOnce(&mut CarrierIntegrator, Spot)) {
+        let (Some(carriers), Some(pair)) = (&mut self.carriers, self.pair_of[node]) else { return };
+        let Some(casing) = carriers.casing_of[pair] else { return };
         let index = node * self.lanes + self.sector;
         if let Some(spot) = self.record.spot((node, point), (pair, &self.pairs[pair]), index, SurfacePlace::Now) {
-            tell(&mut ground.casings[casing], spot);
+            read(&mut carriers.casings[casing], spot);
         }
     }
 
     /// Returns the carrier that a lane faces, and the step that is solved.
     fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, (usize, ForceInterpolation), Lanes)> {
-        let CarriersInStep { casings, casing_of, level, kind, lanes } = self.ground.as_mut()?;
+        let CarriersInStep { casings, casing_of, level, kind, lanes } = self.carriers.as_mut()?;
         let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair])?;
         Some((&mut casings[casing], (*level, *kind), *lanes))
     }
@@ -138,22 +138,22 @@ impl Obstacle for ObstacleView<'_> {
         }
         let gap = self.pairs[pair].gap();
         let slip = if gap.slides_anywhere() {
-            let known = self.record.slips[point][node].filter(|_| self.record.looks > LOOKS);
+            let known = self.record.slips[point][node].filter(|_| self.record.solutions > SOLUTIONS);
             let slip = known.unwrap_or_else(|| {
-                let ground = self.on_ground((node, point), SurfacePlace::Now, |casing, spot| {
+                let carriers = self.on_carrier((node, point), SurfacePlace::Now, |casing, spot| {
                     casing.sliding_distance_at(spot, point)
                 });
-                let ground = ground.unwrap_or_default();
-                std::array::from_fn(|c| sliding.way[c] - ground[c])
+                let carriers = carriers.unwrap_or_default();
+                std::array::from_fn(|c| sliding.sliding_distance[c] - carriers[c])
             });
             self.record.slips[point][node] = Some(slip);
             slip
         } else {
             let at = self.at(node, &self.record.drives[pair][point].0);
             let rigid = gap.sliding_velocity(node, at.index, at.drive, sliding.moved);
-            let ground = self.on_ground((node, point), SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
-            let ground = ground.unwrap_or_default();
-            std::array::from_fn(|i| rigid[i] + sliding.velocity[i] - ground[i])
+            let carriers = self.on_carrier((node, point), SurfacePlace::Begun, |casing, spot| casing.velocity_at(spot));
+            let carriers = carriers.unwrap_or_default();
+            std::array::from_fn(|i| rigid[i] + sliding.velocity[i] - carriers[i])
         };
         let slip = gap.slip_direction(slip, sliding.normal);
         std::array::from_fn(|i| sliding.normal[i] - friction * slip[i])
@@ -164,9 +164,9 @@ impl Obstacle for ObstacleView<'_> {
     }
 
     fn prepare_compliance(&mut self, lanes: Lanes, chosen: &[bool], normals: &[f64]) -> bool {
-        self.record.looks += 1;
-        let Some(CarriersInStep { casings, lanes: of_ground, .. }) = &mut self.ground else { return false };
-        *of_ground = lanes;
+        self.record.solutions += 1;
+        let Some(CarriersInStep { casings, lanes: carrier_lanes, .. }) = &mut self.carriers else { return false };
+        *carrier_lanes = lanes;
         casings.iter_mut().for_each(CarrierIntegrator::clear_lanes);
         for lane in (0..lanes.len()).filter(|lane| chosen[*lane]) {
             let (point, node) = lanes.place(lane);
@@ -176,17 +176,17 @@ impl Obstacle for ObstacleView<'_> {
         true
     }
 
-    fn add_normal_compliance(&mut self, lane: usize, direction: [f64; 3], given: &mut [f64]) {
-        given.fill(0.0);
+    fn add_normal_compliance(&mut self, lane: usize, direction: [f64; 3], carrier_compliance: &mut [f64]) {
+        carrier_compliance.fill(0.0);
         if let Some((casing, at, lanes)) = self.under(lane) {
-            casing.add_normal_compliance(at, lanes, lane, direction, given);
+            casing.add_normal_compliance(at, lanes, lane, direction, carrier_compliance);
         }
     }
 
-    fn add_compliance(&mut self, lane: usize, force: [f64; 3], given: &mut [f64]) {
-        given.fill(0.0);
+    fn add_compliance(&mut self, lane: usize, force: [f64; 3], carrier_compliance: &mut [f64]) {
+        carrier_compliance.fill(0.0);
         if let Some((casing, at, lanes)) = self.under(lane) {
-            casing.add_compliance(at, lanes, lane, force, given);
+            casing.add_compliance(at, lanes, lane, force, carrier_compliance);
         }
     }
 
@@ -202,12 +202,12 @@ impl Obstacle for ObstacleView<'_> {
         let at = self.at(node, drive);
         let point = gap.contact_point(at, moved, self.record.places[step_point][node]);
         let (spin, shaft) = (gap.spin_motion(at, point, &motion), gap.shaft_motion(at, point, &motion));
-        let ground = self.on_ground((node, step_point), SurfacePlace::Now, |casing, spot| {
+        let carriers = self.on_carrier((node, step_point), SurfacePlace::Now, |casing, spot| {
             let [now, before] = [step_point, 0].map(|instant| casing.moved_at(spot, instant));
             std::array::from_fn(|c| now[c] - before[c])
         });
-        let ground: [f64; 3] = ground.unwrap_or_default();
-        std::array::from_fn(|c| spin[c] + shaft[c] - ground[c])
+        let carriers: [f64; 3] = carriers.unwrap_or_default();
+        std::array::from_fn(|c| spin[c] + shaft[c] - carriers[c])
     }
 }
 
@@ -221,7 +221,7 @@ impl Witness for ObstacleView<'_> {
                 *drive = course.at(from + length * theta);
             }
         }
-        (self.record.looks, self.record.step) = (0, [from, length]);
+        (self.record.solutions, self.record.step) = (0, [from, length]);
         self.record.slips.iter_mut().for_each(|slips| slips.fill(None));
         self.record.lanes_of = self.enter_lanes(Lanes { points: count - 1, nodes: self.pair_of.len() });
     }
@@ -348,13 +348,13 @@ impl ObstacleView<'_> {
             return false;
         }
         let (now, before) = (trial.displacement(i, node), trial.displacement(i - 1, node));
-        let ground = self.on_ground((node, i), SurfacePlace::Now, |casing, spot| {
+        let carriers = self.on_carrier((node, i), SurfacePlace::Now, |casing, spot| {
             let [now, before] = [i, i - 1].map(|point| casing.moved_at(spot, point));
             std::array::from_fn(|c| now[c] - before[c])
         });
-        let ground: [f64; 3] = ground.unwrap_or_default();
+        let carriers: [f64; 3] = carriers.unwrap_or_default();
         open.was_behind(
-            std::array::from_fn(|c| now[c] - before[c] - ground[c]),
+            std::array::from_fn(|c| now[c] - before[c] - carriers[c]),
             trial.normal(i, node),
             trial.gap(i, node),
         )
@@ -412,10 +412,10 @@ impl ObstacleView<'_> {
                 open += weights[k] * trial.finite_gap(k, node);
             }
             let (spin, shaft) = (gap.spin_motion(at, point, motion), gap.shaft_motion(at, point, motion));
-            let ground = self
-                .on_ground((node, i), SurfacePlace::Acted, |casing, spot| casing.worked_at(spot, i))
+            let carriers = self
+                .on_carrier((node, i), SurfacePlace::Acted, |casing, spot| casing.worked_at(spot, i))
                 .unwrap_or_default();
-            there = std::array::from_fn(|c| there[c] - ground[c]);
+            there = std::array::from_fn(|c| there[c] - carriers[c]);
             let slip: [f64; 3] = std::array::from_fn(|c| there[c] + spin[c] + shaft[c]);
             let heat = -dot(tangential, slip);
             work.shaft -= dot(force, spin);

@@ -156,7 +156,7 @@ pub struct SpanRecord {
     pub acted: [Vec<ClosestPoint>; POINTS],
     /// Sliding of nodes along open surfaces at the points (m), where it was requested in this trial; and the number of requests.
     pub slips: [Vec<Option<[f64; 3]>>; POINTS],
-    pub looks: usize,
+    pub solutions: usize,
     pub instants: Instants,
     /// All nodes at all points are in `instants`, before the surface of this pair.
     pub lanes_of: Option<usize>,
@@ -180,7 +180,7 @@ impl SpanRecord {
             places: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             acted: std::array::from_fn(|_| vec![ClosestPoint::default(); nodes]),
             slips: std::array::from_fn(|_| vec![None; nodes]),
-            looks: 0,
+            solutions: 0,
             instants: Instants::new(Lanes { points: MOST, nodes }.width()),
             lanes_of: None,
             implausible: false,
@@ -219,14 +219,14 @@ impl SpanRecord {
     }
 
     /// Prescribed motion of a span (s) that the pairs are at the end of.
-    pub fn set_out(&mut self, pairs: &[ContactPair], span: f64) {
+    pub fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
         for (course, pair) in self.courses.iter_mut().zip(pairs) {
             *course = MotionCourse::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
         }
     }
 
     /// Nodes are guessed to be where they were at the start of the step.
-    pub fn stay(&mut self) {
+    pub fn guess_start_places(&mut self) {
         let [first, rest @ ..] = &mut self.places;
         rest.iter_mut().for_each(|places| places.copy_from_slice(first));
     }
@@ -237,7 +237,7 @@ impl SpanRecord {
         for (node, place) in self.places[0].iter_mut().enumerate() {
             *place = place_of(node);
         }
-        self.stay();
+        self.guess_start_places();
         for (node, tally) in self.tallies.iter_mut().enumerate() {
             *tally = NodeTally { lowest: gap_of(node), ..NodeTally::NOTHING };
         }

@@ -33,7 +33,7 @@ pub struct Structure {
     /// Modal contact force on its surfaces found in the last step (N·√kg⁻¹); empty where it carries none.
     pub(super) delayed: Vec<f64>,
     /// Step control of each sector, for adaptive steps of single sectors.
-    pub(super) pace: StepControl,
+    pub(super) step_control: StepControl,
     /// Tables and scratch of that scheme.
     pub(super) galerkin: Option<Box<Galerkin>>,
     /// Smallest gaps within the last span where a scheme looks within it (m), `[node · lanes + lane]`; else empty.
@@ -90,7 +90,7 @@ impl Structure {
             pulling: Pulling::new(pair_of.len()),
             lowest: vec![f64::INFINITY; modes.lanes()],
             delayed: Vec::new(),
-            pace: StepControl::new(modes.sectors(), contacts),
+            step_control: StepControl::new(modes.sectors(), contacts),
             galerkin: None,
             lowest_in_span: Vec::new(),
             pair_of,
@@ -110,7 +110,7 @@ impl Structure {
             pulling: Pulling::default(),
             lowest: Vec::new(),
             delayed: vec![0.0; model.len()],
-            pace: StepControl::default(),
+            step_control: StepControl::default(),
             galerkin: None,
             lowest_in_span: Vec::new(),
             lanes: modes.lanes(),
@@ -198,19 +198,19 @@ impl Structure {
             let index = self.index(node, sector);
             state.multipliers[node] = self.history.multiplier[index];
             state.gaps[node] = self.history.gap.before[index];
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.pace.normals, node, sector));
+            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.step_control.normals, node, sector));
             state.forces[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.history.force.now, node, sector));
         }
         for (row, slope) in state.slopes.iter_mut().enumerate() {
-            *slope = self.pace.slopes[row * self.lanes + sector];
+            *slope = self.step_control.slopes[row * self.lanes + sector];
         }
-        state.looked = true;
+        state.gaps_known = true;
     }
 
     /// Contacts of a sector as they are after it, and the smallest gap of each node on the way (m).
     pub(super) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
         for (row, slope) in state.slopes.iter().enumerate() {
-            self.pace.slopes[row * self.lanes + sector] = *slope;
+            self.step_control.slopes[row * self.lanes + sector] = *slope;
         }
         for node in 0..self.nodes() {
             let index = self.index(node, sector);
@@ -219,7 +219,7 @@ impl Structure {
             for component in 0..3 {
                 let (row, of_state) = ((3 * node + component) * self.lanes + sector, 3 * node + component);
                 self.history.force.now[row] = state.forces[of_state];
-                self.pace.normals[row] = state.normals[of_state];
+                self.step_control.normals[row] = state.normals[of_state];
             }
         }
     }
@@ -238,11 +238,11 @@ impl Structure {
         self.delayed.fill(0.0);
         self.history.clear();
         self.pulling.clear();
-        self.pace.bank.fill(0.0);
-        self.pace.largest.fill(0.0);
-        self.pace.level.fill(0);
-        self.pace.slopes.fill(0.0);
-        self.pace.normals.fill(0.0);
+        self.step_control.bank.fill(0.0);
+        self.step_control.largest.fill(0.0);
+        self.step_control.level.fill(0);
+        self.step_control.slopes.fill(0.0);
+        self.step_control.normals.fill(0.0);
     }
 
     /// There was no step before: gaps and predictions are those of the start.
@@ -354,7 +354,7 @@ impl Structure {
     pub(super) fn save(&self, writer: &mut StateWriter) {
         self.modes.save(writer);
         self.delayed.save(writer);
-        self.pace.save(writer);
+        self.step_control.save(writer);
         self.pulling.save(writer);
         self.history.save(writer);
     }
@@ -363,7 +363,7 @@ impl Structure {
     pub(super) fn check(&self, reader: &mut StateReader, saved: &mut ContactHistory) {
         self.modes.check(reader);
         self.delayed.check(reader);
-        self.pace.check(reader);
+        self.step_control.check(reader);
         self.pulling.check(reader);
         saved.restore(&mut reader.clone());
         self.history.check(reader);
@@ -373,7 +373,7 @@ impl Structure {
     pub(super) fn restore(&mut self, reader: &mut StateReader) {
         self.modes.restore(reader);
         self.delayed.restore(reader);
-        self.pace.restore(reader);
+        self.step_control.restore(reader);
         self.pulling.restore(reader);
         self.history.restore(reader);
     }

@@ -2,7 +2,7 @@
 //!
 //! D. Doyen, A. Ern, S. Piperno, SIAM J. Sci. Comput. 33 (2011): period 16/3 s, contacts on [1, 5/3] and [11/3, 13/3].
 
-use crate::guide::told;
+use crate::guide::print_row;
 use crate::rods::{NEARLY_NONE, SCHEMES, SOLVERS, StraightRod, against_plane, orders, quiet_step, set_samples};
 use tiprub_core::gaps::PrescribedMotion;
 use tiprub_core::settings::{Scheme, Solver};
@@ -119,7 +119,7 @@ fn print(scheme: Scheme, solver: Solver, elements: usize, outcome: &BouncingRun)
     let BouncingRun { step, bottom, force, contacts, losses, residual } = outcome;
     let times = contacts[..2].iter().flatten().map(|time| format!("{time:.4}")).collect::<Vec<_>>().join(", ");
     let losses = losses.iter().map(|loss| format!("{:.3}", 100.0 * loss)).collect::<Vec<_>>().join(", ");
-    told!(
+    print_row!(
         "| {scheme:?} | {solver:?} | {elements} | {:.2} | {:.3} | {:.2e} | {:.2e} | {:+.1e} | {:.2e} | {times} | {losses} | {residual:.0e} |",
         step * 1e3,
         bottom[0],
@@ -132,11 +132,11 @@ fn print(scheme: Scheme, solver: Solver, elements: usize, outcome: &BouncingRun)
 
 #[test]
 fn the_bar_bounces_as_the_series_says() {
-    told!("exact: contacts {CONTACTS:.4?}, period {PERIOD:.4}, loss 0");
-    told!(
+    print_row!("exact: contacts {CONTACTS:.4?}, period {PERIOD:.4}, loss 0");
+    print_row!(
         "| scheme | solver | elements | h (ms) | bottom, largest error (m) | L2, period 1 | L2, period 3 | impulse | force L2 | contacts (s) | loss after each period (%) | ledger |"
     );
-    told!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    print_row!("|---|---|---|---|---|---|---|---|---|---|---|---|");
     for scheme in SCHEMES {
         let mut errors = Vec::new();
         for elements in [25, 50, 100, 200] {
@@ -153,7 +153,7 @@ fn the_bar_bounces_as_the_series_says() {
             }
         }
         let orders = orders(&errors);
-        told!("{scheme:?}: orders of L2 {orders:.2?}");
+        print_row!("{scheme:?}: orders of L2 {orders:.2?}");
         // A displacement whose velocity jumps is met with order 2/3 · 3/2 = 1 by methods of second order; the loss is of order 1.
         let mean = orders.iter().sum::<f64>() / 3.0;
         assert!((0.65..1.15).contains(&mean), "order {mean}");

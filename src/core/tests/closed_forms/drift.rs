@@ -3,7 +3,7 @@
 //!
 //! 1e5 steps here; 1e7 by `cargo test --release -p tiprub-core --test closed_forms drift -- --ignored --nocapture`.
 
-use crate::guide::told;
+use crate::guide::print_row;
 use crate::rods::{NEARLY_NONE, SCHEMES, StraightRod, against_plane, quiet_step, set_samples, single};
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::gaps::PrescribedMotion;
@@ -104,11 +104,11 @@ fn impacts(steps: u64, step: f64) -> [f64; 2] {
 }
 
 fn measure(steps: u64) {
-    told!("| energy over {steps} steps | scheme | largest change | change at the end |");
-    told!("|---|---|---|---|");
+    print_row!("| energy over {steps} steps | scheme | largest change | change at the end |");
+    print_row!("|---|---|---|---|");
     for scheme in SCHEMES {
         for (name, [most, end]) in [("free flight", free(scheme, steps)), ("closed contact", closed(scheme, steps))] {
-            told!("| {name} | {scheme:?} | {most:.1e} | {end:+.1e} |");
+            print_row!("| {name} | {scheme:?} | {most:.1e} | {end:+.1e} |");
             // Rounding walks with the root of the number of steps.
             let bound = 1e-13 * (steps as f64).sqrt();
             assert!(most < bound, "{name}, {scheme:?}: {most:e}");
@@ -116,7 +116,7 @@ fn measure(steps: u64) {
     }
     for step in [2e-4, 1e-4, 5e-5] {
         let [most, end] = impacts(steps, step);
-        told!("| elastic impacts, h = {} µs | MasslessBoundary | {most:.1e} | {end:+.1e} |", step * 1e6);
+        print_row!("| elastic impacts, h = {} µs | MasslessBoundary | {most:.1e} | {end:+.1e} |", step * 1e6);
         assert!(most < 0.05, "{most:e}");
     }
 }

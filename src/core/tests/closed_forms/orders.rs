@@ -1,7 +1,7 @@
 //! Observed orders of convergence of the schemes, against what theory gives: free flight, forced vibration, contact that stays
 //! closed, impacts.
 
-use crate::guide::told;
+use crate::guide::print_row;
 use crate::rods::{SCHEMES, SOLVERS, against_plane, orders, set_samples, single};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use tiprub_core::dynamics::modal::ModalModel;
@@ -15,7 +15,7 @@ const FAR: f64 = 1e9;
 fn row(phase: &str, scheme: Scheme, solver: Solver, quantity: &str, errors: &[f64], theory: &str) -> f64 {
     let orders = orders(errors);
     let list = |values: Vec<String>| values.join(", ");
-    told!(
+    print_row!(
         "| {phase} | {scheme:?} | {solver:?} | {quantity} | {} | {} | {theory} |",
         list(errors.iter().map(|error| format!("{error:.1e}")).collect()),
         list(orders.iter().map(|order| format!("{order:.2}")).collect())
@@ -29,8 +29,8 @@ fn solvers(scheme: Scheme) -> Vec<Solver> {
 }
 
 fn head() {
-    told!("| phase | scheme | solver | quantity | errors, h halved | orders | theory |");
-    told!("|---|---|---|---|---|---|---|");
+    print_row!("| phase | scheme | solver | quantity | errors, h halved | orders | theory |");
+    print_row!("|---|---|---|---|---|---|---|");
 }
 
 /// Modes seen by one node: (ω, shape).

@@ -1,6 +1,6 @@
 //! Oscillators and balls against stops, through the core, against closed forms: exact times, losses, grazing, long sequences.
 
-use crate::guide::told;
+use crate::guide::print_row;
 use crate::rods::{SOLVERS, against_plane, set_samples, single};
 use tiprub_core::dynamics::modal::ModalModel;
 use tiprub_core::gaps::PrescribedMotion;
@@ -48,8 +48,8 @@ fn dead_stop(case: DeadStop, methods: (Scheme, Solver), step: f64, turns: f64) -
 
 #[test]
 fn what_touches_a_rigid_stop_stays_and_the_spring_takes_it_back() {
-    told!("| scheme | solver | d/A | h (µs) | position | touch (steps) | loss | exact | ledger |");
-    told!("|---|---|---|---|---|---|---|---|---|");
+    print_row!("| scheme | solver | d/A | h (µs) | position | touch (steps) | loss | exact | ledger |");
+    print_row!("|---|---|---|---|---|---|---|---|---|");
     for scheme in RIGID {
         for solver in SOLVERS {
             for share in [0.2, 0.9] {
@@ -57,7 +57,7 @@ fn what_touches_a_rigid_stop_stays_and_the_spring_takes_it_back() {
                 let mut last = f64::INFINITY;
                 for step in [1e-5, 1e-6] {
                     let [position, touch, loss, ledger] = dead_stop(case, (scheme, solver), step, 3.4);
-                    told!(
+                    print_row!(
                         "| {scheme:?} | {solver:?} | {share} | {} | {position:.1e} | {touch:.2} | {loss:.6} | {:.6} | {ledger:.0e} |",
                         step * 1e6,
                         case.loss()
@@ -81,7 +81,7 @@ fn after_one_impact_an_oscillator_only_grazes() {
         for excess in [1e-2, 1e-4, 1e-6] {
             let case = DeadStop { omega: OMEGA, amplitude: 1e-3 * (1.0 + excess), distance: 1e-3 };
             let [position, touch, loss, ledger] = dead_stop(case, (scheme, Solver::Lcp), 1e-5, 20.0);
-            told!(
+            print_row!(
                 "{scheme:?}, A = (1 + {excess:e})d: position {position:.1e}, touch {touch:.2} steps late, loss {loss:.3e} of {:.3e}",
                 case.loss()
             );
@@ -156,8 +156,8 @@ fn on_a_spring(omega: f64, compliance: f64) -> ModalModel {
 
 #[test]
 fn a_ball_bounces_on_a_spring_for_ever() {
-    told!("| solver | h (µs) | height, 20 bounces | time of touch 20 (s) | largest force | energy | ledger |");
-    told!("|---|---|---|---|---|---|---|");
+    print_row!("| solver | h (µs) | height, 20 bounces | time of touch 20 (s) | largest force | energy | ledger |");
+    print_row!("|---|---|---|---|---|---|---|");
     let ball = Ball { omega: 200.0, gravity: 9.81, height: 0.05 };
     for solver in SOLVERS {
         let mut errors = Vec::new();
@@ -190,7 +190,7 @@ fn a_ball_bounces_on_a_spring_for_ever() {
             };
             let (touch, force) = (touches[19] - expected, force / ball.gravity / ball.force_over_weight() - 1.0);
             let energy = energy / (ball.gravity * ball.height);
-            told!(
+            print_row!(
                 "| {solver:?} | {} | {:.1e} | {touch:+.1e} | {force:+.1e} | {energy:+.1e} | {:.0e} |",
                 step * 1e6,
                 worst / ball.height,
@@ -200,7 +200,7 @@ fn a_ball_bounces_on_a_spring_for_ever() {
             errors.push(worst / ball.height);
         }
         let order = 0.5 * (errors[0] / errors[2]).log2();
-        told!("{solver:?}: order {order:.2}");
+        print_row!("{solver:?}: order {order:.2}");
         assert!(order > 1.3 && errors[2] < 1e-3, "{errors:?}");
     }
 }
@@ -233,15 +233,15 @@ fn bilinear(case: Bilinear, solver: Solver, step: f64, turns: u32) -> [f64; 3] {
 
 #[test]
 fn impact_oscillator_period_matches_the_closed_form() {
-    told!("| solver | A/d | period (s) | period, h = 200, 100, 50 µs | order | force at 50 µs | energy |");
-    told!("|---|---|---|---|---|---|---|");
+    print_row!("| solver | A/d | period (s) | period, h = 200, 100, 50 µs | order | force at 50 µs | energy |");
+    print_row!("|---|---|---|---|---|---|---|");
     for solver in SOLVERS {
         for share in [1.000_1, 1.01, 1.5, 10.0] {
             let case = Bilinear { omega: OMEGA, ratio: 25.0, distance: 1e-3, amplitude: share * 1e-3 };
             let found = [2e-4, 1e-4, 5e-5].map(|step| bilinear(case, solver, step, 40));
             let errors = found.map(|found| found[0].abs());
             let order = 0.5 * (errors[0] / errors[2]).log2();
-            told!(
+            print_row!(
                 "| {solver:?} | {share} | {:.6} | {:.1e}, {:.1e}, {:.1e} | {order:.2} | {:+.1e} | {:+.1e} |",
                 case.period(),
                 errors[0],

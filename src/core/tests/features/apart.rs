@@ -90,10 +90,10 @@ fn energy_out_of_nothing_ends_a_run_whatever_turns_beside() {
         (scene.settings.time.step, scene.settings.experiment.communication_step) = (4e-6, 4e-6);
     });
     for (scene, word) in [(curved, "J of spurious energy"), (unresolved, "gained spurious energy")] {
-        let ((single, why), (both, told)) = (refused(&alone(&scene)), refused(&scene));
+        let ((single, why), (both, reported)) = (refused(&alone(&scene)), refused(&scene));
         assert!(why.contains(word) && !why.contains("of front"), "{why}");
-        assert!(told.contains(word) && told.contains(" of front ") && !told.contains("rear"), "{told}");
-        assert_eq!(single.time().to_bits(), both.time().to_bits(), "{why}\n{told}");
+        assert!(reported.contains(word) && reported.contains(" of front ") && !reported.contains("rear"), "{reported}");
+        assert_eq!(single.time().to_bits(), both.time().to_bits(), "{why}\n{reported}");
         // Taken together, the two are within all bounds.
         let (ledger, energy) = (both.system().ledger(), real(&both, "kinetic_energy") + real(&both, "strain_energy"));
         println!("{word}: {} J of {} J, {energy} J", ledger.curvature_work.value(), ledger.exchanged());
@@ -179,8 +179,8 @@ fn massless_boundary_looks_at_every_structure_under_a_blade() {
     };
     for seal_first in [false, true] {
         assert!(try_started(&scene(10.0, seal_first)).is_ok());
-        let told = try_started(&scene(30.0, seal_first)).unwrap_err().to_string();
-        assert!(told.contains("too long for massless-boundary") && told.contains("2.910109e-7"), "{told}");
+        let reported = try_started(&scene(30.0, seal_first)).unwrap_err().to_string();
+        assert!(reported.contains("too long for massless-boundary") && reported.contains("2.910109e-7"), "{reported}");
     }
 }
 
@@ -188,8 +188,8 @@ fn massless_boundary_looks_at_every_structure_under_a_blade() {
 #[test]
 fn contacts_are_counted_where_they_push_each_other() {
     let both = several::in_one_casing(rub(350), Solver::Lcp, 0.0);
-    let told = Simulation::new(&both).unwrap_err().to_string();
-    assert!(told.starts_with("surface[2].structure: 2100 contact nodes") && told.contains("`rear`"), "{told}");
+    let reported = Simulation::new(&both).unwrap_err().to_string();
+    assert!(reported.starts_with("surface[2].structure: 2100 contact nodes") && reported.contains("`rear`"), "{reported}");
     let mut apart = both;
     let mut second = apart.settings.structures[2].clone();
     second.name = "second".into();
@@ -218,8 +218,8 @@ fn flutter_of_each_rotor_is_told() {
     set(&mut simulation, "front_casing.friction_coefficient", 0.001);
     assert!(simulation.take_notes().is_empty());
     set(&mut simulation, "rear_casing.friction_coefficient", 0.15);
-    let told = simulation.take_notes();
-    assert!(flutter(&told, "rear") == front && flutter(&told, "front") == 0, "{told:?}");
+    let reported = simulation.take_notes();
+    assert!(flutter(&reported, "rear") == front && flutter(&reported, "front") == 0, "{reported:?}");
     // Once.
     for friction in [0.001, 0.15] {
         set(&mut simulation, "rear_casing.friction_coefficient", friction);
@@ -236,19 +236,19 @@ fn what_linear_gaps_miss_is_told_of_each_rotor() {
         }
     });
     let mut simulation = started(&scene);
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     let why = loop {
         let outcome = simulation.do_step(simulation.time(), 2e-5);
-        told.extend(simulation.take_notes());
+        reported.extend(simulation.take_notes());
         if let Err(error) = outcome {
             break error.to_string();
         }
         if simulation.time() > 1e-2 {
-            panic!("{told:?}")
+            panic!("{reported:?}")
         }
     };
-    let of = |name: &str| told.iter().filter(|text| text.contains(&format!("of {name} is displaced"))).count();
-    assert!(of("front") == 1 && of("rear") == 1 && told.len() == 2, "{told:?}\n{why}");
+    let of = |name: &str| reported.iter().filter(|text| text.contains(&format!("of {name} is displaced"))).count();
+    assert!(of("front") == 1 && of("rear") == 1 && reported.len() == 2, "{reported:?}\n{why}");
 }
 
 /// A rotor that fails is not told to flutter because another one does.
@@ -280,12 +280,12 @@ fn steps_that_modes_do_not_resolve_are_told_of_each_structure() {
     // The highest mode of the rear is half as fast.
     scene.roms[1].stiffness *= 0.25;
     let mut simulation = started(&scene);
-    let told = [1e-6, 3e-6, 6e-6].map(|length| {
+    let reported = [1e-6, 3e-6, 6e-6].map(|length| {
         go(&mut simulation, length);
         simulation.take_notes()
     });
     let of = |texts: &[Warning], name: &str| texts.iter().filter(|text| text.starts_with(name)).count();
-    assert_eq!(told.each_ref().map(|texts| [of(texts, "front: "), of(texts, "rear: ")]), [[0, 0], [1, 0], [1, 1]]);
+    assert_eq!(reported.each_ref().map(|texts| [of(texts, "front: "), of(texts, "rear: ")]), [[0, 0], [1, 0], [1, 1]]);
 }
 
 /// Radial displacement of a flexible casing is an output of rotors; another pair's open surface has none.
@@ -300,8 +300,8 @@ fn an_output_that_no_pair_has_is_refused() {
     scene.roms.extend(rotor.roms);
     Simulation::new(&scene).unwrap();
     scene.settings.outputs.slave_displacement = true;
-    let told = Simulation::new(&scene).unwrap_err().to_string();
-    assert!(told.starts_with("outputs.slave_displacement: needs"), "{told}");
+    let reported = Simulation::new(&scene).unwrap_err().to_string();
+    assert!(reported.starts_with("outputs.slave_displacement: needs"), "{reported}");
     let place = scene.settings.surfaces.len() - 1;
     scene.settings.surfaces[place].structure = Some("ring".into());
     let (name, motion) = ("ring".into(), BodyMotion::Still);
@@ -315,7 +315,7 @@ fn an_output_that_no_pair_has_is_refused() {
 /// What is wrong is told with its number or its name.
 #[test]
 fn messages_say_which_contact_surface_or_structure_is_meant() {
-    let told = |change: fn(&mut Scene)| Simulation::new(&two(change)).unwrap_err().to_string();
+    let reported = |change: fn(&mut Scene)| Simulation::new(&two(change)).unwrap_err().to_string();
     for (beginning, change) in [
         ("contact[2].gap: ", (|scene| scene.settings.contacts[1].gap = 0.03) as fn(&mut Scene)),
         ("contact[2].sector_gaps: ", |scene| scene.settings.contacts[1].sector_gaps = vec![1e-4; 2]),
@@ -325,8 +325,8 @@ fn messages_say_which_contact_surface_or_structure_is_meant() {
         }),
         ("structure[2].frequency_factors: ", |scene| scene.settings.structures[1].frequency_factors = vec![1.0; 2]),
     ] {
-        let told = told(change);
-        assert!(told.starts_with(beginning), "{told}");
+        let reported = reported(change);
+        assert!(reported.starts_with(beginning), "{reported}");
     }
     // Tips that are too fast are refused by the name of their input, or accepted once.
     let fast = |accept: bool| {
@@ -396,6 +396,6 @@ fn friction_of_one_pair_is_not_that_of_the_other() {
         turned.into_iter().collect::<Result<Vec<_>, _>>()
     };
     assert!(outcome(0.45, 0.9).is_ok(), "{:?}", outcome(0.45, 0.9));
-    let told = outcome(0.9, 0.45).unwrap_err();
-    assert!(told.contains("no unique solution"), "{told}");
+    let reported = outcome(0.9, 0.45).unwrap_err();
+    assert!(reported.contains("no unique solution"), "{reported}");
 }

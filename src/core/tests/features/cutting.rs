@@ -194,10 +194,10 @@ fn warns_of_growth_under_a_cut_when_it_ends_a_run() {
     for speed in [SPEED, -SPEED, 0.0] {
         scene.settings.structures[0].speed = speed;
         let mut run = started(&scene);
-        let told = |part: &str| run.warnings().iter().any(|warning| warning.contains(part));
-        assert!(told("cutting is physically unstable") && !told("0.0000 kHz"), "{:?}", run.warnings());
+        let reported = |part: &str| run.warnings().iter().any(|warning| warning.contains(part));
+        assert!(reported("cutting is physically unstable") && !reported("0.0000 kHz"), "{:?}", run.warnings());
         assert_eq!(
-            told("with a coating that the blades cut: the sliding law"),
+            reported("with a coating that the blades cut: the sliding law"),
             speed.abs() < 1.0,
             "{:?}",
             run.warnings()

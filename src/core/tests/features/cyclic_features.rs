@@ -140,9 +140,9 @@ fn without_coupling_a_disk_has_the_steps_of_its_sectors() {
         scene.settings.contacts[0].friction = 0.0;
         scene.roms[1].contact_map *= 30.0;
         (scene.settings.time.step, scene.settings.experiment.communication_step) = (1e-5, 1e-5);
-        let told = try_started(&scene).unwrap_err().to_string();
-        let step = told.split("`internal_step_max`) below ").nth(1).and_then(|text| text.split(' ').next());
-        step.and_then(|step| step.parse::<f64>().ok()).unwrap_or_else(|| panic!("{told}"))
+        let reported = try_started(&scene).unwrap_err().to_string();
+        let step = reported.split("`internal_step_max`) below ").nth(1).and_then(|text| text.split(' ').next());
+        step.and_then(|step| step.parse::<f64>().ok()).unwrap_or_else(|| panic!("{reported}"))
     });
     assert!((named[0] / named[1] - 1.0).abs() < 1e-6, "{named:?}");
 }

@@ -269,17 +269,17 @@ fn excitation_work_is_force_times_displacement() {
                 }
                 touched += usize::from(!run.system().events().is_empty());
             }
-            let told = real(&run, "excitation_work");
+            let reported = real(&run, "excitation_work");
             // Quasi-static modes take the force of their own instant.
             let tolerance = if scheme.is_massless() { 3e-3 } else { 1e-10 };
-            let (apart, residual) = ((told - work).abs() / exchanged, real(&run, "energy_residual_relative").abs());
+            let (apart, residual) = ((reported - work).abs() / exchanged, real(&run, "energy_residual_relative").abs());
             println!(
-                "{}, {}: {touched} steps in contact, {told:.6e} J, apart {apart:.1e}, residual {residual:.1e}",
+                "{}, {}: {touched} steps in contact, {reported:.6e} J, apart {apart:.1e}, residual {residual:.1e}",
                 rom.name,
                 scheme.name()
             );
             assert!(
-                touched > 50 && told.abs() > 1e-6 && apart < tolerance && residual < 1e-10,
+                touched > 50 && reported.abs() > 1e-6 && apart < tolerance && residual < 1e-10,
                 "{apart:e} {residual:e}"
             );
         }
@@ -320,7 +320,7 @@ fn state_keeps_the_excitation_over_other_steps() {
 
 #[test]
 fn an_excitation_that_cannot_be_is_refused() {
-    let told = |change: fn(&mut ExcitationSettings)| {
+    let reported = |change: fn(&mut ExcitationSettings)| {
         let mut scene = scene(models::blade(3), Scheme::ModalExact, 2, 500.0);
         change(scene.settings.structures[0].excitation.as_mut().unwrap());
         Simulation::new(&scene).map(|_| ()).unwrap_err().to_string()
@@ -336,7 +336,7 @@ fn an_excitation_that_cannot_be_is_refused() {
         ("structure[1].excitation.amplitude", |it| it.amplitude = f64::NAN),
         ("structure[1].excitation.order", |it| it.order = 2_000_000),
     ] {
-        let found = told(change);
+        let found = reported(change);
         assert!(found.starts_with(beginning), "{found}");
     }
     let mut scene = scene(models::blade(3), Scheme::ModalExact, 4000, 500.0);

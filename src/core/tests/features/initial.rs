@@ -54,9 +54,9 @@ fn blades_go_on_from_where_they_start_as_free_vibration() {
             .flat_map(start)
             .map(|(mode, [d, v])| 0.5 * ((v / size(mode)).powi(2) + (model.frequencies[mode] * d / size(mode)).powi(2)))
             .sum();
-        let told = real(&run, "kinetic_energy") + real(&run, "strain_energy");
+        let reported = real(&run, "kinetic_energy") + real(&run, "strain_energy");
         let tolerance = if scheme == Scheme::CentralDifference { 1e-3 } else { 1e-11 };
-        assert!((told / energy - 1.0).abs() < tolerance, "{scheme:?}: {told:e} J, {energy:e} J");
+        assert!((reported / energy - 1.0).abs() < tolerance, "{scheme:?}: {reported:e} J, {energy:e} J");
         let (mut off, mut largest) = (0.0_f64, 0.0_f64);
         for _ in 0..60 {
             // Not the step that the initialisation took.
@@ -155,7 +155,7 @@ fn starts_and_ratios_are_checked_parameters() {
     set_element(&mut inside, "initial_displacement", 0, 1e-4);
     let error = inside.initialise(0.0).unwrap_err().to_string();
     assert!(error.contains("contact nodes start inside the casing"), "{error}");
-    let told = |change: fn(&mut Scene)| {
+    let reported = |change: fn(&mut Scene)| {
         let mut scene = given.clone();
         change(&mut scene);
         let refused = Simulation::new(&scene).and_then(|mut run| run.initialise(0.0));
@@ -181,7 +181,7 @@ fn starts_and_ratios_are_checked_parameters() {
         }),
         ("structure[1].damping_ratios[2]", |scene| scene.settings.structures[0].damping_ratios = vec![0.01, 1.5]),
     ] {
-        let found = told(change);
+        let found = reported(change);
         assert!(found.starts_with(beginning), "{found}");
     }
     let mut massless =

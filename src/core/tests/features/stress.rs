@@ -80,21 +80,21 @@ fn stress_that_is_not_asked_for_costs_nothing() {
 
 #[test]
 fn stress_without_places_is_refused() {
-    let told = |change: fn(&mut Scene)| {
+    let reported = |change: fn(&mut Scene)| {
         let mut scene = scene();
         change(&mut scene);
         Simulation::new(&scene).map(|_| ()).unwrap_err().to_string()
     };
-    let missing = told(|scene| scene.roms[0].extras.stress = None);
+    let missing = reported(|scene| scene.roms[0].extras.stress = None);
     assert!(missing.starts_with("outputs.stress: needs stress points in the ROM of a rotor"), "{missing}");
-    let unwatched = told(|scene| scene.settings.outputs.watched_sectors.clear());
+    let unwatched = reported(|scene| scene.settings.outputs.watched_sectors.clear());
     assert!(unwatched.starts_with("outputs.stress: needs `outputs.watched_sectors`"), "{unwatched}");
-    let short = told(|scene| {
+    let short = reported(|scene| {
         let stress = scene.roms[0].extras.stress.as_mut().unwrap();
         stress.map = stress.map.rows(0, STRESSES).into_owned();
     });
     assert!(short.contains("`stress_map`"), "{short}");
-    let broken = told(|scene| scene.roms[0].extras.stress.as_mut().unwrap().map[(1, 1)] = f64::NAN);
+    let broken = reported(|scene| scene.roms[0].extras.stress.as_mut().unwrap().map[(1, 1)] = f64::NAN);
     assert!(broken.contains("`stress_map`: non-finite entry at (1, 1)"), "{broken}");
 }
 
@@ -113,8 +113,8 @@ fn heated(thermal: fn(usize) -> f64) -> Scene {
 
 fn stress_of(run: &Simulation, sector: usize) -> Vec<f64> {
     let names = ["radial", "tangential", "axial", "radial_tangential", "tangential_axial", "axial_radial"];
-    let told = |place: u32, name: &str| element(run, &format!("blade[{sector}].{name}_stress"), place);
-    (0..2).flat_map(|place| names.map(|name| told(place, name))).collect()
+    let reported = |place: u32, name: &str| element(run, &format!("blade[{sector}].{name}_stress"), place);
+    (0..2).flat_map(|place| names.map(|name| reported(place, name))).collect()
 }
 
 fn warm(scene: &Scene, temperature: f64) -> Simulation {
@@ -196,8 +196,8 @@ fn stress_that_forces_decide_does_not_depend_on_the_stiffness() {
 fn stress_of_a_heated_blade_needs_its_static_thermal_stress() {
     let mut scene = heated(|_| 0.0);
     scene.roms[0].extras.stress_thermal = None;
-    let told = |scene: &Scene| Simulation::new(scene).map(|_| ()).unwrap_err().to_string();
-    let refused = told(&scene);
+    let reported = |scene: &Scene| Simulation::new(scene).map(|_| ()).unwrap_err().to_string();
+    let refused = reported(&scene);
     assert!(
         refused.starts_with("outputs.stress: stress of a rotor with `structure.thermal` needs static thermal stress"),
         "{refused}"
@@ -208,7 +208,7 @@ fn stress_of_a_heated_blade_needs_its_static_thermal_stress() {
     let changed = |change: fn(&mut Scene)| {
         let mut scene = heated(|_| 0.0);
         change(&mut scene);
-        told(&scene)
+        reported(&scene)
     };
     let shape = changed(|scene| scene.roms[0].extras.stress_thermal = Some(DMatrix::zeros(6, 1)));
     assert!(shape.contains("`stress_thermal`: shape (6, 1) found, (12, 1) expected"), "{shape}");

@@ -195,7 +195,7 @@ fn tips_move_by_the_modes_that_are_told() {
         go(&mut run, 2e-5);
         for node in 0..3_u32 {
             for (axis, name) in ["radial", "tangential", "axial"].into_iter().enumerate() {
-                let told = element(&run, &format!("blade[3].tip_{name}_displacement"), node);
+                let reported = element(&run, &format!("blade[3].tip_{name}_displacement"), node);
                 let row = 3 * node as usize + axis;
                 // The modes of this ROM are its coordinates, up to their sense.
                 let term = |mode: usize| {
@@ -205,8 +205,8 @@ fn tips_move_by_the_modes_that_are_told() {
                     1.0_f64.copysign(most) * amplitude * map[(row, mode)]
                 };
                 let sum: f64 = (0..modes).map(term).sum();
-                largest = largest.max(told.abs());
-                assert!((told - sum).abs() < 1e-10 * (told.abs() + 1e-6), "{told:e} {sum:e}");
+                largest = largest.max(reported.abs());
+                assert!((reported - sum).abs() < 1e-10 * (reported.abs() + 1e-6), "{reported:e} {sum:e}");
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Free bodies by a tolerance: an impact in closed form, momentum and energy, convergence, states that continue.
 
 use crate::counting::allocations_of;
-use crate::guide::{self, told};
+use crate::guide::{self, print_row};
 use lattice::*;
 use nalgebra::DMatrix;
 use tiprub_core::settings::*;
@@ -173,11 +173,11 @@ fn the_error_follows_the_tolerance() {
         for friction in [0.0, 0.2] {
             let of = |tolerance: f64| marched(scene.clone(), tolerance, friction);
             let errors = over_tolerance(of, steps, &TOLERANCES, 1e-7);
-            told!("{name}, µ {friction}: error over tolerance {errors:?}");
+            print_row!("{name}, µ {friction}: error over tolerance {errors:?}");
             assert!(errors.iter().all(|error| *error < 1.0), "{name}, µ {friction}: {errors:?}");
         }
     }
-    told!("tolerances {TOLERANCES:?}");
+    print_row!("tolerances {TOLERANCES:?}");
     guide::hold("cargo test -p tiprub-core --test free marched");
 }
 
@@ -267,10 +267,10 @@ fn friction_that_puts_energy_in_ends_the_run() {
             assert!(energy < 1.01 * start, "{energy} J of {start} J");
             simulation.do_step(simulation.time(), H).err()
         });
-        let told = ended.map(|error| error.to_string()).unwrap_or_default();
+        let reported = ended.map(|error| error.to_string()).unwrap_or_default();
         assert!(
-            told.contains("friction has added") && told.contains("not model sticking"),
-            "{rigid} {tolerance}: {told}"
+            reported.contains("friction has added") && reported.contains("not model sticking"),
+            "{rigid} {tolerance}: {reported}"
         );
     }
 }
@@ -302,8 +302,8 @@ fn with_sticking_friction_takes_energy_alone() {
         }
         let tolerances = [1e-1, 1e-2, 1e-3];
         let errors = over_tolerance(of, 60, &tolerances, 1e-5);
-        told!("tolerances {tolerances:?}");
-        told!("sticking, rigid {rigid}: error over tolerance {errors:.1?}");
+        print_row!("tolerances {tolerances:?}");
+        print_row!("sticking, rigid {rigid}: error over tolerance {errors:.1?}");
         assert!(errors.iter().all(|error| *error < 6.0), "{errors:?}");
     }
     guide::hold("cargo test -p tiprub-core --test free sticking");
@@ -331,10 +331,10 @@ fn what_sticks_flies_off_as_with_light_contact_nodes() {
 /// none.
 #[test]
 fn contact_without_flexibility_of_its_own_is_told() {
-    let told = |rom: Rom| {
+    let reported = |rom: Rom| {
         let scene = thrown_at_wall(rom, 0.0203, [-6.0, 30.0, 4.0]);
         let simulation = started(&marched(scene, 1e-3, 0.0));
         simulation.warnings().iter().filter(|text| text.contains("no independent flexibility")).count()
     };
-    assert_eq!([told(faces([0.0; 3])), told(sprung())], [1, 0]);
+    assert_eq!([reported(faces([0.0; 3])), reported(sprung())], [1, 0]);
 }

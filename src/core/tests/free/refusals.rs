@@ -123,8 +123,8 @@ fn friction_that_jams_a_contact_on_a_plate_is_refused() {
 #[test]
 fn warns_of_friction_without_a_unique_solution_in_flight() {
     let simulation = started(&with_local_mode(0.0203, &[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]));
-    let told = simulation.warnings().join(" ");
-    assert!(told.contains("cannot be shown to have a unique solution"), "{told}");
+    let reported = simulation.warnings().join(" ");
+    assert!(reported.contains("cannot be shown to have a unique solution"), "{reported}");
     let mut frictionless = with_local_mode(0.0203, &[(0, [1.0, 0.0, 0.0]), (1, [0.0, 1.0, 0.0])]);
     frictionless.settings.contacts[0].friction = 0.0;
     let simulation = started(&frictionless);

@@ -1,7 +1,7 @@
 //! Energy over very many impacts that take none: what the bank holds is bounded.
 
 use super::{SECTORS, scene};
-use crate::guide::{self, told};
+use crate::guide::{self, print_row};
 use tiprub_core::settings::{Scheme, Shape};
 use tiprub_test_models::{go, real, set, started};
 
@@ -33,7 +33,7 @@ fn blades_keep_their_energy_over_thousands_of_impacts() {
             assert!((energy(&simulation) + lost - given).abs() < 1e-10 * given, "{tolerance:e}");
         }
         let (left, effort) = (energy(&simulation) / given, *simulation.system().effort());
-        told!(
+        print_row!(
             "tolerance {tolerance:.0e}: energy left {left:.4}, most lost {most:.4}, {} steps, {} trials per blade",
             effort.steps / SECTORS as u64,
             effort.trials / SECTORS as u64

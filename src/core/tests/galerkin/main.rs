@@ -10,7 +10,7 @@ mod guide;
 mod sticking;
 
 use counting::allocations_of;
-use guide::told;
+use guide::print_row;
 use tiprub_core::settings::{LoadSettings, OutputSettings, Scheme, Shape, SplineSettings, TimeSettings};
 use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::disk::TestDisk;
@@ -99,14 +99,14 @@ fn is_the_limit_of_massless_boundary_within_its_tolerance() {
     let (coarse, fine) = (other(1e-7), other(5e-8));
     let (first, second) = (exact.impulse - coarse.impulse, exact.impulse - fine.impulse);
     let distance = apart(&fine.displacements, &exact.displacements);
-    told!("massless-boundary, h = 0.05 us: {distance:.1e}, impulse {:.1e}", second / exact.impulse);
+    print_row!("massless-boundary, h = 0.05 us: {distance:.1e}, impulse {:.1e}", second / exact.impulse);
     assert!(distance < 1e-5);
     // Of first order in h, towards the same.
     assert!((first / second - 2.0).abs() < 0.1 && (second / exact.impulse).abs() < 1e-4, "{first:e} {second:e}");
     for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
         let found = run(&scene(Scheme::Galerkin, H, tolerance), still);
         let error = apart(&found.displacements, &exact.displacements);
-        told!("tolerance {tolerance:.0e}: {error:.1e}, steps per blade {}", found.steps);
+        print_row!("tolerance {tolerance:.0e}: {error:.1e}, steps per blade {}", found.steps);
         assert!(error < tolerance && found.residual < 1e-13);
     }
     guide::hold("cargo test -p tiprub-core --test galerkin");
@@ -411,13 +411,13 @@ fn a_tolerance_that_is_missed_is_counted_and_told_once() {
         let of_start = simulation.warnings().iter().filter(|text| text.contains("cannot be reached")).count();
         (counts.map(|name| real(&simulation, name)), notes, (*simulation.system().effort(), of_start))
     };
-    let ([steps, trials, most, missed], notes, (effort, told)) = run(1e-3);
-    assert!(missed == 0.0 && notes.is_empty() && told == 0, "{notes:?}");
+    let ([steps, trials, most, missed], notes, (effort, reported)) = run(1e-3);
+    assert!(missed == 0.0 && notes.is_empty() && reported == 0, "{notes:?}");
     let sectors = 4.0;
     assert!(steps >= 40.0 * sectors && trials > steps && most >= trials / 40.0 && most < trials, "{effort:?}");
-    let ([_, _, _, missed], notes, (effort, told)) = run(1e-9);
+    let ([_, _, _, missed], notes, (effort, reported)) = run(1e-9);
     assert!(
-        told == 1 && missed > 0.0 && (effort.missed as f64).to_bits() == missed.to_bits() && notes.len() == 1,
+        reported == 1 && missed > 0.0 && (effort.missed as f64).to_bits() == missed.to_bits() && notes.len() == 1,
         "{effort:?} {notes:?}"
     );
     assert!(

@@ -1,7 +1,7 @@
 //! Contacts that may stick, by a tolerance, on whole scenes: blades by themselves, in elastic casings, coupled.
 
 use super::{Combination, H, apart, disk_displacements, goes_on_with_the_same_bits, run, scene, scene_time, still};
-use crate::guide::{self, told};
+use crate::guide::{self, print_row};
 use tiprub_core::settings::{Scheme, Shape, Solver, TimeSettings};
 use tiprub_core::{Rom, Scene};
 use tiprub_test_models::disk::TestDisk;
@@ -22,13 +22,13 @@ fn errors_of_friction_that_may_stick_are_those_asked_for() {
         if name == "rigid" {
             let far = |step: f64| apart(&of(Scheme::MasslessBoundary, step, 1e-3).displacements, &exact.displacements);
             let (coarse, fine) = (far(2e-7), far(5e-8));
-            told!("coulomb, massless-boundary, h = 0.05 us: {fine:.1e}");
+            print_row!("coulomb, massless-boundary, h = 0.05 us: {fine:.1e}");
             assert!(fine < 1e-5 && coarse > 2.0 * fine, "{coarse:e} {fine:e}");
         }
         for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
             let found = of(Scheme::Galerkin, H, tolerance);
             let error = apart(&found.displacements, &exact.displacements);
-            told!("coulomb, {name}, tolerance {tolerance:.0e}: {error:.1e}, steps per blade {}", found.steps);
+            print_row!("coulomb, {name}, tolerance {tolerance:.0e}: {error:.1e}, steps per blade {}", found.steps);
             assert!(error < 1.5 * tolerance && found.residual < 1e-13, "{error:e} {:e}", found.residual);
         }
     }
@@ -105,7 +105,7 @@ fn errors_stay_near_the_tolerance_where_blades_stick_and_slip() {
         for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
             let (found, effort) = run(tolerance);
             let error = found.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / GAP / tolerance;
-            told!(
+            print_row!(
                 "{speed} rad/s, tolerance {tolerance:.0e}: error over it {error:.2}, {} steps, {} trials, missed {}",
                 effort.steps,
                 effort.trials,

@@ -136,15 +136,15 @@ fn growth_is_told_in_the_sense_of_rotation_and_by_node() {
     scene.settings.time.scheme = Scheme::CentralDifference;
     scene.settings.time.step = 7.2e-6;
     scene.settings.experiment.communication_step = 5e-5;
-    let told = |scene: &Scene| started(scene).warnings().join("\n");
-    let text = told(&scene);
+    let reported = |scene: &Scene| started(scene).warnings().join("\n");
+    let text = reported(&scene);
     assert!(text.contains("trailing_edge") && text.contains("+θ") && !text.contains("−θ"), "{text}");
     // The same physical step, asked for through the communication step alone.
     scene.settings.time.step = 1.0;
     scene.settings.experiment.communication_step = 5e-5 / 7.0;
-    assert_eq!(told(&scene), text);
+    assert_eq!(reported(&scene), text);
     scene.settings.structures[0].speed *= -1.0;
-    assert!(!told(&scene).contains("+θ"), "{}", told(&scene));
+    assert!(!reported(&scene).contains("+θ"), "{}", reported(&scene));
 }
 
 #[test]
@@ -422,9 +422,9 @@ fn rejects_too_fast_tips_unless_the_scene_accepts_them() {
         scene.settings.accept_implausible = true;
         let accepted = outcomes(&mut started(&scene));
         assert!(accepted.iter().all(|(outcome, _)| outcome.is_ok()));
-        assert_eq!(accepted.map(|(_, told)| told), [0, 0, 1, 0, 0, 0], "{sense}");
+        assert_eq!(accepted.map(|(_, reported)| reported), [0, 0, 1, 0, 0, 0], "{sense}");
         scene.settings.silence = vec!["implausible".into()];
-        assert_eq!(outcomes(&mut started(&scene)).map(|(_, told)| told), [0; 6], "{sense}");
+        assert_eq!(outcomes(&mut started(&scene)).map(|(_, reported)| reported), [0; 6], "{sense}");
         (scene.settings.accept_implausible, scene.settings.silence) = (false, Vec::new());
     }
 }

@@ -50,10 +50,10 @@ fn friction_that_feeds_a_vibration_ends_the_run() {
             assert!(heat >= before - 1e-9 * simulation.system().ledger().scale(), "{scheme:?}: {heat} after {before}");
             before = before.max(heat);
         });
-        let told = outcome.unwrap_err().to_string();
+        let reported = outcome.unwrap_err().to_string();
         assert!(
-            told.contains("friction has added") && told.contains("solver coulomb"),
-            "{scheme:?}, {solver:?}: {told}"
+            reported.contains("friction has added") && reported.contains("solver coulomb"),
+            "{scheme:?}, {solver:?}: {reported}"
         );
     }
 }

@@ -35,8 +35,8 @@ fn rejects_a_later_step_beyond_massless_boundary() {
     for share in [0.2, 0.99] {
         go(&mut simulation, share * usable);
     }
-    let told = simulation.do_step(simulation.time(), 1.01 * usable).unwrap_err().to_string();
-    assert!(told.contains("too long for massless-boundary"), "{told}");
+    let reported = simulation.do_step(simulation.time(), 1.01 * usable).unwrap_err().to_string();
+    assert!(reported.contains("too long for massless-boundary"), "{reported}");
     go(&mut simulation, 0.99 * usable);
 }
 
@@ -193,24 +193,24 @@ fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
     scene.settings.experiment.communication_step = 5e-6;
     let mut simulation = try_started(&scene).unwrap();
     assert!(simulation.warnings().is_empty(), "{:?}", simulation.warnings());
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for length in [5e-6, 7.9e-6, 8e-6, 8e-6, 4e-6, 1.6e-5] {
         go(&mut simulation, length);
-        told.push(simulation.take_notes().join("; "));
+        reported.push(simulation.take_notes().join("; "));
     }
-    assert!(told[2].contains("8.000e-6"), "{told:?}");
-    assert_eq!(told.iter().filter(|text| !text.is_empty()).count(), 1, "{told:?}");
+    assert!(reported[2].contains("8.000e-6"), "{reported:?}");
+    assert_eq!(reported.iter().filter(|text| !text.is_empty()).count(), 1, "{reported:?}");
     // Told at the start for the step to expect, it is told again when the step is materially longer.
     let mut scene = with_step(scene, 2e-5);
     scene.settings.experiment.communication_step = 1e-5;
     let mut simulation = try_started(&scene).unwrap();
     assert!(simulation.warnings().join(" ").contains("1.000e-5"), "{:?}", simulation.warnings());
     let steps = [1e-5, 1.1e-5, 2e-5, 1e-5, 2e-5];
-    let told = steps.map(|length| {
+    let reported = steps.map(|length| {
         go(&mut simulation, length);
         simulation.take_notes().len()
     });
-    assert_eq!(told, [0, 0, 1, 0, 0]);
+    assert_eq!(reported, [0, 0, 1, 0, 0]);
 }
 
 #[test]
@@ -241,7 +241,7 @@ fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
 /// What is too large to be looked at is told, and only where friction makes it matter.
 #[test]
 fn growth_that_is_not_looked_at_is_told() {
-    let told = |scheme: Scheme, modes: usize, friction: f64| {
+    let reported = |scheme: Scheme, modes: usize, friction: f64| {
         let mut scene = models::rub(2);
         scene.settings.time.scheme = scheme;
         let own = scene.roms[0].order();
@@ -258,7 +258,7 @@ fn growth_that_is_not_looked_at_is_told() {
         simulation.warnings().iter().any(|text| text.contains("is not checked: the model has"))
     };
     for scheme in [Scheme::ModalExact, Scheme::Galerkin] {
-        let found = [told(scheme, 151, 0.1), told(scheme, 151, 0.0), told(scheme, 150, 0.1)];
+        let found = [reported(scheme, 151, 0.1), reported(scheme, 151, 0.0), reported(scheme, 150, 0.1)];
         assert_eq!(found, [true, false, false], "{scheme:?}");
     }
 }
@@ -336,12 +336,12 @@ fn refused_steps_name_adaptive_steps_first() {
 #[test]
 fn remedies_are_those_that_the_preset_leaves() {
     let mut scene = with_step(round(Scheme::CentralDifference), 1e-5);
-    let told = |scene: &Scene| try_started(scene).unwrap_err().to_string();
-    let plain = told(&scene);
+    let reported = |scene: &Scene| try_started(scene).unwrap_err().to_string();
+    let plain = reported(&scene);
     assert!(plain.contains("`time.step`") && plain.contains("modal-exact"), "{plain}");
     scene.settings.preset = tiprub_core::settings::Preset::Paper;
     scene.settings.contacts[0].solver = Solver::Film;
-    let paper = told(&scene);
+    let paper = reported(&scene);
     assert!(paper.contains("remove `preset`") && !paper.contains("modal-exact"), "{paper}");
 }
 
@@ -354,7 +354,7 @@ fn digging_in_is_told_with_its_friction() {
         |row: usize, mode: usize| [[0.5, 1.0, 0.0], [1.0, -0.5, 0.0], [0.0, 0.0, 1.0], [0.1, 0.1, 0.0]][mode][row];
     let mut rom = models::modal("leaning", &[1000.0, 4000.0, 5000.0, 9000.0], shape, vec![place]);
     rom.damping_ratio = 0.005;
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for speed in [1300.0, -1300.0] {
         let mut scene = with_step(models::round(rom.clone()), 1e-7);
         scene.settings.structures[0].speed = speed;
@@ -362,21 +362,21 @@ fn digging_in_is_told_with_its_friction() {
         scene.settings.silence = vec![Topic::StiffnessAtRest.id().to_owned()];
         let warnings = try_started(&scene).unwrap().warnings().to_vec();
         assert!(warnings.len() <= 1, "{warnings:?}");
-        told.extend(warnings);
+        reported.extend(warnings);
     }
     // Σ φ_r²/ω² over Σ φ_r φ_θ/ω², in units of the first.
     let [along, across] = [(0.25 + 1.0 / 16.0 + 0.01 / 81.0), (0.5 - 0.5 / 16.0 + 0.01 / 81.0)];
     let expected = format!("µ* = {:.3}", along / across);
     // It does so without swinging, and nothing else grows.
-    let told = told.iter().filter(|text| text.contains("locks up")).collect::<Vec<_>>();
-    assert!(told.len() == 1 && told[0].contains(&expected), "{expected}: {told:?}");
-    assert!(told[0].contains("1/s and 0 Hz") && !told[0].contains("flutter"), "{told:?}");
+    let reported = reported.iter().filter(|text| text.contains("locks up")).collect::<Vec<_>>();
+    assert!(reported.len() == 1 && reported[0].contains(&expected), "{expected}: {reported:?}");
+    assert!(reported[0].contains("1/s and 0 Hz") && !reported[0].contains("flutter"), "{reported:?}");
 }
 
 /// A casing that turns as it yields: under one blade its part of W is the rank-one matrix c(1 − µτ), whatever the angle.
 #[test]
 fn what_a_casing_does_to_solvability_is_told_with_its_place() {
-    let told = |turned: f64, friction: f64| {
+    let reported = |turned: f64, friction: f64| {
         let mut ring = models::ring(36, 3);
         let shape = |row: usize, _: usize| [1.0, turned, 0.0][row % 3];
         let turning = models::modal("ring", &[3000.0], shape, ring.contact_nodes.clone());
@@ -389,11 +389,11 @@ fn what_a_casing_does_to_solvability_is_told_with_its_place() {
         warnings.into_iter().filter(|text| text.contains("contribution of the casing")).collect::<Vec<_>>()
     };
     for (turned, friction) in [(6.0, 0.15), (0.0, 0.15), (1e3, 0.0)] {
-        assert!(told(turned, friction).is_empty(), "{:?}", told(turned, friction));
+        assert!(reported(turned, friction).is_empty(), "{:?}", reported(turned, friction));
     }
     for turned in [7.0, -7.0] {
-        let told = told(turned, 0.15);
-        assert!(told.len() == 1 && told[0].contains("-1.00e0 times the largest, at θ = 0.00 rad"), "{told:?}");
+        let reported = reported(turned, 0.15);
+        assert!(reported.len() == 1 && reported[0].contains("-1.00e0 times the largest, at θ = 0.00 rad"), "{reported:?}");
     }
 }
 
@@ -415,7 +415,7 @@ fn growth_of_many_nodes_together_is_told_of_them_all() {
 /// The number of blades that is told may press on the casing at once, each adding as much as the first.
 #[test]
 fn massless_boundary_tells_how_many_blades_may_press_at_once() {
-    let told = |blades: usize, share: f64| {
+    let reported = |blades: usize, share: f64| {
         let mut scene = on_a_ring(round(Scheme::MasslessBoundary));
         scene.roms[0] = models::rich_blade(blades);
         scene.roms[1].contact_map *= 4.0;
@@ -424,9 +424,9 @@ fn massless_boundary_tells_how_many_blades_may_press_at_once() {
         let many = warnings.iter().find_map(|text| text.split("stable for up to ").nth(1)?.split(' ').next());
         many.map(|many| many.parse::<usize>().unwrap())
     };
-    let many = told(200, 0.9).unwrap();
+    let many = reported(200, 0.9).unwrap();
     assert!((1..200).contains(&many), "{many}");
-    assert_eq!([told(many, 0.9), told(many + 1, 0.9)], [None, Some(many)]);
+    assert_eq!([reported(many, 0.9), reported(many + 1, 0.9)], [None, Some(many)]);
 }
 
 /// Of coupled sectors the sense of the start alone is looked at: the other takes as long again.
@@ -437,7 +437,7 @@ fn the_other_sense_of_a_disk_is_told_to_be_unknown() {
     for (speed, expected) in [(1300.0, 0), (-1300.0, 1), (1300.0, 0), (-1300.0, 0)] {
         set(&mut simulation, "speed", speed);
         go(&mut simulation, 1e-6);
-        let told = simulation.take_notes();
-        assert_eq!(told.iter().filter(|text| text.contains("was not checked")).count(), expected, "{told:?}");
+        let reported = simulation.take_notes();
+        assert_eq!(reported.iter().filter(|text| text.contains("was not checked")).count(), expected, "{reported:?}");
     }
 }

@@ -73,10 +73,10 @@ fn a_run_ends_where_film_pulls_and_goes_on_where_it_does_not() {
         let (mut simulation, outcome) = pressed(&scene);
         let case = format!("{whole} {scheme:?} {product}: {outcome:?}");
         if pulls {
-            let told = outcome.unwrap_err().to_string();
+            let reported = outcome.unwrap_err().to_string();
             let named = ["contact node rear", ", 33 % of the impulse", "solver = \"lcp\""];
-            assert!(named.iter().all(|part| told.contains(part)), "{told}");
-            assert_eq!(told.contains("`time.step`"), product > 2.0, "{told}");
+            assert!(named.iter().all(|part| reported.contains(part)), "{reported}");
+            assert_eq!(reported.contains("`time.step`"), product > 2.0, "{reported}");
         } else {
             assert!(outcome.is_ok(), "{case}");
             let [front, rear] = [0, 1].map(|node| simulation.system().multiplier(node, 0));
@@ -100,9 +100,9 @@ fn little_pulling_is_told_once_and_so_is_that_of_the_paper() {
         scene.settings.preset = preset;
         let (mut simulation, outcome) = pressed(&scene);
         assert!(outcome.is_ok(), "{outcome:?}");
-        let told = about_film(simulation.take_notes());
-        assert_eq!(told.len(), usize::from(expected.is_some()), "{told:?}");
-        for (text, share) in told.iter().zip(expected) {
+        let reported = about_film(simulation.take_notes());
+        assert_eq!(reported.len(), usize::from(expected.is_some()), "{reported:?}");
+        for (text, share) in reported.iter().zip(expected) {
             assert!(text.contains(share) && text.contains("contact node rear"), "{text}");
             let paper = preset == Preset::Paper;
             assert!(text.contains("The run ends") != paper && text.contains("Remove `preset`") == paper, "{text}");

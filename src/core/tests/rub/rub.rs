@@ -453,8 +453,8 @@ fn amplitudes_of_nodal_diameters_are_fourier_coefficients() {
                 [real + moved * cosine, imaginary + moved * sine]
             });
             let expected = sum[0].hypot(sum[1]) / middle.len() as f64 * if diameter == 0 { 1.0 } else { 2.0 } / 7.0;
-            let told = tiprub_test_models::element(&simulation, "nodal_diameter_amplitude", diameter);
-            assert!(expected > 1e-9 && (told / expected - 1.0).abs() < 1e-10, "{diameter}: {told:e} {expected:e}");
+            let reported = tiprub_test_models::element(&simulation, "nodal_diameter_amplitude", diameter);
+            assert!(expected > 1e-9 && (reported / expected - 1.0).abs() < 1e-10, "{diameter}: {reported:e} {expected:e}");
         }
     }
 }

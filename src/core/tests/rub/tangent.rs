@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::guide;
-use crate::guide::told;
+use crate::guide::print_row;
 use tiprub_core::settings::{LoadSettings, Scheme, Solver, SplineSettings, TimeSettings};
 use tiprub_core::variables::{Causality, DataType, Variability};
 use tiprub_core::{Scene, Simulation};
@@ -176,7 +176,7 @@ fn derivatives_over_a_step_are_those_of_central_differences() {
         }
         lines.push(line);
     }
-    lines.into_iter().for_each(|line| told!("{line}"));
+    lines.into_iter().for_each(|line| print_row!("{line}"));
     guide::hold("cargo test -p tiprub-core --test rub");
 }
 

@@ -69,8 +69,8 @@ fn rejects_thermal_loads_that_do_not_fit() {
         |loads| *loads = loads.clone().insert_column(0, 1.0),
     ];
     for change in changes {
-        let told = heated(change).unwrap_err();
-        assert!(told.contains("`thermal_loads`") && told.contains("finite values expected"), "{told}");
+        let reported = heated(change).unwrap_err();
+        assert!(reported.contains("`thermal_loads`") && reported.contains("finite values expected"), "{reported}");
     }
 }
 
@@ -163,7 +163,7 @@ fn rejects_wrong_units_and_axes_unless_the_scene_accepts_them() {
         let refusal = start(false).1.unwrap_err().to_string();
         assert!(refusal.contains(word) && refusal.contains("--accept-implausible"), "{word}: {refusal}");
         let (simulation, outcome) = start(true);
-        let told = simulation.warnings().join("; ");
-        assert!(told.contains(word) && told.contains('?'), "{word}: {told} {outcome:?}");
+        let reported = simulation.warnings().join("; ");
+        assert!(reported.contains(word) && reported.contains('?'), "{word}: {reported} {outcome:?}");
     }
 }

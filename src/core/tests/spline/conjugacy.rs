@@ -146,8 +146,8 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         assert!((own / fixed - 1.0).abs() < 1e-12, "{}: {own:e} {fixed:e}", feature.0);
         // Its moment is that of the force at the contact point, about the shaft's centre.
         let ([x, y, z], [fx, fy, fz]) = (std::array::from_fn(|i| acting.point[i] - drive.shaft[i]), acting.force);
-        for (told, found) in acting.moment.into_iter().zip([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx]) {
-            assert!((told - found).abs() < 1e-12, "{}: {:?}, {found}", feature.0, acting.moment);
+        for (reported, found) in acting.moment.into_iter().zip([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx]) {
+            assert!((reported - found).abs() < 1e-12, "{}: {:?}, {found}", feature.0, acting.moment);
         }
         let wrench = law.wrench(at, point, normal);
         let surface = |motion: MotionIncrement| {
@@ -160,15 +160,15 @@ fn normals_and_motions_are_the_derivatives_of_the_gap() {
         ]
         .map(surface);
         let size = 1e-7;
-        let mut check = |what: &str, told: f64, change: &dyn Fn(f64, &mut PrescribedMotion, &mut [f64])| {
+        let mut check = |what: &str, reported: f64, change: &dyn Fn(f64, &mut PrescribedMotion, &mut [f64])| {
             let ends = [size, -size].map(|by| {
                 let (mut drive, mut displacement) = (drive, displacement.clone());
                 change(by, &mut drive, &mut displacement);
                 looked(&mut law, lanes, &drive, &displacement).0
             });
             let found = (ends[0] - ends[1]) / (2.0 * size);
-            println!("{}, {what}: {found:.9} told {told:.9}, gap {gap:.1e}", feature.0);
-            assert!((found - told).abs() < 1e-6, "{}, {what}: {found} told {told}", feature.0);
+            println!("{}, {what}: {found:.9} told {reported:.9}, gap {gap:.1e}", feature.0);
+            assert!((found - reported).abs() < 1e-6, "{}, {what}: {found} told {reported}", feature.0);
         };
         for component in 0..3 {
             let change = |by, _: &mut PrescribedMotion, moved: &mut [f64]| moved[component * lanes] += by;
@@ -218,8 +218,8 @@ fn friction_heat_goes_to_the_patch_facing_the_node() {
             }
         }
         for (patch, heat) in (0..).zip(heat) {
-            let told = simulation.real(first + patch).unwrap() * LENGTH;
-            assert!((told - heat).abs() < 1e-9 * (heat + 1e-3), "{patch}: {told} for {heat}");
+            let reported = simulation.real(first + patch).unwrap() * LENGTH;
+            assert!((reported - heat).abs() < 1e-9 * (heat + 1e-3), "{patch}: {reported} for {heat}");
         }
     }
     println!("{moved:.3} J of {total:.1} J are heat of another patch than that of the undisplaced node");
@@ -243,6 +243,6 @@ fn energy_that_no_input_brings_ends_the_run() {
         None
     };
     assert_eq!(ends(2e-6), None);
-    let told = ends(1e-4).unwrap();
-    assert!(told.contains("J of spurious energy") && told.contains("Use a smaller internal step"), "{told}");
+    let reported = ends(1e-4).unwrap();
+    assert!(reported.contains("J of spurious energy") && reported.contains("Use a smaller internal step"), "{reported}");
 }

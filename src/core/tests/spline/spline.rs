@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 
 use crate::casings::*;
-use crate::guide::told;
+use crate::guide::print_row;
 use tiprub_core::gaps::dot;
 use tiprub_core::gaps::surface_spline::{ClosestPoint, Evaluation, REACH, SurfaceSpline};
 use tiprub_core::settings::{Closure, Interpolation};
@@ -296,7 +296,7 @@ fn a_round_casing_is_met_to_fourth_order() {
     let errors: Vec<f64> = [24, 36, 72, 144, 288].into_iter().map(error).collect();
     for (count, error) in [24, 36, 72, 144, 288].into_iter().zip(&errors) {
         let facets = off_the_circle(count, Closure::Smooth, Interpolation::Facets);
-        told!("| {count} | {:.3e} | {:.3e} |", 1e6 * error, 1e6 * facets);
+        print_row!("| {count} | {:.3e} | {:.3e} |", 1e6 * error, 1e6 * facets);
     }
     let rates = [(0, 1, 1.5_f64), (1, 2, 2.0), (2, 3, 2.0), (3, 4, 2.0)]
         .map(|(a, b, ratio)| (errors[a] / errors[b]).ln() / ratio.ln());

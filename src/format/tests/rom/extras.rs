@@ -118,14 +118,14 @@ fn reads_back_known_rub_errors() {
         let rom = with(Some(errors));
         assert_eq!(read_rom(&write_rom(&rom), "rom").unwrap(), rom);
     }
-    for (text, told) in [
+    for (text, reported) in [
         ("modes=0.1,nodes=0.2", "\"nodes=0.2\" does not name a known error"),
         ("modes=0.1,modes=0.2", "\"modes=0.2\" is repeated or is not a non-negative number"),
         ("mesh=-1", "\"mesh=-1\" is repeated or is not"),
         ("mesh=NaN", "\"mesh=NaN\" is repeated or is not"),
         ("patches", "\"patches\" is repeated or is not"),
     ] {
-        refused(|file| drop(file.entries.insert("rub_errors".into(), text.into())), &["metadata `rub_errors`", told]);
+        refused(|file| drop(file.entries.insert("rub_errors".into(), text.into())), &["metadata `rub_errors`", reported]);
     }
     let alone = |file: &mut Loose| drop(file.entries.insert("rub_errors_found_on".into(), "a rub".into()));
     refused(alone, &["metadata `rub_errors_found_on`: given without `rub_errors`"]);
@@ -139,25 +139,25 @@ fn watched_points_come_whole_and_only_where_they_can() {
         change(&mut file);
         read_rom(&file.bytes(), "rom").unwrap_err().to_string()
     };
-    let told = refused(&|file| drop(file.arrays.remove("watched_positions")));
-    assert!(told.contains("`watched_positions`") && told.contains("`watched_map`"), "{told}");
-    let told = refused(&|file| drop(file.entries.insert("watched_names".into(), "a,a".into())));
-    assert!(told.contains("`watched_names`") && told.contains("twice"), "{told}");
-    let told = refused(&|file| drop(file.arrays.remove("stress_map")));
-    assert!(told.contains("`stress_map`") && told.contains("`stress_positions`"), "{told}");
-    let told = refused(&|file| drop(file.entries.insert("stress_names".into(), "a".into())));
-    assert!(told.contains("`stress_names`") && told.contains("`stress_positions`"), "{told}");
-    let told = refused(&|file| {
+    let reported = refused(&|file| drop(file.arrays.remove("watched_positions")));
+    assert!(reported.contains("`watched_positions`") && reported.contains("`watched_map`"), "{reported}");
+    let reported = refused(&|file| drop(file.entries.insert("watched_names".into(), "a,a".into())));
+    assert!(reported.contains("`watched_names`") && reported.contains("twice"), "{reported}");
+    let reported = refused(&|file| drop(file.arrays.remove("stress_map")));
+    assert!(reported.contains("`stress_map`") && reported.contains("`stress_positions`"), "{reported}");
+    let reported = refused(&|file| drop(file.entries.insert("stress_names".into(), "a".into())));
+    assert!(reported.contains("`stress_names`") && reported.contains("`stress_positions`"), "{reported}");
+    let reported = refused(&|file| {
         let map = file.arrays["watched_map"].clone();
         file.arrays.insert("stress_map".into(), map);
     });
-    assert!(told.contains("`stress_map`") && told.contains("6 components"), "{told}");
-    let told = refused(&|file| drop(file.entries.insert("basis".into(), "free_interface".into())));
-    assert!(told.contains("`basis`") && told.contains("free-interface"), "{told}");
+    assert!(reported.contains("`stress_map`") && reported.contains("6 components"), "{reported}");
+    let reported = refused(&|file| drop(file.entries.insert("basis".into(), "free_interface".into())));
+    assert!(reported.contains("`basis`") && reported.contains("free-interface"), "{reported}");
     let mut negative = rom.clone();
     negative.contact_nodes[0].area = -1e-6;
-    let told = read_rom(&write_rom(&negative), "rom").unwrap_err().to_string();
-    assert!(told.contains("`contact_areas`, node 1"), "{told}");
+    let reported = read_rom(&write_rom(&negative), "rom").unwrap_err().to_string();
+    assert!(reported.contains("`contact_areas`, node 1"), "{reported}");
 }
 
 /// ROMs with any of the extras.
@@ -199,9 +199,9 @@ fn rows_of_patches_fit_the_patches() {
     assert_eq!(with(&rom, " 2 ").unwrap().rows(), 2);
     assert_eq!(with(&rom, "1").unwrap().extras.rows, None);
     let more = (nodes + 1).to_string();
-    for (rows, told) in [("two", "not a whole number"), ("0", "0 rows of"), (more.as_str(), "are required")] {
+    for (rows, reported) in [("two", "not a whole number"), ("0", "0 rows of"), (more.as_str(), "are required")] {
         let error = with(&rom, rows).unwrap_err().to_string();
-        assert!(error.contains("`contact_rows`") && error.contains(told), "{error}");
+        assert!(error.contains("`contact_rows`") && error.contains(reported), "{error}");
     }
     rom.contact_nodes[0].area = 0.0;
     assert!(with(&rom, "2").unwrap_err().to_string().contains("without areas"));

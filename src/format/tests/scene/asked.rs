@@ -32,7 +32,7 @@ fn a_scene_with_a_free_master_survives_writing_and_reading() {
 #[test]
 fn slips_of_free_masters_are_located() {
     let text = write_scene(&features::scene_with_a_free_master());
-    let told = |from: &str, to: &str, parts: &[&str]| {
+    let reported = |from: &str, to: &str, parts: &[&str]| {
         assert!(text.contains(from), "{from:?} in:\n{text}");
         let changed = text.replacen(from, to, 1);
         let message = parse_scene(&changed, "free.toml").unwrap_err().to_string();
@@ -41,24 +41,24 @@ fn slips_of_free_masters_are_located() {
             assert!(message.contains(part), "{part:?} is not in {message:?}");
         }
     };
-    told("motion = \"free\"", "motion = \"fre\"", &["structure[1].motion", "Did you mean `free`?"]);
-    told("[0.0, -100.0, 0.5]", "-100.0", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
-    told("[0.0, -100.0, 0.5]", "[0.0, -100.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
-    told("[0.0, -100.0, 0.5]", "[0.0, -100.0, 0.5, 7.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
-    told("[0.0, -100.0, 0.5]", "[0.0, nan, 0.5]", &["structure[1].velocity"]);
-    told("motion = \"free\"", "motion = \"rotating\"", &["structure[1].velocity: needs `motion = \"free\"`"]);
-    told("nodes = \"left_\"", "nodes = 3", &["contact[1].nodes: found integer `3`"]);
-    told(
+    reported("motion = \"free\"", "motion = \"fre\"", &["structure[1].motion", "Did you mean `free`?"]);
+    reported("[0.0, -100.0, 0.5]", "-100.0", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
+    reported("[0.0, -100.0, 0.5]", "[0.0, -100.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
+    reported("[0.0, -100.0, 0.5]", "[0.0, -100.0, 0.5, 7.0]", &["structure[1].velocity: ", "list of 3 numbers, m/s"]);
+    reported("[0.0, -100.0, 0.5]", "[0.0, nan, 0.5]", &["structure[1].velocity"]);
+    reported("motion = \"free\"", "motion = \"rotating\"", &["structure[1].velocity: needs `motion = \"free\"`"]);
+    reported("nodes = \"left_\"", "nodes = 3", &["contact[1].nodes: found integer `3`"]);
+    reported(
         "nodes = \"left_\"\n",
         "",
         &["contact[1].master: a structure of several contacts needs `contact.nodes`", "Set `nodes` in every contact"],
     );
-    told("nodes = \"left_\"", "nodes = \"left_\"\ngap = 1e-3", &["contact[1].gap: excludes a free master"]);
-    told("rigid = true", "rigid = 1", &["surface[2].rigid: found integer `1`, expected true or false"]);
-    told("rigid = true", "rigit = true", &["surface[2].rigit: unknown key", "Did you mean `rigid`?"]);
-    told("solver = \"lcp\"", "solver = \"film\"", &["Give all contacts the same solver"]);
+    reported("nodes = \"left_\"", "nodes = \"left_\"\ngap = 1e-3", &["contact[1].gap: excludes a free master"]);
+    reported("rigid = true", "rigid = 1", &["surface[2].rigid: found integer `1`, expected true or false"]);
+    reported("rigid = true", "rigit = true", &["surface[2].rigit: unknown key", "Did you mean `rigid`?"]);
+    reported("solver = \"lcp\"", "solver = \"film\"", &["Give all contacts the same solver"]);
     let parts = ["time.input_interpolation: excludes a scene with free masters only: such a scene has no inputs"];
-    told("[time]", "[time]\ninput_interpolation = \"hold\"", &parts);
+    reported("[time]", "[time]\ninput_interpolation = \"hold\"", &parts);
 }
 
 #[test]
@@ -283,7 +283,7 @@ fn largest_and_smallest_values_are_accepted() {
 #[test]
 fn inner_tables_are_tables_with_all_they_need() {
     let text = write_scene(&common::complete_scene());
-    let told = |from: &str, to: &str, parts: &[&str]| {
+    let reported = |from: &str, to: &str, parts: &[&str]| {
         assert_eq!(text.matches(from).count(), 1, "{from:?} in:\n{text}");
         let message = parse_scene(&text.replace(from, to), "scene.toml").unwrap_err().to_string();
         assert!(message.starts_with("scene.toml:"), "{message}");
@@ -292,27 +292,27 @@ fn inner_tables_are_tables_with_all_they_need() {
         }
     };
     let motion = "motion = \"rotating\"";
-    told(motion, "spin = true", &["structure[1].spin: found boolean, expected a table", "{ stiffening = true }"]);
-    told(motion, "load = [2, 1.0]", &["structure[1].load: found array, expected a table", "{ order = 2"]);
-    told(motion, "load = {}", &["structure[1].load.order: missing", "to `load` of [[structure]]: whole number"]);
-    told(motion, "spin = { growt = true }", &["structure[1].spin.growt: unknown key", "Did you mean `growth`?"]);
-    told(motion, "spin = { growth = 1 }", &["structure[1].spin.growth: found integer `1`, expected true or false"]);
-    told(motion, "thermal = 1.5", &["structure[1].thermal", "expected true or false"]);
-    told(motion, "order = 3", &["structure[1].order: unknown key", "belongs to `load` of [[structure]]"]);
+    reported(motion, "spin = true", &["structure[1].spin: found boolean, expected a table", "{ stiffening = true }"]);
+    reported(motion, "load = [2, 1.0]", &["structure[1].load: found array, expected a table", "{ order = 2"]);
+    reported(motion, "load = {}", &["structure[1].load.order: missing", "to `load` of [[structure]]: whole number"]);
+    reported(motion, "spin = { growt = true }", &["structure[1].spin.growt: unknown key", "Did you mean `growth`?"]);
+    reported(motion, "spin = { growth = 1 }", &["structure[1].spin.growth: found integer `1`, expected true or false"]);
+    reported(motion, "thermal = 1.5", &["structure[1].thermal", "expected true or false"]);
+    reported(motion, "order = 3", &["structure[1].order: unknown key", "belongs to `load` of [[structure]]"]);
     let moving = "moving = true";
-    told(moving, "spline = 72", &["surface[1].spline: found integer, expected a table", "{ around = 72, along = 5 }"]);
-    told(moving, "spline = { around = -1 }", &["surface[1].spline.around: found integer `-1`, expected a"]);
-    told(moving, "spline = { closure = \"smoth\" }", &["surface[1].spline.closure", "Did you mean `smooth`?"]);
-    told(moving, "patches = {}", &["surface[1].patches.around: missing", "to `patches` of [[surface]]"]);
-    told(moving, "structure = 3", &["surface[1].structure: found integer `3`"]);
+    reported(moving, "spline = 72", &["surface[1].spline: found integer, expected a table", "{ around = 72, along = 5 }"]);
+    reported(moving, "spline = { around = -1 }", &["surface[1].spline.around: found integer `-1`, expected a"]);
+    reported(moving, "spline = { closure = \"smoth\" }", &["surface[1].spline.closure", "Did you mean `smooth`?"]);
+    reported(moving, "patches = {}", &["surface[1].patches.around: missing", "to `patches` of [[surface]]"]);
+    reported(moving, "structure = 3", &["surface[1].structure: found integer `3`"]);
     let meridian = "meridian = \"contour\"";
-    told(meridian, "coating = \"thick\"", &["contact[1].coating: found string, expected a table"]);
+    reported(meridian, "coating = \"thick\"", &["contact[1].coating: found string, expected a table"]);
     for key in ["thickness", "modulus", "yield_stress", "hardening", "cells_around", "cells_along"] {
         let all =
             "thickness = 5e-3, modulus = 1e9, yield_stress = 1e7, hardening = 1e8, cells_around = 100, cells_along = 9";
         let rest: Vec<&str> = all.split(", ").filter(|item| !item.starts_with(key)).collect();
         let coating = format!("coating = {{ {} }}", rest.join(", "));
         let missing = format!("contact[1].coating.{key}: missing");
-        told(meridian, &coating, &[&missing, &format!("Add `{key} = ...` to `coating` of [[contact]]")]);
+        reported(meridian, &coating, &[&missing, &format!("Add `{key} = ...` to `coating` of [[contact]]")]);
     }
 }

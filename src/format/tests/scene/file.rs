@@ -78,8 +78,8 @@ fn the_papers_preset_is_the_method_whole() {
         if key.starts_with("contact") {
             text = text.replace("gap = 1e-3", "gap = 1e-3\nsolver = \"lcp\"");
         }
-        let told = parse_scene(&text, "demo.toml").unwrap_err().to_string();
-        assert!(told.contains(key) && told.contains("the scheme and the solver of the paper"), "{told}");
+        let reported = parse_scene(&text, "demo.toml").unwrap_err().to_string();
+        assert!(reported.contains(key) && reported.contains("the scheme and the solver of the paper"), "{reported}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! Free rings through the casing reduction against the closed forms of thin rings: modes of the ROM by their number of waves.
 
-use crate::guide::told;
+use crate::guide::print_row;
 use std::f64::consts::TAU;
 
 use tiprub_core::Rom;
@@ -71,8 +71,8 @@ fn pair(rom: &Rom, n: u32, component: usize) -> [f64; 2] {
 #[test]
 fn reduced_free_rings_have_textbook_frequencies() {
     let Material { young_modulus, density, poisson_ratio, .. } = CasingOptions::default().material;
-    told!("| n | plane | side/R | ROM (Hz) | thin ring (Hz) | deviation | pair split |");
-    told!("|---|---|---|---|---|---|---|");
+    print_row!("| n | plane | side/R | ROM (Hz) | thin ring (Hz) | deviation | pair split |");
+    print_row!("|---|---|---|---|---|---|---|");
     let (mut deviations, mut rows) = (Vec::new(), Vec::new());
     for side in [0.03, 0.015] {
         let rom = ring(side);
@@ -90,7 +90,7 @@ fn reduced_free_rings_have_textbook_frequencies() {
                 };
                 let found = pair(&rom, n, component);
                 let (deviation, split) = (found[0] / exact - 1.0, found[1] / found[0] - 1.0);
-                told!(
+                print_row!(
                     "| {n} | {plane} | {:.2} | {:.3} | {:.3} | {:+.3} % | {split:.0e} |",
                     side / RADIUS,
                     found[0] / TAU,
@@ -108,11 +108,11 @@ fn reduced_free_rings_have_textbook_frequencies() {
         let [thick, thin] = [0, 1].map(|k| deviations[k][i]);
         // Shear and rotatory inertia make it softer, with the square of n side/R; what is left is mesh and reduction.
         let limit = (4.0 * thin - thick) / 3.0;
-        told!("number {i}: extrapolated to a thin ring {:+.3} %", 100.0 * limit);
+        print_row!("number {i}: extrapolated to a thin ring {:+.3} %", 100.0 * limit);
         assert!(thick < 0.0 && (3.2..6.0).contains(&(thick / thin)), "number {i}: {thick} {thin}");
         assert!(limit.abs() < 1.5e-3, "number {i}: {limit}");
         let [a, b] = [&rows[i], &rows[i + deviations[0].len()]];
-        told!("| {} | {a} | {b} | {:+.2} % |", 2 + i / 2, 100.0 * limit);
+        print_row!("| {} | {a} | {b} | {:+.2} % |", 2 + i / 2, 100.0 * limit);
     }
     crate::guide::hold("cargo test -p tiprub-model --test casing closed_rings");
 }

@@ -232,8 +232,8 @@ fn compare(options: &CasingOptions, drive: CasingDrive, scheme: Scheme, step: f6
             }
         }
         for node in 0..AROUND * ALONG {
-            let told = element(&run, "casing_displacement", u32::try_from(node).unwrap());
-            moved = [moved[0].max((told - mesh.radial(node)).abs()), moved[1].max(told.abs())];
+            let reported = element(&run, "casing_displacement", u32::try_from(node).unwrap());
+            moved = [moved[0].max((reported - mesh.radial(node)).abs()), moved[1].max(reported.abs())];
         }
     }
     let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);

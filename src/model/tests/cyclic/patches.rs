@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use crate::guide::told;
+use crate::guide::print_row;
 
 use crate::common::disk::{COARSE, CellCounts, boundary, copies, model, pencils, sector};
 use faer::Mat;
@@ -172,7 +172,7 @@ fn patch_responses_converge_faster_with_free_interface() {
         let mut last = f64::INFINITY;
         for modes in [4, 8, 12, 16] {
             let [fixed, free] = KINDS.map(|kind| error(kind, modes));
-            told!("| {} | {modes} | {fixed} | {free} |", if clamped.is_empty() { "none" } else { "bore" });
+            print_row!("| {} | {modes} | {fixed} | {free} |", if clamped.is_empty() { "none" } else { "bore" });
             assert!(free < 0.3 * fixed && free < 0.3 * last, "{modes}: {fixed:.2e} {free:.2e}");
             last = free;
         }

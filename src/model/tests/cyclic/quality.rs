@@ -262,18 +262,18 @@ fn families_are_cut_in_a_gap() {
 fn progress_is_told_from_the_calling_thread_and_ends_full() {
     let mesh = sector(ElementKind::Hex8, 7, COARSE);
     let caller = std::thread::current().id();
-    let told = std::cell::RefCell::new(Vec::new());
+    let reported = std::cell::RefCell::new(Vec::new());
     let listener = |progress: ReductionProgress| {
         assert_eq!(std::thread::current().id(), caller);
-        told.borrow_mut().push(progress);
+        reported.borrow_mut().push(progress);
     };
     let contact = tips(&mesh, 2);
     let bore = mesh.set("BORE").unwrap();
     let options = options(ModeSelection::Count(3), 3);
     reduce_cyclic(&model(mesh.clone()), bore, &contact, &boundary(&mesh, 7), &options, &listener).unwrap();
-    let told = told.into_inner();
-    for stage in told.iter().map(|progress| progress.stage) {
-        let fractions: Vec<f64> = told.iter().filter(|p| p.stage == stage).map(|p| p.fraction).collect();
+    let reported = reported.into_inner();
+    for stage in reported.iter().map(|progress| progress.stage) {
+        let fractions: Vec<f64> = reported.iter().filter(|p| p.stage == stage).map(|p| p.fraction).collect();
         assert!(fractions.windows(2).all(|two| two[0] <= two[1]), "{stage}: {fractions:?}");
         assert!((fractions.last().unwrap() - 1.0).abs() < 1e-12, "{stage} ends at {:?}", fractions.last());
     }

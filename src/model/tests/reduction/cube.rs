@@ -1,6 +1,6 @@
 //! The bodies of the cube between two rings: free body and open panel reduced without loss of what they must keep.
 
-use crate::guide::told;
+use crate::guide::print_row;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::rom::DisplacementFrame;
@@ -249,7 +249,7 @@ fn free_cube_converges_faster_with_free_interface_modes() {
     for modes in [8, 16, 32, 64] {
         let fixed = error(ReductionKind::FixedInterface, modes);
         let free = error(ReductionKind::FreeInterface, modes);
-        told!("| {modes} | {fixed} | {free} |");
+        print_row!("| {modes} | {fixed} | {free} |");
         assert!(free < 0.5 * fixed && free < 0.55 * last, "{modes}: {fixed:e} {free:e}");
         last = free;
     }

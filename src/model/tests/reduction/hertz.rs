@@ -1,7 +1,7 @@
 //! H. Hertz's contact of a rigid sphere with an elastic half-space: a quarter of a large block, reduced to the nodes of its surface
 //! and met by the contact solvers of the core, at rest and in an impact.
 
-use crate::guide::told;
+use crate::guide::print_row;
 use nalgebra::DMatrix;
 use tiprub_core::Rom;
 use tiprub_core::dynamics::modal::{ModalModel, NodePair};
@@ -190,7 +190,7 @@ fn refine(per_radius: usize) -> ([f64; 3], String) {
                 let other = at_rest(&block, &model, solver, approach);
                 let off = other.force / theory.force(approach) - 1.0;
                 let [deep, negative] = other.violation;
-                told!(
+                print_row!(
                     "| {per_radius}, δ = 20 µm | {} | {solver:?} | {off:+.2e} | {:+.2e} | {:.2e} | {:.4} | penetration {deep:.0e} δ, adhesion {negative:.0e} F |",
                     block.elements,
                     other.radius[0] / radius - 1.0,
@@ -199,7 +199,7 @@ fn refine(per_radius: usize) -> ([f64; 3], String) {
                 );
                 assert!(solver == Solver::Film || (other.force / found.force - 1.0).abs() < 1e-9, "{solver:?}");
             }
-            told!(
+            print_row!(
                 "| {per_radius}, δ = 20 µm | {} | Lcp | {:+.2e} | {:+.2e} | {:.2e} | {:.4} | |",
                 block.elements,
                 errors[0],
@@ -218,11 +218,11 @@ fn refine(per_radius: usize) -> ([f64; 3], String) {
 }
 
 fn table(meshes: &[usize]) -> Vec<[f64; 3]> {
-    told!("| elements per radius | elements | solver | force | contact radius | pressure, L2 | p(0)/p0 | |");
-    told!("|---|---|---|---|---|---|---|---|");
+    print_row!("| elements per radius | elements | solver | force | contact radius | pressure, L2 | p(0)/p0 | |");
+    print_row!("|---|---|---|---|---|---|---|---|");
     let found = meshes.iter().map(|per_radius| refine(*per_radius));
     let (errors, rows): (Vec<[f64; 3]>, Vec<String>) = found.unzip();
-    rows.iter().for_each(|row| told!("{row}"));
+    rows.iter().for_each(|row| print_row!("{row}"));
     errors
 }
 
@@ -239,8 +239,8 @@ fn a_sphere_pressed_on_a_block_meets_hertz() {
 /// A heavy sphere that hits the block slowly: the block follows at rest, which is what Hertz's impact supposes.
 #[test]
 fn a_sphere_that_hits_a_block_meets_hertz() {
-    told!("| scheme | h (µs) | duration | largest force | deepest | impulse | energy left in the sphere | ledger |");
-    told!("|---|---|---|---|---|---|---|---|");
+    print_row!("| scheme | h (µs) | duration | largest force | deepest | impulse | energy left in the sphere | ledger |");
+    print_row!("|---|---|---|---|---|---|---|---|");
     let (theory, block) = (hertz(), block(3));
     // Waves cross the block in 0.07 ms; the impact takes 20 ms.
     let duration = 20e-3;
@@ -280,7 +280,7 @@ fn a_sphere_that_hits_a_block_meets_hertz() {
         let left = (system.bank().modal_state(last, 0).1 / step).powi(2) / (0.25 * mass * speed * speed);
         let off = [release / exact.duration, force / exact.force, deepest / exact.depth, impulse / exact.impulse, left]
             .map(|value| value - 1.0);
-        told!(
+        print_row!(
             "| {scheme:?} | {:.0} | {:+.2e} | {:+.2e} | {:+.2e} | {:+.2e} | {:+.2e} | {ledger:.0e} |",
             step * 1e6,
             off[0],

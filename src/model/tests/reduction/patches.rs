@@ -1,6 +1,6 @@
 //! Contact patches and free-interface modes: consistent weights, exact statics, exact low frequencies.
 
-use crate::guide::told;
+use crate::guide::print_row;
 
 use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
 use nalgebra::DMatrix;
@@ -85,9 +85,9 @@ fn rows_of_patches_across_the_thickness_add_up() {
             }
             assert_eq!(patches.iter().map(|patch| patch.row).collect::<Vec<_>>()[..4], [0, 0, 0, 1]);
         }
-        for (refused, told) in [([3, 0], "0 rows of 3"), ([3, 40], "40 rows of 3"), ([99, 1], "99 is outside")] {
+        for (refused, reported) in [([3, 0], "0 rows of 3"), ([3, 40], "40 rows of 3"), ([99, 1], "99 is outside")] {
             let error = tip_patches(&mesh, &set, refused, name).unwrap_err().to_string();
-            assert!(error.contains(told), "{error}");
+            assert!(error.contains(reported), "{error}");
         }
     }
     // One linear element has nodes at its sides alone.
@@ -221,7 +221,7 @@ fn patch_flexibility_converges_and_point_flexibility_does_not() {
     let grows = |tip: TipContact| [6, 12, 24].map(|chord| own(tip, chord));
     let (points, patches) = (grows(TipContact::Nodes(5)), grows(TipContact::Patches(5)));
     for (chord, (point, patch)) in [6, 12, 24].into_iter().zip(points.into_iter().zip(patches)) {
-        told!("| {chord} | {point} | {patch} |");
+        print_row!("| {chord} | {point} | {patch} |");
     }
     crate::guide::hold("cargo test -p tiprub-model --test reduction patches");
     let change = |values: [f64; 3]| (values[2] / values[1] - 1.0).abs();
@@ -272,14 +272,14 @@ fn what_cannot_be_divided_or_held_is_refused() {
     assert!(refused(&all, 10).contains("10 is outside 1..=9"));
     assert!(refused(&all[..3], 2).contains("no outer face of an element has all of its nodes in the contact set"));
     let contact = tip(&mesh, 3);
-    let told =
+    let reported =
         |contact: &[ContactPoint], kind, modes| reduced(mesh.clone(), contact, kind, modes).unwrap_err().to_string();
     let twice = [contact[0].clone(), ContactPoint { name: "again".into(), ..contact[0].clone() }];
-    assert!(told(&twice, ReductionKind::FreeInterface, 4).contains("flexibility of the contact coordinates"));
-    assert!(told(&twice, ReductionKind::FixedInterface, 4).contains("depends on those of the other patches"));
+    assert!(reported(&twice, ReductionKind::FreeInterface, 4).contains("flexibility of the contact coordinates"));
+    assert!(reported(&twice, ReductionKind::FixedInterface, 4).contains("depends on those of the other patches"));
     let free = 3 * (mesh.nodes.len() - nodes_at(&mesh, 0, 0.0).len());
-    assert!(told(&contact, ReductionKind::FreeInterface, free - 8).contains("possible besides 9 contact coordinates"));
-    assert!(told(&contact, ReductionKind::FreeInterface, free - 9).contains("has no residual flexibility"));
+    assert!(reported(&contact, ReductionKind::FreeInterface, free - 8).contains("possible besides 9 contact coordinates"));
+    assert!(reported(&contact, ReductionKind::FreeInterface, free - 9).contains("has no residual flexibility"));
 }
 
 /// What a ROM says of its forced response is so: against dense solutions with the full matrices, between the frequencies checked.
@@ -304,7 +304,7 @@ fn the_forced_response_is_off_by_as_much_as_the_rom_says() {
         assert!(rom.checks.response_frequencies.len() >= 2, "{:?}", rom.checks);
         assert!(rom.checks.flexibility_deviation.iter().all(|off| *off < 1e-6), "{:?}", rom.checks);
         let radial = DMatrix::from_fn(contact.len(), rom.order(), |patch, column| rom.contact_map[(3 * patch, column)]);
-        for (frequency, told) in rom.checks.response_frequencies.iter().zip(&rom.checks.response_deviation) {
+        for (frequency, reported) in rom.checks.response_frequencies.iter().zip(&rom.checks.response_deviation) {
             let square = (std::f64::consts::TAU * frequency).powi(2);
             let solved = |stiffness: &DMatrix<f64>, mass: &DMatrix<f64>, map: &DMatrix<f64>| {
                 map.transpose() * (stiffness - mass * square).lu().solve(map).unwrap()
@@ -312,7 +312,7 @@ fn the_forced_response_is_off_by_as_much_as_the_rom_says() {
             let (full, own) =
                 (solved(&stiffness, &mass, &loads), solved(&rom.stiffness, &rom.mass, &radial.transpose()));
             let off = 100.0 * (&full - own).norm() / full.norm();
-            assert!((off - told).abs() <= 1e-3 * off + 1e-7, "{kind:?} at {frequency} Hz: {off:e} %, told {told:e} %");
+            assert!((off - reported).abs() <= 1e-3 * off + 1e-7, "{kind:?} at {frequency} Hz: {off:e} %, told {reported:e} %");
         }
     }
 }

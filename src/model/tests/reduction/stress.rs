@@ -1,7 +1,7 @@
 //! Stress that a reduced model recovers, against that of the full one and closed forms.
 
 use crate::common::{dense, distorted_box, nodes_at, steel, straight_box, wobble};
-use crate::guide::{self, told};
+use crate::guide::{self, print_row};
 use nalgebra::{DMatrix, DVector};
 use tiprub_core::Simulation;
 use tiprub_core::rom::{DisplacementFrame, STRESSES, von_mises};
@@ -136,12 +136,12 @@ fn places_of_modes_are_where_their_stress_is_largest() {
     assert!(at(1)[1].abs() < 1e-12 || (at(1)[1] - SIZE[1]).abs() < 1e-12, "{:?}", at(1));
     let refused =
         |places: StressPlaces| reduced(&mesh, &tip, (ReductionKind::FreeInterface, 6), places).unwrap_err().to_string();
-    let told = refused(StressPlaces { nodes: Vec::new(), modes: 7 });
-    assert!(told.starts_with("places of largest stress: 7 requested"), "{told}");
-    let told = refused(StressPlaces { nodes: vec![("a".into(), 100_000)], modes: 0 });
-    assert!(told.contains("`a`") && told.contains("node 100001 does not exist"), "{told}");
-    let told = refused(StressPlaces { nodes: vec![("a".into(), 0), ("a".into(), 1)], modes: 0 });
-    assert!(told.contains("`a`: it appears twice"), "{told}");
+    let reported = refused(StressPlaces { nodes: Vec::new(), modes: 7 });
+    assert!(reported.starts_with("places of largest stress: 7 requested"), "{reported}");
+    let reported = refused(StressPlaces { nodes: vec![("a".into(), 100_000)], modes: 0 });
+    assert!(reported.contains("`a`") && reported.contains("node 100001 does not exist"), "{reported}");
+    let reported = refused(StressPlaces { nodes: vec![("a".into(), 0), ("a".into(), 1)], modes: 0 });
+    assert!(reported.contains("`a`: it appears twice"), "{reported}");
 }
 
 /// Pulses of force on three patches, one after the other (N).
@@ -228,7 +228,7 @@ fn stress_converges_to_the_full_model() {
     }
     for (modes, row) in counts.iter().zip(&errors) {
         let values: Vec<String> = row.iter().map(|error| format!("{error:.0e}")).collect();
-        told!("| {modes} | {} |", values.join(" | "));
+        print_row!("| {modes} | {} |", values.join(" | "));
     }
     for column in 0..4 {
         assert!(errors[4][column] < 0.1 * errors[0][column], "{errors:?}");

@@ -27,7 +27,7 @@ pub(super) fn common_start(scene: &Scene, index: usize) -> Result<String, String
     let of = |node: &ContactNode| pairs.clone().find(|(_, contact)| claims(contact, node));
     let places: Vec<Option<usize>> = rom.contact_nodes.iter().map(|node| Some(of(node)?.0)).collect();
     if let Some(border) = places.windows(2).position(|pair| pair[0] != pair[1]) {
-        let told = |place: usize| {
+        let reported = |place: usize| {
             let pair = places[place].map_or("no contact".to_owned(), |pair| format!("contact[{}]", pair + 1));
             format!("`{}` ({pair})", rom.contact_nodes[place].name)
         };
@@ -35,8 +35,8 @@ pub(super) fn common_start(scene: &Scene, index: usize) -> Result<String, String
             "pairs select contact nodes by name, and the pair of a new node between {} and {} is undefined. Reduce the \
              blade with more --contact-nodes, let their --contact-names start with the `nodes` of the pairs, and \
              compare runs",
-            told(border),
-            told(border + 1)
+            reported(border),
+            reported(border + 1)
         ));
     }
     let start = places.first().copied().flatten().and_then(|pair| scene.settings.contacts[pair].nodes.clone());
@@ -135,8 +135,8 @@ mod tests {
         for (finest, refused) in [(4, 1), (8, 2)] {
             let (levels, missing) = of(finest);
             assert_eq!(levels, made);
-            let told = ["9 nodes: ", "17 nodes: "].iter().filter(|count| missing.contains(*count)).count();
-            assert!(told == refused && missing.contains("outside 2..=5"), "{missing}");
+            let reported = ["9 nodes: ", "17 nodes: "].iter().filter(|count| missing.contains(*count)).count();
+            assert!(reported == refused && missing.contains("outside 2..=5"), "{missing}");
         }
     }
 
@@ -151,13 +151,13 @@ mod tests {
     #[test]
     fn new_nodes_of_which_no_pair_is_known_are_not_made() {
         let own = ["leading", "mid", "trailing"];
-        for (pairs, told) in [
+        for (pairs, reported) in [
             (&["leading"][..], "`leading` (contact[1]) and `mid` (no contact)"),
             (&["leading", "trailing"], "`leading` (contact[1]) and `mid` (no contact)"),
             (&["trailing", "l", "m"], "`leading` (contact[2]) and `mid` (contact[3])"),
         ] {
             let [_, nodes, _] = refined(own, pairs);
-            assert!(nodes.levels.is_empty() && nodes.missing.contains(told), "{pairs:?}: {}", nodes.missing);
+            assert!(nodes.levels.is_empty() && nodes.missing.contains(reported), "{pairs:?}: {}", nodes.missing);
         }
     }
 }

@@ -89,7 +89,7 @@ fn error(refined: &Refined) -> Option<Statement> {
         std::array::from_fn(|index| if errors[index].is_none() { to_finest[index] } else { None });
     let parts =
         [("", changes_text(&errors)), ("no limit found; difference from the finest level: ", changes_text(&unread))];
-    let found = parts.iter().filter(|(_, told)| !told.is_empty()).map(|(what, told)| format!("{what}{told}"));
+    let found = parts.iter().filter(|(_, reported)| !reported.is_empty()).map(|(what, reported)| format!("{what}{reported}"));
     let found = found.collect::<Vec<_>>().join("; ");
     Some(Statement::remark(format!("Error of the scene due to {}", title(refined)), found))
 }
@@ -120,8 +120,8 @@ pub fn statements(found: &ConvergenceResult) -> Vec<Statement> {
 fn digging(refined: &Refined) -> Option<Statement> {
     let levels = refined.direction.levels.iter().zip(&refined.digging);
     let known = levels.map(|(level, least)| {
-        let told = least.map_or("none".to_owned(), |least| format!("{least:.3}"));
-        format!("{} with {}", told, value(refined, level.value))
+        let reported = least.map_or("none".to_owned(), |least| format!("{least:.3}"));
+        format!("{} with {}", reported, value(refined, level.value))
     });
     let found = known.collect::<Vec<_>>().join(", ");
     let some = refined.digging.iter().any(Option::is_some);
@@ -195,8 +195,8 @@ fn scope(found: &ConvergenceResult) -> Vec<Statement> {
         .map(|(what, titles)| format!("{what}{titles}"))
         .collect();
     let refined = Statement::remark("Refined directions (other errors are not included)", parts.join("; "));
-    let told = estimate::rom_errors_text(&found.of_rom);
-    let of_rom = told.map(|told| Statement::remark("Errors stored in the ROM of the scene", told));
+    let reported = estimate::rom_errors_text(&found.of_rom);
+    let of_rom = reported.map(|reported| Statement::remark("Errors stored in the ROM of the scene", reported));
     std::iter::once(refined).chain(of_rom).collect()
 }
 

@@ -196,8 +196,8 @@ impl Total {
                 found,
             ));
         }
-        if let Some(told) = estimate::rom_errors_text(&self.of_rom) {
-            all.push(Statement::remark(format!("{title}: errors stored in the ROM"), told));
+        if let Some(reported) = estimate::rom_errors_text(&self.of_rom) {
+            all.push(Statement::remark(format!("{title}: errors stored in the ROM"), reported));
         }
         for target in TARGETS {
             let found = match self.cheapest(target, None) {

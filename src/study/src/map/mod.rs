@@ -132,9 +132,9 @@ pub fn of_scene(
 ) -> Result<(Study, Vec<String>)> {
     let (mut map, speeds) = Map::prepare(scene, request)?;
     let steps = map.internal_steps(&speeds);
-    let told = |done| progress(done, speeds.len(), steps);
-    told(0);
-    map.runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), told)?;
+    let reported = |done| progress(done, speeds.len(), steps);
+    reported(0);
+    map.runs = sweep::sweep(&speeds, threads, |speed| map.setup.run(*speed), reported)?;
     if let (true, Some(Err(refusal))) =
         (map.answered().next().is_none(), map.runs.first().map(|run| run.outcome.as_ref().map(|_| ())))
     {

@@ -305,8 +305,8 @@ fn the_rotor_turns_in_the_sense_of_the_scene() {
             [1, 4].iter().for_each(|row| scene.roms[0].contact_map.row_mut(*row).neg_mut());
         }
         let study = run(scene, &request, 1);
-        let told = study.facts.iter().find(|(name, _)| name == "angular velocities").unwrap().1.clone();
-        assert!(told.contains(if sense < 0.0 { "negative sense" } else { "positive sense" }), "{told}");
+        let reported = study.facts.iter().find(|(name, _)| name == "angular velocities").unwrap().1.clone();
+        assert!(reported.contains(if sense < 0.0 { "negative sense" } else { "positive sense" }), "{reported}");
         let rows = &study.figure("normal-force").unwrap().sheet.rows;
         assert!(rows.iter().all(|row| row[1] > 1.0), "{rows:?}");
         [rows[0][1], rows[1][1]]
@@ -350,12 +350,12 @@ fn what_does_not_fit_is_refused_before_the_work() {
 #[test]
 fn the_cost_told_is_what_is_done() {
     let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 2)) };
-    let told = std::cell::RefCell::new(Vec::new());
-    let tell = |done: usize, all: usize, steps: f64| told.borrow_mut().push((done, all, steps));
+    let reported = std::cell::RefCell::new(Vec::new());
+    let tell = |done: usize, all: usize, steps: f64| reported.borrow_mut().push((done, all, steps));
     let (study, _) = of_scene(scene(FIRST, 4), &request, 1, tell).unwrap();
     let done = study.results["internal_steps"].as_f64().unwrap();
-    assert_eq!(told.borrow().iter().map(|told| (told.0, told.1)).collect::<Vec<_>>(), [(0, 2), (1, 2), (2, 2)]);
-    assert!((told.borrow()[0].2 / done - 1.0).abs() < 0.02, "{told:?} {done}");
+    assert_eq!(reported.borrow().iter().map(|reported| (reported.0, reported.1)).collect::<Vec<_>>(), [(0, 2), (1, 2), (2, 2)]);
+    assert!((reported.borrow()[0].2 / done - 1.0).abs() < 0.02, "{reported:?} {done}");
 }
 
 #[test]

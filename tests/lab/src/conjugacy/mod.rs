@@ -212,11 +212,11 @@ fn table(rows: &[ConjugacyRow]) -> String {
     );
     for ConjugacyRow { case, seen: [first, second], round } in rows {
         let ConjugacyCase { feature, scheme, solver, friction } = case;
-        let told = |there: bool, value: f64| if there { format!("{value:.0e}") } else { "-".to_owned() };
-        let round = told(round.is_some(), round.unwrap_or_default());
-        let shaft = told(*feature != SurfaceFeature::Free, first.shaft);
-        let force = told(feature.side() == WrenchSide::ControlPoints, first.force);
-        let moment = told(feature.side() != WrenchSide::Dented, first.moment);
+        let reported = |there: bool, value: f64| if there { format!("{value:.0e}") } else { "-".to_owned() };
+        let round = reported(round.is_some(), round.unwrap_or_default());
+        let shaft = reported(*feature != SurfaceFeature::Free, first.shaft);
+        let force = reported(feature.side() == WrenchSide::ControlPoints, first.force);
+        let moment = reported(feature.side() != WrenchSide::Dented, first.moment);
         let _ = writeln!(
             text,
             "| {} | {} | {} | {friction} | {} | {round} | {shaft} | {:.0e} | {force} | {moment} | {:.1e} | {:.1e} |",

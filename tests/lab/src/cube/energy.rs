@@ -51,7 +51,7 @@ impl Losses {
     pub(super) fn statement(&self) -> Statement {
         let limit = self.limit();
         let off = self.0.iter().map(|loss| (loss.without_gain / limit - 1.0).abs()).fold(0.0, f64::max);
-        let told = self.0.iter().map(|loss| {
+        let reported = self.0.iter().map(|loss| {
             let [lost, without] = [loss.lost, loss.without_gain].map(|share| 100.0 * share);
             format!("h = {} µs: {lost:.3} % ({without:.3} %)", 1e6 * loss.step)
         });
@@ -60,7 +60,7 @@ impl Losses {
             off < 0.05,
             format!(
                 "loss (without curvature work) at {}; limit h → 0: {:.3} %; in the paper, at its step: {:.2} %",
-                told.collect::<Vec<_>>().join(", "),
+                reported.collect::<Vec<_>>().join(", "),
                 100.0 * limit,
                 100.0 * PAPER_LOSS
             ),

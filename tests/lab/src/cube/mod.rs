@@ -227,14 +227,14 @@ fn meeting(main: &Flown) -> Vec<Statement> {
 fn truncation(sizes: &SizeStudy) -> Statement {
     let modal: Vec<_> = sizes.rings.iter().filter(|size| size.static_responses == 0).collect();
     let falls = modal.windows(2).all(|pair| (0..3).all(|i| pair[1].apart[i] < pair[0].apart[i]));
-    let told = modal.iter().map(|size| {
+    let reported = modal.iter().map(|size| {
         let [x, slowing, z, _] = size.apart.map(|share| 100.0 * share);
         format!("{} modes: {x:.3}, {slowing:.3}, {z:.3} %", size.modes)
     });
     Statement::tested(
         "With more ring modes, u1x, slowing and u1z of tiprub come closer to method a",
         falls && modal.len() > 1,
-        told.collect::<Vec<_>>().join("; "),
+        reported.collect::<Vec<_>>().join("; "),
     )
 }
 
@@ -313,7 +313,7 @@ fn slow(flown: &[Flown]) -> Result<Vec<Statement>> {
         let (kinetic, strain) = (history.kinetic.last().copied()?, history.strain.last().copied()?);
         Some((kinetic, strain, asymmetry(history, f64::MAX)[0]))
     };
-    let told: Vec<String> = rough
+    let reported: Vec<String> = rough
         .outcomes
         .iter()
         .filter_map(|outcome| {
@@ -333,7 +333,7 @@ fn slow(flown: &[Flown]) -> Result<Vec<Statement>> {
             100.0 * AT_REST
         ),
         !at_rest.is_empty() && at_rest.iter().all(|still| *still),
-        format!("kinetic and strain energy after 3 ms, of initially 1218.75 J: {}", told.join("; ")),
+        format!("kinetic and strain energy after 3 ms, of initially 1218.75 J: {}", reported.join("; ")),
     ));
     Ok(all)
 }
@@ -342,7 +342,7 @@ fn times(main: &Flown) -> Result<Statement> {
     let seconds =
         |name: &str| main.outcome(name).map(|outcome| outcome.history().map(|history| history.processor_time));
     let base = seconds(PAPER)?.unwrap_or(f64::NAN);
-    let told = main.outcomes.iter().filter_map(|outcome| {
+    let reported = main.outcomes.iter().filter_map(|outcome| {
         let time = outcome.history()?.processor_time;
         Some(format!("{} {time:.2} s ({:.2})", outcome.name, time / base))
     });
@@ -350,7 +350,7 @@ fn times(main: &Flown) -> Result<Statement> {
         "Run times (in the paper, c is within 5 % of a, and b takes 10 times as long as a)",
         format!(
             "processor time of the steps (relative to the first tiprub run): {}",
-            told.collect::<Vec<_>>().join("; ")
+            reported.collect::<Vec<_>>().join("; ")
         ),
     ))
 }

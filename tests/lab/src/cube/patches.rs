@@ -107,12 +107,12 @@ impl PatchStudy {
             let nodes = impulse("5, nodes").unwrap_or(f64::NAN);
             let patches =
                 ["5, 2 ×", "5, 3 ×", "5, 4 ×", "5, 6 ×"].map(|start| impulse(start).unwrap_or(f64::NAN) / nodes - 1.0);
-            let told = patches.map(|share| format!("{:+.1} %", 100.0 * share));
+            let reported = patches.map(|share| format!("{:+.1} %", 100.0 * share));
             found.push(Statement::tested(
                 "With more patches on the flat faces, the impulse of the left face comes closer to that of contact \
                  nodes",
                 patches.is_sorted_by(|a, b| a.abs() > b.abs()),
-                told.join(", "),
+                reported.join(", "),
             ));
         }
         found

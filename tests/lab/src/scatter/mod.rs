@@ -186,9 +186,9 @@ pub(crate) fn study(arguments: &StudyCommon, console: &Console) -> Result<Study>
             [0.0, 0.15, 0.3, 0.6].map(|friction| sectors::solutions(degree, friction, TRIALS[which] / 5))
         })
         .collect();
-    let told = |error| tiprub_shell::Failure::from_core("mission", error);
-    let long = mission::long_steps(if arguments.quick { 1 } else { 10 }).map_err(told)?;
-    let hour = mission::hour(if arguments.quick { 100 } else { 1 }).map_err(told)?;
+    let reported = |error| tiprub_shell::Failure::from_core("mission", error);
+    let long = mission::long_steps(if arguments.quick { 1 } else { 10 }).map_err(reported)?;
+    let hour = mission::hour(if arguments.quick { 100 } else { 1 }).map_err(reported)?;
     Ok(Study {
         name: "scatter",
         title: "Tolerance and energy in random rubs".into(),
@@ -236,12 +236,12 @@ type Left = (f64, f64, f64, [u64; 2]);
 
 fn left() -> Result<Vec<Left>> {
     let scene = bumps(rich_blade(SECTORS));
-    let told = |error: tiprub_core::Error| tiprub_shell::Failure::from_core("error at the shortest steps", error);
-    let truth = run(&scene, (1e-5, 1e-9), 0.0).map_err(told)?;
+    let reported = |error: tiprub_core::Error| tiprub_shell::Failure::from_core("error at the shortest steps", error);
+    let truth = run(&scene, (1e-5, 1e-9), 0.0).map_err(reported)?;
     let mut all = Vec::new();
     for longest in LONGEST {
         for tolerance in SMALL {
-            let ran = run(&scene, (longest, tolerance), 0.0).map_err(told)?;
+            let ran = run(&scene, (longest, tolerance), 0.0).map_err(reported)?;
             all.push((longest, tolerance, apart(&ran.displacements, &truth.displacements), ran.steps));
         }
     }

@@ -56,7 +56,7 @@ fn capital(word: &str) -> String {
 /// The paper's curves of all three nodes come down to zero, several times each.
 pub(crate) fn all_nodes_touch(run: &Run, names: &[String], gap: f64) -> Statement {
     let nodes = names.iter().zip(run.least.iter().zip(&run.touches));
-    let told = nodes.map(|(name, (least, touches))| {
+    let reported = nodes.map(|(name, (least, touches))| {
         format!("{} {:.3} of the clearance at rest, {touches} times in contact", name.replace('_', " "), least / gap)
     });
     Statement::tested(
@@ -65,7 +65,7 @@ pub(crate) fn all_nodes_touch(run: &Run, names: &[String], gap: f64) -> Statemen
         format!(
             "smallest clearances at {:.1} rad/s, and contacts after the first {RAMP_PERIODS} periods: {}",
             run.speed,
-            told.collect::<Vec<_>>().join("; ")
+            reported.collect::<Vec<_>>().join("; ")
         ),
     )
 }

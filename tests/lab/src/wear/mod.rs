@@ -61,7 +61,7 @@ const CASES: [WearCase; 6] = [
 ];
 
 impl WearCase {
-    fn told(self) -> String {
+    fn reported(self) -> String {
         let other = [
             (self.modes > PLAIN.modes, ", twice the modes"),
             (self.step < PLAIN.step, ", half the step"),
@@ -122,7 +122,7 @@ impl WearWindow {
         format!(
             "| {:.1}{} | {} | {} to {} | {added:.0} | {mean:.0}, {largest:.0} | {} | {} |\n",
             self.speed,
-            self.case.told(),
+            self.case.reported(),
             self.case.order,
             self.end - WINDOW,
             self.end,

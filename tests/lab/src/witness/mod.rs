@@ -169,11 +169,11 @@ struct WitnessScene {
 impl WitnessScene {
     fn new(quick: bool) -> Result<Self> {
         let size = WitnessSize::of(quick);
-        let told = |error| failure("full model of the blade", error);
+        let reported = |error| failure("full model of the blade", error);
         let material = Rotor37Options::default().material;
-        let blade = blade_mesh(size.mesh).map_err(told)?;
-        let clamped = blade.mesh.set("hub").map_err(told)?;
-        let full = FullBlade::new(&blade.mesh, &material, clamped).map_err(told)?;
+        let blade = blade_mesh(size.mesh).map_err(reported)?;
+        let clamped = blade.mesh.set("hub").map_err(reported)?;
+        let full = FullBlade::new(&blade.mesh, &material, clamped).map_err(reported)?;
         let mut setting = Self { size, material, full, middle: 0.0, blade };
         setting.middle = setting.parts(Touching::Patches(3, 1))?[1].angle();
         Ok(setting)
@@ -217,7 +217,7 @@ impl WitnessScene {
     }
 
     fn rom_with(&self, reduced: &WitnessModel, stress: StressPlaces) -> Result<Rom> {
-        let told = |error| failure("reduction of the blade", error);
+        let reported = |error| failure("reduction of the blade", error);
         let options = ReductionOptions {
             name: "rotor37".into(),
             kind: match reduced.touching {
@@ -228,14 +228,14 @@ impl WitnessScene {
             checked_modes: 10,
             sectors: 1,
             frame: DisplacementFrame::Cylindrical,
-            watched: self.blade.contact_points(3).map_err(told)?,
+            watched: self.blade.contact_points(3).map_err(reported)?,
             stress,
             damping_ratio: 0.0,
         };
         let (mesh, contact) = (self.blade.mesh.clone(), self.contact(reduced.touching)?);
-        let clamped = self.blade.mesh.set("hub").map_err(told)?;
-        let model = FeModel::assembled(mesh, &self.material, String::new(), &silent).map_err(told)?;
-        Ok(reduce_model(model, clamped, &contact, &options, None, &silent).map_err(told)?.rom)
+        let clamped = self.blade.mesh.set("hub").map_err(reported)?;
+        let model = FeModel::assembled(mesh, &self.material, String::new(), &silent).map_err(reported)?;
+        Ok(reduce_model(model, clamped, &contact, &options, None, &silent).map_err(reported)?.rom)
     }
 
     /// The scene around a reduced model.
@@ -264,7 +264,7 @@ impl WitnessScene {
 
     /// The full model, with stress at gauges.
     fn run_full(&self, touching: Touching, division: u32, gauges: &[Gauge]) -> Result<BladeHistory> {
-        let told = |error| failure("full model of the blade", error);
+        let reported = |error| failure("full model of the blade", error);
         let settings = scene_source::settings("builtin:rotor37-one-row")?;
         let Shape::TwoLobe { depth, width, .. } = settings.surfaces[0].shape else {
             return Err(Failure::new("lab witness", "the scene has no bumps", ""));
@@ -278,7 +278,7 @@ impl WitnessScene {
         };
         let parts: Vec<TipPart> = self.parts(touching)?.into_iter().map(|part| part.turned(-self.phase())).collect();
         let steps = BladeSteps { interval: INTERVAL, division, samples: self.size.samples };
-        self.full.march(&parts, &obstacle, steps, (&self.watched()?, gauges)).map_err(told)
+        self.full.march(&parts, &obstacle, steps, (&self.watched()?, gauges)).map_err(reported)
     }
 
     /// Nodes whose displacements are compared.

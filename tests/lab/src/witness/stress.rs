@@ -41,7 +41,7 @@ impl StressHistory {
     /// Stress at one place beside that of another run (L2).
     fn apart_at(&self, other: &Self, place: usize) -> f64 {
         let at = |all: &Vec<f64>| all[STRESSES * place..STRESSES * (place + 1)].to_vec();
-        let of = |told: &Self| told.stresses.iter().map(at).collect::<Vec<_>>();
+        let of = |reported: &Self| reported.stresses.iter().map(at).collect::<Vec<_>>();
         parts_apart(&of(self), &of(other), &[STRESSES])
     }
 
@@ -148,7 +148,7 @@ impl WitnessScene {
 
     /// Stress of the same forces at rest, ROM against full model: difference beside the largest.
     fn at_rest(&self, rom: &Rom, gauges: &[Gauge], touching: Touching) -> Result<f64> {
-        let told = |error| failure("blade at rest", error);
+        let reported = |error| failure("blade at rest", error);
         let solve = || rom.stiffness.clone().cholesky();
         let held = solve().ok_or_else(|| Failure::new("lab stress", "the reduced model is not constrained", ""))?;
         let stress = rom.extras.stress.as_ref().map(|stress| stress.map.clone()).unwrap_or_default();
@@ -169,7 +169,7 @@ impl WitnessScene {
                     (node, force.map(|one| weight * one))
                 })
                 .collect();
-            for (found, full) in found.iter().zip(self.full.at_rest(&loads, gauges).map_err(told)?) {
+            for (found, full) in found.iter().zip(self.full.at_rest(&loads, gauges).map_err(reported)?) {
                 off = off.max((found - full).abs());
                 largest = largest.max(full.abs());
             }
@@ -186,7 +186,7 @@ fn run(scene: &tiprub_core::Scene, samples: usize) -> tiprub_core::Result<Stress
     let rows = names.map(|name| simulation.table().find(&format!("blade[1].{name}_stress")));
     let count = rows[0].map_or(0, tiprub_core::variables::Variable::len);
     let rows = rows.map(|row| row.map_or(0, |row| row.reference));
-    let mut told = StressHistory { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
+    let mut reported = StressHistory { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
     for sample in 0..samples {
         simulation.do_step(sample as f64 * INTERVAL, INTERVAL)?;
         let read = |row: u32, place: usize| simulation.real(row + u32::try_from(place).unwrap_or_default());
@@ -197,11 +197,11 @@ fn run(scene: &tiprub_core::Scene, samples: usize) -> tiprub_core::Result<Stress
             }
         }
         let equivalents = (0..count).map(|place| read(rows[STRESSES], place)).collect::<Result<_, _>>()?;
-        told.displacements.push(simulation.watched_displacements());
-        told.stresses.push(stresses);
-        told.equivalents.push(equivalents);
+        reported.displacements.push(simulation.watched_displacements());
+        reported.stresses.push(stresses);
+        reported.equivalents.push(equivalents);
     }
-    Ok(told)
+    Ok(reported)
 }
 
 /// The reduced model under forces of every step, by the steps that the full model took: what the missing modes alone do.
@@ -213,7 +213,7 @@ fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<StressHistory
     let stressed = seen(rom.extras.stress.as_ref().map(|stress| &stress.map));
     let h = INTERVAL / f64::from(division);
     let (mut u, mut v) = (DVector::zeros(squares.len()), DVector::<f64>::zeros(squares.len()));
-    let mut told = StressHistory { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
+    let mut reported = StressHistory { displacements: Vec::new(), stresses: Vec::new(), equivalents: Vec::new() };
     for (step, force) in forces.iter().enumerate() {
         let push = &loads * DVector::from_column_slice(force);
         for (mode, square) in squares.iter().enumerate() {
@@ -224,12 +224,12 @@ fn pushed(rom: &Rom, forces: &[Vec<f64>], division: u32) -> Result<StressHistory
         }
         if (step + 1) % division as usize == 0 {
             let stresses = (&stressed * &u).as_slice().to_vec();
-            told.displacements.push((&watched * &u).as_slice().to_vec());
-            told.equivalents.push(places(&stresses).map(von_mises).collect());
-            told.stresses.push(stresses);
+            reported.displacements.push((&watched * &u).as_slice().to_vec());
+            reported.equivalents.push(places(&stresses).map(von_mises).collect());
+            reported.stresses.push(stresses);
         }
     }
-    Ok(told)
+    Ok(reported)
 }
 
 /// Everything that is found.
@@ -256,19 +256,19 @@ impl StressResult {
     /// Rows: name, distance under the same forces and in the same rub.
     fn rows(&self) -> Vec<(String, Option<Apart>, Option<Apart>)> {
         let witness = self.witness();
-        let own = self.full[..self.full.len() - 1].iter().map(|(division, told)| {
+        let own = self.full[..self.full.len() - 1].iter().map(|(division, reported)| {
             (
                 format!("full model, steps of {} µs", 1e6 * INTERVAL / f64::from(*division)),
                 None,
-                Some(told.apart(witness)),
+                Some(reported.apart(witness)),
             )
         });
         let reduced = self.reduced.iter().map(|(modes, forced, rubbed)| {
-            let rubbed = rubbed.as_ref().ok().map(|told| told.apart(witness));
+            let rubbed = rubbed.as_ref().ok().map(|reported| reported.apart(witness));
             (format!("{modes} modes"), Some(forced.apart(witness)), rubbed)
         });
-        let (modes, told) = &self.ships;
-        let ships = (format!("{modes} modes, default tolerance"), None, Some(told.apart(witness)));
+        let (modes, reported) = &self.ships;
+        let ships = (format!("{modes} modes, default tolerance"), None, Some(reported.apart(witness)));
         own.chain(reduced).chain([ships]).collect()
     }
 }
@@ -287,7 +287,7 @@ fn find(setting: &WitnessScene, quick: bool, console: &Console) -> Result<Stress
     let march = |division: &u32| setting.run_full(touching, *division, &gauges).map(StressHistory::full);
     let mut full = sweep::sweep(divisions, sweep::processors(), march, |done| task.at(done as u64))?;
     let forces = full.last_mut().map(|(_, forces)| std::mem::take(forces)).unwrap_or_default();
-    let full = divisions.iter().copied().zip(full.into_iter().map(|(told, _)| told)).collect();
+    let full = divisions.iter().copied().zip(full.into_iter().map(|(reported, _)| reported)).collect();
     let finest = divisions[divisions.len() - 1];
     let task = console.task("Reduced models of the blade", Some(roms.len() as u64));
     let all: Vec<(usize, Rom)> = counts(quick).iter().copied().zip(roms).collect();
@@ -325,7 +325,7 @@ fn tables(found: &StressResult) -> String {
     let (full, ships) = (found.witness().largest(), found.ships.1.largest());
     let coarser = &found.full[found.full.len() - 2].1;
     for (place, name) in found.names.iter().enumerate() {
-        let apart = |told: &StressHistory| percent(told.apart_at(found.witness(), place));
+        let apart = |reported: &StressHistory| percent(reported.apart_at(found.witness(), place));
         text.push_str(&format!(
             "| `{name}` | {:.0} % | {:.1} | {:.1} | {} | {} |\n",
             100.0 * found.heights[place],
@@ -343,16 +343,16 @@ fn figure(found: &StressResult) -> Result<StudyFigure> {
     let most = (0..largest.len()).max_by(|a, b| largest[*a].total_cmp(&largest[*b])).unwrap_or_default();
     let few = found.reduced.iter().find_map(|(modes, _, rubbed)| Some((*modes, rubbed.as_ref().ok()?)));
     let mut shown = vec![("full model".to_owned(), found.witness()), ("default model".to_owned(), &found.ships.1)];
-    shown.extend(few.map(|(modes, told)| (format!("{modes} modes"), told)));
+    shown.extend(few.map(|(modes, reported)| (format!("{modes} modes"), reported)));
     let time = |sample: usize| 1e3 * (sample + 1) as f64 * INTERVAL;
-    let line = |told: &StressHistory| -> Vec<(f64, f64)> {
-        told.equivalents.iter().enumerate().map(|(sample, all)| (time(sample), 1e-6 * all[most])).collect()
+    let line = |reported: &StressHistory| -> Vec<(f64, f64)> {
+        reported.equivalents.iter().enumerate().map(|(sample, all)| (time(sample), 1e-6 * all[most])).collect()
     };
-    let series = shown.iter().map(|(name, told)| Series::line(name.as_str(), line(told))).collect();
+    let series = shown.iter().map(|(name, reported)| Series::line(name.as_str(), line(reported))).collect();
     let mut sheet = Sheet::new(["time (ms)"]);
     sheet.columns.extend(shown.iter().map(|(name, _)| format!("{name} (MPa)")));
     for sample in 0..found.ships.1.equivalents.len() {
-        let values = shown.iter().map(|(_, told)| 1e-6 * told.equivalents[sample][most]);
+        let values = shown.iter().map(|(_, reported)| 1e-6 * reported.equivalents[sample][most]);
         sheet.rows.push([time(sample)].into_iter().chain(values).collect());
     }
     Ok(StudyFigure {
@@ -372,7 +372,7 @@ fn statements(found: &StressResult) -> Vec<Statement> {
     let (first, last) = (apart[0], apart[apart.len() - 1]);
     let coarser = found.full[found.full.len() - 2].1.apart(witness);
     let ships = found.ships.1.apart(witness);
-    let most = found.reduced.last().and_then(|(_, _, rubbed)| rubbed.as_ref().ok()).map(|told| told.apart(witness));
+    let most = found.reduced.last().and_then(|(_, _, rubbed)| rubbed.as_ref().ok()).map(|reported| reported.apart(witness));
     vec![
         Statement::tested(
             "With the fewest modes, the static stress agrees with that of the full model to 1e-6",

@@ -14,9 +14,9 @@ impl Trial {
 
     /// Gaps at the start where nobody has looked; `gap` of a node displaced so (m).
     pub fn find_start_gaps(&mut self, state: &SectorState, mut gap: impl FnMut(usize, [f64; 3]) -> f64) {
-        if !state.looked {
+        if !state.gaps_known {
             for node in 0..self.nodes() {
-                self.begun.gaps[node] = gap(node, super::vector3_at(&self.start, node));
+                self.start_contacts.gaps[node] = gap(node, super::vector3_at(&self.start, node));
             }
         }
     }

@@ -123,8 +123,8 @@ impl Trial {
     /// The same of a force that is linear in time, against the step before: what sticks and slides turns its force without opening.
     fn bend(&self, node: usize, component: usize) -> f64 {
         let row = 3 * node + component;
-        let slope = self.force(1, node)[component] - self.begun.forces[row];
-        let followed = if self.multiplier(0, node) > 0.0 { self.begun.slopes[row] / self.per_step } else { 0.0 };
+        let slope = self.force(1, node)[component] - self.start_contacts.forces[row];
+        let followed = if self.multiplier(0, node) > 0.0 { self.start_contacts.slopes[row] / self.per_step } else { 0.0 };
         let before = slope - followed;
         if self.multiplier(1, node) == 0.0 && slope.abs() > before.abs() { slope } else { before }
     }
@@ -138,7 +138,7 @@ impl Trial {
         open.fold(0.0, |deepest, node| {
             let gap = gap_at_start(node, vector3_at(&self.start, node));
             // Less than 0.15 times a jump lies below the gaps at the points.
-            let is_steady = gap.is_some_and(|gap| (gap - self.begun.gaps[node]).abs() < self.depths[node]);
+            let is_steady = gap.is_some_and(|gap| (gap - self.start_contacts.gaps[node]).abs() < self.depths[node]);
             if is_steady { deepest.max(self.depths[node]) } else { deepest }
         })
     }

@@ -63,7 +63,7 @@ pub struct Trial {
     known: bool,
     now: Sums<2>,
     /// Contacts at the start.
-    begun: Contacts,
+    start_contacts: Contacts,
     /// Displacements of the lanes without forces after the start (m), what forces add, and the sum.
     free: Vec<f64>,
     pushed: Vec<f64>,
@@ -83,8 +83,8 @@ pub struct Trial {
     columns: Vec<f64>,
     closing: Vec<f64>,
     /// Compliance of the obstacle, if it is elastic.
-    given: Vec<f64>,
-    gives: bool,
+    carrier_compliance: Vec<f64>,
+    carrier_yields: bool,
     solver: ContactSolver,
     instructions: InstructionSet,
     /// Unknowns of the problem: lanes.
@@ -97,7 +97,7 @@ pub struct Trial {
     reach: (Sums<1>, Vec<f64>),
     free_motion: FreeMotion,
     /// Weights of the work of forces at each point.
-    ways: [[f64; POINTS]; POINTS],
+    work_weights: [[f64; POINTS]; POINTS],
     /// Displacements at each point without the residual flexibility (m), where they are asked for.
     inert: [Vec<f64>; POINTS],
     /// Forces at one of them, turned round (N).
@@ -150,7 +150,7 @@ impl Trial {
             velocities: rows(),
             known: false,
             now: Sums::new(modes, nodes),
-            begun: Contacts {
+            start_contacts: Contacts {
                 forces: rows(),
                 multipliers: vec![0.0; nodes],
                 gaps: vec![0.0; nodes],
@@ -170,8 +170,8 @@ impl Trial {
             forces: three(),
             columns: vec![0.0; lanes.len() * 3 * lanes.width()],
             closing: vec![0.0; lanes.len() * lanes.width()],
-            given: width(),
-            gives: false,
+            carrier_compliance: width(),
+            carrier_yields: false,
             solver: ContactSolver::new(lanes.len()),
             instructions: InstructionSet::detect(),
             members: Vec::with_capacity(lanes.len()),
@@ -185,7 +185,7 @@ impl Trial {
                 unresolved_amplitudes: Sums::new(modes, nodes),
                 is_known: false,
             },
-            ways: [[0.0; POINTS]; POINTS],
+            work_weights: [[0.0; POINTS]; POINTS],
             inert: std::array::from_fn(|_| rows()),
             withdrawn: rows(),
             impulses: rows(),
@@ -203,7 +203,7 @@ impl Trial {
     #[must_use]
     pub fn sticking(mut self) -> Self {
         self.sticking = Some(Box::new(Sticking::new(self.lanes.nodes)));
-        self.begun.slopes = vec![0.0; 3 * self.lanes.nodes];
+        self.start_contacts.slopes = vec![0.0; 3 * self.lanes.nodes];
         self
     }
 
@@ -279,10 +279,10 @@ impl Trial {
 
     /// Gaps at the start where nobody has looked.
     fn find_gaps_at_start(&mut self, rows: &ContactRows, state: &SectorState, obstacle: &mut impl Obstacle) {
-        if !state.looked {
+        if !state.gaps_known {
             self.find_start(rows, state);
             for node in 0..self.nodes() {
-                (self.begun.gaps[node], _) = obstacle.gap(node, 0, vector3_at(&self.start, node));
+                (self.start_contacts.gaps[node], _) = obstacle.gap(node, 0, vector3_at(&self.start, node));
             }
         }
     }
@@ -325,14 +325,14 @@ impl Trial {
     ) {
         let compliance = level.compliance_of(kind);
         self.free_motion.is_known = false;
-        self.ways = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
+        self.work_weights = std::array::from_fn(|i| kind.work_weights(&level.basis, i));
         self.lanes = compliance.lanes();
-        let (begun, lanes) = (&mut self.begun, self.lanes);
-        begun.forces.copy_from_slice(&state.forces);
-        begun.multipliers.copy_from_slice(&state.multipliers);
-        begun.gaps.copy_from_slice(&state.gaps);
-        begun.normals.copy_from_slice(&state.normals);
-        begun.slopes.iter_mut().zip(&state.slopes).for_each(|(slope, before)| *slope = *before);
+        let (start_contacts, lanes) = (&mut self.start_contacts, self.lanes);
+        start_contacts.forces.copy_from_slice(&state.forces);
+        start_contacts.multipliers.copy_from_slice(&state.multipliers);
+        start_contacts.gaps.copy_from_slice(&state.gaps);
+        start_contacts.normals.copy_from_slice(&state.normals);
+        start_contacts.slopes.iter_mut().zip(&state.slopes).for_each(|(slope, before)| *slope = *before);
         self.per_step = if kind == ForceInterpolation::Polynomial { 1.0 / level.step } else { 0.0 };
         let (nodes, stride) = (lanes.nodes, 3 * lanes.width());
         if let Some(rows) = rows {
@@ -441,7 +441,7 @@ impl Trial {
         for lane in 0..lanes.len() {
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
-        self.gives = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * width]);
+        self.carrier_yields = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * width]);
         for lane in 0..lanes.len() {
             if self.chosen[lane] {
                 self.choose(lane, compliance, obstacle);
@@ -504,8 +504,8 @@ impl Trial {
 
     /// Returns the sliding distance that a force on a node at a point works on (m).
     fn sliding_distance(&self, point: usize, node: usize) -> [f64; 3] {
-        let terms = self.ways[point].iter().zip(&self.inert);
-        terms.fold([0.0; 3], |way, (weight, inert)| std::array::from_fn(|c| way[c] + weight * inert[3 * node + c]))
+        let terms = self.work_weights[point].iter().zip(&self.inert);
+        terms.fold([0.0; 3], |sliding_distance, (weight, inert)| std::array::from_fn(|c| sliding_distance[c] + weight * inert[3 * node + c]))
     }
 
     /// A lane becomes an unknown: the direction of its force, and what that moves.
@@ -515,7 +515,7 @@ impl Trial {
         let sliding = SlidingState {
             moved: lanes.vector3(&self.moved, lane),
             velocity: vector3_at(&self.velocities, node),
-            way: self.sliding_distance(point, node),
+            sliding_distance: self.sliding_distance(point, node),
             normal: lanes.vector3(&self.normals, lane),
         };
         let direction = obstacle.direction(node, point, &sliding);
@@ -528,12 +528,12 @@ impl Trial {
             column: &mut self.columns[lane * 3 * width..][..3 * width],
             closing: &mut self.closing[lane * width..][..width],
         });
-        if self.gives {
-            obstacle.add_normal_compliance(lane, direction, &mut self.given[..width]);
+        if self.carrier_yields {
+            obstacle.add_normal_compliance(lane, direction, &mut self.carrier_compliance[..width]);
             let closing = &mut self.closing[lane * width..][..width];
             let now = self.multipliers[lane];
-            for ((given, closing), without) in self.given.iter().zip(closing).zip(&mut self.without) {
-                (*closing, *without) = (*closing + given, *without - now * given);
+            for ((carrier_compliance, closing), without) in self.carrier_compliance.iter().zip(closing).zip(&mut self.without) {
+                (*closing, *without) = (*closing + carrier_compliance, *without - now * carrier_compliance);
             }
         }
     }

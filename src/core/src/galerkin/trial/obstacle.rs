@@ -17,7 +17,7 @@ pub trait Obstacle {
         None
     }
 
-    /// Whether directions of sliding turn within a step, and ask for [`SlidingState::way`].
+    /// Whether directions of sliding turn within a step, and ask for [`SlidingState::sliding_distance`].
     fn turns(&self) -> bool {
         false
     }
@@ -58,7 +58,7 @@ pub struct SlidingState {
     /// Velocity of its vibration at the start of the step (m/s).
     pub velocity: [f64; 3],
     /// Sliding distance that a force at this point works on, Σ_k S_ik ũ_k (m), by modes with inertia; 0 unless [`Obstacle::turns`].
-    pub way: [f64; 3],
+    pub sliding_distance: [f64; 3],
     /// Unit normal at the point.
     pub normal: [f64; 3],
 }

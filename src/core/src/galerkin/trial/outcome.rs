@@ -18,17 +18,17 @@ impl Trial {
 
     /// λ of a node at point 0 … s (N).
     pub fn multiplier(&self, point: usize, node: usize) -> f64 {
-        if point == 0 { self.begun.multipliers[node] } else { self.multipliers[self.lanes.at(point, node)] }
+        if point == 0 { self.start_contacts.multipliers[node] } else { self.multipliers[self.lanes.at(point, node)] }
     }
 
     /// Force on it (N).
     pub fn force(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { vector3_at(&self.begun.forces, node) } else { self.lane(&self.forces, point, node) }
+        if point == 0 { vector3_at(&self.start_contacts.forces, node) } else { self.lane(&self.forces, point, node) }
     }
 
     /// Returns the gap of a node (m).
     pub fn gap(&self, point: usize, node: usize) -> f64 {
-        if point == 0 { self.begun.gaps[node] } else { self.gaps[self.lanes.at(point, node)] }
+        if point == 0 { self.start_contacts.gaps[node] } else { self.gaps[self.lanes.at(point, node)] }
     }
 
     /// The same where forces work on it: none where there is nothing to touch, beyond a free edge.
@@ -39,12 +39,12 @@ impl Trial {
 
     /// Returns the unit normal of a node.
     pub fn normal(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { vector3_at(&self.begun.normals, node) } else { self.lane(&self.normals, point, node) }
+        if point == 0 { vector3_at(&self.start_contacts.normals, node) } else { self.lane(&self.normals, point, node) }
     }
 
     /// The unit normal for which its force was found: force − λ · normal is friction.
     fn solved_normal(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { vector3_at(&self.begun.normals, node) } else { self.lane(&self.solved_normals, point, node) }
+        if point == 0 { vector3_at(&self.start_contacts.normals, node) } else { self.lane(&self.solved_normals, point, node) }
     }
 
     /// Friction force on it (N).
@@ -66,7 +66,7 @@ impl Trial {
     /// A node that had nothing to touch at the start of the step and is inside something now.
     pub fn entered(&self) -> Option<usize> {
         let inside = |node: &usize| (1..=self.points()).any(|point| self.gap(point, *node) < 0.0);
-        (0..self.nodes()).find(|node| self.begun.gaps[*node] == f64::INFINITY && inside(node))
+        (0..self.nodes()).find(|node| self.start_contacts.gaps[*node] == f64::INFINITY && inside(node))
     }
 
     /// Whether anything pushes.
@@ -118,7 +118,7 @@ impl Trial {
             state.forces[3 * node..3 * node + 3].copy_from_slice(&force);
             state.normals[3 * node..3 * node + 3].copy_from_slice(&normal);
             for (component, slope) in state.slopes.iter_mut().skip(3 * node).take(3).enumerate() {
-                let change = force[component] - self.begun.forces[3 * node + component];
+                let change = force[component] - self.start_contacts.forces[3 * node + component];
                 *slope = if points == 1 {
                     change * self.per_step
                 } else {
@@ -128,7 +128,7 @@ impl Trial {
             state.multipliers[node] = self.multiplier(points, node);
             state.gaps[node] = self.gap(points, node);
         }
-        state.looked = true;
+        state.gaps_known = true;
         self.forget();
     }
 }

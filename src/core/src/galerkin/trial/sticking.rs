@@ -25,7 +25,7 @@ pub(super) struct Sticking {
     /// Motion of all nodes against what they touch per force along each axis of each: columns of three rows of lanes.
     columns: Vec<f64>,
     /// The same of what they touch, and under the forces of now.
-    given: Vec<f64>,
+    carrier_compliance: Vec<f64>,
     under: Vec<f64>,
 }
 
@@ -37,7 +37,7 @@ impl Sticking {
             solver: CoulombSolver::new(nodes),
             axes: vec![[[0.0; 3]; 3]; nodes],
             columns: vec![0.0; 3 * nodes * stride],
-            given: vec![0.0; stride],
+            carrier_compliance: vec![0.0; stride],
             under: vec![0.0; stride],
         }
     }
@@ -84,7 +84,7 @@ impl Trial {
             self.without[lane] = self.gaps[lane] - pushed;
             self.chosen[lane] = self.gaps[lane] <= 0.0 || self.multipliers[lane] > 0.0 || self.without[lane] < 0.0;
         }
-        self.gives = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * lanes.width()]);
+        self.carrier_yields = obstacle.prepare_compliance(lanes, &self.chosen, &self.normals[..3 * lanes.width()]);
         self.find_under(own, obstacle);
         for lane in 0..lanes.len() {
             if self.chosen[lane] {
@@ -118,12 +118,12 @@ impl Trial {
     /// Finds the displacements of the obstacle under the current forces.
     fn find_under(&mut self, own: &mut Sticking, obstacle: &mut impl Obstacle) {
         own.under.fill(0.0);
-        if !self.gives {
+        if !self.carrier_yields {
             return;
         }
         for lane in (0..self.lanes.len()).filter(|lane| self.multipliers[*lane] > 0.0) {
-            obstacle.add_compliance(lane, self.lanes.vector3(&self.forces, lane), &mut own.given);
-            own.under.iter_mut().zip(&own.given).for_each(|(sum, given)| *sum += given);
+            obstacle.add_compliance(lane, self.lanes.vector3(&self.forces, lane), &mut own.carrier_compliance);
+            own.under.iter_mut().zip(&own.carrier_compliance).for_each(|(sum, carrier_compliance)| *sum += carrier_compliance);
         }
     }
 
@@ -147,9 +147,9 @@ impl Trial {
             let (table, columns) = (compliance.columns(), &columns[..]);
             let sums = [&mut *target];
             self.instructions.run(Combine { table, stride, columns, coefficients: [&direction[..]], sums });
-            if self.gives {
-                obstacle.add_compliance(lane, direction, &mut own.given[..stride]);
-                target.iter_mut().zip(&own.given).for_each(|(moved, given)| *moved += given);
+            if self.carrier_yields {
+                obstacle.add_compliance(lane, direction, &mut own.carrier_compliance[..stride]);
+                target.iter_mut().zip(&own.carrier_compliance).for_each(|(moved, carrier_compliance)| *moved += carrier_compliance);
             }
         }
     }
@@ -230,7 +230,7 @@ impl Trial {
             let pushed = self.lanes.vector3(&self.pushed, self.lanes.at(points, node));
             let (mut own, mut moved) = (0.0, 0.0);
             for point in 0..=points {
-                let terms = self.ways[point].iter().zip(&slips);
+                let terms = self.work_weights[point].iter().zip(&slips);
                 let slip =
                     terms.fold([0.0; 3], |sum, (weight, slip)| std::array::from_fn(|c| sum[c] + weight * slip[c]));
                 let tangential = self.friction_force(point, node);
@@ -251,7 +251,7 @@ impl Trial {
     /// the result is four times the distance because of the duration of sticking.
     pub fn find_turn(&mut self, residual: &DMatrix<f64>, step: f64, obstacle: &impl Obstacle) -> f64 {
         self.withdrawn.copy_from_slice(&self.velocities);
-        let (matrix, x, y) = (residual, &self.begun.slopes, &mut self.withdrawn);
+        let (matrix, x, y) = (residual, &self.start_contacts.slopes, &mut self.withdrawn);
         self.instructions.run(AddProduct { matrix, x, y });
         let touches = |node: &usize| (0..2).all(|point| self.multiplier(point, *node) > 0.0);
         let turn = |node: usize| {

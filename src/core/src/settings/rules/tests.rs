@@ -343,7 +343,7 @@ fn check(scene: &Scene, solver: Solver) -> crate::Result<()> {
 
 #[test]
 fn every_row_refuses_what_breaks_it_and_tells_it() {
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for (whole, changes) in [(rotor(), OF_ROTORS), (flight(), OF_FREE_MASTERS)] {
         check(&whole, Solver::Lcp).unwrap();
         for (beginning, change) in changes {
@@ -351,14 +351,14 @@ fn every_row_refuses_what_breaks_it_and_tells_it() {
             change(&mut scene);
             let error = check(&scene, scene.settings.contacts[0].solver).unwrap_err().to_string();
             assert!(error.starts_with(beginning), "{error:?} instead of {beginning:?}");
-            told.push(error);
+            reported.push(error);
         }
     }
-    told.push(check(&rotor(), Solver::Coulomb).unwrap_err().to_string());
+    reported.push(check(&rotor(), Solver::Coulomb).unwrap_err().to_string());
     for rule in all() {
         let [features, relation, because, remedy] = rule.columns();
         let whole =
             |error: &String| [&relation, &because, &remedy].into_iter().all(|part| error.contains(part.as_str()));
-        assert!(told.iter().any(whole), "{features} {relation}: no case here breaks it");
+        assert!(reported.iter().any(whole), "{features} {relation}: no case here breaks it");
     }
 }

@@ -68,26 +68,26 @@ impl Simulation {
     /// Warnings of the start are told; those of the step to expect among them.
     pub(in crate::simulation) fn begin_telling(&mut self, parameters: &Parameters) {
         let expected = self.compiled.expected_step(parameters.step);
-        self.told = WarningState::new(self.rotors.len(), self.compiled.carriers.len());
+        self.warning_state = WarningState::new(self.rotors.len(), self.compiled.carriers.len());
         for kind in 0..KINDS {
-            for of in 0..self.told.steps[kind].len() {
-                self.told.steps[kind][of] =
+            for of in 0..self.warning_state.steps[kind].len() {
+                self.warning_state.steps[kind][of] =
                     if self.warning_of_step(kind, of, expected).is_some() { expected } else { 0.0 };
             }
         }
-        let mut doubts: Vec<Warning> = self.compiled.slips().iter().map(Slip::warning).collect();
-        doubts.extend(self.compiled.idle_patches());
+        let mut uncertain_warnings: Vec<Warning> = self.compiled.slips().iter().map(Slip::warning).collect();
+        uncertain_warnings.extend(self.compiled.idle_patches());
         for (body, speed) in self.speeds().into_iter().enumerate() {
-            let mut told = [false; 2];
-            senses_of(parameters.speeds[body]).for_each(|sense| told[sense] = true);
-            self.told.senses[body] = told;
-            self.told.friction[body] = self.warnings_of(body, parameters.speeds[body]).len();
+            let mut warning_state = [false; 2];
+            senses_of(parameters.speeds[body]).for_each(|sense| warning_state[sense] = true);
+            self.warning_state.senses[body] = warning_state;
+            self.warning_state.friction[body] = self.warnings_of(body, parameters.speeds[body]).len();
             let fast = self.compiled.slip_of_speed(body, speed);
             let fastest = plausibility::fastest(self.compiled.body(body).1);
-            self.told.fastest[body] = if fast.is_some() { f64::INFINITY } else { fastest };
-            doubts.extend(fast.iter().map(Slip::warning));
+            self.warning_state.fastest[body] = if fast.is_some() { f64::INFINITY } else { fastest };
+            uncertain_warnings.extend(fast.iter().map(Slip::warning));
         }
-        self.warnings.extend(doubts);
+        self.warnings.extend(uncertain_warnings);
     }
 
     /// Returns the warnings for a structure whose contact slides in the sense of this sign.
@@ -99,8 +99,8 @@ impl Simulation {
     pub(in crate::simulation) fn warn_of_friction(&mut self, parameters: &Parameters) {
         for (body, sense) in parameters.speeds.iter().enumerate() {
             let warnings = self.warnings_of(body, *sense);
-            if warnings.len() > self.told.friction[body] {
-                self.told.friction[body] = warnings.len();
+            if warnings.len() > self.warning_state.friction[body] {
+                self.warning_state.friction[body] = warnings.len();
                 warnings.into_iter().for_each(|text| self.note(text));
             }
         }
@@ -110,11 +110,11 @@ impl Simulation {
     /// told about. Allocates only to tell.
     pub(in crate::simulation) fn warn_of_step_and_speeds(&mut self, step: f64, length: f64) {
         for kind in 0..KINDS {
-            for of in 0..self.told.steps[kind].len() {
-                if step > MATERIAL * self.told.steps[kind][of]
+            for of in 0..self.warning_state.steps[kind].len() {
+                if step > MATERIAL * self.warning_state.steps[kind][of]
                     && let Some(text) = self.warning_of_step(kind, of, step)
                 {
-                    self.told.steps[kind][of] = step;
+                    self.warning_state.steps[kind][of] = step;
                     self.note(text);
                 }
             }
@@ -133,9 +133,9 @@ impl Simulation {
     /// The same of the load on a casing.
     fn warn_of_load(&mut self, carrier: usize, turn: f64) {
         let coarse =
-            self.system.scheme() == Scheme::CentralDifference && turn > MATERIAL * self.told.load_turned[carrier];
+            self.system.scheme() == Scheme::CentralDifference && turn > MATERIAL * self.warning_state.load_turned[carrier];
         if coarse && self.compiled.carriers[carrier].loads.nodal.is_some() {
-            self.told.load_turned[carrier] = turn;
+            self.warning_state.load_turned[carrier] = turn;
             let name = self.compiled.carrier_name(self.compiled.bodies.len() + carrier);
             self.note(coarse_excitation(&format!("the load on the {name}"), turn));
         }
@@ -143,22 +143,22 @@ impl Simulation {
 
     /// Central differences make a resonance too large where the excitation turns far in one internal step (rad).
     fn warn_of_excitation(&mut self, body: usize, turn: f64) {
-        if self.system.scheme() != Scheme::CentralDifference || turn <= MATERIAL * self.told.turned[body] {
+        if self.system.scheme() != Scheme::CentralDifference || turn <= MATERIAL * self.warning_state.turned[body] {
             return;
         }
-        self.told.turned[body] = turn;
+        self.warning_state.turned[body] = turn;
         self.note(self.compiled.warning_of(body, coarse_excitation("the excitation", turn)));
     }
 
     fn warn_of_speed(&mut self, body: usize, speed: f64) {
-        if speed.abs() > self.told.fastest[body]
+        if speed.abs() > self.warning_state.fastest[body]
             && let Some(slip) = self.compiled.slip_of_speed(body, speed)
         {
-            self.told.fastest[body] = f64::INFINITY;
+            self.warning_state.fastest[body] = f64::INFINITY;
             self.note(slip.warning());
         }
         for sense in senses_of(speed).filter(|_| speed != 0.0) {
-            if !std::mem::replace(&mut self.told.senses[body][sense], true) {
+            if !std::mem::replace(&mut self.warning_state.senses[body][sense], true) {
                 let found = self.limits.as_ref().map_or(Vec::new(), |limits| {
                     limits.bodies[body].of_sense(sense, speed, &self.compiled.rotor_name(body))
                 });
@@ -216,8 +216,8 @@ impl Simulation {
     pub fn if_reversed(&self) -> Vec<Warning> {
         let Some(limits) = &self.limits else { return Vec::new() };
         let mut found = Vec::new();
-        for (index, (body, told)) in limits.bodies.iter().zip(&self.told.senses).enumerate() {
-            let other = [0, 1].into_iter().filter(|sense| !told[*sense] && body.senses[*sense].is_some());
+        for (index, (body, warning_state)) in limits.bodies.iter().zip(&self.warning_state.senses).enumerate() {
+            let other = [0, 1].into_iter().filter(|sense| !warning_state[*sense] && body.senses[*sense].is_some());
             let rotor = self.compiled.rotor_name(index);
             let speed = limits.parameters.speeds[index];
             found.extend(other.flat_map(|sense| body.of_sense(sense, speed, &rotor)));

@@ -64,11 +64,11 @@ pub fn mode_damping(
     quantity: Quantity,
     name: &str,
     structure: &StructureSettings,
-    told: &str,
+    warning_state: &str,
 ) {
     let ratios = &structure.damping_ratios;
     if !ratios.is_empty() {
-        let row = table.damping(quantity, name, 0.0, &format!("Modal damping ratios of the first modes of {told}"));
+        let row = table.damping(quantity, name, 0.0, &format!("Modal damping ratios of the first modes of {warning_state}"));
         (row.dimension, row.start) = (Some(ratios.len()), Some(StartValue::Real(ratios.clone())));
     }
 }

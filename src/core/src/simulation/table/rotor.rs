@@ -195,7 +195,7 @@ const PER_EXTENT: [PerExtent; 2] = [
 
 /// Pressure and force per length, of contact patches.
 fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
-    for (name, told, unit, nominal, extent) in PER_EXTENT {
+    for (name, warning_state, unit, nominal, extent) in PER_EXTENT {
         let extents: Vec<f64> = body.rom.contact_nodes.iter().map(extent).collect();
         if extents.contains(&0.0) {
             continue;
@@ -203,7 +203,7 @@ fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
         let (index, count) = (body.index, extents.len());
         let list = node_list(body);
         let text =
-            format!("Normal contact {told} at the centre of each patch ({list}), mean over the communication step");
+            format!("Normal contact {warning_state} at the centre of each patch ({list}), mean over the communication step");
         let read = each(move |view, node| view.mean * view.normal_impulse(index, node, sector - 1) / extents[node]);
         let row = table.output(format!("blade[{sector}].{name}"), Span::Mean, Some((unit, nominal)), text, read);
         row.dimension = Some(count);

@@ -32,14 +32,14 @@ pub struct CarrierIntegrator {
     /// Displacements that forces at each point of the accepted step work on, Σ_k S_ik u_k (m).
     worked: [Vec<f64>; POINTS],
     /// Weights of the work of forces at each point of the step that is tried.
-    pub ways: [[f64; POINTS]; POINTS],
+    pub work_weights: [[f64; POINTS]; POINTS],
     /// δ² per squared impulse on each mode: ½ mean φ²/ω².
     error_form: Vec<f64>,
     impulses: Vec<f64>,
     /// Modes as each lane sees them in fixed directions, and along its normal; lanes that face this structure, and their directions.
     seen: [Vec<f64>; 3],
     along: Vec<f64>,
-    facing: Vec<bool>,
+    obstacle: Vec<bool>,
     frames: Vec<PolarFrame>,
     /// Modes under a unit of λ of one lane.
     force: Vec<f64>,
@@ -72,11 +72,11 @@ impl CarrierIntegrator {
             moved: std::array::from_fn(|_| vec![0.0; padded]),
             velocity: vec![0.0; padded],
             worked: std::array::from_fn(|_| vec![0.0; padded]),
-            ways: [[0.0; POINTS]; POINTS],
+            work_weights: [[0.0; POINTS]; POINTS],
             impulses: vec![0.0; modes],
             seen: std::array::from_fn(|_| vec![0.0; lanes.len() * stride]),
             along: vec![0.0; lanes.len() * stride],
-            facing: vec![false; lanes.len()],
+            obstacle: vec![false; lanes.len()],
             frames: vec![PolarFrame::FIXED; lanes.len()],
             force: vec![0.0; stride],
             whole: if bank.is_loaded() {
@@ -119,9 +119,9 @@ impl CarrierIntegrator {
 
     /// Returns the displacement that a force at point i of the tried step works on at a place (m), in the directions of the node.
     pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> [f64; 3] {
-        let (weights, moved) = (&self.ways[i], &self.moved);
-        let way = |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
-        at_place(spot.surface, spot.place, spot.frame, way)
+        let (weights, moved) = (&self.work_weights[i], &self.moved);
+        let sliding_distance = |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
+        at_place(spot.surface, spot.place, spot.frame, sliding_distance)
     }
 
     /// Displacement of a place at a point of the step (m), in the directions of the node.
@@ -136,8 +136,8 @@ impl CarrierIntegrator {
 
     /// Weigh displacements at the points for the work of forces there.
     pub fn weigh(&mut self, points: usize) {
-        let Self { worked, moved, ways, .. } = self;
-        for (worked, weights) in worked.iter_mut().zip(ways).take(points + 1) {
+        let Self { worked, moved, work_weights, .. } = self;
+        for (worked, weights) in worked.iter_mut().zip(work_weights).take(points + 1) {
             for (row, worked) in worked.iter_mut().enumerate() {
                 *worked = (0..=points).map(|k| weights[k] * moved[k][row]).sum();
             }
@@ -179,13 +179,13 @@ impl CarrierIntegrator {
 
     /// No lane faces it yet.
     pub fn clear_lanes(&mut self) {
-        self.facing.fill(false);
+        self.obstacle.fill(false);
     }
 
     /// A lane of the sector that is solved faces a place, with this normal.
     pub fn set_lane(&mut self, lane: usize, spot: Spot, normal: [f64; 3]) {
         let padded = self.force.len();
-        (self.facing[lane], self.frames[lane]) = (true, spot.frame);
+        (self.obstacle[lane], self.frames[lane]) = (true, spot.frame);
         let around = Around::new(spot);
         let window = lane * padded..(lane + 1) * padded;
         let Self { seen, shapes, along, instructions, .. } = self;
@@ -203,21 +203,21 @@ impl CarrierIntegrator {
         }
     }
 
-    /// By how much it gives way at all lanes (m, along their normals) per λ of one with the force `direction` per λ: added to `given`.
+    /// By how much it gives way at all lanes (m, along their normals) per λ of one with the force `direction` per λ: added to `carrier_compliance`.
     pub fn add_normal_compliance(
         &mut self,
         (level, kind): (usize, ForceInterpolation),
         lanes: Lanes,
         lane: usize,
         direction: [f64; 3],
-        given: &mut [f64],
+        carrier_compliance: &mut [f64],
     ) {
         let padded = self.force.len();
         for i in 1..=lanes.points {
             self.move_modes((level, kind), lanes, (i, lane), direction);
-            for node in (0..lanes.nodes).filter(|node| self.facing[lanes.at(i, *node)]) {
+            for node in (0..lanes.nodes).filter(|node| self.obstacle[lanes.at(i, *node)]) {
                 let other = lanes.at(i, node);
-                given[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
+                carrier_compliance[other] += dot_of(&self.along[other * padded..][..padded], &self.force);
             }
         }
     }
@@ -229,13 +229,13 @@ impl CarrierIntegrator {
         lanes: Lanes,
         lane: usize,
         force: [f64; 3],
-        given: &mut [f64],
+        carrier_compliance: &mut [f64],
     ) {
         let padded = self.force.len();
         self.move_modes(at, lanes, (1, lane), force);
-        for other in (0..lanes.nodes).filter(|node| self.facing[*node]) {
+        for other in (0..lanes.nodes).filter(|node| self.obstacle[*node]) {
             let fixed = self.seen.each_ref().map(|seen| dot_of(&seen[other * padded..][..padded], &self.force));
-            lanes.set(given, other, self.frames[other].local(fixed));
+            lanes.set(carrier_compliance, other, self.frames[other].local(fixed));
         }
     }
 
@@ -247,7 +247,7 @@ impl CarrierIntegrator {
         (i, lane): (usize, usize),
         force: [f64; 3],
     ) {
-        if !self.facing[lane] {
+        if !self.obstacle[lane] {
             return self.force.fill(0.0);
         }
         let padded = self.force.len();

@@ -74,7 +74,7 @@ struct SceneMut<'a> {
 
 /// The set and the scene, as one system with adaptive steps.
 pub struct CoupledStepper<'a> {
-    together: &'a mut CoupledSet,
+    coupled_set: &'a mut CoupledSet,
     world: SceneMut<'a>,
 }
 
@@ -196,11 +196,11 @@ impl CoupledSet {
             bank.read_sector(0, &mut position[..dynamic], &mut velocity[..dynamic]);
             bank.read_loads(casing.whole.loads_mut());
         }
-        let first = self.sectors.first().map(|one| &structures[one.structure].pace);
+        let first = self.sectors.first().map(|one| &structures[one.structure].step_control);
         (self.fresh, self.failed) = (true, None);
         (self.bank, self.largest, self.level) =
-            first.map_or((0.0, 0.0, 0), |pace| (pace.bank[0], pace.largest[0], pace.level_of(0)));
-        let mut marching = CoupledStepper { together: self, world: SceneMut { structures, pairs } };
+            first.map_or((0.0, 0.0, 0), |step_control| (step_control.bank[0], step_control.largest[0], step_control.level_of(0)));
+        let mut marching = CoupledStepper { coupled_set: self, world: SceneMut { structures, pairs } };
         marching.find_start();
         marching
     }
@@ -222,15 +222,15 @@ fn kinds_of(modes: &Sectors) -> Vec<ContactModes> {
 
 impl CoupledSector {
     /// It faces its surfaces.
-    fn facing<'a>(
+    fn obstacle<'a>(
         &'a mut self,
         (structures, pairs): (&'a [Structure], &'a mut [ContactPair]),
-        ground: Option<CarriersInStep<'a>>,
+        carriers: Option<CarriersInStep<'a>>,
     ) -> (ObstacleView<'a>, &'a mut Trial, &'a mut SectorState) {
         let structure = &structures[self.structure];
         let (pair_of, lanes) = (&structure.pair_of[..], structure.lanes());
-        let facing = ObstacleView { ground, pairs, pair_of, lanes, sector: self.sector, record: &mut self.record };
-        (facing, &mut self.trial, &mut self.state)
+        let obstacle = ObstacleView { carriers, pairs, pair_of, lanes, sector: self.sector, record: &mut self.record };
+        (obstacle, &mut self.trial, &mut self.state)
     }
 }
 
@@ -241,7 +241,7 @@ impl CoupledStepper<'_> {
         at: (SpanStep, ForceInterpolation),
         to: impl FnMut(&mut ObstacleView, (&mut Trial, &mut SectorState), &Tables, Option<&mut CoupledDisk>),
     ) {
-        self.together.sectors.iter_mut().for_each(|one| one.far = false);
+        self.coupled_set.sectors.iter_mut().for_each(|one| one.far = false);
         self.each_of(false, at, to);
     }
 
@@ -252,9 +252,9 @@ impl CoupledStepper<'_> {
         (step, kind): (SpanStep, ForceInterpolation),
         mut to: impl FnMut(&mut ObstacleView, (&mut Trial, &mut SectorState), &Tables, Option<&mut CoupledDisk>),
     ) {
-        let CoupledSet { sectors, casings, casing_of, tables, disks, .. } = &mut *self.together;
+        let CoupledSet { sectors, casings, casing_of, tables, disks, .. } = &mut *self.coupled_set;
         for one in sectors.iter_mut().filter(|one| one.far == far) {
-            let ground = (!casings.is_empty()).then_some(CarriersInStep {
+            let carriers = (!casings.is_empty()).then_some(CarriersInStep {
                 casings,
                 casing_of,
                 level: step.level,
@@ -262,14 +262,14 @@ impl CoupledStepper<'_> {
                 lanes: Lanes { points: 0, nodes: 0 },
             });
             let (tables, disk) = (&tables[one.table[0]][one.table[1]], one.disk.map(|disk| &mut disks[disk]));
-            let (mut facing, trial, state) = one.facing((self.world.structures, self.world.pairs), ground);
-            to(&mut facing, (trial, state), tables, disk);
+            let (mut obstacle, trial, state) = one.obstacle((self.world.structures, self.world.pairs), carriers);
+            to(&mut obstacle, (trial, state), tables, disk);
         }
     }
 
     /// Displacements and velocities of what several sectors see, at the start of a step.
     fn find_start(&mut self) {
-        let CoupledSet { disks, casings, .. } = &mut *self.together;
+        let CoupledSet { disks, casings, .. } = &mut *self.coupled_set;
         for disk in disks {
             disk.whole.settle();
             if let Sectors::Coupled(bank) = &mut self.world.structures[disk.structure].modes {
@@ -281,10 +281,10 @@ impl CoupledStepper<'_> {
             casing.whole.settle();
             casing.find_start();
         }
-        let sectors = &mut self.together.sectors;
+        let sectors = &mut self.coupled_set.sectors;
         for one in sectors {
-            let table = &self.together.tables[one.table[0]][one.table[1]];
-            match one.disk.map(|disk| &self.together.disks[disk]) {
+            let table = &self.coupled_set.tables[one.table[0]][one.table[1]];
+            match one.disk.map(|disk| &self.coupled_set.disks[disk]) {
                 None => {
                     one.trial.find_start(&table.rows, &one.state);
                 }
@@ -299,22 +299,22 @@ impl CoupledStepper<'_> {
 
     /// A step begins: prescribed motion at its points, motion without forces, and a guess of these.
     fn prepare(&mut self, step: SpanStep, kind: ForceInterpolation) {
-        for disk in &mut self.together.disks {
+        for disk in &mut self.coupled_set.disks {
             disk.whole.begin(step, kind);
         }
-        let basis = &self.together.tables[0][0].levels[step.level].basis;
-        for casing in &mut self.together.casings {
+        let basis = &self.coupled_set.tables[0][0].levels[step.level].basis;
+        for casing in &mut self.coupled_set.casings {
             casing.whole.begin(step, kind);
-            casing.ways = std::array::from_fn(|i| kind.work_weights(basis, i));
+            casing.work_weights = std::array::from_fn(|i| kind.work_weights(basis, i));
         }
-        self.each((step, kind), |facing, (trial, state), tables, disk| {
+        self.each((step, kind), |obstacle, (trial, state), tables, disk| {
             let level = &tables.levels[step.level];
-            facing.begin_step(step.from, step.length, level, kind);
-            facing.record.stay();
+            obstacle.begin_step(step.from, step.length, level, kind);
+            obstacle.record.guess_start_places();
             trial.begin((level, kind), disk.is_none().then_some(&tables.rows), state);
-            trial.find_start_gaps(state, |node, moved| facing.gap(node, 0, moved).0);
+            trial.find_start_gaps(state, |node, moved| obstacle.gap(node, 0, moved).0);
         });
-        if self.together.fresh {
+        if self.coupled_set.fresh {
             // What was handed over before is handed over where nodes are found to be at the start of the span.
             self.react(0..=0, (step, kind));
         }
@@ -322,15 +322,15 @@ impl CoupledStepper<'_> {
 
     /// Forces at some points of the step are handed to what carries surfaces.
     fn react(&mut self, points: std::ops::RangeInclusive<usize>, at: (SpanStep, ForceInterpolation)) {
-        for casing in &mut self.together.casings {
+        for casing in &mut self.coupled_set.casings {
             points.clone().for_each(|point| casing.whole.forces_mut(point).fill(0.0));
         }
-        self.each_of(false, at, |facing, (trial, _), _, _| {
+        self.each_of(false, at, |obstacle, (trial, _), _, _| {
             for (point, node) in points.clone().flat_map(|point| (0..trial.nodes()).map(move |node| (point, node))) {
                 if trial.multiplier(point, node) != 0.0 {
                     let force = trial.force(point, node);
-                    facing.record.act(node, point);
-                    facing.with_carrier_mut(node, point, |casing, spot| casing.react(spot, point, force));
+                    obstacle.record.act(node, point);
+                    obstacle.with_carrier_mut(node, point, |casing, spot| casing.react(spot, point, force));
                 }
             }
         });
@@ -338,7 +338,7 @@ impl CoupledStepper<'_> {
 
     /// Everything moves under the forces of now.
     fn push(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) {
-        let CoupledSet { disks, sectors, .. } = &mut *self.together;
+        let CoupledSet { disks, sectors, .. } = &mut *self.coupled_set;
         for (number, disk) in disks.iter_mut().enumerate() {
             let Sectors::Coupled(bank) = &mut self.world.structures[disk.structure].modes else { continue };
             let lanes = bank.lanes();
@@ -359,11 +359,11 @@ impl CoupledStepper<'_> {
                 one.trial.carry(|point, node| [0, 1, 2].map(|i| moved[point][(3 * node + i) * lanes + sector]));
             }
         }
-        if self.together.casings.is_empty() {
+        if self.coupled_set.casings.is_empty() {
             return;
         }
         self.react(1..=points, (step, kind));
-        for casing in &mut self.together.casings {
+        for casing in &mut self.coupled_set.casings {
             casing.whole.push(step.level, kind);
             casing.recover(points);
         }
@@ -371,21 +371,21 @@ impl CoupledStepper<'_> {
 
     /// Gaps at all points, of sectors that are far or are not: the smallest, the largest of a contact that pushes, and whether nothing does.
     fn find_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize, far: bool) -> (f64, f64, bool) {
-        if self.together.casings.is_empty() {
-            self.each_of(far, (step, kind), |facing, (trial, _), _, _| {
-                trial.find_gaps(facing);
+        if self.coupled_set.casings.is_empty() {
+            self.each_of(far, (step, kind), |obstacle, (trial, _), _, _| {
+                trial.find_gaps(obstacle);
             });
         } else {
             self.each_of(far, (step, kind), |_, (trial, _), _, _| trial.move_rows());
             for point in 1..=points {
                 self.bend_surfaces(point);
-                self.each_of(far, (step, kind), |facing, (trial, _), _, _| {
-                    trial.find_gaps_at(point, |node, moved| facing.gap(node, point, moved));
+                self.each_of(far, (step, kind), |obstacle, (trial, _), _, _| {
+                    trial.find_gaps_at(point, |node, moved| obstacle.gap(node, point, moved));
                 });
             }
         }
         let mut found = (f64::INFINITY, 0.0_f64, true);
-        for one in self.together.sectors.iter().filter(|one| one.far == far) {
+        for one in self.coupled_set.sectors.iter().filter(|one| one.far == far) {
             let (lowest, largest) = one.trial.extremes();
             let least = if lowest.is_nan() || found.0.is_nan() { f64::NAN } else { found.0.min(lowest) };
             found = (least, found.1.max(largest), found.2 && one.trial.rests());
@@ -395,7 +395,7 @@ impl CoupledStepper<'_> {
 
     /// Tell sectors that are far from those that may touch, where the lowest gap is `lowest` (m).
     fn separate_far_sectors(&mut self, lowest: f64) {
-        for one in &mut self.together.sectors {
+        for one in &mut self.coupled_set.sectors {
             one.far = one.trial.rests() && one.trial.extremes().0 > -lowest;
         }
     }
@@ -405,7 +405,7 @@ impl CoupledStepper<'_> {
         let (lowest, ..) = self.find_gaps(step, kind, points, true);
         // What is no number is found out by the next look at all that are near.
         let found = lowest.is_nan() || lowest < 0.0;
-        for one in self.together.sectors.iter_mut().filter(|one| one.far) {
+        for one in self.coupled_set.sectors.iter_mut().filter(|one| one.far) {
             let lowest = one.trial.extremes().0;
             one.far = lowest >= 0.0;
         }
@@ -414,7 +414,7 @@ impl CoupledStepper<'_> {
 
     /// Surfaces that are carried are as at a point of the step.
     fn bend_surfaces(&mut self, point: usize) {
-        let CoupledSet { casings, casing_of, sectors, .. } = &*self.together;
+        let CoupledSet { casings, casing_of, sectors, .. } = &*self.coupled_set;
         for (number, pair) in self.world.pairs.iter_mut().enumerate() {
             let Some(casing) = casing_of[number].map(|casing| &casings[casing]) else { continue };
             let Some(one) = sectors.iter().find(|one| one.structure == pair.structure()) else { continue };
@@ -424,18 +424,18 @@ impl CoupledStepper<'_> {
 
     /// The first sector of which this holds is what the step fails for.
     fn blame(&mut self, holds: impl Fn(&CoupledSector) -> bool, is_lost: bool) {
-        self.together.failed = self.together.sectors.iter().position(holds).map(|index| (index, is_lost));
+        self.coupled_set.failed = self.coupled_set.sectors.iter().position(holds).map(|index| (index, is_lost));
     }
 
     /// Forces that close what penetrates, sector by sector.
     fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, verdict: &mut TrialResult) -> bool {
         let (mut solved, mut failed) = (true, None);
-        self.each_of(false, (step, kind), |facing, (trial, _), tables, _| {
+        self.each_of(false, (step, kind), |obstacle, (trial, _), tables, _| {
             let (lowest, _) = trial.extremes();
             if solved && (lowest < 0.0 || !trial.rests()) {
                 let parts = (tables.levels[step.level].compliance_of(kind), tables.rows.residual());
-                solved = trial.solve(parts, facing, verdict);
-                failed = (!solved).then_some(facing.sector);
+                solved = trial.solve(parts, obstacle, verdict);
+                failed = (!solved).then_some(obstacle.sector);
             }
         });
         if let Some(sector) = failed {
@@ -446,11 +446,11 @@ impl CoupledStepper<'_> {
 
     /// Error, switches and near misses of all.
     fn judge(&mut self, step: SpanStep, points: usize, verdict: &mut TrialResult) {
-        self.together.casings.iter_mut().for_each(CarrierIntegrator::clear_impulses);
-        self.together.disks.iter_mut().for_each(|disk| disk.error = 0.0);
-        self.each((step, ForceInterpolation::Polynomial), |facing, (trial, _), tables, disk| {
+        self.coupled_set.casings.iter_mut().for_each(CarrierIntegrator::clear_impulses);
+        self.coupled_set.disks.iter_mut().for_each(|disk| disk.error = 0.0);
+        self.each((step, ForceInterpolation::Polynomial), |obstacle, (trial, _), tables, disk| {
             let mut own = TrialResult::default();
-            trial.judge((&tables.levels[step.level], &tables.rows), facing, &mut own);
+            trial.judge((&tables.levels[step.level], &tables.rows), obstacle, &mut own);
             match disk {
                 // What one sector leaves all of them swing by.
                 Some(disk) => disk.error = disk.error.hypot(own.error),
@@ -460,31 +460,31 @@ impl CoupledStepper<'_> {
             verdict.switched += own.switched;
             verdict.near |= own.near;
             if own.depth > 0.0 {
-                let depth = trial.depth_without_jumps(|node, moved| facing.gap_within(node, 0.0, moved));
+                let depth = trial.depth_without_jumps(|node, moved| obstacle.gap_within(node, 0.0, moved));
                 verdict.depth = verdict.depth.max(depth);
             }
             for node in 0..trial.nodes() {
                 let impulse = trial.impulse(node);
                 if impulse.iter().any(|component| *component != 0.0) {
-                    facing.with_carrier_mut(node, points, |casing, spot| casing.add_impulse(spot, impulse));
+                    obstacle.with_carrier_mut(node, points, |casing, spot| casing.add_impulse(spot, impulse));
                 }
             }
         });
-        let errors = self.together.casings.iter().map(CarrierIntegrator::error);
-        let errors = errors.chain(self.together.disks.iter().map(|disk| disk.error));
+        let errors = self.coupled_set.casings.iter().map(CarrierIntegrator::error);
+        let errors = errors.chain(self.coupled_set.disks.iter().map(|disk| disk.error));
         verdict.error = errors.fold(verdict.error, f64::max);
     }
 
     /// The state goes back to the structures. Work of loads on the way (J).
     pub fn finish(self) -> f64 {
         let mut load_work = 0.0;
-        let Self { together, world: SceneMut { structures, .. } } = self;
-        for one in &mut together.sectors {
+        let Self { coupled_set, world: SceneMut { structures, .. } } = self;
+        for one in &mut coupled_set.sectors {
             let structure = &mut structures[one.structure];
             structure.write_contacts(one.sector, &one.state, |node| one.record.tallies[node].lowest);
-            (structure.pace.bank[one.sector], structure.pace.largest[one.sector]) = (together.bank, together.largest);
-            structure.pace.level[one.sector] = together.level as u64;
-            let table = &together.tables[one.table[0]][one.table[1]];
+            (structure.step_control.bank[one.sector], structure.step_control.largest[one.sector]) = (coupled_set.bank, coupled_set.largest);
+            structure.step_control.level[one.sector] = coupled_set.level as u64;
+            let table = &coupled_set.tables[one.table[0]][one.table[1]];
             if let (None, Sectors::Uncoupled(bank)) = (one.disk, &mut structure.modes) {
                 let (state, loss) = (&one.state, one.record.work.damping);
                 let moved = one.trial.find_start(&table.rows, state);
@@ -492,13 +492,13 @@ impl CoupledStepper<'_> {
                 bank.lose(one.sector, loss);
             }
         }
-        for disk in &mut together.disks {
+        for disk in &mut coupled_set.disks {
             if let Sectors::Coupled(bank) = &mut structures[disk.structure].modes {
                 bank.write_all(disk.whole.at(0), disk.whole.velocity());
                 bank.lose(disk.whole.collect_loss());
             }
         }
-        for casing in &mut together.casings {
+        for casing in &mut coupled_set.casings {
             let structure = &mut structures[casing.structure];
             structure.delayed.copy_from_slice(casing.whole.forces_mut(0));
             if let Sectors::Uncoupled(bank) = &mut structure.modes {
@@ -514,44 +514,44 @@ impl CoupledStepper<'_> {
 }
 
 impl AdaptiveStepper for CoupledStepper<'_> {
-    fn pace(&mut self) -> (&mut f64, &mut usize) {
-        (&mut self.together.bank, &mut self.together.level)
+    fn step_control(&mut self) -> (&mut f64, &mut usize) {
+        (&mut self.coupled_set.bank, &mut self.coupled_set.level)
     }
 
     fn largest_energy(&mut self) -> f64 {
-        let energy = self.together.energy();
-        self.together.largest = self.together.largest.max(energy);
-        self.together.largest
+        let energy = self.coupled_set.energy();
+        self.coupled_set.largest = self.coupled_set.largest.max(energy);
+        self.coupled_set.largest
     }
 
     fn length(&self, level: usize) -> f64 {
-        self.together.tables[0][0].levels[level].step
+        self.coupled_set.tables[0][0].levels[level].step
     }
 
     fn count(&self) -> u64 {
-        self.together.sectors.len() as u64
+        self.coupled_set.sectors.len() as u64
     }
 
     fn fly(&mut self, step: SpanStep) -> bool {
         let pushed = |one: &CoupledSector| one.state.multipliers.iter().any(|value| *value != 0.0);
-        if !self.together.casings.is_empty() || self.together.sectors.iter().any(pushed) {
+        if !self.coupled_set.casings.is_empty() || self.coupled_set.sectors.iter().any(pushed) {
             return false;
         }
-        for disk in &mut self.together.disks {
+        for disk in &mut self.coupled_set.disks {
             if let Some(bank) = self.world.structures[disk.structure].modes.coupled() {
                 disk.find_reach(bank);
             }
         }
         let mut clear = true;
-        self.each((step, ForceInterpolation::Polynomial), |facing, _, _, disk| {
-            clear = clear && disk.is_some_and(|disk| facing.is_clear(step.from, step.length, &disk.reach));
+        self.each((step, ForceInterpolation::Polynomial), |obstacle, _, _, disk| {
+            clear = clear && disk.is_some_and(|disk| obstacle.is_clear(step.from, step.length, &disk.reach));
         });
         if !clear {
             return false;
         }
         self.pass(step);
-        self.together.disks.iter_mut().for_each(|disk| disk.whole.fly(step.level));
-        self.together.sectors.iter_mut().for_each(|one| one.state.looked = false);
+        self.coupled_set.disks.iter_mut().for_each(|disk| disk.whole.fly(step.level));
+        self.coupled_set.sectors.iter_mut().for_each(|one| one.state.gaps_known = false);
         self.find_start();
         true
     }
@@ -561,9 +561,9 @@ impl AdaptiveStepper for CoupledStepper<'_> {
         let points = if kind == ForceInterpolation::Constant {
             1
         } else {
-            self.together.tables[0][0].levels[step.level].basis.degree
+            self.coupled_set.tables[0][0].levels[step.level].basis.degree
         };
-        let (precision, mut verdict) = (self.together.demand.precision, TrialResult::default());
+        let (precision, mut verdict) = (self.coupled_set.demand.precision, TrialResult::default());
         for pass in 0..PASSES {
             self.push(step, kind, points);
             let (lowest, largest, rests) = self.find_gaps(step, kind, points, false);
@@ -595,17 +595,17 @@ impl AdaptiveStepper for CoupledStepper<'_> {
     }
 
     fn take(&mut self, step: SpanStep, kind: ForceInterpolation, verdict: &TrialResult) -> f64 {
-        let level = &self.together.tables[0][0].levels[step.level];
+        let level = &self.coupled_set.tables[0][0].levels[step.level];
         let points = if kind == ForceInterpolation::Constant { 1 } else { level.basis.degree };
-        self.together.casings.iter_mut().for_each(|casing| casing.weigh(points));
+        self.coupled_set.casings.iter_mut().for_each(|casing| casing.weigh(points));
         let (mut dropped, mut closed) = (0.0, 0.0);
-        let before: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
-        for whole in self.together.shared_bodies() {
+        let before: f64 = self.coupled_set.sectors.iter().map(|one| one.record.work.closing).sum();
+        for whole in self.coupled_set.shared_bodies() {
             dropped += if kind == ForceInterpolation::Constant { whole.dropped() } else { 0.0 };
         }
-        let (mut of_wholes, tolerance) = (dropped, self.together.demand.tolerance);
+        let (mut of_wholes, tolerance) = (dropped, self.coupled_set.demand.tolerance);
         let is_resolved = verdict.resolves_motion(kind, tolerance);
-        self.each((step, kind), |facing, (trial, state), tables, disk| {
+        self.each((step, kind), |obstacle, (trial, state), tables, disk| {
             let own = if kind == ForceInterpolation::Constant && disk.is_none() {
                 trial.dropped(tables.rows.residual(), state)
             } else {
@@ -615,7 +615,7 @@ impl AdaptiveStepper for CoupledStepper<'_> {
             dropped += own;
             let level = &tables.levels[step.level];
             trial.find_minima(&level.basis, is_resolved, tolerance);
-            facing.record_step(&AcceptedStep {
+            obstacle.record_step(&AcceptedStep {
                 level,
                 kind,
                 trial,
@@ -625,7 +625,7 @@ impl AdaptiveStepper for CoupledStepper<'_> {
         });
         self.accept_states(step, kind);
         // What gaps within the precision of contacts that stay closed give is paid as well.
-        let after: f64 = self.together.sectors.iter().map(|one| one.record.work.closing).sum();
+        let after: f64 = self.coupled_set.sectors.iter().map(|one| one.record.work.closing).sum();
         if kind == ForceInterpolation::Constant { dropped + closed } else { after - before }
     }
 }
@@ -634,30 +634,30 @@ impl CoupledStepper<'_> {
     /// Find gaps within a step of free flight, where a node may come closer there than at its ends.
     fn pass(&mut self, step: SpanStep) {
         let mut closer = false;
-        self.each((step, ForceInterpolation::Polynomial), |facing, _, _, disk| {
-            closer = closer || disk.is_some_and(|disk| facing.may_come_closer(step.from, step.length, &disk.reach));
+        self.each((step, ForceInterpolation::Polynomial), |obstacle, _, _, disk| {
+            closer = closer || disk.is_some_and(|disk| obstacle.may_come_closer(step.from, step.length, &disk.reach));
         });
         if !closer {
             return;
         }
-        let (kind, tolerance) = (ForceInterpolation::Polynomial, self.together.demand.tolerance);
-        let points = self.together.tables[0][0].levels[step.level].basis.degree;
+        let (kind, tolerance) = (ForceInterpolation::Polynomial, self.coupled_set.demand.tolerance);
+        let points = self.coupled_set.tables[0][0].levels[step.level].basis.degree;
         self.prepare(step, kind);
         self.push(step, kind, points);
         self.find_gaps(step, kind, points, false);
-        self.each((step, kind), |facing, (trial, _), tables, _| {
+        self.each((step, kind), |obstacle, (trial, _), tables, _| {
             let level = &tables.levels[step.level];
             trial.find_minima(&level.basis, true, tolerance);
-            facing.record_gaps(level, trial);
+            obstacle.record_gaps(level, trial);
         });
     }
 
     /// All states go to the end of the step.
     fn accept_states(&mut self, step: SpanStep, kind: ForceInterpolation) {
-        self.together.fresh = false;
-        for one in &mut self.together.sectors {
+        self.coupled_set.fresh = false;
+        for one in &mut self.coupled_set.sectors {
             if one.disk.is_none() {
-                let tables = &self.together.tables[one.table[0]][one.table[1]];
+                let tables = &self.coupled_set.tables[one.table[0]][one.table[1]];
                 let (level, trial) = (&tables.levels[step.level], &one.trial);
                 let basis = &level.basis;
                 let forces = |node| trial.polynomial(basis, kind, node);
@@ -665,7 +665,7 @@ impl CoupledStepper<'_> {
             }
             one.trial.leave(&mut one.state);
         }
-        self.together.shared_bodies_mut().for_each(|whole| whole.take(step.level, kind));
+        self.coupled_set.shared_bodies_mut().for_each(|whole| whole.take(step.level, kind));
         self.find_start();
     }
 }

@@ -85,7 +85,7 @@ impl Structure {
             }
             bank.flush();
         }
-        self.pace.level.fill(0);
+        self.step_control.level.fill(0);
         sectors as u64
     }
 }

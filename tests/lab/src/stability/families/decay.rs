@@ -30,7 +30,7 @@ pub(crate) fn cases() -> Vec<StabilityCase> {
     for method in StabilityMethod::all() {
         for ratio in [1e-3, 0.005, 0.05, 0.3, 0.9] {
             for (kind, turned) in [("straight", 0.0), ("turned", 0.45)] {
-                let released = Released { method, turned, ratio, told: ratio };
+                let released = Released { method, turned, ratio, reported: ratio };
                 let name = format!("decay/blade/{kind}/ξ={ratio}/{}", method.name());
                 let expected = Expected::right("decay of every mode from the static position, step by step");
                 let quick = method.solver == Solver::Lcp && ratio >= 0.05;
@@ -56,7 +56,7 @@ pub(crate) struct Released {
     /// Damping ratio of the scene.
     pub ratio: f64,
     /// Damping ratio that the closed form is told: another one must be found out.
-    pub told: f64,
+    pub reported: f64,
 }
 
 /// Decay of one mode from rest under a force that has just ended: Re(A aⁿ + B bⁿ) with the roots a, b of its recurrence.
@@ -131,7 +131,7 @@ impl Released {
         let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
         let seen = &rom.contact_map * &shapes;
         let decays: Vec<Decay> =
-            frequencies.iter().map(|frequency| Decay::new(self.method.scheme, *frequency, self.told, step)).collect();
+            frequencies.iter().map(|frequency| Decay::new(self.method.scheme, *frequency, self.reported, step)).collect();
         let mut simulation = Simulation::new(&scene)?;
         simulation.initialise(0.0)?;
         let settle = 30.0 / (self.ratio * frequencies[0]);
@@ -225,11 +225,11 @@ fn close(simulation: &mut Simulation, settle: f64) -> Result<()> {
     Ok(())
 }
 
-/// A ring under a nodal-diameter load that ends; damping `ratio` in the scene, `told` in the closed form.
+/// A ring under a nodal-diameter load that ends; damping `ratio` in the scene, `reported` in the closed form.
 ///
 /// # Errors
 /// The scene is refused.
-pub(crate) fn ring(method: StabilityMethod, order: u32, ratio: f64, told: f64) -> Result<Vec<Check>> {
+pub(crate) fn ring(method: StabilityMethod, order: u32, ratio: f64, reported: f64) -> Result<Vec<Check>> {
     let step = 2e-6;
     let mut scene = method.stepping(round(Tower { slope: 0.0, ..Tower::default() }.rom()), step);
     on_ring(&mut scene, ratio);
@@ -243,7 +243,7 @@ pub(crate) fn ring(method: StabilityMethod, order: u32, ratio: f64, told: f64) -
     let omega = TAU * [9000.0, 900.0, 400.0, 1100.0, 2100.0][order as usize];
     let rest = 0.25 * 1e4 * PI * RADIUS / (omega * omega);
     // Only contact modes of the blades lose their inertia.
-    let decay = Decay::new(method.scheme, omega, told, step);
+    let decay = Decay::new(method.scheme, omega, reported, step);
     set(&mut simulation, "casing_load_amplitude", 0.0)?;
     let (mut off, mut across, mut n) = (0.0_f64, 0.0_f64, 0.0);
     let last = decay.steps(LEFT).max(10.0);

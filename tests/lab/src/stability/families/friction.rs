@@ -152,8 +152,8 @@ fn steady(method: StabilityMethod, speed: f64) -> Result<Vec<Check>> {
     checks.push(Check::so("all outputs finite", watch.finite));
     // Film and lcp know sliding only: the work of their friction means nothing where tips stick, and the start must say so.
     if method.solver != Solver::Coulomb && speed.abs() < 1.0 {
-        let told = simulation.warnings().iter().any(|text| text.contains("sticking"));
-        checks.push(Check::so("a warning that sticking is not modelled", told));
+        let reported = simulation.warnings().iter().any(|text| text.contains("sticking"));
+        checks.push(Check::so("a warning that sticking is not modelled", reported));
     } else {
         checks.push(watch.heat(1e-9));
     }

@@ -404,7 +404,7 @@ fn restore() -> Vec<StabilityCase> {
     cases.push(StabilityCase::new("restore/refused-scheme", expected, |_| CaseEnd::of(after_refusal())).quick(true));
     let expected = Expected::right("one warning for the step used; none for the proposed step");
     cases.push(
-        StabilityCase::new("communication/other-step-than-proposed", expected, |_| CaseEnd::of(told())).quick(true),
+        StabilityCase::new("communication/other-step-than-proposed", expected, |_| CaseEnd::of(reported())).quick(true),
     );
     let expected = Expected::refused(["a different scene"]);
     cases.push(StabilityCase::new("restore/other-scene", expected, |_| CaseEnd::of(other_scene())).quick(true));
@@ -479,7 +479,7 @@ fn after_refusal() -> Result<Vec<Check>> {
 }
 
 /// Steps longer than the scene proposes, across the step that resolves all modes.
-fn told() -> Result<Vec<Check>> {
+fn reported() -> Result<Vec<Check>> {
     let tower = Tower::default();
     let resolved = 2.0 / tower.largest_frequency();
     let mut scene = with_methods(with_step(round(tower.rom()), 1.6 * resolved), Scheme::ModalExact, Solver::Lcp);
@@ -488,14 +488,14 @@ fn told() -> Result<Vec<Check>> {
     let mut simulation = Simulation::new(&scene)?;
     simulation.initialise(0.0)?;
     let before = simulation.warnings().len();
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for factor in [0.9, 1.3, 1.3, 0.9] {
         simulation.do_step(simulation.time(), factor * resolved)?;
-        told.push(simulation.take_notes().len());
+        reported.push(simulation.take_notes().len());
     }
     Ok(vec![
         Check::so("no warning for the proposed step", before == 0),
-        Check::so("one warning for the first longer step", told == [0, 1, 0, 0]),
+        Check::so("one warning for the first longer step", reported == [0, 1, 0, 0]),
     ])
 }
 

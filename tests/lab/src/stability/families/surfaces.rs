@@ -149,10 +149,10 @@ fn dragged(method: StabilityMethod, share: f64) -> Result<Vec<Check>> {
         set(&mut simulation, "casing_radius_change", (-depth * GAP).max(-0.099 * RADIUS))?;
         simulation.do_step(simulation.time(), 2e-6)?;
     }
-    let (told, far) = (!simulation.take_notes().is_empty(), moved(&simulation));
+    let (reported, far) = (!simulation.take_notes().is_empty(), moved(&simulation));
     let error = far * far / (2.0 * RADIUS * GAP);
     Ok(vec![
-        Check::so("a warning is given from 5 % on", told == (error >= 0.05)),
+        Check::so("a warning is given from 5 % on", reported == (error >= 0.05)),
         Check::so("the displacement was reached", far >= wanted),
     ])
 }
