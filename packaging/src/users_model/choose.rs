@@ -184,7 +184,8 @@ pub fn grid(imported: &Imported, options: &CasingMeshArguments) -> Result<Chosen
     free_contact_nodes(imported, &options.model, &clamped)?;
     let (set, _) = nodes_of(imported, name, "--contact-set")?;
     let Some((mesh, _)) = &imported.model.mesh else { return Err(super::no_mesh()) };
-    let grid = GridNodes::chosen(mesh, (&set, &clamped), options.contact_grid, options.contact_axial).map_err(failure)?;
+    let grid =
+        GridNodes::chosen(mesh, (&set, &clamped), options.contact_grid, options.contact_axial).map_err(failure)?;
     Ok(Chosen {
         stress: StressPlaces::default(),
         clamped,

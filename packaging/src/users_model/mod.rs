@@ -205,7 +205,7 @@ fn general(
 ) -> Result<Reduction> {
     let name = source.name();
     let title = format!("Reducing {name}");
-    let options = ReductionOptions {
+    let reduction = ReductionOptions {
         name,
         kind: KindChoice::kind(options.kind, has_patches(chosen)),
         modes: source.kept.modes.unwrap_or_else(|| default_modes(&model, has_patches(chosen))),
@@ -220,7 +220,7 @@ fn general(
     with_progress(&title, console, &|listener| {
         // The matrices are handed over, not copied.
         let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is already reduced", ""))?;
-        reduce_model(model, &chosen.clamped, &chosen.contact, &options, options.spin, listener)
+        reduce_model(model, &chosen.clamped, &chosen.contact, &reduction, options.spin, listener)
     })
 }
 

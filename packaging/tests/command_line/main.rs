@@ -11,6 +11,6 @@ mod project;
 mod reduce;
 mod report;
 mod run;
-mod reported;
 mod usage;
 mod users_models;
+mod warnings;

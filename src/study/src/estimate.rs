@@ -324,7 +324,8 @@ mod tests {
         assert_eq!(all[1], known, "what the run tells stays");
         let reported = errors_text(&all);
         assert!(
-            reported.ends_with("modes unknown, patches along the chord 1.00 %; from the ROM, for a light rub: mesh 5.00 %"),
+            reported
+                .ends_with("modes unknown, patches along the chord 1.00 %; from the ROM, for a light rub: mesh 5.00 %"),
             "{reported}"
         );
         let reported = super::errors_text(&of_rom(&rom));

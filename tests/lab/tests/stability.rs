@@ -104,7 +104,10 @@ fn the_judge_sees_every_way_to_fail() {
     ] {
         assert_eq!(verdict(name), "WRONG", "{name}");
         let reported = happened(name);
-        assert!(reported.contains(check) && !reported.contains("refused") && !reported.contains("not fulfilled"), "{name}: {reported}");
+        assert!(
+            reported.contains(check) && !reported.contains("refused") && !reported.contains("not fulfilled"),
+            "{name}: {reported}"
+        );
     }
 }
 

@@ -359,7 +359,10 @@ fn any_scene_of_blades_meets_a_witness_of_its_own() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lab"));
     let output = command.current_dir(root.path()).args(["beside", &whirl, "--out", "none"]).output().unwrap();
     let reported = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success() && reported.contains("whirl") && reported.contains("a moving shaft"), "{reported}");
+    assert!(
+        !output.status.success() && reported.contains("whirl") && reported.contains("a moving shaft"),
+        "{reported}"
+    );
 }
 
 #[test]

@@ -196,7 +196,9 @@ fn contact_at_points_of_a_fine_tip_is_warned_of() {
         let reported = warned(line);
         match wanted {
             Some(part) => assert!(reported.contains(part), "{line}: {reported}"),
-            None => assert!(!reported.contains("contact at") && !reported.contains("contact patches"), "{line}: {reported}"),
+            None => {
+                assert!(!reported.contains("contact at") && !reported.contains("contact patches"), "{line}: {reported}")
+            }
         }
     }
     let own = |patches: usize| -> String {

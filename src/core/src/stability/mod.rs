@@ -355,7 +355,8 @@ mod tests {
             ..model(&[1000.0], &[[0.0; 3]], 0.0)
         };
         let senses = [vec![vec![radial()[0]; 2]]];
-        let reported = check_solvable_together(&[model], Scheme::ModalExact, 1e-5, 0.3, &senses).unwrap_err().to_string();
+        let reported =
+            check_solvable_together(&[model], Scheme::ModalExact, 1e-5, 0.3, &senses).unwrap_err().to_string();
         assert!(reported.contains("no friction coefficient is safe"), "{reported}");
     }
 

@@ -198,7 +198,11 @@ impl Structure {
             let index = self.index(node, sector);
             state.multipliers[node] = self.history.multiplier[index];
             state.gaps[node] = self.history.gap.before[index];
-            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.step_control.normals, node, sector));
+            state.normals[3 * node..3 * node + 3].copy_from_slice(&self.vector3(
+                &self.step_control.normals,
+                node,
+                sector,
+            ));
             state.forces[3 * node..3 * node + 3].copy_from_slice(&self.vector3(&self.history.force.now, node, sector));
         }
         for (row, slope) in state.slopes.iter_mut().enumerate() {

@@ -189,7 +189,10 @@ fn massless_boundary_looks_at_every_structure_under_a_blade() {
 fn contacts_are_counted_where_they_push_each_other() {
     let both = several::in_one_casing(rub(350), Solver::Lcp, 0.0);
     let reported = Simulation::new(&both).unwrap_err().to_string();
-    assert!(reported.starts_with("surface[2].structure: 2100 contact nodes") && reported.contains("`rear`"), "{reported}");
+    assert!(
+        reported.starts_with("surface[2].structure: 2100 contact nodes") && reported.contains("`rear`"),
+        "{reported}"
+    );
     let mut apart = both;
     let mut second = apart.settings.structures[2].clone();
     second.name = "second".into();

@@ -393,7 +393,10 @@ fn what_a_casing_does_to_solvability_is_told_with_its_place() {
     }
     for turned in [7.0, -7.0] {
         let reported = reported(turned, 0.15);
-        assert!(reported.len() == 1 && reported[0].contains("-1.00e0 times the largest, at θ = 0.00 rad"), "{reported:?}");
+        assert!(
+            reported.len() == 1 && reported[0].contains("-1.00e0 times the largest, at θ = 0.00 rad"),
+            "{reported:?}"
+        );
     }
 }
 

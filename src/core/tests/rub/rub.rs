@@ -454,7 +454,10 @@ fn amplitudes_of_nodal_diameters_are_fourier_coefficients() {
             });
             let expected = sum[0].hypot(sum[1]) / middle.len() as f64 * if diameter == 0 { 1.0 } else { 2.0 } / 7.0;
             let reported = tiprub_test_models::element(&simulation, "nodal_diameter_amplitude", diameter);
-            assert!(expected > 1e-9 && (reported / expected - 1.0).abs() < 1e-10, "{diameter}: {reported:e} {expected:e}");
+            assert!(
+                expected > 1e-9 && (reported / expected - 1.0).abs() < 1e-10,
+                "{diameter}: {reported:e} {expected:e}"
+            );
         }
     }
 }

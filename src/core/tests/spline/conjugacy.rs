@@ -244,5 +244,8 @@ fn energy_that_no_input_brings_ends_the_run() {
     };
     assert_eq!(ends(2e-6), None);
     let reported = ends(1e-4).unwrap();
-    assert!(reported.contains("J of spurious energy") && reported.contains("Use a smaller internal step"), "{reported}");
+    assert!(
+        reported.contains("J of spurious energy") && reported.contains("Use a smaller internal step"),
+        "{reported}"
+    );
 }

@@ -125,7 +125,10 @@ fn reads_back_known_rub_errors() {
         ("mesh=NaN", "\"mesh=NaN\" is repeated or is not"),
         ("patches", "\"patches\" is repeated or is not"),
     ] {
-        refused(|file| drop(file.entries.insert("rub_errors".into(), text.into())), &["metadata `rub_errors`", reported]);
+        refused(
+            |file| drop(file.entries.insert("rub_errors".into(), text.into())),
+            &["metadata `rub_errors`", reported],
+        );
     }
     let alone = |file: &mut Loose| drop(file.entries.insert("rub_errors_found_on".into(), "a rub".into()));
     refused(alone, &["metadata `rub_errors_found_on`: given without `rub_errors`"]);

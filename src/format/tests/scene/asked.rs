@@ -300,7 +300,11 @@ fn inner_tables_are_tables_with_all_they_need() {
     reported(motion, "thermal = 1.5", &["structure[1].thermal", "expected true or false"]);
     reported(motion, "order = 3", &["structure[1].order: unknown key", "belongs to `load` of [[structure]]"]);
     let moving = "moving = true";
-    reported(moving, "spline = 72", &["surface[1].spline: found integer, expected a table", "{ around = 72, along = 5 }"]);
+    reported(
+        moving,
+        "spline = 72",
+        &["surface[1].spline: found integer, expected a table", "{ around = 72, along = 5 }"],
+    );
     reported(moving, "spline = { around = -1 }", &["surface[1].spline.around: found integer `-1`, expected a"]);
     reported(moving, "spline = { closure = \"smoth\" }", &["surface[1].spline.closure", "Did you mean `smooth`?"]);
     reported(moving, "patches = {}", &["surface[1].patches.around: missing", "to `patches` of [[surface]]"]);

@@ -239,7 +239,9 @@ fn a_sphere_pressed_on_a_block_meets_hertz() {
 /// A heavy sphere that hits the block slowly: the block follows at rest, which is what Hertz's impact supposes.
 #[test]
 fn a_sphere_that_hits_a_block_meets_hertz() {
-    print_row!("| scheme | h (µs) | duration | largest force | deepest | impulse | energy left in the sphere | ledger |");
+    print_row!(
+        "| scheme | h (µs) | duration | largest force | deepest | impulse | energy left in the sphere | ledger |"
+    );
     print_row!("|---|---|---|---|---|---|---|---|");
     let (theory, block) = (hertz(), block(3));
     // Waves cross the block in 0.07 ms; the impact takes 20 ms.

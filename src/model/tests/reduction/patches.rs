@@ -278,7 +278,9 @@ fn what_cannot_be_divided_or_held_is_refused() {
     assert!(reported(&twice, ReductionKind::FreeInterface, 4).contains("flexibility of the contact coordinates"));
     assert!(reported(&twice, ReductionKind::FixedInterface, 4).contains("depends on those of the other patches"));
     let free = 3 * (mesh.nodes.len() - nodes_at(&mesh, 0, 0.0).len());
-    assert!(reported(&contact, ReductionKind::FreeInterface, free - 8).contains("possible besides 9 contact coordinates"));
+    assert!(
+        reported(&contact, ReductionKind::FreeInterface, free - 8).contains("possible besides 9 contact coordinates")
+    );
     assert!(reported(&contact, ReductionKind::FreeInterface, free - 9).contains("has no residual flexibility"));
 }
 
@@ -312,7 +314,10 @@ fn the_forced_response_is_off_by_as_much_as_the_rom_says() {
             let (full, own) =
                 (solved(&stiffness, &mass, &loads), solved(&rom.stiffness, &rom.mass, &radial.transpose()));
             let off = 100.0 * (&full - own).norm() / full.norm();
-            assert!((off - reported).abs() <= 1e-3 * off + 1e-7, "{kind:?} at {frequency} Hz: {off:e} %, told {reported:e} %");
+            assert!(
+                (off - reported).abs() <= 1e-3 * off + 1e-7,
+                "{kind:?} at {frequency} Hz: {off:e} %, told {reported:e} %"
+            );
         }
     }
 }

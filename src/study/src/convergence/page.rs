@@ -89,7 +89,8 @@ fn error(refined: &Refined) -> Option<Statement> {
         std::array::from_fn(|index| if errors[index].is_none() { to_finest[index] } else { None });
     let parts =
         [("", changes_text(&errors)), ("no limit found; difference from the finest level: ", changes_text(&unread))];
-    let found = parts.iter().filter(|(_, reported)| !reported.is_empty()).map(|(what, reported)| format!("{what}{reported}"));
+    let found =
+        parts.iter().filter(|(_, reported)| !reported.is_empty()).map(|(what, reported)| format!("{what}{reported}"));
     let found = found.collect::<Vec<_>>().join("; ");
     Some(Statement::remark(format!("Error of the scene due to {}", title(refined)), found))
 }

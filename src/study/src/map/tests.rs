@@ -354,7 +354,10 @@ fn the_cost_told_is_what_is_done() {
     let tell = |done: usize, all: usize, steps: f64| reported.borrow_mut().push((done, all, steps));
     let (study, _) = of_scene(scene(FIRST, 4), &request, 1, tell).unwrap();
     let done = study.results["internal_steps"].as_f64().unwrap();
-    assert_eq!(reported.borrow().iter().map(|reported| (reported.0, reported.1)).collect::<Vec<_>>(), [(0, 2), (1, 2), (2, 2)]);
+    assert_eq!(
+        reported.borrow().iter().map(|reported| (reported.0, reported.1)).collect::<Vec<_>>(),
+        [(0, 2), (1, 2), (2, 2)]
+    );
     assert!((reported.borrow()[0].2 / done - 1.0).abs() < 0.02, "{reported:?} {done}");
 }
 

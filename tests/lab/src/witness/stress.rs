@@ -372,7 +372,8 @@ fn statements(found: &StressResult) -> Vec<Statement> {
     let (first, last) = (apart[0], apart[apart.len() - 1]);
     let coarser = found.full[found.full.len() - 2].1.apart(witness);
     let ships = found.ships.1.apart(witness);
-    let most = found.reduced.last().and_then(|(_, _, rubbed)| rubbed.as_ref().ok()).map(|reported| reported.apart(witness));
+    let most =
+        found.reduced.last().and_then(|(_, _, rubbed)| rubbed.as_ref().ok()).map(|reported| reported.apart(witness));
     vec![
         Statement::tested(
             "With the fewest modes, the static stress agrees with that of the full model to 1e-6",

@@ -124,7 +124,8 @@ impl Trial {
     fn bend(&self, node: usize, component: usize) -> f64 {
         let row = 3 * node + component;
         let slope = self.force(1, node)[component] - self.start_contacts.forces[row];
-        let followed = if self.multiplier(0, node) > 0.0 { self.start_contacts.slopes[row] / self.per_step } else { 0.0 };
+        let followed =
+            if self.multiplier(0, node) > 0.0 { self.start_contacts.slopes[row] / self.per_step } else { 0.0 };
         let before = slope - followed;
         if self.multiplier(1, node) == 0.0 && slope.abs() > before.abs() { slope } else { before }
     }

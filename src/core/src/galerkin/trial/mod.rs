@@ -505,7 +505,9 @@ impl Trial {
     /// Returns the sliding distance that a force on a node at a point works on (m).
     fn sliding_distance(&self, point: usize, node: usize) -> [f64; 3] {
         let terms = self.work_weights[point].iter().zip(&self.inert);
-        terms.fold([0.0; 3], |sliding_distance, (weight, inert)| std::array::from_fn(|c| sliding_distance[c] + weight * inert[3 * node + c]))
+        terms.fold([0.0; 3], |sliding_distance, (weight, inert)| {
+            std::array::from_fn(|c| sliding_distance[c] + weight * inert[3 * node + c])
+        })
     }
 
     /// A lane becomes an unknown: the direction of its force, and what that moves.
@@ -532,7 +534,9 @@ impl Trial {
             obstacle.add_normal_compliance(lane, direction, &mut self.carrier_compliance[..width]);
             let closing = &mut self.closing[lane * width..][..width];
             let now = self.multipliers[lane];
-            for ((carrier_compliance, closing), without) in self.carrier_compliance.iter().zip(closing).zip(&mut self.without) {
+            for ((carrier_compliance, closing), without) in
+                self.carrier_compliance.iter().zip(closing).zip(&mut self.without)
+            {
                 (*closing, *without) = (*closing + carrier_compliance, *without - now * carrier_compliance);
             }
         }

@@ -44,7 +44,11 @@ impl Trial {
 
     /// The unit normal for which its force was found: force − λ · normal is friction.
     fn solved_normal(&self, point: usize, node: usize) -> [f64; 3] {
-        if point == 0 { vector3_at(&self.start_contacts.normals, node) } else { self.lane(&self.solved_normals, point, node) }
+        if point == 0 {
+            vector3_at(&self.start_contacts.normals, node)
+        } else {
+            self.lane(&self.solved_normals, point, node)
+        }
     }
 
     /// Friction force on it (N).

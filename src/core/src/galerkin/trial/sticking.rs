@@ -123,7 +123,10 @@ impl Trial {
         }
         for lane in (0..self.lanes.len()).filter(|lane| self.multipliers[*lane] > 0.0) {
             obstacle.add_compliance(lane, self.lanes.vector3(&self.forces, lane), &mut own.carrier_compliance);
-            own.under.iter_mut().zip(&own.carrier_compliance).for_each(|(sum, carrier_compliance)| *sum += carrier_compliance);
+            own.under
+                .iter_mut()
+                .zip(&own.carrier_compliance)
+                .for_each(|(sum, carrier_compliance)| *sum += carrier_compliance);
         }
     }
 
@@ -149,7 +152,10 @@ impl Trial {
             self.instructions.run(Combine { table, stride, columns, coefficients: [&direction[..]], sums });
             if self.carrier_yields {
                 obstacle.add_compliance(lane, direction, &mut own.carrier_compliance[..stride]);
-                target.iter_mut().zip(&own.carrier_compliance).for_each(|(moved, carrier_compliance)| *moved += carrier_compliance);
+                target
+                    .iter_mut()
+                    .zip(&own.carrier_compliance)
+                    .for_each(|(moved, carrier_compliance)| *moved += carrier_compliance);
             }
         }
     }

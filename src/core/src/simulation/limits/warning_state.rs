@@ -132,8 +132,8 @@ impl Simulation {
 
     /// The same of the load on a casing.
     fn warn_of_load(&mut self, carrier: usize, turn: f64) {
-        let coarse =
-            self.system.scheme() == Scheme::CentralDifference && turn > MATERIAL * self.warning_state.load_turned[carrier];
+        let coarse = self.system.scheme() == Scheme::CentralDifference
+            && turn > MATERIAL * self.warning_state.load_turned[carrier];
         if coarse && self.compiled.carriers[carrier].loads.nodal.is_some() {
             self.warning_state.load_turned[carrier] = turn;
             let name = self.compiled.carrier_name(self.compiled.bodies.len() + carrier);

@@ -68,7 +68,8 @@ pub fn mode_damping(
 ) {
     let ratios = &structure.damping_ratios;
     if !ratios.is_empty() {
-        let row = table.damping(quantity, name, 0.0, &format!("Modal damping ratios of the first modes of {warning_state}"));
+        let row =
+            table.damping(quantity, name, 0.0, &format!("Modal damping ratios of the first modes of {warning_state}"));
         (row.dimension, row.start) = (Some(ratios.len()), Some(StartValue::Real(ratios.clone())));
     }
 }

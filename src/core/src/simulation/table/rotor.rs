@@ -202,8 +202,9 @@ fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
         }
         let (index, count) = (body.index, extents.len());
         let list = node_list(body);
-        let text =
-            format!("Normal contact {warning_state} at the centre of each patch ({list}), mean over the communication step");
+        let text = format!(
+            "Normal contact {warning_state} at the centre of each patch ({list}), mean over the communication step"
+        );
         let read = each(move |view, node| view.mean * view.normal_impulse(index, node, sector - 1) / extents[node]);
         let row = table.output(format!("blade[{sector}].{name}"), Span::Mean, Some((unit, nominal)), text, read);
         row.dimension = Some(count);

@@ -120,7 +120,8 @@ impl CarrierIntegrator {
     /// Returns the displacement that a force at point i of the tried step works on at a place (m), in the directions of the node.
     pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> [f64; 3] {
         let (weights, moved) = (&self.work_weights[i], &self.moved);
-        let sliding_distance = |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
+        let sliding_distance =
+            |row: usize| weights.iter().zip(moved).map(|(weight, moved)| weight * moved[row]).sum::<f64>();
         at_place(spot.surface, spot.place, spot.frame, sliding_distance)
     }
 

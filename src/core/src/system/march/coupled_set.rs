@@ -198,8 +198,9 @@ impl CoupledSet {
         }
         let first = self.sectors.first().map(|one| &structures[one.structure].step_control);
         (self.fresh, self.failed) = (true, None);
-        (self.bank, self.largest, self.level) =
-            first.map_or((0.0, 0.0, 0), |step_control| (step_control.bank[0], step_control.largest[0], step_control.level_of(0)));
+        (self.bank, self.largest, self.level) = first.map_or((0.0, 0.0, 0), |step_control| {
+            (step_control.bank[0], step_control.largest[0], step_control.level_of(0))
+        });
         let mut marching = CoupledStepper { coupled_set: self, world: SceneMut { structures, pairs } };
         marching.find_start();
         marching
@@ -482,7 +483,8 @@ impl CoupledStepper<'_> {
         for one in &mut coupled_set.sectors {
             let structure = &mut structures[one.structure];
             structure.write_contacts(one.sector, &one.state, |node| one.record.tallies[node].lowest);
-            (structure.step_control.bank[one.sector], structure.step_control.largest[one.sector]) = (coupled_set.bank, coupled_set.largest);
+            (structure.step_control.bank[one.sector], structure.step_control.largest[one.sector]) =
+                (coupled_set.bank, coupled_set.largest);
             structure.step_control.level[one.sector] = coupled_set.level as u64;
             let table = &coupled_set.tables[one.table[0]][one.table[1]];
             if let (None, Sectors::Uncoupled(bank)) = (one.disk, &mut structure.modes) {

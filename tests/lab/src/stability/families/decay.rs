@@ -130,8 +130,10 @@ impl Released {
         let rom = &scene.roms[0];
         let (frequencies, shapes) = modes(&rom.mass, &rom.stiffness);
         let seen = &rom.contact_map * &shapes;
-        let decays: Vec<Decay> =
-            frequencies.iter().map(|frequency| Decay::new(self.method.scheme, *frequency, self.reported, step)).collect();
+        let decays: Vec<Decay> = frequencies
+            .iter()
+            .map(|frequency| Decay::new(self.method.scheme, *frequency, self.reported, step))
+            .collect();
         let mut simulation = Simulation::new(&scene)?;
         simulation.initialise(0.0)?;
         let settle = 30.0 / (self.ratio * frequencies[0]);

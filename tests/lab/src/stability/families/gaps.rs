@@ -340,7 +340,8 @@ fn small_rub(exponent: i32, method: StabilityMethod, friction: f64) -> Result<(V
 /// Processor time of this process's only working thread (s), as the system counts it; 0 where it does not tell.
 pub(crate) fn processor_time() -> f64 {
     let reported = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
-    reported.split_whitespace()
+    reported
+        .split_whitespace()
         .next()
         .and_then(|text| text.parse::<f64>().ok())
         .map_or(0.0, |nanoseconds| 1e-9 * nanoseconds)

@@ -29,7 +29,9 @@ fn faults() -> Vec<StabilityCase> {
     };
     vec![
         case("damping-of-blades-10%", |method| Released { method, turned: 0.45, ratio: 0.055, reported: 0.05 }.blade()),
-        case("damping-of-blades-0.1%", |method| Released { method, turned: 0.0, ratio: 0.05005, reported: 0.05 }.blade()),
+        case("damping-of-blades-0.1%", |method| {
+            Released { method, turned: 0.0, ratio: 0.05005, reported: 0.05 }.blade()
+        }),
         case("damping-of-a-ring-10%", |method| decay::ring(method, 2, 0.055, 0.05)),
         case("speed-1%", |method| PressedRotor { method, order: 3, speed: 1300.0, factor: 1.01, early: 0.0 }.run()),
         case("rotor-a-step-early", |method| {
