@@ -7,7 +7,7 @@ use tiprub_study::arguments::{CacheArguments, MapArguments, SceneOptions, Stabil
 
 use crate::{
     library::PlatformChoice,
-    own_arguments::{ConvergenceCommand, ErrorCommand},
+    mesh_arguments::{ConvergenceCommand, ErrorCommand},
     reduce_arguments::ReduceArguments,
     thermal_arguments::ThermalArguments,
 };

@@ -14,7 +14,7 @@ use tiprub_study::arguments::positive;
 
 use crate::{
     casing_arguments::CasingArguments,
-    own_arguments::{BladeArguments, CasingMeshArguments, SectorArguments},
+    mesh_arguments::{BladeArguments, CasingMeshArguments, SectorArguments},
     shared_arguments::{KindChoice, MaterialChoice, MeshSize, OutputArguments, pair},
 };
 

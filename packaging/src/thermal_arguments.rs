@@ -9,7 +9,7 @@ use tiprub_shell::places::NamedFile;
 use crate::{
     casing_arguments::RingArguments,
     cli::{FmiChoice, LibraryArguments},
-    own_arguments::{AxisChoice, MeshSource, ModelOptions, UnitChoice},
+    mesh_arguments::{AxisChoice, MeshSource, ModelOptions, UnitChoice},
     shared_arguments::axial,
 };
 

@@ -28,7 +28,7 @@ use crate::{
     reduced::ReducedModel,
     rom_facts::RomFacts,
     shared_arguments::{MaterialChoice, OutputArguments},
-    users_model,
+    user_mesh,
 };
 
 /// Reduce, check, write.
@@ -167,10 +167,10 @@ fn reduced(model: &ModelToReduce, console: &Console) -> Result<ReducedModel> {
     let [left, right] = builtin::RINGS.map(|(_, side)| side);
     match model {
         ModelToReduce::Blade(own) => {
-            users_model::blade(own.file.as_deref(), &own.blade, (&own.tips, own.kept.clone()), console)
+            user_mesh::blade(own.file.as_deref(), &own.blade, (&own.tips, own.kept.clone()), console)
         }
-        ModelToReduce::Sector(own) => users_model::sector(own, console),
-        ModelToReduce::CasingMesh(own) => users_model::casing(own, console),
+        ModelToReduce::Sector(own) => user_mesh::sector(own, console),
+        ModelToReduce::CasingMesh(own) => user_mesh::casing(own, console),
         ModelToReduce::Casing(own) => casing(own, console),
         ModelToReduce::Rotor37(own) => rotor37(&own.options(), console),
         ModelToReduce::Stage(own) => stage(own, console),
@@ -212,8 +212,8 @@ fn rotor37(options: &Rotor37Options, console: &Console) -> Result<ReducedModel> 
     let reduced = ReducedModel::general(reduction::rotor37(options, console)?, Some("hub"));
     let (MeshCounts { chord, thickness, .. }, [patches, rows]) = (options.mesh, options.tip.counts());
     let is_patch = !matches!(options.tip, TipContact::Nodes(_));
-    let narrow = (is_patch && patches > chord + 1).then(|| users_model::narrow(patches, chord as f64, chord + 1));
-    let narrow_rows = (rows > thickness + 1).then(|| users_model::narrow_rows(rows, thickness));
+    let narrow = (is_patch && patches > chord + 1).then(|| user_mesh::narrow(patches, chord as f64, chord + 1));
+    let narrow_rows = (rows > thickness + 1).then(|| user_mesh::narrow_rows(rows, thickness));
     Ok(ReducedModel { warnings: narrow.into_iter().chain(narrow_rows).collect(), ..reduced })
 }
 

@@ -17,8 +17,8 @@ use tiprub_study::{
 use crate::{
     cli::{StudyArguments, StudyCommand},
     commands::reduce::check_target,
-    own_arguments::ConvergenceCommand,
-    users_model::BladeSource,
+    mesh_arguments::ConvergenceCommand,
+    user_mesh::BladeSource,
 };
 
 /// Study, write, sum up.

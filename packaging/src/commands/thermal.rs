@@ -19,7 +19,7 @@ use crate::{
     shared_arguments::MaterialChoice,
     thermal_arguments::ThermalArguments,
     thermal_fmu::ThermalPackage,
-    users_model,
+    user_mesh,
 };
 
 /// Reduce, check, find the library, zip.
@@ -31,7 +31,7 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<CommandOut
     let name = arguments.name();
     let targets = targets(arguments.fmi, &arguments.output, &name)?;
     let own =
-        arguments.file.as_deref().map(|file| users_model::conducting(file, &arguments.model(), console)).transpose()?;
+        arguments.file.as_deref().map(|file| user_mesh::conducting(file, &arguments.model(), console)).transpose()?;
     let conductor = match arguments.ring.material {
         None if own.is_some() => None,
         None | Some(MaterialChoice::Steel) => Some(Conductor::steel()),

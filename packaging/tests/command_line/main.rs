@@ -12,5 +12,5 @@ mod reduce;
 mod report;
 mod run;
 mod usage;
-mod users_models;
+mod user_meshes;
 mod warnings;

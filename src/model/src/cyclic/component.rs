@@ -60,7 +60,7 @@ pub(super) struct ModeQuality {
 
 /// Which modes are computed.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum DiameterModes {
+pub(super) enum RequestedModes {
     Count(usize),
     /// All with ω² up to this, and the next one.
     UpTo(f64),
@@ -74,7 +74,7 @@ impl Component {
     pub(super) fn fixed_interface(
         at_rest: &CyclicPencil<'_>,
         full: &CyclicPencil<'_>,
-        wanted: DiameterModes,
+        wanted: RequestedModes,
     ) -> Result<Self> {
         let parts = at_rest.parts();
         let ComplexModes { eigenvalues, shapes } = modes(at_rest, parts.order() - parts.contact, wanted)?;
@@ -181,10 +181,10 @@ impl Component {
 ///
 /// # Errors
 /// The errors of [`lowest_modes`].
-pub(super) fn modes(operator: &CyclicPencil<'_>, order: usize, wanted: DiameterModes) -> Result<ComplexModes> {
+pub(super) fn modes(operator: &CyclicPencil<'_>, order: usize, wanted: RequestedModes) -> Result<ComplexModes> {
     match wanted {
-        DiameterModes::Count(count) => lowest_modes(operator, order, count),
-        DiameterModes::UpTo(square) => {
+        RequestedModes::Count(count) => lowest_modes(operator, order, count),
+        RequestedModes::UpTo(square) => {
             let mut count = 12.min(order);
             loop {
                 let modes = lowest_modes(operator, order, count)?;

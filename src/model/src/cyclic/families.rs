@@ -12,7 +12,7 @@
 //! when it is at least [`SMALLEST_GAP`].
 
 use super::ModeSelection;
-use super::component::DiameterModes;
+use super::component::RequestedModes;
 
 /// Gaps narrower than this share of their frequency tell no families apart.
 pub const SMALLEST_GAP: f64 = 0.005;
@@ -26,13 +26,13 @@ pub(super) struct Choice {
 }
 
 /// Returns the modes that must be computed for a selection, of `available` modes.
-pub(super) fn wanted(selection: ModeSelection, available: usize) -> DiameterModes {
+pub(super) fn wanted(selection: ModeSelection, available: usize) -> RequestedModes {
     match selection {
-        ModeSelection::Families(modes) => DiameterModes::Count((modes + (modes / 4).max(4)).min(available)),
-        ModeSelection::Count(modes) => DiameterModes::Count(modes),
+        ModeSelection::Families(modes) => RequestedModes::Count((modes + (modes / 4).max(4)).min(available)),
+        ModeSelection::Count(modes) => RequestedModes::Count(modes),
         ModeSelection::UpTo(frequency) => {
             let angular = core::f64::consts::TAU * frequency;
-            DiameterModes::UpTo(angular * angular)
+            RequestedModes::UpTo(angular * angular)
         }
     }
 }

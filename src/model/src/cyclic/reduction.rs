@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix};
 use tiprub_core::Rom;
 use tiprub_core::rom::{ContactNode, DisplacementFrame, Harmonic, RomExtras};
 
-use super::component::{self, Component, ComponentModes, DiameterModes};
+use super::component::{self, Component, ComponentModes, RequestedModes};
 use super::condense::Condensed;
 use super::operator::CyclicPencil;
 use super::sector::Sector;
@@ -95,18 +95,18 @@ fn find(
     // The first mode in any case: it tells a mechanism from a structure.
     let mut modes = match (options.kind, wanted) {
         (ReductionKind::FixedInterface, _) => lanczos::lowest_modes(full, parts.order(), checked.max(1))?,
-        (ReductionKind::FreeInterface, DiameterModes::Count(count)) => {
+        (ReductionKind::FreeInterface, RequestedModes::Count(count)) => {
             lanczos::lowest_modes(full, parts.order(), count.max(checked).max(1))?
         }
-        (ReductionKind::FreeInterface, DiameterModes::UpTo(_)) => component::modes(full, parts.order(), wanted)?,
+        (ReductionKind::FreeInterface, RequestedModes::UpTo(_)) => component::modes(full, parts.order(), wanted)?,
     };
     step();
     let component = match (options.kind, wanted) {
         (ReductionKind::FixedInterface, _) => Component::fixed_interface(&held, full, wanted)?,
-        (ReductionKind::FreeInterface, DiameterModes::Count(count)) => {
+        (ReductionKind::FreeInterface, RequestedModes::Count(count)) => {
             Component::free_interface(&held, full, &modes.lowest(count))?
         }
-        (ReductionKind::FreeInterface, DiameterModes::UpTo(_)) => Component::free_interface(&held, full, &modes)?,
+        (ReductionKind::FreeInterface, RequestedModes::UpTo(_)) => Component::free_interface(&held, full, &modes)?,
     };
     modes = modes.lowest(checked);
     let shapes = node_shapes(full, modes.shapes.as_ref(), nodes);

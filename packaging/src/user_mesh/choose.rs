@@ -12,7 +12,7 @@ use tiprub_model::{
 use tiprub_shell::{Failure, Result};
 
 use super::failure;
-use crate::own_arguments::{BladeOptions, CasingMeshArguments, ModelOptions, SectorArguments, TipOptions};
+use crate::mesh_arguments::{BladeOptions, CasingMeshArguments, ModelOptions, SectorArguments, TipOptions};
 
 /// Share of the largest radius by which nodes of the two faces of a sector may miss each other.
 const FACE_TOLERANCE: f64 = 1e-5;

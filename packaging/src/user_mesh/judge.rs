@@ -8,7 +8,7 @@ use tiprub_model::{
 use tiprub_shell::{Failure, Result};
 
 use super::choose::{Chosen, PATCHES};
-use crate::own_arguments::{ModelOptions, UnitChoice};
+use crate::mesh_arguments::{ModelOptions, UnitChoice};
 
 /// First natural frequencies (Hz) of things that are built lie in here.
 const USUAL_FREQUENCIES: [f64; 2] = [1.0, 1e6];

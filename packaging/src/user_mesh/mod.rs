@@ -31,7 +31,7 @@ use tiprub_study::convergence::refine::{self, Meshed};
 
 use crate::shared_arguments::KindChoice;
 use crate::{
-    own_arguments::{
+    mesh_arguments::{
         BladeOptions, CasingMeshArguments, FromMesh, KeptOptions, MeshSource, ModelOptions, SectorArguments, TipOptions,
     },
     reduced::ReducedModel,

@@ -225,7 +225,7 @@ fn patches_of_other_elements_are_as_soft() {
         values.iter().fold(0.0, |a: f64, b| a.max(*b)) / values.iter().fold(f64::INFINITY, |a, b| a.min(*b)) - 1.0
     };
     assert!(apart(patches) < 0.02 && apart(nodes) > 0.2, "{patches:?} {nodes:?}");
-    crate::guide::hold("cargo test -p tiprub --test command_line users_models");
+    crate::guide::hold("cargo test -p tiprub --test command_line user_meshes");
 }
 
 #[test]

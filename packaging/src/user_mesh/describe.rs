@@ -11,7 +11,7 @@ use tiprub_model::{
 };
 
 use super::choose::Chosen;
-use crate::own_arguments::ModelOptions;
+use crate::mesh_arguments::ModelOptions;
 
 /// Describes the input and the choices, for people and for programs.
 pub fn describe(imported: &Imported, options: &ModelOptions, chosen: &Chosen) -> (String, Value) {
