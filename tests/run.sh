@@ -2,8 +2,8 @@
 # All tests: Rust (workspace, release), and beside them Python (FMPy) against the packaged FMUs of rotor 37.
 # Works from any directory; ends with pytest's summary line; exit code 1 on any failure.
 #
-# What one core does alone (the library in one unit of code, pytest) runs beside what fills the others; its words are kept
-# in target/tests-logs and told when it has ended.
+# Jobs that use one core (the library as one code unit, pytest) run beside jobs that use all cores. Their output is
+# written to target/tests-logs and printed when they end.
 set -u
 
 here=$(CDPATH= cd -- "$(dirname -- "$0")" && pwd)
@@ -26,7 +26,7 @@ library() {
     CARGO_ENCODED_RUSTFLAGS=$library_flags cargo rustc -p "$crate" --profile fmu --target-dir target/product "$@"
 }
 
-# What both are made of is compiled once. Only what ships is optimised as a whole.
+# Shared dependencies are compiled once. Only the library that ships is optimised as a whole.
 libraries() {
     library tiprub-fmi --features test-panic -- -C opt-level=0 -C debug-assertions=off &&
         cp target/product/fmu/libtiprub_fmi.so target/product/test_panic.so &&
@@ -44,8 +44,8 @@ python_environment() {
     echo "ready: $("$venv/bin/python" --version), $(grep -c == "$here/requirements.txt") pinned packages"
 }
 
-# The words of a job, which has ended with the status $2.
-told() {
+# Prints the output of a job that ended with the status $2.
+print_log() {
     cat "$logs/$1"
     [ "$2" -eq 0 ]
 }
@@ -61,17 +61,17 @@ cargo test --workspace --release --tests --no-run || failed=1
 
 section "FMU library, as it ships and with a panic on request: cargo build"
 wait "$library_job"
-told library $? || exit 1
+print_log library $? || exit 1
 
 section "Python environment: $venv"
 wait "$environment_job"
-told environment $? || exit 1
+print_log environment $? || exit 1
 
 [ "$failed" -eq 0 ] || exit 1
 TIPRUB_LIBRARY=$root/target/product/fmu/libtiprub_fmi.so
 TIPRUB_LIBRARY_THERMAL=$root/target/product/fmu/libtiprub_thermal_fmi.so
 TIPRUB_LIBRARY_TEST_PANIC=$root/target/product/test_panic.so
-# The command line that the tests in Rust run, too.
+# The command line that the Rust tests run.
 TIPRUB=$root/target/release/tiprub
 export TIPRUB_LIBRARY TIPRUB_LIBRARY_THERMAL TIPRUB_LIBRARY_TEST_PANIC TIPRUB
 
@@ -91,6 +91,6 @@ fi
 
 section "Python: pytest tests/python"
 wait "$pytest_job"
-told pytest $? || failed=1
+print_log pytest $? || failed=1
 
 exit "$failed"
