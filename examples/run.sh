@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Run an example of a system around the FMU, from nothing: makes a Python environment of its own from pinned
-# packages, builds tiprub where none is given, runs the example, and leaves figures and tables in target/examples/NAME.
+# Run an example that couples the FMU with other models: create a Python environment from pinned packages, build tiprub unless it
+# is given, run the example, and write figures and tables to target/examples/NAME.
 #
 #     examples/run.sh NAME [options of the example]     examples/run.sh NAME --help
 #
-# TIPRUB names a tiprub program to take instead of building one; TIPRUB_LIBRARY an FMU library.
+# TIPRUB gives the path of a tiprub program to use instead of building one, TIPRUB_LIBRARY that of an FMU library.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 known=$(shopt -s nullglob; cd "$root/examples" && for main in */*.py; do [ "${main%/*}" = "$(basename "$main" .py)" ] && echo -n " ${main%/*}"; done; true)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Build the guide as a book, target/book/index.html, with mdBook. A warning is an error: nothing in the book may be missing.
+# Build the guide as a book, target/book/index.html, with mdBook. Warnings are errors.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 if ! command -v mdbook >/dev/null; then

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Build the FMU libraries, of scenes and of heat conduction (thermal-PLATFORM), for every platform, or for those named, into target/libraries, and show what each needs:
+# Build the FMU libraries for scenes and for heat conduction (thermal-PLATFORM) into target/libraries, for all platforms or for the
+# given ones, and print the system libraries that each requires:
 #
 #     packaging/libraries.sh [x86_64-linux|x86_64-windows|aarch64-linux|x86_64-darwin|aarch64-darwin]...
 #
-# Linux libraries run with glibc 2.17 and later. The Zig linker crosses (both packages come from PyPI, pinned); nothing
-# of Microsoft's or Apple's is needed. The same sources and the same Rust give the same bytes, wherever they are built.
-# `tiprub package --library target/libraries` takes what is here.
+# Linux libraries require glibc 2.17 or later. The Zig linker (pinned, from PyPI) links for other platforms; no Microsoft or Apple
+# software is required. Equal sources and an equal Rust version give equal bytes on every machine.
+# `tiprub package --library target/libraries` uses these libraries.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target_dir=${CARGO_TARGET_DIR:-target}
@@ -20,7 +21,7 @@ all="x86_64-linux x86_64-windows aarch64-linux x86_64-darwin aarch64-darwin"
 [ $# -gt 0 ] || set -- $all
 cargo fetch --locked --quiet
 . packaging/remap.sh
-# The linker for Windows writes a time into the library.
+# The linker for Windows writes a time stamp into the library.
 export SOURCE_DATE_EPOCH=315532800
 export MACOSX_DEPLOYMENT_TARGET=11.0
 mkdir -p "$out"

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Make everything that a release holds, into target/release-VERSION:
+# Build all files of a release in target/release-VERSION:
 #
 #     wheels, the libraries of all platforms, the guide as a book, the sources, licences, a bill of materials (CycloneDX),
-#     what the studies of the guide wrote (docs), and SHA-256 checksums of all of it.
+#     the study results of the guide (docs), and SHA-256 checksums of all files.
 #
-# Offline but for the registries of Rust and Python, and the database of advisories. `--no-check` leaves cargo deny out,
-# `--no-wheels` the wheels.
+# Network access is required for the registries of Rust and Python and for the advisory database. `--no-check` skips cargo deny,
+# `--no-wheels` skips the wheels.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 check=yes wheels=yes
@@ -39,7 +39,7 @@ done
 find . -name bill-of-materials.json -not -path './target/*' -delete
 
 packaging/libraries.sh
-# The same bytes for everybody: order, owner, times and modes do not depend on the machine or its umask.
+# Reproducible archives: order, owner, times and modes do not depend on the machine or its umask.
 tarred() {
     tar --sort=name --owner=0 --group=0 --numeric-owner --mode=a=rX,u+w --mtime="@$SOURCE_DATE_EPOCH" -C "$1" -c "$2" |
         gzip -9n > "$out/$3.tar.gz"

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Build the Python wheel for every platform it is made for, or for those named, into target/wheels:
+# Build the Python wheels in target/wheels, for all supported platforms or for the given ones:
 #
 #     packaging/wheels.sh [x86_64-linux|x86_64-windows|aarch64-linux]...
 #     packaging/wheels.sh --native
 #
-# A wheel holds the program for its platform, the module of packaging/python, and the FMU libraries of all platforms that
-# are in target/libraries. Where that has none, packaging/libraries.sh builds them; delete it after a change of the sources.
-# Linux wheels run with glibc 2.17 and later. The same sources, Rust and SOURCE_DATE_EPOCH give the same bytes.
+# A wheel contains the program for its platform, the module of packaging/python, and the FMU libraries in target/libraries. If that
+# folder is empty, packaging/libraries.sh builds them; delete the folder after changing the sources.
+# Linux wheels require glibc 2.17 or later. Equal sources, Rust version and SOURCE_DATE_EPOCH give equal bytes.
 #
-# --native builds for this machine alone, fast, with the library of `cargo build`: for a try, not to be handed on.
+# --native builds quickly for this machine only, with the library of `cargo build`: for tests, not for distribution.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mkdir -p "${CARGO_TARGET_DIR:-target}/wheels"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Judge the packaged FMUs by importers that nobody here wrote, and on other platforms: FMPy, fmuloader, Ecos, libcosim, FMU
-# Manipulation Toolbox and fmi-sim; Windows by wine and 64-bit Arm by qemu. What is missing is skipped, with its reason.
-# Leaves target/importers.md, the table of tools. Arguments go to pytest.
+# Test the packaged FMUs with independent importers and on other platforms: FMPy, fmuloader, Ecos, libcosim, FMU Manipulation Toolbox
+# and fmi-sim; Windows with wine and 64-bit Arm with qemu. Missing tools are skipped with a reason.
+# Writes the table of tools to target/importers.md. Arguments are passed to pytest.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 target_dir=$(realpath -m "${CARGO_TARGET_DIR:-target}")
@@ -23,7 +23,7 @@ for platform in x86_64-linux x86_64-windows aarch64-linux; do
     PATH=$target_dir/cross-venv/bin:$PATH cargo zigbuild --quiet --release -p tiprub-fmi-host --example drive --target "$triple"
     cp "$target_dir/$triple/release/examples/drive$suffix" "$target_dir/drivers/$platform$suffix"
 done
-# Rust's own library asks Windows for random numbers where wine before 9 has none; the FMU's does not.
+# The Rust standard library requires a random number source that wine before version 9 lacks; the FMU does not.
 "$target_dir/cross-venv/bin/python" -m ziglang cc -target x86_64-windows-gnu -shared -O2 -ladvapi32 \
     -o "$target_dir/drivers/bcryptprimitives.dll" tests/importers/bcryptprimitives.c
 TIPRUB_TARGET=$target_dir TIPRUB=$target_dir/release/tiprub PATH=$venv/bin:$PATH \
