@@ -11,7 +11,7 @@ class Rub:
     """The rub FMU: temperatures of the patches in, heat into them out (W, means over the step)."""
 
     def __init__(self, unit, share):
-        """`share` is `heat_to_slave` of the scene: what of the friction goes into the casing."""
+        """`share` is `slave_heat_fraction` of the scene: what of the friction goes into the casing."""
         self.unit, self.share = unit, share
         self._into, self._out = unit.names(TEMPERATURE), unit.names(HEAT)
         self.save, self.restore, self.drop = unit.save, unit.restore, unit.drop

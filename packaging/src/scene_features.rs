@@ -138,7 +138,7 @@ fn of_contact(contact: &ContactSettings, found: &mut Vec<String>) {
             contact.slave
         ));
     }
-    if let Some(share) = contact.heat_to_slave {
+    if let Some(share) = contact.slave_heat_fraction {
         found.push(format!(
             "friction heat is shared: a fraction of {share} goes into `{}`, the rest into the blades",
             contact.slave

@@ -308,26 +308,26 @@ def test_a_step_that_takes_too_many_internal_steps_is_discarded_and_can_be_repea
     time, before = 12 * LONG, free.get("internal_trials")
     free.step(time, LONG)
     needed = int(free.get("internal_trials") - before)
-    assert needed > 100 and free.get("normal_impulse") > 0 and free.get("internal_steps_most") >= needed
+    assert needed > 100 and free.get("normal_impulse") > 0 and free.get("internal_steps_max") >= needed
     unchanged = bounded.read(outputs)
     for most in (needed - 1, 1):
-        bounded.set(steps_at_most=most)
+        bounded.set(max_internal_steps=most)
         with pytest.raises(FMICallException) as caught:
             bounded.step(time, LONG)
-        assert caught.value.status == 2 and f"steps_at_most = {most}" in bounded.log
+        assert caught.value.status == 2 and f"max_internal_steps = {most}" in bounded.log
         assert bounded.read(outputs) == unchanged
         if make == "two":
             assert bounded.fmu.getRealStatus(2) == pytest.approx(time, abs=1e-12)
             assert not bounded.fmu.getBooleanStatus(3)
     for wrong in (-1, 2**31 - 1):
-        assert "steps_at_most" in bounded.refused(lambda value: bounded.set(steps_at_most=value), wrong)
-    bounded.set(steps_at_most=needed)
+        assert "max_internal_steps" in bounded.refused(lambda value: bounded.set(max_internal_steps=value), wrong)
+    bounded.set(max_internal_steps=needed)
     bounded.step(time, LONG)
     assert bits(bounded.read(outputs)) == bits(free.read(outputs))
     if make == "three":
         early = instance(earlyReturnAllowed=True)
         into_the_rub(early, 12)
-        early.set(steps_at_most=needed - 1)
+        early.set(max_internal_steps=needed - 1)
         event, terminate, returned, reached = early.step(time, LONG)
         assert (event, terminate, returned) == (False, False, True) and time < reached < time + LONG
         assert early.get("time") == reached

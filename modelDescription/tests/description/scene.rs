@@ -25,7 +25,7 @@ pub fn complete() -> Scene {
     (ring.thermal, ring.load) = (true, Some(LoadSettings { order: 2, amplitude: 0.0, phase: 0.0 }));
     scene.settings.surfaces[0].patches = Some(PatchSettings { around: 8, along: 1 });
     let contact = &mut scene.settings.contacts[0];
-    contact.heat_to_slave = Some(0.4);
+    contact.slave_heat_fraction = Some(0.4);
     contact.coating = Some(CoatingSettings {
         thickness: 1e-3,
         modulus: 0.0,
@@ -115,9 +115,9 @@ pub const OPTIONS: [Switch; 32] = [
     ("a shape other than `circular`", |scene| scene.settings.surfaces[0].shape = Shape::Circular {}),
     ("`friction` > 0", |scene| {
         // Without friction there is no heat to share.
-        (scene.settings.contacts[0].friction, scene.settings.contacts[0].heat_to_slave) = (0.0, None);
+        (scene.settings.contacts[0].friction, scene.settings.contacts[0].slave_heat_fraction) = (0.0, None);
     }),
-    ("`heat_to_slave`", |scene| scene.settings.contacts[0].heat_to_slave = None),
+    ("`slave_heat_fraction`", |scene| scene.settings.contacts[0].slave_heat_fraction = None),
     ("`coating`", |scene| {
         scene.settings.contacts[0].coating = None;
         (scene.settings.outputs.wear, scene.settings.outputs.wear_profile) = (false, false);

@@ -198,10 +198,10 @@ pub static EFFECTS: &[Effect] = &[
     physics("cutting of a coating", "`contact.coating.cutting`", rotates, |scene| {
         contact(scene, |one| one.coating.is_some_and(|coating| coating.cutting.is_some()))
     }),
-    physics("friction heat shared with the casing", "`contact.heat_to_slave`", rotates, |scene| {
-        contact(scene, |one| one.heat_to_slave.is_some())
+    physics("friction heat shared with the casing", "`contact.slave_heat_fraction`", rotates, |scene| {
+        contact(scene, |one| one.slave_heat_fraction.is_some())
     })
-    .by(|scene| scene.settings.contacts.iter_mut().for_each(|one| one.heat_to_slave = Some(0.5))),
+    .by(|scene| scene.settings.contacts.iter_mut().for_each(|one| one.slave_heat_fraction = Some(0.5))),
     physics("inertia of contact nodes", "a scheme other than `galerkin` and `massless-boundary`", always, |scene| {
         !scene.settings.time.scheme.is_massless()
     }),
@@ -228,10 +228,10 @@ pub static EFFECTS: &[Effect] = &[
     physics("chips, and wear of the blade tip", "not supported: only a coating wears", rotates, never),
     machinery("adaptive steps", "`time.scheme = \"galerkin\"`", |scene| scene.settings.time.scheme == Scheme::Galerkin)
         .by(|scene| scene.settings.time.scheme = Scheme::Galerkin),
-    machinery("limited number of internal steps", "`time.steps_at_most`, or adaptive steps", |scene| {
+    machinery("limited number of internal steps", "`time.max_internal_steps`, or adaptive steps", |scene| {
         scene.settings.bounds_steps()
     })
-    .by(|scene| scene.settings.time.steps_at_most = Some(0)),
+    .by(|scene| scene.settings.time.max_internal_steps = Some(0)),
     machinery("inputs that jump", "`time.input_interpolation = \"hold\"`", |scene| {
         scene.settings.time.input_interpolation == InputInterpolation::Hold
     })

@@ -193,9 +193,9 @@ fn gaps_of_sectors_stand_for_the_gap_and_heat_needs_friction() {
     let clearance = names.iter().position(|name| name == "clearance_minimum").unwrap();
     assert!(rows.last().unwrap()[clearance] <= 1e-3);
     assert!(project.succeed(&["inspect", "scene.toml", "--quiet"]).contains("gaps 0.001 m to 0.0012 m"));
-    fs::write(project.path("scene.toml"), SCENE.replace("friction = 0.1", "heat_to_slave = 0.5")).unwrap();
+    fs::write(project.path("scene.toml"), SCENE.replace("friction = 0.1", "slave_heat_fraction = 0.5")).unwrap();
     let error = project.fail(&["run", "scene.toml"], 1);
-    assert!(error.contains("heat_to_slave") && error.contains("friction"), "{error}");
+    assert!(error.contains("slave_heat_fraction") && error.contains("friction"), "{error}");
 }
 
 #[test]

@@ -350,7 +350,7 @@ pub struct ContactSettings {
     pub coating: Option<CoatingSettings>,
     /// Share of the friction heat that goes into the slave (-), 0 to 1; the patch outputs carry this share.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub heat_to_slave: Option<f64>,
+    pub slave_heat_fraction: Option<f64>,
 }
 
 impl ContactSettings {
@@ -395,7 +395,7 @@ pub struct TimeSettings {
     pub tolerance: Option<f64>,
     /// Most internal steps of one communication step, those tried in vain included; 0, or absent: any number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub steps_at_most: Option<u32>,
+    pub max_internal_steps: Option<u32>,
     /// Inputs between communication points.
     #[serde(default, skip_serializing_if = "is_default")]
     pub input_interpolation: InputInterpolation,
@@ -525,7 +525,7 @@ pub struct SceneSettings {
 impl SceneSettings {
     /// Whether the importer may bound the number of internal steps: where the scene does, or where a tolerance leaves it open.
     pub fn bounds_steps(&self) -> bool {
-        self.time.steps_at_most.is_some() || self.takes_a_tolerance()
+        self.time.max_internal_steps.is_some() || self.takes_a_tolerance()
     }
 
     /// Whether warnings about a topic are not given.

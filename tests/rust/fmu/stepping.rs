@@ -440,7 +440,7 @@ fn rejected_values_within_a_step_leave_the_ramps() {
 /// The scene with a bound on its internal steps, which an importer may change.
 fn bounded() -> Scene {
     let mut scene = scene();
-    scene.settings.time.steps_at_most = Some(0);
+    scene.settings.time.max_internal_steps = Some(0);
     scene
 }
 
@@ -480,7 +480,7 @@ fn free(scene: Scene) -> Free {
         }
     }
     let (step, needed, before, after) = found;
-    Free { bound: reference_of(&core, "steps_at_most"), scene, references, step, needed, before, after }
+    Free { bound: reference_of(&core, "max_internal_steps"), scene, references, step, needed, before, after }
 }
 
 #[test]
@@ -515,7 +515,7 @@ fn fmi2_discards_too_many_steps_and_can_repeat() {
                 slave.expect((api.fmi2GetBooleanStatus)(slave.handle, 3, &raw mut terminated));
             }
             assert!((last - time).abs() < 1e-12 && terminated == 0, "{last} {terminated}");
-            assert!(slave.log().contains(&format!("steps_at_most = {most}")), "{}", slave.log());
+            assert!(slave.log().contains(&format!("max_internal_steps = {most}")), "{}", slave.log());
             assert_eq!(bits(&slave.reals(&found.references)), found.before);
             assert!(slave.serialise(slave.save()) == state, "as if it had not been tried");
         }

@@ -38,7 +38,7 @@ fn warm(scene: &mut Scene) {
     flexible(scene);
     let ring = &mut scene.settings.structures[1];
     (ring.thermal, ring.load) = (true, Some(LoadSettings { order: 2, amplitude: 100.0, phase: 0.1 }));
-    scene.settings.contacts[0].heat_to_slave = Some(0.4);
+    scene.settings.contacts[0].slave_heat_fraction = Some(0.4);
     scene.settings.outputs.slave_displacement = true;
 }
 

@@ -60,7 +60,7 @@ impl SceneSettings {
             let flies = master.is_some_and(|master| master.motion == BodyMotion::Free);
             contact.validate(flies, &format!("contact[{}]", index + 1))?;
         }
-        within("time.steps_at_most", f64::from(self.time.steps_at_most.unwrap_or(0)), 0.0, ranges::STEPS)?;
+        within("time.max_internal_steps", f64::from(self.time.max_internal_steps.unwrap_or(0)), 0.0, ranges::STEPS)?;
         if let Some(tolerance) = self.time.tolerance {
             within("time.tolerance", tolerance, ranges::TOLERANCE[0], ranges::TOLERANCE[1])?;
         }
@@ -267,8 +267,8 @@ impl ContactSettings {
             return Err(Error::invalid(format!("{at}.nodes"), "the text is empty", remedy));
         }
         within(&format!("{at}.friction"), self.friction, 0.0, ranges::FRICTION)?;
-        if let Some(share) = self.heat_to_slave {
-            within(&format!("{at}.heat_to_slave"), share, 0.0, 1.0)?;
+        if let Some(share) = self.slave_heat_fraction {
+            within(&format!("{at}.slave_heat_fraction"), share, 0.0, 1.0)?;
         }
         if let Some(coating) = &self.coating {
             coating.validate(&format!("{at}.coating"))?;

@@ -37,7 +37,7 @@ impl Simulation {
     }
 
     /// Most internal steps of a communication step, 0 for any number.
-    pub(super) fn steps_at_most(&self) -> u64 {
+    pub(super) fn max_internal_steps(&self) -> u64 {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ 1e9")]
         let most = self.value_of(Quantity::StepsAtMost, 0) as u64;
         most
@@ -45,7 +45,7 @@ impl Simulation {
 
     /// Room for the state to go back to, where it may be needed: how many steps the others take is known beforehand.
     pub(super) fn make_room(&mut self) {
-        if self.steps_at_most() > 0 && self.is_marched() && self.mark.is_empty() {
+        if self.max_internal_steps() > 0 && self.is_marched() && self.mark.is_empty() {
             self.mark = vec![0; self.state_size];
         }
     }
@@ -72,13 +72,13 @@ impl Simulation {
         };
         Error::Exhausted {
             problem: format!(
-                "the communication step of {} s from t = {} s needs more internal steps{of_whom} than steps_at_most = \
+                "the communication step of {} s from t = {} s needs more internal steps{of_whom} than max_internal_steps = \
                  {most}, so it was discarded",
                 shown(length),
                 shown_time(self.time)
             ),
             remedy: format!(
-                "Repeat it with a shorter communication step, a larger steps_at_most (0: no limit) or {other}"
+                "Repeat it with a shorter communication step, a larger max_internal_steps (0: no limit) or {other}"
             ),
         }
     }

@@ -37,7 +37,7 @@ impl Simulation {
     /// ```
     /// # use tiprub_core::Simulation;
     /// # let mut scene = tiprub_test_models::rub(2);
-    /// scene.settings.time.steps_at_most = Some(10);
+    /// scene.settings.time.max_internal_steps = Some(10);
     /// let mut simulation = Simulation::new(&scene)?;
     /// simulation.initialise(0.0)?;
     /// simulation.begin_partial_step(0.0, 1e-4)?;
@@ -87,7 +87,7 @@ impl Simulation {
         let step = if keeps { self.system.step_size() } else { step };
         let hold = self.holds();
         self.check_motions(step, step_size)?;
-        let most = self.steps_at_most();
+        let most = self.max_internal_steps();
         if !partial && !self.is_marched() && most > 0 && count > most {
             return Err(self.exhausted(step_size, most));
         }

@@ -275,7 +275,7 @@ fn wear_takes_at_least_yield_stress_times_volume() {
 fn friction_power_is_shared_between_blades_and_patches() {
     let (share, length) = (0.3, 5e-5);
     let mut scene = scene_with(("plain", |_| {}), Scheme::ModalExact, Solver::Lcp);
-    scene.settings.contacts[0].heat_to_slave = Some(share);
+    scene.settings.contacts[0].slave_heat_fraction = Some(share);
     let mut simulation = started(&scene);
     let mut before = 0.0;
     for _ in 0..40 {
@@ -304,8 +304,8 @@ fn a_blade_has_the_outputs_that_its_scene_asks_for() {
             "clearance_minimum",
             "normal_force",
             "tangential_force",
-            "normal_force_now",
-            "tangential_force_now",
+            "normal_force_instantaneous",
+            "tangential_force_instantaneous",
         ]
         .map(|name| simulation.table().find(&format!("blade[1].{name}")).is_some())
     };

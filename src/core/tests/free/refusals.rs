@@ -36,7 +36,7 @@ fn scenes_that_make_no_sense_are_refused_with_the_reason() {
         ("gap", |scene| scene.settings.contacts[0].gap = 1e-3),
         ("sector_gaps", |scene| scene.settings.contacts[0].sector_gaps = vec![1e-3]),
         ("meridian", |scene| scene.settings.contacts[0].meridian = Meridian::Cylinder),
-        ("heat_to_slave", |scene| scene.settings.contacts[0].heat_to_slave = Some(0.5)),
+        ("slave_heat_fraction", |scene| scene.settings.contacts[0].slave_heat_fraction = Some(0.5)),
         ("needs the solver of contact[1]", |scene| scene.settings.contacts[1].solver = Solver::Film),
         ("the position of its surface", |scene| scene.settings.surfaces[0].structure = None),
         ("shape", |scene| scene.settings.surfaces[0].shape = Shape::Lobes { amplitude: 1e-4, order: 2, phase: 0.0 }),

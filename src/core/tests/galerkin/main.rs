@@ -407,7 +407,7 @@ fn a_tolerance_that_is_missed_is_counted_and_told_once() {
                 simulation.take_notes()
             })
             .collect();
-        let counts = ["internal_steps", "internal_trials", "internal_steps_most", "missed_steps"];
+        let counts = ["internal_steps", "internal_trials", "internal_steps_max", "missed_steps"];
         let of_start = simulation.warnings().iter().filter(|text| text.contains("cannot be reached")).count();
         (counts.map(|name| real(&simulation, name)), notes, (*simulation.system().effort(), of_start))
     };
@@ -430,7 +430,7 @@ fn a_tolerance_that_is_missed_is_counted_and_told_once() {
 }
 
 fn bound(simulation: &mut Simulation, most: i32) -> tiprub_core::Result<()> {
-    let reference = simulation.table().find("steps_at_most").unwrap().reference;
+    let reference = simulation.table().find("max_internal_steps").unwrap().reference;
     simulation.set_integer(reference, most)
 }
 
@@ -451,7 +451,7 @@ fn discarded_step_changes_nothing() {
         go(&mut free, H);
         go(&mut bounded, H);
         most = most.max(free.system().steps_tried() - before);
-        assert_eq!(real(&free, "internal_steps_most").to_bits(), (most as f64).to_bits());
+        assert_eq!(real(&free, "internal_steps_max").to_bits(), (most as f64).to_bits());
     }
     assert!(most > 20, "{most}");
     // The next three spans at once, with inputs that change.
@@ -474,7 +474,7 @@ fn discarded_step_changes_nothing() {
         });
         assert!(count < 30, "only the message: {count}");
         assert!(
-            message.contains(&format!("steps_at_most = {allowed}"))
+            message.contains(&format!("max_internal_steps = {allowed}"))
                 && message.contains("was discarded")
                 && message.contains("shorter communication step"),
             "{message}"
@@ -514,7 +514,7 @@ fn discarded_step_changes_nothing() {
 fn every_scheme_keeps_the_bound_and_wrong_ones_are_refused() {
     for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary, Scheme::CentralDifference] {
         let mut scene = scene(scheme, 1e-7, 1e-3);
-        scene.settings.time.steps_at_most = Some(400);
+        scene.settings.time.max_internal_steps = Some(400);
         let (mut simulation, mut other) = (started(&scene), started(&scene));
         let state = everything(&simulation);
         let error = simulation.do_step(0.0, 401e-7).unwrap_err();
@@ -527,7 +527,7 @@ fn every_scheme_keeps_the_bound_and_wrong_ones_are_refused() {
             go(one, 400e-7);
         }
         assert_eq!(bits(&simulation), bits(&other));
-        assert_eq!(real(&simulation, "internal_steps_most").to_bits(), 400.0_f64.to_bits());
+        assert_eq!(real(&simulation, "internal_steps_max").to_bits(), 400.0_f64.to_bits());
         // What may end early does as many as are allowed.
         simulation.begin_partial_step(simulation.time(), 1000e-7).unwrap();
         while simulation.advance().is_ok() {}
@@ -542,14 +542,14 @@ fn every_scheme_keeps_the_bound_and_wrong_ones_are_refused() {
         go(&mut other, 1e-7);
         for (value, words) in [(-1, "outside 0"), (i32::MIN, "outside 0"), (i32::MAX, "outside 0")] {
             let message = bound(&mut other, value).unwrap_err().to_string();
-            assert!(message.contains("steps_at_most") && message.contains(words), "{message}");
+            assert!(message.contains("max_internal_steps") && message.contains(words), "{message}");
         }
         bound(&mut other, 1_000_000_000).unwrap();
         go(&mut other, 1000e-7);
     }
     let mut wrong = scene(Scheme::Galerkin, H, 1e-3);
-    wrong.settings.time.steps_at_most = Some(u32::MAX);
-    assert!(try_started(&wrong).unwrap_err().to_string().contains("time.steps_at_most"));
+    wrong.settings.time.max_internal_steps = Some(u32::MAX);
+    assert!(try_started(&wrong).unwrap_err().to_string().contains("time.max_internal_steps"));
 }
 
 /// A casing that closes and opens in the middle of long communication steps, against spans of the longest step.

@@ -203,7 +203,7 @@ fn kinds() -> Vec<Scene> {
     models::flexible(&mut scene);
     scene.settings.structures[1].thermal = true;
     scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 1e3, phase: 0.2 });
-    scene.settings.contacts[0].heat_to_slave = Some(0.3);
+    scene.settings.contacts[0].slave_heat_fraction = Some(0.3);
     scenes.push(scene);
     let mut scene = models::rub(3);
     models::coating(&mut scene);

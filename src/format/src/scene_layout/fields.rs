@@ -521,7 +521,7 @@ pub const FIELDS: [SceneField; 102] = [
         "Ratio of normal to tangential cutting force.",
     ),
     field(
-        "contact.heat_to_slave",
+        "contact.slave_heat_fraction",
         "number",
         Some("not given"),
         "0 to 1; with friction only",
@@ -560,7 +560,7 @@ pub const FIELDS: [SceneField; 102] = [
          masters, as a fraction of a thousandth of the smallest extent.",
     ),
     field(
-        "time.steps_at_most",
+        "time.max_internal_steps",
         "whole number",
         Some("0 (no limit)"),
         "0 to 1000000000",

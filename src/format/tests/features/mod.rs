@@ -37,14 +37,14 @@ pub fn scene_with_every_feature() -> SceneSettings {
         Some(SplineSettings { around: 90, along: 6, closure: Closure::FreeEnds, interpolation: Interpolation::Facets });
     surface.patches = Some(PatchSettings { around: 8, along: 2 });
     scene.contacts[0].coating = Some(coating());
-    scene.contacts[0].heat_to_slave = Some(0.4);
+    scene.contacts[0].slave_heat_fraction = Some(0.4);
     (scene.outputs.wear, scene.outputs.slave_displacement) = (true, true);
     scene.outputs.stress = true;
     (scene.outputs.modal_amplitudes, scene.outputs.tip_displacements) = (Some(5), true);
     (scene.outputs.casing_forces, scene.outputs.support_reaction, scene.outputs.wear_profile) = (true, true, true);
     scene.time.input_interpolation = InputInterpolation::Hold;
     scene.time.tolerance = Some(2e-3);
-    scene.time.steps_at_most = Some(5000);
+    scene.time.max_internal_steps = Some(5000);
     scene
 }
 

@@ -64,7 +64,7 @@ fn slips_of_free_masters_are_located() {
 #[test]
 fn features_that_are_off_are_not_written() {
     let text = write_scene(&common::complete_scene());
-    let off = "velocity rigid nodes spin whirl axial_shift frequency_factors thermal load structure spline patches coating heat_to_slave wear \
+    let off = "velocity rigid nodes spin whirl axial_shift frequency_factors thermal load structure spline patches coating slave_heat_fraction wear \
                slave_displacement input_interpolation modal_amplitudes tip_displacements casing_forces support_reaction \
                wear_profile cutting";
     for key in off.split(' ') {
@@ -211,8 +211,8 @@ fn numbers_of_coatings_have_their_ranges() {
     refused(coating(|c| c.cells_along = 10_001), &parts);
     refused(coating(|c| (c.cells_around, c.cells_along) = (10_000_000, 10_000_000)), &["exceed the limit"]);
     for share in [-0.1, 1.1, f64::NAN] {
-        let parts = ["contact[1].heat_to_slave", "between 0 and 1"];
-        refused(|scene| scene.contacts[0].heat_to_slave = Some(share), &parts);
+        let parts = ["contact[1].slave_heat_fraction", "between 0 and 1"];
+        refused(|scene| scene.contacts[0].slave_heat_fraction = Some(share), &parts);
     }
 }
 
@@ -270,13 +270,13 @@ fn largest_and_smallest_values_are_accepted() {
     scene.structures[1].load = Some(LoadSettings { order: u32::MAX, amplitude: -1e12, phase: 1e6 });
     scene.surfaces[0].spline = Some(SplineSettings { around: 2000, along: 200, ..SplineSettings::default() });
     scene.surfaces[0].patches = Some(PatchSettings { around: 100, along: 100 });
-    scene.contacts[0].heat_to_slave = Some(1.0);
+    scene.contacts[0].slave_heat_fraction = Some(1.0);
     let coating = scene.contacts[0].coating.as_mut().unwrap();
     (coating.yield_stress, coating.hardening, coating.thickness, coating.modulus) = (0.0, 0.0, 0.1, 1e13);
     (coating.cells_around, coating.cells_along) = (10_000_000, 1);
     parse_scene(&write_scene(&scene), "scene").unwrap();
     scene.surfaces[0].spline = Some(SplineSettings { around: 4, along: 2, ..SplineSettings::default() });
-    scene.contacts[0].heat_to_slave = Some(0.0);
+    scene.contacts[0].slave_heat_fraction = Some(0.0);
     parse_scene(&write_scene(&scene), "scene").unwrap();
 }
 

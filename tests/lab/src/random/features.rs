@@ -48,7 +48,7 @@ pub(crate) const FEATURES: [SceneFeature; 36] = [
     ("friction", |scene| scene.settings.contacts.iter().any(|contact| contact.friction > 0.0)),
     ("slow sliding", |scene| any_structure(scene, |own| own.motion == BodyMotion::Rotating && own.speed.abs() < 30.0)),
     ("held inputs", |scene| scene.settings.time.input_interpolation == InputInterpolation::Hold),
-    ("bounded steps", |scene| scene.settings.time.steps_at_most.is_some()),
+    ("bounded steps", |scene| scene.settings.time.max_internal_steps.is_some()),
 ];
 
 fn any_structure(scene: &Scene, has: impl Fn(&StructureSettings) -> bool) -> bool {

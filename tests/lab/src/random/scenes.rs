@@ -109,7 +109,7 @@ fn time(random: &mut SeededRandom, scene: &mut Scene, scheme: Scheme) -> Vec<f64
         time.tolerance = Some(random.scale(1e-5, 5e-2));
     }
     if chance(random, 0.03) {
-        time.steps_at_most = Some(2 + u32::try_from(random.below(40)).unwrap_or(0));
+        time.max_internal_steps = Some(2 + u32::try_from(random.below(40)).unwrap_or(0));
     }
     if chance(random, 0.1) {
         time.input_interpolation = InputInterpolation::Hold;
@@ -253,7 +253,7 @@ impl Draw<'_> {
             contact.meridian = Meridian::Cylinder;
         }
         if friction > 0.0 && self.chance(0.2) {
-            contact.heat_to_slave = Some(self.random.unit());
+            contact.slave_heat_fraction = Some(self.random.unit());
         }
         contact.coating = coated.then(|| self.coating(gap));
         self.settings.surfaces.push(surface);

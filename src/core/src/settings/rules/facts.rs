@@ -75,7 +75,7 @@ pub(super) const MODULUS: Fact = fact("contact.coating.modulus", "", |at| at.pla
 pub(super) const YIELD: Fact =
     fact("contact.coating.yield_stress", "", |at| at.plastic(|coating| coating.yield_stress));
 pub(super) const HARDENING: Fact = fact("contact.coating.hardening", "", |at| at.plastic(|coating| coating.hardening));
-pub(super) const HEAT: Fact = fact("contact.heat_to_slave", "", |at| at.contact().heat_to_slave.is_some());
+pub(super) const HEAT: Fact = fact("contact.slave_heat_fraction", "", |at| at.contact().slave_heat_fraction.is_some());
 pub(super) const SOLVER: Fact = fact("contact.solver", "", |_| true);
 pub(super) const FILM: Fact = fact("contact.solver", "`film`", |at| at.solver == Solver::Film);
 pub(super) const COULOMB: Fact = fact("contact.solver", "`coulomb`", |at| at.solver == Solver::Coulomb);

@@ -166,8 +166,8 @@ const OF_ROTORS: &[(&str, Change)] = &[
     ("contact[1].meridian: excludes a surface spline", |scene| {
         scene.settings.contacts[0].meridian = Meridian::Cylinder;
     }),
-    ("contact[1].heat_to_slave: needs `contact.friction`", |scene| {
-        (scene.settings.contacts[0].friction, scene.settings.contacts[0].heat_to_slave) = (0.0, Some(0.5));
+    ("contact[1].slave_heat_fraction: needs `contact.friction`", |scene| {
+        (scene.settings.contacts[0].friction, scene.settings.contacts[0].slave_heat_fraction) = (0.0, Some(0.5));
     }),
     ("contact[2].coating: excludes a contact that is solved together", |scene| {
         second(&mut scene.settings);

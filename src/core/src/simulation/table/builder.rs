@@ -180,7 +180,7 @@ impl TableBuilder {
             tolerance.nominal = Some(start);
         }
         if settings.bounds_steps() {
-            self.steps_at_most(settings);
+            self.max_internal_steps(settings);
         }
         let reason = settings.time.scheme_reason.as_ref();
         let reason = reason.map_or(String::new(), |reason| format!("; the start value is {reason}"));
@@ -189,14 +189,14 @@ impl TableBuilder {
     }
 
     /// Most internal steps, which may change between communication steps.
-    fn steps_at_most(&mut self, settings: &SceneSettings) {
+    fn max_internal_steps(&mut self, settings: &SceneSettings) {
         let text = "Maximum number of internal steps in one communication step, including rejected trials (0: no \
                     limit); a communication step that needs more is discarded";
-        let most = self.parameter(Quantity::StepsAtMost, "steps_at_most", None, 0.0, text);
+        let most = self.parameter(Quantity::StepsAtMost, "max_internal_steps", None, 0.0, text);
         (most.kind, most.variability) = (DataType::Integer, Variability::Tunable);
         (most.min, most.max) = (Some(0.0), Some(ranges::STEPS));
         most.start =
-            Some(StartValue::Integer(i32::try_from(settings.time.steps_at_most.unwrap_or(0)).unwrap_or(i32::MAX)));
+            Some(StartValue::Integer(i32::try_from(settings.time.max_internal_steps.unwrap_or(0)).unwrap_or(i32::MAX)));
     }
 
     /// Adds the interpolation of inputs between communication points.

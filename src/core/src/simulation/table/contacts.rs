@@ -244,7 +244,7 @@ const EFFORTS: [Count; 3] = [
         |view| view.trials(),
     ),
     (
-        "internal_steps_most",
+        "internal_steps_max",
         "Largest number of trial internal steps of all blades together in any communication step since the start",
         |view| view.most_tried(),
     ),

@@ -111,7 +111,7 @@ pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
         }
     }
     for pair in parts.pairs() {
-        if let Some(share) = pair.contact.heat_to_slave.filter(|_| parts.has_friction()) {
+        if let Some(share) = pair.contact.slave_heat_fraction.filter(|_| parts.has_friction()) {
             table.belongs(pair.index, parts.of_pair(&pair));
             let text = "Fraction of the friction heat that flows into the casing; the rest flows into the blades";
             let row = table.parameter(Quantity::HeatToSlave, "casing_heat_fraction", None, share, text);
@@ -203,7 +203,7 @@ fn heat(table: &mut TableBuilder, pair: &PairFacts) {
             each(move |view, patch| view.mean * view.slave_share(index) * view.window.pairs[index].patch_heat[patch]);
         table.output("casing_friction_power", Span::Mean, power, text, read).dimension = Some(pair.patches);
     }
-    if pair.contact.heat_to_slave.is_some() {
+    if pair.contact.slave_heat_fraction.is_some() {
         let text = "Friction power into the blades, mean over the communication step";
         let read =
             scalar(move |view| view.mean * (1.0 - view.slave_share(index)) * view.window.pairs[index].friction_heat);

@@ -285,7 +285,7 @@ pub fn watched_rows(
         },
         NodeRow {
             quantity: Quantity::Output,
-            name: "normal_force_now",
+            name: "normal_force_instantaneous",
             span: Span::Point,
             unit: force,
             text: "Normal contact force in the last internal step",
@@ -294,7 +294,7 @@ pub fn watched_rows(
         },
         NodeRow {
             quantity: Quantity::Output,
-            name: "tangential_force_now",
+            name: "tangential_force_instantaneous",
             span: Span::Point,
             unit: force,
             text: "Friction force in the last internal step",

@@ -54,7 +54,7 @@ pub(crate) fn scene(name: &str) -> Scene {
             on_ring(&mut scene, 0.01);
             scene.settings.structures[1].thermal = true;
             scene.settings.structures[1].load = Some(LoadSettings { order: 2, amplitude: 1e3, phase: 0.0 });
-            scene.settings.contacts[0].heat_to_slave = Some(0.5);
+            scene.settings.contacts[0].slave_heat_fraction = Some(0.5);
             scene
         }
         _ => bumps(Tower { sectors: 4, neighbour: 1e6, ..Tower::default() }.rom()),
