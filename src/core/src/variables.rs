@@ -201,7 +201,7 @@ pub enum Quantity {
     /// Error that a step may make, parameter.
     Tolerance,
     /// Most internal steps of a communication step, parameter.
-    StepsAtMost,
+    MaxInternalSteps,
     /// Solver, parameter.
     SolverChoice,
     /// Interpolation of inputs between communication points, parameter.

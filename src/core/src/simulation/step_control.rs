@@ -39,7 +39,7 @@ impl Simulation {
     /// Most internal steps of a communication step, 0 for any number.
     pub(super) fn max_internal_steps(&self) -> u64 {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ 1e9")]
-        let most = self.value_of(Quantity::StepsAtMost, 0) as u64;
+        let most = self.value_of(Quantity::MaxInternalSteps, 0) as u64;
         most
     }
 

@@ -232,7 +232,7 @@ impl Simulation {
         }
         self.tangent.follows = true;
         // What was done once may be done again.
-        if let Some(bound) = twin.table.with_quantity_of(Quantity::StepsAtMost, 0) {
+        if let Some(bound) = twin.table.with_quantity_of(Quantity::MaxInternalSteps, 0) {
             twin.values[bound.reference as usize] = 0.0;
         }
         for (input, seed) in inputs.iter().zip(seed) {

@@ -192,7 +192,7 @@ impl TableBuilder {
     fn max_internal_steps(&mut self, settings: &SceneSettings) {
         let text = "Maximum number of internal steps in one communication step, including rejected trials (0: no \
                     limit); a communication step that needs more is discarded";
-        let most = self.parameter(Quantity::StepsAtMost, "max_internal_steps", None, 0.0, text);
+        let most = self.parameter(Quantity::MaxInternalSteps, "max_internal_steps", None, 0.0, text);
         (most.kind, most.variability) = (DataType::Integer, Variability::Tunable);
         (most.min, most.max) = (Some(0.0), Some(ranges::STEPS));
         most.start =
