@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_back_to_the_same_bits() {
+    fn numbers_round_trip_bit_for_bit() {
         for value in [0.0, -0.0, 1.0, 0.1, 1e-6, 3.56e-4, 1800.0, 1e7, 2.2e-308, 5e-324, f64::MAX, -1.0 / 3.0] {
             assert_eq!(number(value).parse::<f64>().unwrap().to_bits(), value.to_bits());
         }
@@ -44,7 +44,7 @@ mod tests {
     }
 
     #[test]
-    fn text_is_legal_xml() {
+    fn replaces_characters_that_are_illegal_in_xml() {
         assert_eq!(clean("a\nb\tc\u{1}d\u{ffff}é"), "a b c\u{fffd}d\u{fffd}é");
     }
 }

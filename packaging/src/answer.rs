@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn five_lines_of_six_digits_answer_a_run() {
+    fn run_summary_has_five_lines_with_six_digits() {
         let names =
             ["normal_impulse", "friction_loss", "torque", "clearance_minimum", "kinetic_energy", "strain_energy"];
         let rows: [&[f64]; 7] = [
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_scene_does_not_have_is_a_dash_with_its_reason() {
+    fn missing_results_show_a_dash_and_reason() {
         let lines = lines(&recording(&["front.torque", "rear.torque"], &[&[0.0, 0.0], &[1.0, -3.0]]), 0.0);
         let text = text(&lines);
         assert!(text.contains("heat       -                no contact"), "{text}");

@@ -312,7 +312,7 @@ mod tests {
 
     /// An option that a command does not list does not exist there.
     #[test]
-    fn options_of_another_model_are_refused() {
+    fn rejects_options_of_another_model() {
         let own = "blade.inp --contact-set TIP --clamp-set ROOT";
         for (line, right) in [
             (format!("reduce blade {own} --sectors 36 --spin 900 --contact-nodes 3"), true),
@@ -374,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn options_are_read() {
+    fn parses_run_and_reduce_options() {
         let Command::Run(run) = parse("run a.toml --set speed=-2 --set name=a=b --stop 1e-3 --json").unwrap().command
         else {
             panic!("run")
@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_options_exit_with_two_and_say_what_is_wanted() {
+    fn invalid_options_exit_with_two_and_explain_usage() {
         for (line, hint) in [
             ("run a.toml --set speed", "NAME=VALUE"),
             ("reduce rotor37 --mesh 10x2", "CHORDxTHICKNESSxSPAN"),

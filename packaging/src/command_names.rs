@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn proposes_the_kind_of_model_where_it_is_missing() {
+    fn proposes_the_missing_model_kind() {
         for (line, now) in [
             (
                 "reduce blade.inp --contact-set TIP --clamp-set ROOT --sectors 36",
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn words_that_a_shell_would_part_are_quoted() {
+    fn quotes_words_that_a_shell_would_split() {
         assert_eq!(quoted("my blade.inp"), "'my blade.inp'");
         assert_eq!(quoted("it's"), "'it'\\''s'");
         assert_eq!(quoted("-0.02:0.256,0.04:0.245"), "-0.02:0.256,0.04:0.245");

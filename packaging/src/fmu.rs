@@ -289,7 +289,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn dates_are_those_of_the_calendar() {
+    fn dates_match_the_calendar() {
         // `date -u -d @SECONDS +%FT%TZ`
         assert_eq!(date_time(0), "1970-01-01T00:00:00Z");
         assert_eq!(date_time(951_827_696), "2000-02-29T12:34:56Z");
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn the_date_is_left_out_unless_it_is_given() {
+    fn date_is_omitted_unless_given() {
         assert_eq!(generation_date(None).unwrap(), "");
         assert_eq!(generation_date(Some("0\n")).unwrap(), "1970-01-01T00:00:00Z");
         for wrong in ["yesterday", "-1", "", "999999999999999"] {

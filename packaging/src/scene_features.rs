@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_free_master_is_told_with_limits_of_its_own() {
+    fn free_body_is_reported_with_its_limits() {
         let settings = tiprub_format::parse_scene(tiprub_gallery::scene_source::CUBE_SCENE, "scene").unwrap();
         let mut scene = Scene { settings, roms: vec![two_sectors(false); 3] };
         scene.settings.surfaces[1].rigid = true;
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn coupled_blades_are_not_said_to_stand_alone() {
+    fn coupled_blades_are_not_reported_as_uncoupled() {
         for coupled in [false, true] {
             let scene = scene(|scene| scene.roms = vec![two_sectors(coupled)]);
             assert_eq!(limits(&scene).concat().contains("not coupled"), !coupled);

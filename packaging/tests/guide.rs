@@ -25,7 +25,7 @@ fn run_in(directory: &Path, command: &str) -> Vec<String> {
 }
 
 #[test]
-fn what_commands_say_is_what_the_guide_shows() {
+fn command_outputs_match_the_guide() {
     let of_program: Vec<_> = blocks().into_iter().filter(|block| block.1.starts_with("tiprub ")).collect();
     let commands: BTreeSet<&str> = of_program.iter().map(|block| block.1.as_str()).collect();
     assert!(!commands.is_empty());
@@ -45,7 +45,7 @@ fn what_commands_say_is_what_the_guide_shows() {
 
 /// A block whose test does not look at it would hold nothing.
 #[test]
-fn every_block_from_a_test_is_held_by_it() {
+fn every_quoted_test_output_is_checked_by_its_test() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let folders = [("tiprub-core", "src/core"), ("tiprub-model", "src/model"), ("tiprub", "packaging")];
     for (page, command, block) in blocks() {
@@ -81,7 +81,7 @@ fn the_first_scene_of_the_reference_is_the_built_in_scene() {
 
 /// The rub of the first run at one, half and a quarter of its internal step: what a newcomer sees of the step.
 #[test]
-fn the_first_run_at_halved_steps() {
+fn first_run_results_at_halved_steps() {
     for step in [0.5, 0.25, 0.125] {
         let lines = run(&format!("tiprub run builtin:rotor37-one-row --all --set internal_step_max={step}e-6"));
         let number = |name: &str| {
@@ -100,7 +100,7 @@ fn the_first_run_at_halved_steps() {
 
 /// The rub of the first run after two revolutions, without mass at the contact: points along the tip, and patches.
 #[test]
-fn the_first_run_with_points_and_patches() {
+fn first_run_results_with_points_and_patches() {
     let root = tempfile::tempdir().unwrap();
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37-one-row.toml");
     let scene = fs::read_to_string(shipped).unwrap();
@@ -128,7 +128,7 @@ fn the_first_run_with_points_and_patches() {
 /// Tables with decimals stand in a block, in a part that is generated, or behind a mark that says who wrote them and when, or
 /// that they are given.
 #[test]
-fn every_table_of_figures_says_where_it_comes_from() {
+fn every_numeric_table_states_its_source() {
     let marks = ["<!-- from: ", "<!-- generated: ", "<!-- written: ", "<!-- given -->"];
     for (page, text) in pages() {
         let mut marked = false;
@@ -161,7 +161,7 @@ fn decimal(cell: &str) -> bool {
 
 /// The comparison sees a last digit that differs, a sign, an order and a number that is missing.
 #[test]
-fn a_figure_that_differs_is_seen() {
+fn comparison_detects_any_difference_in_figures() {
     let found = "| ModalExact | Lcp | 200 | 133452.84 | 49.42 | -1.0e-3, 2.0e-13 |".to_owned();
     let seen = |shown: &str| holds(&found, &numbers(shown));
     for right in ["| | 200 | 133,452.8 | 49.42 |", "200, 49.4, 0.0010", "−0.0010", "−1e-3", "2e-13"] {
@@ -176,7 +176,7 @@ fn a_figure_that_differs_is_seen() {
 
 /// What the README's sample prints: torque and largest force of the demo's scene at 1700 rad/s with µ = 0.1.
 #[test]
-fn the_sample_of_the_readme_prints_what_it_says() {
+fn readme_sample_prints_the_documented_values() {
     let readme = pages().into_iter().find(|page| page.0 == "README.md").unwrap().1;
     let line = readme.lines().find(|line| line.starts_with("print(result[\"torque\"]")).unwrap();
     let [torque, force] = numbers(line.split('#').nth(1).unwrap())[..] else { panic!("{line}") };

@@ -37,7 +37,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn massless_contact_nodes_agree_and_take_longer_steps() {
+fn massless_contact_nodes_agree_and_allow_longer_steps() {
     let rom = reduce_rotor37(&Rotor37Options::paper(), &|_| {}).unwrap().rom;
     let model = ModalModel::from_rom(&rom, rom.damping_ratio).unwrap();
     let normals = rom.contact_nodes.iter().map(|node| {

@@ -30,7 +30,7 @@ fn off(found: [f64; 3]) -> f64 {
 }
 
 #[test]
-fn the_blade_stands_stretched_at_speed_and_follows_the_speed() {
+fn blade_stretch_follows_the_rotor_speed() {
     let scene = scene();
     let mut simulation = Simulation::new(&scene).unwrap();
     simulation.initialise(0.0).unwrap();

@@ -168,7 +168,7 @@ fn held(name: &str, found: &str) -> String {
 
 /// `preset = "paper"` is what it was: settings as they are read, and the same settings and bits as spelled out.
 #[test]
-fn the_papers_preset_is_what_it_was() {
+fn paper_preset_is_unchanged() {
     let preset = scenes::around_blades(scenes::PRESET);
     let written = tiprub_format::write_scene(&preset.settings);
     assert_eq!(written, held("preset_paper.toml", &written), "see the head of this file");
@@ -181,7 +181,7 @@ fn the_papers_preset_is_what_it_was() {
 }
 
 #[test]
-fn every_scene_gives_the_bits_it_gave() {
+fn every_scene_matches_its_golden_bits() {
     let found: String = scenes::all().iter().map(|scene| line(scene) + "\n").collect();
     let expected = held("golden.txt", &found);
     for (found, expected) in found.lines().zip(expected.lines()) {
@@ -191,7 +191,7 @@ fn every_scene_gives_the_bits_it_gave() {
 }
 
 #[test]
-fn both_faces_of_the_library_give_the_bits_of_the_core() {
+fn fmi2_and_fmi3_match_the_core_bit_for_bit() {
     let path = shipped();
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
     for scene in scenes::all() {
@@ -205,7 +205,7 @@ fn both_faces_of_the_library_give_the_bits_of_the_core() {
 }
 
 #[test]
-fn something_happens_in_every_scene() {
+fn every_golden_scene_has_nontrivial_outputs() {
     for scene in scenes::all() {
         let table = Simulation::new(&scene).unwrap();
         let (_, last) = native(&scene, false);

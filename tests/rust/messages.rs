@@ -222,7 +222,7 @@ fn product_sources(folder: &Path) -> Vec<PathBuf> {
 
 /// Writes all strings to `target/messages.md`, to be read in one sitting.
 #[test]
-fn user_visible_strings_avoid_words_that_users_stumbled_over() {
+fn user_visible_strings_avoid_confusing_words() {
     let (mut list, mut count, mut banned) = (String::from("# Strings that users read\n"), 0, Vec::new());
     for folder in ["src", "fmi", "modelDescription", "packaging", "tests/lab"] {
         for path in product_sources(&root().join(folder)) {
@@ -248,7 +248,7 @@ fn user_visible_strings_avoid_words_that_users_stumbled_over() {
 }
 
 #[test]
-fn strings_of_one_call_are_one_message_and_tests_are_left_out() {
+fn strings_of_a_call_form_one_message_and_tests_are_skipped() {
     let source = r##"
         //! Ordinary documentation of a file.
         /// Ordinary documentation of a function.

@@ -27,7 +27,7 @@ fn free_of(package: &str, unwanted: &[&str]) {
 }
 
 #[test]
-fn imports_run_one_way() {
+fn crate_dependencies_respect_the_layers() {
     let offline = ["faer", "rayon", "quick-xml", "zip", "clap", "plotters", "indicatif", "libloading"];
     let floors = ["tiprub-model", "tiprub-reference", "tiprub-model-description", "tiprub"];
     let files = ["tiprub-format", "tiprub-fmi", "tiprub-fmi-facade", "toml", "safetensors", "serde_json"];
@@ -69,7 +69,7 @@ fn lines_with(path: &Path, word: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_boundary_is_the_only_place_of_unsafe_code_in_the_library() {
+fn unsafe_code_is_confined_to_the_fmi_boundary() {
     let (mut files, source) = (Vec::new(), root().join("fmi/facade/src"));
     sources(&source, &mut files);
     assert!(files.len() > 10);

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn every_form_of_the_uri_leads_to_the_directory() {
+    fn accepts_every_form_of_the_resource_uri() {
         let directory = directory();
         let path = directory.path();
         let text = path.to_str().unwrap();
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_locations_are_refused_with_the_remedy() {
+    fn rejects_invalid_locations_with_remedy() {
         for (uri, reason) in [
             ("", "empty"),
             ("  ", "empty"),
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn windows_has_drives_and_servers() {
+    fn resolves_windows_drives_and_unc_paths() {
         for (rest, path) in [
             ("///C:/fmu/resources", "C:/fmu/resources"),
             ("/C:/fmu/resources", "C:/fmu/resources"),
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn native_paths() {
+    fn accepts_native_paths() {
         let directory = directory();
         let path = directory.path();
         let text = path.to_str().unwrap();

@@ -129,7 +129,7 @@ mod tests {
 
     /// Every header field, read by the layout of PKWARE's APPNOTE 4.3.7, 4.3.12 and 4.3.16 and nothing else.
     #[test]
-    fn every_header_byte_keeps_the_rules() {
+    fn zip_headers_conform_to_the_specification() {
         let entries = sample();
         let archive = bytes(&entries);
         let mut at = 0;
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_entries_give_the_same_bytes_and_read_back() {
+    fn archives_are_reproducible_and_round_trip() {
         let entries = sample();
         let archive = bytes(&entries);
         assert_eq!(archive, bytes(&entries));
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_importers_trip_over_are_refused() {
+    fn rejects_names_that_importers_cannot_handle() {
         for name in ["./a", "a//b", "/a", "a\\b", "../a", "", "a/", "ä", "c:a"] {
             let failure = write_into(Cursor::new(Vec::new()), &[ArchiveEntry::new(name, "x")]).unwrap_err();
             assert_eq!(failure.what, name);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refused_archive_leaves_no_file() {
+    fn rejected_archive_leaves_no_file() {
         let root = tempfile::tempdir().unwrap();
         assert!(write(&root.path().join("x.fmu"), &[ArchiveEntry::new("./a", "x")]).is_err());
         assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 0);

@@ -297,7 +297,7 @@ mod tests {
 </fmiModelDescription>"#;
 
     #[test]
-    fn both_versions_are_read() {
+    fn reads_fmi2_and_fmi3_descriptions() {
         let two = parse(FMI2).unwrap();
         assert_eq!(
             (two.fmi_version.as_str(), two.model_name.as_str(), two.token.as_str()),
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn descriptions_that_no_tool_writes_are_refused() {
+    fn rejects_excessive_nesting_and_attributes() {
         let nested = "<a>".repeat(60);
         assert!(parse(&nested).unwrap_err().problem.contains("nested"));
         let attributes: String = (0..60).map(|index| format!(" a{index}=\"\"")).collect();
@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn every_truncation_is_refused() {
+    fn rejects_every_truncation() {
         for (length, _) in FMI3.char_indices() {
             // Cut after the last variable it would still lack the closing tags.
             let result = parse(&FMI3[..length]);

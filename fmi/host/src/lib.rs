@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn a_truncated_zip_is_named_with_a_remedy() {
+    fn rejects_truncated_zip_with_name_and_remedy() {
         let (_root, path) = archive_with(&[ArchiveEntry::new("modelDescription.xml", "x".repeat(1000))]);
         let bytes = fs::read(&path).unwrap();
         for length in [0, 1, 30, bytes.len() / 2, bytes.len() - 1] {
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn flipped_bits_anywhere_never_panic() {
+    fn bit_flips_never_panic() {
         let (_root, path) =
             archive_with(&[ArchiveEntry::new("modelDescription.xml", "<a/>".repeat(50)), ArchiveEntry::new("b", "c")]);
         let bytes = fs::read(&path).unwrap();
@@ -283,13 +283,13 @@ mod tests {
     }
 
     #[test]
-    fn a_zip_that_is_no_fmu_is_named() {
+    fn rejects_zip_that_is_not_an_fmu_by_name() {
         let (_root, path) = archive_with(&[ArchiveEntry::new("a.txt", "hello")]);
         assert!(UnpackedFmu::open(&path).unwrap_err().problem.contains("modelDescription.xml"));
     }
 
     #[test]
-    fn names_that_lead_out_are_refused() {
+    fn rejects_names_outside_the_target_directory() {
         let root = tempfile::tempdir().unwrap();
         assert!(inside(root.path(), "../evil").is_err());
         assert!(inside(root.path(), "/evil").is_err());
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bomb_is_refused_by_its_size_before_anything_is_unpacked() {
+    fn rejects_zip_bomb_before_unpacking() {
         let (_root, path) = archive_with(&[ArchiveEntry::new("resources/zeros", vec![0; 1 << 20])]);
         announce(&path, 3 << 30);
         let failure = UnpackedFmu::open(&path).unwrap_err();
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_wanted_is_unpacked_and_all_of_it_checked() {
+    fn unpacks_only_requested_entries_and_verifies_them() {
         let (_root, path) =
             archive_with(&[ArchiveEntry::new("a", "x".repeat(100)), ArchiveEntry::new(DESCRIPTION, "no XML")]);
         let root = tempfile::tempdir().unwrap();

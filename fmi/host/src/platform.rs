@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_is_in_the_order_of_the_platforms() {
+    fn platform_table_follows_the_platform_order() {
         for (index, platform) in Platform::ALL.into_iter().enumerate() {
             assert_eq!(platform as usize, index);
             assert!(platform.place("3.0", "x").starts_with(&format!("binaries/{}/x.", platform.tuple())));

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_library_is_refused() {
+    fn rejects_file_that_is_not_a_library() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("tiprub.so");
         std::fs::write(&path, "text").unwrap();

@@ -59,7 +59,7 @@ fn keep_after_the_step(scene: &Scene, count: usize) {
 }
 
 #[test]
-fn means_and_totals_are_zero_at_the_start_whatever_the_inputs() {
+fn means_and_totals_start_at_zero_for_any_inputs() {
     for (scene, value) in [(scene::rigid(), 0.0), (scene::complete(), 0.0), (scene::complete(), 1e-4)] {
         let mut simulation = Simulation::new(&scene).unwrap();
         for reference in inputs(&simulation) {
@@ -116,7 +116,7 @@ fn describes_arrays_and_kelvin_for_each_version() {
 }
 
 #[test]
-fn the_page_tells_of_grid_heat_and_spin() {
+fn page_describes_grid_heat_and_spin() {
     let simulation = Simulation::new(&scene::complete()).unwrap();
     let roms = scene::complete().roms;
     let page = html(&scene::description(simulation.table(), &roms, true));
@@ -132,7 +132,7 @@ fn the_page_tells_of_grid_heat_and_spin() {
 }
 
 #[test]
-fn the_default_is_at_most_fifty_scalars_and_the_time() {
+fn default_has_at_most_fifty_scalars_and_the_time() {
     let count = |outputs: OutputSettings| {
         let mut scene = scene::rigid();
         // Of a ROM without watched points, which add four outputs each.

@@ -22,7 +22,7 @@ fn compare(name: &str, text: &str) {
 }
 
 #[test]
-fn texts_are_as_recorded() {
+fn descriptions_match_the_snapshots() {
     let (table, rom) = (common::table(), common::rom());
     let description = common::description(&table, &rom, true);
     compare("fmi2.xml", &fmi2_xml(&description));

@@ -77,7 +77,7 @@ fn the_root_names_version_token_and_date() {
 }
 
 #[test]
-fn capabilities_are_those_implemented() {
+fn declared_capabilities_match_the_implementation() {
     let flags = |text: &str| -> BTreeMap<String, String> {
         let pair = |flag: &str| flag.split_once('=').map(|(key, value)| (key.to_owned(), value.to_owned())).unwrap();
         text.split_whitespace().map(pair).collect()
@@ -128,7 +128,7 @@ fn arrays_are_flattened_with_consecutive_references() {
 }
 
 #[test]
-fn starts_stand_exactly_where_they_must() {
+fn start_values_are_present_exactly_where_required() {
     let [(_, two), (_, three), _] = all();
     let typed: Vec<_> = two.iter().filter(|(path, _)| path.contains("/ScalarVariable/")).collect();
     for (variable, (_, value)) in at(&two, "/ModelVariables/ScalarVariable").iter().zip(typed) {
@@ -171,7 +171,7 @@ fn the_model_structure_is_complete() {
 }
 
 #[test]
-fn outputs_depend_on_the_step_only_and_means_start_at_zero() {
+fn outputs_have_no_dependencies_and_means_start_at_zero() {
     for (version, elements) in all() {
         let (outputs, initial) = match version {
             "2.0" => ("/ModelStructure/Outputs/Unknown", "/ModelStructure/InitialUnknowns/Unknown"),
@@ -250,7 +250,7 @@ fn page_names_all_variables_and_checks() {
 
 proptest::proptest! {
     #[test]
-    fn any_text_of_a_user_is_written_so_that_it_reads_back(text in "\\PC*|[\\x00-\\x20<>&\"']*") {
+    fn arbitrary_user_text_round_trips(text in "\\PC*|[\\x00-\\x20<>&\"']*") {
         let (table, rom) = (common::table(), common::rom());
         let mut description = common::description(&table, &rom, true);
         description.description = &text;

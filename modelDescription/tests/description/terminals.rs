@@ -14,7 +14,7 @@ fn values<'a>(xml: &'a str, attribute: &str) -> Vec<&'a str> {
 }
 
 #[test]
-fn members_are_variables_and_ports_are_whole() {
+fn terminal_members_exist_and_terminals_are_complete() {
     let complete = scene::complete();
     let simulation = Simulation::new(&complete).unwrap();
     for arrays in [false, true] {
@@ -43,7 +43,7 @@ fn members_are_variables_and_ports_are_whole() {
 
 /// Patches of a surface are other places than those of the ROM, even where they are as many.
 #[test]
-fn heat_of_other_patches_makes_no_port() {
+fn no_heat_terminal_for_surface_patches() {
     let complete = scene::complete();
     let simulation = Simulation::new(&complete).unwrap();
     let mut description = scene::description(simulation.table(), &complete.roms, false);
@@ -52,7 +52,7 @@ fn heat_of_other_patches_makes_no_port() {
 }
 
 #[test]
-fn a_rotor_alone_has_its_shaft_and_the_forces_on_it() {
+fn single_rotor_has_shaft_and_force_terminals() {
     let rigid = scene::rigid();
     let simulation = Simulation::new(&rigid).unwrap();
     let terminals = fmi3_terminals(&scene::description(simulation.table(), &rigid.roms, false)).unwrap();

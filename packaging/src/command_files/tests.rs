@@ -88,7 +88,7 @@ fn defined(command: &clap::Command, path: &str, found: &mut BTreeSet<(String, St
 }
 
 #[test]
-fn every_argument_that_names_a_file_is_known_as_read_or_written() {
+fn every_file_argument_is_classified_as_input_or_output() {
     let mut cli = Cli::command();
     cli.build();
     let (mut found, mut known) = (BTreeSet::new(), BTreeSet::new());
@@ -113,7 +113,7 @@ fn named_written() -> String {
 /// The file that is written is there, and what is read is a link to it.
 #[test]
 #[cfg(unix)]
-fn no_command_replaces_what_it_reads() {
+fn no_command_overwrites_its_inputs() {
     let mut pairs = 0;
     for (command, _, words, name) in written() {
         for (.., line) in read().into_iter().filter(|(reading, ..)| *reading == command) {
@@ -138,13 +138,13 @@ fn no_command_replaces_what_it_reads() {
 }
 
 #[test]
-fn the_list_beside_a_stiffness_file_is_read_and_protected() {
+fn implicit_dof_list_is_protected_as_an_input() {
     let failure = answer("reduce blade --stiffness job.sti --mass job.mas --contact-set A --clamp-set B --inp job.dof");
     assert!(failure.unwrap_err().problem.contains("is the same file as --dofs"));
 }
 
 #[test]
-fn files_that_a_mesh_includes_are_read_and_protected() {
+fn included_mesh_files_are_protected_as_inputs() {
     let root = tempfile::tempdir().unwrap();
     let [mesh, part, nodes] = ["mesh.inp", "part.inp", "nodes.csv"].map(|name| root.path().join(name));
     fs::write(&mesh, "** INPUT=none.inp\n*Include, input = part.inp\n").unwrap();

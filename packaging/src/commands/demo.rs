@@ -289,7 +289,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_a_scene_that_somebody_changed_is_kept() {
+    fn demo_keeps_only_a_modified_scene() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join(SCENE_FILE);
         let text = |stop| rotor37_text(ROM_FILE, stop);

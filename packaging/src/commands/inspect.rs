@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_files_are_named_and_never_panic() {
+    fn invalid_files_are_named_without_panic() {
         for (name, contents, hint) in [
             ("a.fmu", "no zip", "not a complete zip"),
             ("a.safetensors", "\u{8}\0\0\0\0\0\0\0{}", "a.safetensors"),

@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_panic_is_a_failure_of_the_work() {
+    fn panic_is_reported_as_a_failure() {
         let said: [fn() -> Result<CommandOutcome>; 2] = [|| panic!("index {} too large", 7), || panic!("plain")];
         for (panics, words) in said.into_iter().zip(["index 7 too large", "plain"]) {
             let failure = walled(panics).unwrap_err();

@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_and_directories_are_told_apart() {
+    fn distinguishes_files_from_directories() {
         let both = targets(FmiChoice::Both, Path::new("out"), "rub").unwrap();
         let paths: Vec<_> = both.iter().map(|(_, path)| path.display().to_string()).collect();
         assert_eq!(paths, ["out/rub_fmi2.fmu", "out/rub_fmi3.fmu"]);

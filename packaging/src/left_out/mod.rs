@@ -191,7 +191,7 @@ mod tests {
 
     /// The guide prints this table; `UPDATE_SNAPSHOTS=1` writes it anew.
     #[test]
-    fn the_guide_has_this_table() {
+    fn guide_contains_the_generated_table() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/left-out.md");
         let page = std::fs::read_to_string(path).unwrap();
         let [begin, end] = ["<!-- generated: left out -->\n", "<!-- end of generated part -->"];
@@ -206,7 +206,7 @@ mod tests {
 
     /// An effect that a key switches on is present afterwards; effects that the scene has are not listed.
     #[test]
-    fn effects_that_keys_add_are_found_in_the_scene_that_has_them() {
+    fn enabled_effects_are_detected_in_the_scene() {
         let scene = rub(4);
         for effect in EFFECTS {
             let Some(with) = effect.with.filter(|_| (effect.concerns)(&scene)) else { continue };
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn the_list_names_costs_and_refusals_of_the_scene_at_hand() {
+    fn list_reports_cost_or_rejection_for_the_scene() {
         let scene = round(blade(4));
         let all = left_out(&scene, false).unwrap();
         let of = |name: &str| all.iter().find(|one| one.effect.name == name);

@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn places_of_the_builder_get_neutral_names() {
+    fn build_paths_are_remapped_to_neutral_names() {
         let root = tempfile::tempdir().unwrap();
         let home = root.path().join("home");
         let registry = home.join("registry/src/index.example-0123");

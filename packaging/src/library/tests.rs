@@ -67,7 +67,7 @@ fn selects_libraries_of_a_directory_by_their_content() {
 }
 
 #[test]
-fn installed_libraries_are_beside_the_program_or_in_its_prefix() {
+fn finds_libraries_beside_the_program_or_in_its_prefix() {
     let root = tempfile::tempdir().unwrap();
     let program = root.path().join("bin/tiprub");
     for name in ["bin/x86_64-windows.dll", "lib/tiprub/x86_64-linux.so", "lib/tiprub/other.so"] {
@@ -108,7 +108,7 @@ fn installed_program_builds_and_caches_a_missing_library() {
 }
 
 #[test]
-fn a_library_of_another_release_is_refused_by_name_and_version() {
+fn rejects_library_of_another_release_by_version() {
     let root = tempfile::tempdir().unwrap();
     let path = root.path().join("old.so");
     let other = LIBRARY_RELEASE.replacen(env!("CARGO_PKG_VERSION"), "9.8.7", 1);
@@ -125,7 +125,7 @@ fn a_library_of_another_release_is_refused_by_name_and_version() {
 }
 
 #[test]
-fn a_file_that_is_no_library_is_refused_by_name() {
+fn rejects_file_that_is_not_a_library_by_name() {
     let root = tempfile::tempdir().unwrap();
     let console = Console::new(true, false);
     let refused = |path: PathBuf| load(LibraryUnit::Scene, &arguments(&[path], &[]), &console).unwrap_err();
@@ -162,7 +162,7 @@ fn a_file_that_is_no_library_is_refused_by_name() {
 }
 
 #[test]
-fn libraries_of_both_units_are_told_apart() {
+fn distinguishes_contact_and_thermal_libraries() {
     let (root, console) = (tempfile::tempdir().unwrap(), Console::new(true, false));
     let [scene, thermal] = ["x86_64-linux.so", "thermal-x86_64-linux.so"].map(|name| root.path().join(name));
     let conducts = [elf(62), tiprub_format::THERMAL_FILE.as_bytes().to_vec()].concat();

@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn text_cannot_break_the_page() {
+    fn text_is_escaped_in_the_page() {
         assert_eq!(escape("<a href=\"x\">&"), "&lt;a href=&quot;x&quot;&gt;&amp;");
     }
 }

@@ -6,7 +6,7 @@ use crate::project::{Project, SCENE, json};
 
 #[test]
 #[cfg(target_os = "linux")]
-fn results_that_stdout_does_not_take_are_a_failure() {
+fn failed_write_to_stdout_is_a_failure() {
     let project = Project::new();
     let onto = |stdout: fs::File| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
@@ -23,7 +23,7 @@ fn results_that_stdout_does_not_take_are_a_failure() {
 
 #[test]
 #[cfg(unix)]
-fn names_that_are_no_text_are_names_of_files() {
+fn accepts_file_names_that_are_not_utf8() {
     use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
     let project = Project::new();
     let odd = OsStr::from_bytes(b"a\xffb");
@@ -103,7 +103,7 @@ fn waits_for_the_reader_of_a_pipe_with_a_message() {
 
 #[test]
 #[cfg(unix)]
-fn no_output_is_an_input_or_another_output() {
+fn rejects_outputs_that_coincide_with_other_files() {
     let project = Project::new();
     fs::hard_link(project.path("scene.toml"), project.path("hard.csv")).unwrap();
     std::os::unix::fs::symlink("small.rom.safetensors", project.path("soft.csv")).unwrap();

@@ -5,7 +5,7 @@ use std::fs;
 use crate::project::{Project, SCENE};
 
 #[test]
-fn damaged_fmus_are_named_by_inspect_at_every_length() {
+fn inspect_names_fmus_truncated_at_any_length() {
     let project = Project::new();
     project.succeed(&["package", "scene.toml", "--fmi", "2", "-o", "x.fmu", "--library", "library.so"]);
     let bytes = fs::read(project.path("x.fmu")).unwrap();
@@ -60,7 +60,7 @@ fn run_inspect_and_the_fmu_report_the_scheme_and_its_reason() {
 }
 
 #[test]
-fn step_limits_are_those_at_which_a_scene_is_refused() {
+fn reported_step_limits_match_rejection() {
     let project = Project::new();
     let limits = |friction: &str| {
         let scene = SCENE.replace("friction = 0.1", friction);

@@ -43,7 +43,7 @@ fn a_package_is_complete_reproducible_and_inspectable() {
 }
 
 #[test]
-fn what_a_scene_does_not_use_of_a_rom_stays_out_of_the_package() {
+fn package_omits_unused_rom_data() {
     let project = Project::new();
     let package = |directory: &str| {
         project.succeed(&[
@@ -83,7 +83,7 @@ fn what_a_scene_does_not_use_of_a_rom_stays_out_of_the_package() {
 }
 
 #[test]
-fn scalars_and_dates_are_packed_as_asked() {
+fn package_options_control_scalars_and_date() {
     let project = Project::new();
     let describe = |arguments: &[&str], date: Option<&str>| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
@@ -102,7 +102,7 @@ fn scalars_and_dates_are_packed_as_asked() {
 }
 
 #[test]
-fn a_fixed_internal_step_is_told_where_it_is_true() {
+fn fixed_internal_step_is_declared_only_if_it_is_constant() {
     let project = Project::new();
     let reported = |step: &str, communication_step: &str| {
         let scene: Vec<String> = SCENE
@@ -128,7 +128,7 @@ fn a_fixed_internal_step_is_told_where_it_is_true() {
 
 #[cfg(unix)]
 #[test]
-fn libraries_of_a_directory_are_not_written_over() {
+fn package_does_not_overwrite_libraries() {
     let project = Project::new();
     fs::create_dir(project.path("libraries")).unwrap();
     fs::rename(project.path("library.so"), project.path("libraries/x.fmu")).unwrap();
@@ -139,7 +139,7 @@ fn libraries_of_a_directory_are_not_written_over() {
 }
 
 #[test]
-fn failed_packages_leave_nothing() {
+fn failed_package_leaves_no_files() {
     let project = Project::new();
     let before = project.files();
     let missing = project.fail(&["package", "scene.toml", "--library", "none.so"], 1);

@@ -26,7 +26,7 @@ fn a_native_run_writes_one_row_per_communication_point() {
 
 /// What the CSV says, without looking for it: the lobes of the scene reach through the gap.
 #[test]
-fn the_summary_of_a_run_tells_its_extremes() {
+fn run_summary_reports_extremes() {
     let project = Project::new();
     let text = project.succeed(&["run", "scene.toml", "--csv", "out.csv", "--all", "--quiet"]);
     let json = project.succeed(&["run", "scene.toml", "--json", "--quiet"]);
@@ -61,7 +61,7 @@ fn the_summary_of_a_run_tells_its_extremes() {
 
 /// Five lines before all else, the same with and without `--all`, and then where the rest is.
 #[test]
-fn a_run_answers_first_in_five_lines() {
+fn run_output_starts_with_five_summary_lines() {
     let project = Project::new();
     let [short, long] = [&[][..], &["--all"]]
         .map(|more| project.succeed(&[&["run", "scene.toml", "--csv", "out.csv", "--quiet"], more].concat()));
@@ -79,7 +79,7 @@ fn a_run_answers_first_in_five_lines() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn results_that_nobody_takes_are_no_success() {
+fn closed_output_pipe_is_a_failure() {
     let project = Project::new();
     let command = |line: &str| {
         let mut shell = Command::new("sh");
@@ -111,7 +111,7 @@ fn settings_and_times_can_be_replaced() {
 
 /// Inputs of a file: a speed that grows is integrated exactly, what rests changes nothing, what cannot be followed is told.
 #[test]
-fn inputs_over_time_are_followed_without_delay() {
+fn time_varying_inputs_are_followed_without_delay() {
     let project = Project::new();
     let csv = |inputs: &str| {
         fs::write(project.path("inputs.csv"), inputs).unwrap();
@@ -150,7 +150,7 @@ fn inputs_over_time_are_followed_without_delay() {
 }
 
 #[test]
-fn a_communication_step_longer_than_the_run_is_warned_of() {
+fn warns_of_communication_step_longer_than_the_run() {
     let project = Project::new();
     fs::write(project.path("scene.toml"), SCENE.replace("communication_step = 1e-3", "communication_step = 0.1"))
         .unwrap();
@@ -167,7 +167,7 @@ fn a_communication_step_longer_than_the_run_is_warned_of() {
 }
 
 #[test]
-fn a_run_is_warned_for_the_step_it_takes() {
+fn run_warnings_refer_to_the_actual_step() {
     let project = Project::new();
     // 2/omega_max of the springs is 2 ms.
     let scene =
@@ -185,7 +185,7 @@ fn a_run_is_warned_for_the_step_it_takes() {
 }
 
 #[test]
-fn gaps_of_sectors_stand_for_the_gap_and_heat_needs_friction() {
+fn sector_gaps_replace_the_gap_and_heat_requires_friction() {
     let project = Project::new();
     fs::write(project.path("scene.toml"), SCENE.replace("gap = 1e-3", "sector_gaps = [1e-3, 1e-3, 1.2e-3, 1e-3]"))
         .unwrap();
@@ -199,7 +199,7 @@ fn gaps_of_sectors_stand_for_the_gap_and_heat_needs_friction() {
 }
 
 #[test]
-fn a_run_beyond_the_memory_is_refused_with_its_size() {
+fn rejects_run_larger_than_memory_with_its_size() {
     let project = Project::new();
     let message = project.fail(&["run", "scene.toml", "--step", "1e-9", "--quiet"], 2);
     assert!(message.contains("50000001 communication points") && message.contains("GB"), "{message}");

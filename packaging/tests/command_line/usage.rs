@@ -5,7 +5,7 @@ use std::fs;
 use crate::project::{Project, SCENE, json};
 
 #[test]
-fn wrong_command_lines_exit_with_two_and_say_what_to_do() {
+fn invalid_command_lines_exit_with_two_and_a_remedy() {
     let project = Project::new();
     let unknown = project.fail(&["run", "scene.toml", "--set", "sped=1"], 2);
     assert!(unknown.contains("no such variable") && unknown.contains("`speed`"), "{unknown}");
@@ -22,7 +22,7 @@ fn wrong_command_lines_exit_with_two_and_say_what_to_do() {
 }
 
 #[test]
-fn failures_exit_with_one_and_are_json_too() {
+fn failures_exit_with_one_and_are_available_as_json() {
     let project = Project::new();
     let output = project.run(&["run", "missing.toml", "--json"]);
     assert_eq!(output.status.code(), Some(1));
@@ -39,7 +39,7 @@ fn failures_exit_with_one_and_are_json_too() {
 
 /// Errors of every command, from the parser, the check of names, or the work.
 #[test]
-fn every_error_is_one_json_object_too() {
+fn every_error_is_available_as_one_json_object() {
     let project = Project::new();
     for (line, code, what, words) in [
         ("run --json", 2, "<SCENE>", "required"),
@@ -79,7 +79,7 @@ fn every_error_is_one_json_object_too() {
 }
 
 #[test]
-fn help_is_there_for_every_command() {
+fn every_command_has_help() {
     let project = Project::new();
     for command in ["demo", "reduce", "package", "run", "inspect", "study"] {
         let help = project.succeed(&[command, "--help"]);

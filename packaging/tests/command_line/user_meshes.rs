@@ -89,7 +89,7 @@ fn command() -> String {
 }
 
 #[test]
-fn a_mesh_of_gmsh_becomes_a_running_scene_as_the_guide_tells() {
+fn gmsh_mesh_becomes_a_running_scene_as_in_the_guide() {
     let project = ModelProject::new(&["blade_hex20.inp"]);
     let reported = project.succeed(&command());
     assert_eq!(reported["rom"]["sectors"], 36);
@@ -117,7 +117,7 @@ fn a_mesh_of_gmsh_becomes_a_running_scene_as_the_guide_tells() {
 }
 
 #[test]
-fn matrices_of_calculix_give_the_rom_of_the_mesh() {
+fn calculix_matrices_give_the_same_rom_as_the_mesh() {
     let project = ModelProject::new(&[
         "bar.inp",
         "bar.sti",
@@ -153,7 +153,7 @@ fn matrices_of_calculix_give_the_rom_of_the_mesh() {
 }
 
 #[test]
-fn gmsh_sector_has_the_frequencies_of_calculix() {
+fn gmsh_sector_frequencies_match_calculix() {
     let project = ModelProject::new(&["sector.msh"]);
     let line = "reduce sector sector.msh --contact-set TIP --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --young 210e9 --poisson 0.3 --density 7850 --contact-nodes 3 --modes 12 \
@@ -207,7 +207,7 @@ fn an_exported_mesh_is_read_back_to_the_same_frequencies() {
 
 /// Radial flexibility (m/N) in the middle of the tip, on meshes of three kinds: patches do not depend on the elements, nodes do.
 #[test]
-fn patches_of_other_elements_are_as_soft() {
+fn patch_flexibility_is_independent_of_element_type() {
     let kinds = ["hex20", "penta15", "tet10"];
     let files = kinds.map(|kind| format!("blade_{kind}.inp"));
     let project = ModelProject::new(&files.each_ref().map(String::as_str));
@@ -229,7 +229,7 @@ fn patches_of_other_elements_are_as_soft() {
 }
 
 #[test]
-fn effects_of_spin_are_computed_for_a_mesh_of_ones_own() {
+fn spin_effects_are_computed_for_a_user_mesh() {
     let project = ModelProject::new(&["blade_tet10.msh"]);
     let line = "reduce blade blade_tet10.msh --contact-set TIP --clamp-set ROOT --units mm-t-s --material titanium --spin 1500";
     let reported = project.succeed(line);
@@ -240,7 +240,7 @@ fn effects_of_spin_are_computed_for_a_mesh_of_ones_own() {
 }
 
 #[test]
-fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
+fn rejects_invalid_arguments_and_models_with_remedy() {
     let project = ModelProject::new(&["bar.inp", "bar.sti", "bar.mas", "bar.dof", "sector.msh", "blade_hex8.inp"]);
     project.write("empty.inp", "");
     project.write("picture.png", b"\x89PNG");
@@ -292,7 +292,7 @@ fn wrong_command_lines_and_models_are_refused_with_the_remedy() {
 }
 
 #[test]
-fn rigid_body_modes_of_a_free_disk_are_no_reason_to_warn() {
+fn free_disk_rigid_body_modes_cause_no_warning() {
     let project = ModelProject::new(&["sector.msh"]);
     let line = "reduce sector sector.msh --contact-set TIP --clamp-set none --sectors 12 --cyclic-low LOW --cyclic-high HIGH \
                 --units mm-t-s --material steel --contact-nodes 2 --modes 25";
@@ -303,7 +303,7 @@ fn rigid_body_modes_of_a_free_disk_are_no_reason_to_warn() {
 }
 
 #[test]
-fn a_casing_of_ones_own_is_the_casing_that_ships() {
+fn user_casing_mesh_reproduces_the_built_in_casing() {
     let project = ModelProject::new(&[]);
     let common = "--contact-grid 12x2 --modes 20 --fixed-interface-modes 40";
     project.succeed(&format!(
@@ -394,7 +394,7 @@ fn conducts_heat_in_a_casing_mesh_of_the_user() {
 }
 
 #[test]
-fn accepts_contact_node_numbers_and_rejects_wrong_tips_and_axes() {
+fn accepts_node_numbers_and_rejects_invalid_tips_and_axes() {
     let project = ModelProject::new(&["blade_hex8.inp"]);
     let line =
         "reduce blade blade_hex8.inp --clamp-set ROOT --sectors 36 --units mm-t-s --material steel --modes 4 --force";

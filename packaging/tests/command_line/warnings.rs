@@ -76,7 +76,7 @@ fn a_warning_is_silenced_by_its_identifier() {
 
 /// Slips end with an error, unless the scene or the command line says that they are meant; an FMU then says so too.
 #[test]
-fn slips_are_refused_by_every_command_unless_they_are_meant() {
+fn every_command_rejects_suspect_input_unless_accepted() {
     let project = Project::new();
     fs::write(
         project.path("scene.toml"),
@@ -116,7 +116,7 @@ fn slips_are_refused_by_every_command_unless_they_are_meant() {
 }
 
 #[test]
-fn nothing_that_a_terminal_obeys_is_printed() {
+fn control_characters_are_never_printed() {
     let project = Project::new();
     let mut rom = tiprub_format::read_rom(&fs::read(project.path("small.rom.safetensors")).unwrap(), "").unwrap();
     rom.origin = "mass\u{1b}]0;owned\u{7}\u{9b}31m\u{202e}".into();
@@ -146,7 +146,7 @@ fn nothing_that_a_terminal_obeys_is_printed() {
 
 /// What comes up in a run is told beside the warnings of its start, and not among them once more.
 #[test]
-fn what_comes_up_in_a_run_is_told_once() {
+fn run_time_warnings_appear_once() {
     let project = Project::new();
     let path = project.path("small.rom.safetensors");
     let mut rom = tiprub_format::read_rom(&fs::read(&path).unwrap(), "small").unwrap();

@@ -121,7 +121,7 @@ fn dead(page: &Path, target: &str, pages: &BTreeMap<PathBuf, BTreeSet<String>>) 
 }
 
 #[test]
-fn no_link_is_dead() {
+fn guide_has_no_dead_links() {
     let pages: Vec<_> = pages().into_iter().map(|(path, text)| (path, split(&text).0)).collect();
     let known: BTreeMap<_, _> = pages.iter().map(|(path, prose)| (path.clone(), anchors(prose))).collect();
     let (mut wrong, mut count) = (Vec::new(), 0);
@@ -149,7 +149,7 @@ fn no_link_is_dead() {
 
 /// Paths of the sources that the pages name, such as `src/core/src/laws/film.rs`.
 #[test]
-fn no_path_is_dead() {
+fn guide_has_no_dead_paths() {
     let roots = ["src/", "tests/", "fmi/", "packaging/", "modelDescription/", "docs/", ".ci/"];
     let (mut wrong, mut count) = (Vec::new(), 0);
     for (page, text) in pages() {
@@ -216,7 +216,7 @@ fn unknown<'a>(line: &'a str, known: &mut BTreeMap<Vec<&'a str>, BTreeSet<String
 }
 
 #[test]
-fn every_command_shown_is_one() {
+fn every_documented_command_is_valid() {
     let mut shown = Vec::new();
     for (page, text) in pages() {
         let (prose, code) = split(&text);
@@ -250,7 +250,7 @@ pub fn sources(folder: &Path, name: &str) -> String {
 
 /// `cargo test -p PACKAGE --test NAME` and `--example NAME` name what is there.
 #[test]
-fn every_test_and_example_named_is_there() {
+fn every_named_test_and_example_exists() {
     let mut count = 0;
     for (page, text) in pages() {
         let (prose, code) = split(&text);

@@ -41,7 +41,7 @@ fn run_builtin(project: &TempDir, name: &str) -> (serde_json::Value, Vec<String>
 }
 
 #[test]
-fn the_flexible_casing_that_ships_runs_and_heats_its_patches() {
+fn built_in_flexible_casing_runs_and_heats_its_patches() {
     let project = tempfile::tempdir().unwrap();
     let (last, names, rows) = run_builtin(&project, "builtin:flexible-casing");
     let column = |name: &str| names.iter().position(|other| other == name).unwrap_or_else(|| panic!("{name}"));
@@ -62,7 +62,7 @@ fn the_flexible_casing_that_ships_runs_and_heats_its_patches() {
 }
 
 #[test]
-fn the_abradable_casing_that_ships_wears_and_does_not_heal() {
+fn built_in_abradable_casing_wears_irreversibly() {
     let project = tempfile::tempdir().unwrap();
     let (last, names, rows) = run_builtin(&project, "builtin:abradable");
     let cells: Vec<usize> =
@@ -78,7 +78,7 @@ fn the_abradable_casing_that_ships_wears_and_does_not_heal() {
 }
 
 #[test]
-fn inspect_tells_what_a_scene_that_ships_adds() {
+fn inspect_lists_the_features_of_a_built_in_scene() {
     let project = tempfile::tempdir().unwrap();
     let text = succeed(&project, &["inspect", "builtin:flexible-casing", "--quiet"]);
     for part in [

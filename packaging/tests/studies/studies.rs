@@ -34,7 +34,7 @@ fn columns(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
 /// The branch of engine order 4 leans far above its crossing with the first mode. Linear theory does not place it, the motion
 /// is not all multiples of the casing's two lobes and not all steady: these three statements are answered with no.
 #[test]
-fn the_quick_interaction_map_sees_the_branch_lean() {
+fn quick_interaction_map_shows_the_leaning_branch() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
     let arguments = ["study", "map", "scene.toml", "--quick", "--json", "--quiet", "--out", "out"];
@@ -79,7 +79,7 @@ fn the_quick_interaction_map_sees_the_branch_lean() {
 
 /// The cheapest of a scene, and two schemes that meet.
 #[test]
-fn the_quick_study_of_errors_takes_any_scene() {
+fn quick_error_study_accepts_any_scene() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
     // Contact nodes do not know how wide the tip is.
@@ -113,7 +113,7 @@ fn the_quick_study_of_errors_takes_any_scene() {
 
 /// Its tolerance is what is refined, beside the steps of other schemes; each is held against the limit of its own equations.
 #[test]
-fn a_scene_that_goes_by_a_tolerance_is_studied_like_others() {
+fn error_study_supports_adaptive_scenes() {
     let root = tempfile::tempdir().unwrap();
     let scene = around("builtin:rotor37-paper")
         .replace("step = 1.0e-6 ", "step = 8.0e-5 ")
@@ -266,7 +266,7 @@ fn three_steps(root: &Path, [friction, speed, step]: [f64; 3], method: &str) -> 
 /// Every answer of the study is that of a run with the same start values and step, and the largest accepted steps part what is accepted
 /// from what is refused.
 #[test]
-fn the_study_of_stability_answers_as_runs_do() {
+fn stability_study_agrees_with_runs() {
     let root = tempfile::tempdir().unwrap();
     own_scene(root.path());
     let json = stability(root.path(), "own.toml");
@@ -419,7 +419,7 @@ fn convergence_study_reports_what_it_cannot_refine() {
 
 /// Just below the limit of central differences, models with more modes or nodes are refused.
 #[test]
-fn a_direction_whose_models_are_refused_takes_half_the_step() {
+fn rejected_refinements_are_repeated_with_half_the_step() {
     let root = tempfile::tempdir().unwrap();
     own_scene(root.path());
     let scene = fs::read_to_string(root.path().join("own.toml")).unwrap();
@@ -441,7 +441,7 @@ fn a_direction_whose_models_are_refused_takes_half_the_step() {
 
 /// Two other meshes of the blade tell where the sequence goes; the ROM that is written with it tells whoever runs it.
 #[test]
-fn what_the_mesh_leaves_is_found_and_goes_with_the_rom() {
+fn mesh_error_is_estimated_and_stored_in_the_rom() {
     let root = tempfile::tempdir().unwrap();
     own_scene(root.path());
     for mesh in ["4x1x6", "8x1x12"] {
@@ -489,7 +489,7 @@ fn what_the_mesh_leaves_is_found_and_goes_with_the_rom() {
 }
 
 #[test]
-fn the_study_of_convergence_refuses_another_mesh() {
+fn convergence_study_rejects_a_different_mesh() {
     let root = tempfile::tempdir().unwrap();
     own_scene(root.path());
     let refuse = |more: &[&str], code: i32| {
@@ -508,7 +508,7 @@ fn the_study_of_convergence_refuses_another_mesh() {
 
 /// Told at once: nothing is reduced for it, and no directory stays.
 #[test]
-fn what_a_study_cannot_do_is_told_before_the_work() {
+fn rejects_unsupported_studies_before_running() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("file"), "").unwrap();
     let refuse = |arguments: &[&str], code: i32| {
@@ -534,7 +534,7 @@ fn what_a_study_cannot_do_is_told_before_the_work() {
 }
 
 #[test]
-fn built_in_models_are_reduced_once_unless_asked_otherwise() {
+fn built_in_models_are_cached_unless_disabled() {
     let root = tempfile::tempdir().unwrap();
     let kept = root.path().join("kept");
     let kept = kept.to_str().unwrap();

@@ -23,7 +23,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn interior_minimum_is_that_of_the_polynomial() {
+    fn interior_minimum_matches_sampled_polynomial() {
         let mut found = 0;
         for case in 0..400_u32 {
             // Straight lines and parabolas among them.

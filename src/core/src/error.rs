@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_lose_the_rounding_of_sums() {
+    fn shown_times_hide_accumulated_rounding() {
         for (time, text) in [
             (0.0007400000000000001, "0.00074"),
             (1_000_000.000_000_1, "1.0000000000001e6"),
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_short_and_read_back() {
+    fn numbers_are_short_and_round_trip() {
         for (value, text) in [
             (0.0, "0"),
             (-0.25, "-0.25"),

@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_that_cross_are_told_from_lines_that_overlap() {
+    fn distinguishes_crossing_from_overlapping_lines() {
         let straight = [[0.0, 0.0], [0.3, 0.1]];
         assert!(!crosses_neighbour(&straight, 0.1));
         let folded = [[0.0, 0.0], [0.3, 0.05], [0.0, 0.1]];

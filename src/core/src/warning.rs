@@ -272,7 +272,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn identifiers_are_unique_words_that_are_found_again() {
+    fn identifiers_are_unique_and_round_trip() {
         for (index, topic) in Topic::ALL.iter().enumerate() {
             let id = topic.id();
             assert!(id.chars().all(|letter| letter.is_ascii_lowercase() || letter == '-'), "{id}");
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn the_name_of_a_structure_stands_before_the_problem() {
+    fn structure_name_precedes_the_problem() {
         let warning = Warning::new(Topic::Sticking, "too slow", "turn faster").named("front");
         assert_eq!(warning.lines(), &["front: too slow".to_owned(), "turn faster".to_owned()]);
         assert_eq!(warning.logged(), "[sticking] front: too slow. turn faster");

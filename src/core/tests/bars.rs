@@ -96,7 +96,7 @@ fn collide(elements: usize, scheme: Scheme, solver: Solver) -> BarRun {
 }
 
 #[test]
-fn two_bars_meet_and_part_as_plane_waves_say() {
+fn impact_of_two_bars_matches_plane_wave_solution() {
     let exact = carpenter::exact();
     let [touch, release] = [exact.touch, exact.release].map(|time| 1e6 * time);
     print_row!("| exact | | {:.1} | {touch:.2} | {release:.2} | {:.4} | 0 |", exact.force, exact.impulse);

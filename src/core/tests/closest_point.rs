@@ -34,7 +34,7 @@ fn found(projection: Projection) -> (ClosestPoint, [f64; 3], [f64; 3], f64) {
 }
 
 #[test]
-fn the_closest_point_is_found_from_anywhere_around() {
+fn finds_the_closest_point_from_any_start() {
     let mut random = SeededRandom(6);
     for (name, casing) in [("round", round as CasingShape), ("conical", conical), ("lobed", lobed)] {
         for (around, along) in [(36, 5), (72, 3), (7, 4), (12, 2)] {
@@ -113,7 +113,7 @@ fn no_sampled_point_is_closer() {
 }
 
 #[test]
-fn the_seam_of_a_smooth_surface_is_no_special_place() {
+fn seam_of_a_smooth_surface_has_no_effect() {
     let around = 36;
     let surface = spline(&data(around, 5, conical), around, 5);
     let mut at = place(around - 2, 2, 0.5, 0.3);
@@ -135,7 +135,7 @@ fn the_seam_of_a_smooth_surface_is_no_special_place() {
 }
 
 #[test]
-fn starts_on_the_opposite_side_lead_back() {
+fn projection_started_on_opposite_side_converges() {
     let grids = [4, 36, 500].map(|around| [(around, round as CasingShape), (around, conical)]);
     for ((around, casing), (closure, interpolation)) in
         grids.into_iter().flatten().flat_map(|grid| KINDS.map(|kind| (grid, kind)))
@@ -171,7 +171,7 @@ fn finds_the_closer_side_of_a_kinked_seam() {
 }
 
 #[test]
-fn a_corner_on_an_inner_ring_of_facets_is_no_edge() {
+fn inner_ring_corner_of_facets_is_not_an_edge() {
     let points = data(12, 3, |_, z| RADIUS - 5.0 * z * z);
     let surface = SurfaceSpline::new(&points, 12, 3, Closure::Smooth, Interpolation::Facets).unwrap();
     let corner = surface.evaluate(place(3, 1, 0.0, 0.0)).point;
@@ -185,7 +185,7 @@ fn a_corner_on_an_inner_ring_of_facets_is_no_edge() {
 }
 
 #[test]
-fn node_finds_the_surface_within_its_extension_only() {
+fn projection_succeeds_only_within_the_axial_extension() {
     for (closure, interpolation) in KINDS {
         let points = data(36, 3, conical);
         let surface = SurfaceSpline::new(&points, 36, 3, closure, interpolation).unwrap();
@@ -225,7 +225,7 @@ fn node_finds_the_surface_within_its_extension_only() {
 }
 
 #[test]
-fn facets_meet_a_node_on_the_flat_and_at_corners() {
+fn facets_project_to_flats_and_corners() {
     let around = 12;
     let facets = |radius: CasingShape| {
         let points = data(around, 3, radius);
@@ -267,7 +267,7 @@ fn facets_meet_a_node_on_the_flat_and_at_corners() {
 }
 
 #[test]
-fn places_from_angle_and_axial_position_are_near() {
+fn initial_guess_from_angle_and_axial_position_is_close() {
     for (surface, _) in every_surface() {
         let mut random = SeededRandom(10);
         for _ in 0..100 {
@@ -290,7 +290,7 @@ fn places_from_angle_and_axial_position_are_near() {
 }
 
 #[test]
-fn hopeless_nodes_are_lost_without_panic() {
+fn unprojectable_nodes_are_reported_without_panic() {
     for (surface, _) in every_surface() {
         let start = place(0, 0, 0.5, 0.5);
         for x in [[f64::NAN, 0.0, 0.0], [0.1, f64::INFINITY, 0.0], [0.1, 0.1, f64::NEG_INFINITY]] {
@@ -371,7 +371,7 @@ fn facets_kick_a_sliding_node_and_splines_do_not() {
 }
 
 #[test]
-fn nothing_but_construction_allocates() {
+fn allocates_only_during_construction() {
     for (mut surface, points) in every_surface() {
         let mut values = points.clone();
         let mut random = SeededRandom(12);

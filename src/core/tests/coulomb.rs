@@ -166,7 +166,7 @@ fn random_problem(lcg: &mut Lcg, contacts: usize, kind: usize) -> (DMatrix<f64>,
 }
 
 #[test]
-fn random_problems_are_all_solved() {
+fn solves_all_random_problems() {
     let (mut lcg, mut reported) = (Lcg(20), 0.0_f64);
     for case in 0..1000 {
         let (kind, contacts) = (case % 8, 1 + lcg.below(30));
@@ -253,7 +253,7 @@ fn next_step_starts_from_the_last() {
 }
 
 #[test]
-fn without_friction_it_is_the_complementarity_problem() {
+fn zero_friction_gives_the_linear_complementarity_problem() {
     for (contacts, seed) in [(3, 1), (12, 2), (48, 3), (168, 4)] {
         let (w, free) = blades_in_casing(contacts, seed);
         let mut coulomb = solver(&w, &free, &vec![0.0; contacts]);
@@ -272,7 +272,7 @@ fn without_friction_it_is_the_complementarity_problem() {
 }
 
 #[test]
-fn coincident_nodes_carry_the_load_of_one() {
+fn coincident_nodes_carry_the_load_of_a_single_node() {
     let (block, displacement) = blades_in_casing(3, 1022);
     let single = |friction: f64| {
         let mut one = solver(&block.view((0, 0), (3, 3)).into_owned(), &displacement[..3], &[friction]);
@@ -293,7 +293,7 @@ fn coincident_nodes_carry_the_load_of_one() {
 }
 
 #[test]
-fn hopeless_problems_end_finite_and_unsolved() {
+fn unsolvable_problems_end_finite_and_unsolved() {
     // A wall against a wall: no flexibility, and a penetration.
     let mut rigid = solver(&DMatrix::zeros(6, 6), &[-1e-6, 0.0, 0.0, 1e-6, 0.0, 0.0], &[0.5; 2]);
     let outcome = rigid.solve(2);
@@ -324,7 +324,7 @@ fn hopeless_problems_end_finite_and_unsolved() {
 }
 
 #[test]
-fn only_the_leading_block_counts() {
+fn solver_uses_only_the_leading_block() {
     let (w, free) = blades_in_casing(12, 5);
     let mut exact = solver(&w, &free, &[0.4; 12]);
     let mut roomy = CoulombSolver::new(30);
@@ -341,7 +341,7 @@ fn only_the_leading_block_counts() {
 }
 
 #[test]
-fn units_do_not_matter() {
+fn solution_is_independent_of_units() {
     // Lengths and forces scaled by powers of two: W 2^-16 to 2^10 times, hence 1e-14 to 1e-6 m/N.
     let (w, free) = blades_in_casing(12, 6);
     let mut plain = solver(&w, &free, &[0.7; 12]);
@@ -382,7 +382,7 @@ fn solving_does_not_allocate() {
 
 /// Blades are stiffer along than across, and casings sideways hardly yield: the law holds as well as elsewhere.
 #[test]
-fn contacts_that_hardly_yield_sideways_are_solved() {
+fn solves_contacts_with_small_tangential_flexibility() {
     let mut lcg = Lcg(31);
     for case in 0..200 {
         let (contacts, stiff) = (1 + lcg.below(12), 10.0_f64.powi(-1 - case % 6));

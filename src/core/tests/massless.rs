@@ -116,7 +116,7 @@ fn pressed(damping_ratio: f64, share: f64) -> (f64, f64) {
 
 /// Above the limit that is computed closed contact grows without bound, below it stays.
 #[test]
-fn closed_contact_is_stable_up_to_the_limit_and_not_beyond() {
+fn closed_contact_is_stable_only_up_to_the_limit() {
     let (stable, unstable) = (pressed(0.0, 0.8).0, pressed(0.0, 1.1).0);
     print_row!("largest energy {stable:.1e} J below, {unstable:.1e} J above");
     assert!(unstable > 1e3 * stable && pressed(0.05, 0.7).1 < 1e-9 && pressed(0.05, 1.05).1 > 1e-3);
@@ -125,7 +125,7 @@ fn closed_contact_is_stable_up_to_the_limit_and_not_beyond() {
 /// One mode with inertia on the residual flexibility of a node: q⁺ = (1 + β − S)q − βq⁻ with S = κ + c K. Damping lowers β, and
 /// with it the S up to which both roots stay within the unit circle.
 #[test]
-fn damping_is_part_of_the_limit() {
+fn step_limit_accounts_for_damping() {
     let (frequency, fixed) = (2e4, 5e4);
     for damping_ratio in [0.0, 0.1, 0.3, 0.6] {
         let model = ModalModel {
@@ -167,7 +167,7 @@ fn joined(frequencies: [f64; 2], seen: [f64; 2], step: f64) -> f64 {
 
 /// Soft or stiff against the master, hardly seen or more than it: below the limit no step is unstable, and a little above one is.
 #[test]
-fn a_flexible_slave_is_part_of_the_limit() {
+fn step_limit_accounts_for_slave_flexibility() {
     for (own, slave) in [(0.3, 0.05), (0.5, 1e-3), (0.5, 0.5), (0.7, 1.5), (0.3, 4.0), (0.3, 20.0)] {
         for seen in [0.03, 0.3, 1.0, 3.0] {
             let model = |frequencies: Vec<f64>, shapes: [f64; 4], quasi_static: usize| ModalModel {
@@ -224,7 +224,7 @@ fn dragged(step: f64, solver: Solver) -> (System, f64) {
 }
 
 #[test]
-fn friction_opposes_sliding_however_short_the_step_is() {
+fn friction_opposes_sliding_for_any_step_length() {
     for solver in [Solver::Lcp, Solver::Film] {
         // By its forces the node stands 1e-5 m and more away from where it would be without: 10 m/s at the first of these steps.
         let ends = [1e-6, 1e-7, 1e-8].map(|step| {

@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_short() {
+    fn tick_labels_are_short() {
         let ticks = [0.0, 0.30000000000000004, -1500.0, 2e-7, 1e6, -0.25].map(tick);
         assert_eq!(ticks, ["0", "0.3", "-1500", "2e-7", "1e6", "-0.25"]);
     }

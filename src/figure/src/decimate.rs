@@ -27,7 +27,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn peaks_ends_and_order_survive() {
+    fn decimation_keeps_peaks_ends_and_order() {
         let mut points: Vec<(f64, f64)> = (0..100_000).map(|i| (f64::from(i), (f64::from(i) * 1e-3).sin())).collect();
         points[31_415].1 = 50.0;
         points[77_777].1 = -40.0;

@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn nearer_faces_are_drawn_later_and_stay_inside_the_frame() {
+    fn nearer_faces_are_drawn_last_and_inside_the_frame() {
         let surface = two_squares();
         // From above: the radial direction (x) points towards the observer.
         let view = ViewPoint::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
@@ -346,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_turned_away_are_not_drawn() {
+    fn back_faces_are_not_drawn() {
         let mut surface = two_squares();
         surface.faces[1].reverse();
         let view = ViewPoint::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);

@@ -361,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_legend_takes_several_lines_within_the_picture() {
+    fn long_legend_wraps_within_the_picture() {
         let line =
             |index: u32| Series::line(format!("a method with a long name {index}"), vec![(0.0, 1.0), (1.0, 2.0)]);
         let plot = Plot::new("x", "y", (0..7).map(line).collect());
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_data_are_drawn_too() {
+    fn plots_degenerate_data() {
         for points in [vec![], vec![(0.0, 0.0)], vec![(1.0, f64::NAN), (2.0, 3.0)], vec![(0.0, 7.0), (1.0, 7.0)]] {
             for logarithmic in [false, true] {
                 let plot = Plot { logarithmic, ..Plot::new("x", "y", vec![Series::line("a", points.clone())]) };

@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_forms_hold_every_cell() {
+    fn markdown_and_html_contain_every_cell() {
         let mut table = Table::new("errors < 1", ["method", "error"]);
         table.rows.push(vec!["film".into(), "1e-3".into()]);
         assert_eq!(table.to_markdown(), "errors < 1\n\n| method | error |\n|---|---|\n| film | 1e-3 |\n");

@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_light_touch_is_seen_and_the_largest_is_strongest() {
+    fn short_contacts_are_visible_and_largest_force_is_strongest() {
         let mut values = vec![0.0; 4000];
         (values[2001], values[3000]) = (0.5, 940.0);
         let mut map = map(Shows::Largest, values);
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn small_clearances_are_strong_and_rounding_below_zero_is_zero() {
+    fn small_clearances_are_strong_and_negative_rounding_is_zero() {
         let map = map(Shows::Smallest, vec![-3e-16, 50.0, 100.0, 400.0]);
         let range = map.range();
         assert_eq!(range.map(f64::to_bits), [0.0, 400.0].map(f64::to_bits));
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_maps_are_drawn_too() {
+    fn draws_degenerate_maps() {
         for values in [vec![], vec![0.0], vec![f64::NAN; 3], vec![-1.0; 3]] {
             let mut map = map(Shows::Largest, values.clone());
             map.rows[1].1.clone_from(&values);

@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_files_are_read_and_only_up_to_a_size() {
+    fn reads_only_regular_files_up_to_the_size_limit() {
         let here = Path::new(env!("CARGO_MANIFEST_DIR"));
         let manifest = here.join("Cargo.toml");
         let bytes = read_file(&manifest, 1 << 20).unwrap();

@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slips_are_recognised_and_strangers_are_not() {
+    fn suggests_typos_but_not_unrelated_names() {
         let names = ["gap", "friction", "sector_gaps", "master", "slave"];
         assert_eq!(closest("gpa", names), Some("gap"));
         assert_eq!(closest("Sector-Gaps", names), Some("sector_gaps"));

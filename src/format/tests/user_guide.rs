@@ -55,7 +55,7 @@ fn keys(scene: &SceneSettings) -> BTreeSet<String> {
 }
 
 #[test]
-fn the_list_of_keys_is_that_of_the_settings() {
+fn documented_keys_match_the_settings() {
     let mut scene = common::complete_scene();
     let mut found = keys(&scene);
     for shape in [
@@ -87,7 +87,7 @@ fn the_list_of_keys_is_that_of_the_settings() {
 
 /// Every identifier of a warning can be looked up.
 #[test]
-fn the_list_of_warnings_is_that_of_the_core() {
+fn documented_warnings_match_the_core() {
     let mut text = String::from("\n| identifier | meaning | what to do |\n|---|---|---|\n");
     for topic in tiprub_core::warning::Topic::ALL {
         let _ = writeln!(text, "| `{}` | {} | {} |", topic.id(), topic.meaning(), topic.remedy());
@@ -112,7 +112,7 @@ fn least() -> String {
 }
 
 #[test]
-fn keys_with_a_default_may_be_left_out_and_the_others_not() {
+fn only_keys_with_a_default_are_optional() {
     let text = least();
     parse_scene(&text, "least").unwrap();
     let outer = |field: &&SceneField| !field.table().contains('.');
@@ -146,7 +146,7 @@ fn the_chapter_on_scenes_lists_every_key() {
 }
 
 #[test]
-fn the_chapter_on_scenes_lists_what_needs_or_excludes_what() {
+fn scene_chapter_lists_all_dependencies_and_conflicts() {
     let mut text = String::from("| what | needs or excludes | because | remedy |\n|---|---|---|---|\n");
     for rule in rules::all() {
         let _ = writeln!(text, "| {} |", rule.columns().join(" | "));
@@ -155,7 +155,7 @@ fn the_chapter_on_scenes_lists_what_needs_or_excludes_what() {
 }
 
 #[test]
-fn the_example_of_the_chapter_on_scenes_is_a_scene() {
+fn example_in_scene_chapter_is_a_valid_scene() {
     let chapter = fs::read_to_string(chapter("scene-file.md")).unwrap();
     let example = chapter.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     let scene = parse_scene(example, "example").unwrap();
@@ -203,7 +203,7 @@ fn all_examples() -> Vec<(String, String)> {
 
 /// A whole scene has a name, and is a scene. Else it is what a scene can add: to the first one of the chapter on scenes.
 #[test]
-fn every_example_of_the_guide_makes_a_scene() {
+fn every_example_in_the_guide_is_a_valid_scene() {
     let base = examples(&fs::read_to_string(chapter("scene-file.md")).unwrap()).remove(0);
     let settings = parse_scene(&base, "base").unwrap();
     let base: toml::Table = toml::from_str(&base).unwrap();
@@ -252,7 +252,7 @@ fn the_chapter_on_roms_lists_arrays_and_metadata() {
 
 /// The file was written by running the first Python example of the chapter (safetensors 0.8.0, NumPy 2.4.6).
 #[test]
-fn the_file_that_the_python_example_writes_is_a_rom() {
+fn python_example_writes_a_valid_rom() {
     let bytes = include_bytes!("data/written_by_python.rom.safetensors");
     let rom = read_rom(bytes, "written_by_python").unwrap();
     assert_eq!((rom.name.as_str(), rom.sectors, rom.frame), ("blade", 12, DisplacementFrame::Cylindrical));

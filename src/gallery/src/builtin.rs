@@ -314,7 +314,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn models_are_refined_by_name() {
+    fn refines_built_in_models_by_name() {
         let console = Console::new(true, false);
         let with = |modes: f64| ModelVariant { modes, tip: TipContact::Nodes(0), mesh: 1.0 };
         let off = RomCache::off();
@@ -328,7 +328,7 @@ mod tests {
 
     /// Every other mesh is one: its nodes grow with the factor, and a factor of 1 is the mesh that ships.
     #[test]
-    fn other_meshes_are_coarser_and_finer() {
+    fn mesh_factor_scales_the_node_count() {
         for name in [ROTOR37, ROTOR37_PAPER] {
             let own = rotor37(name).unwrap().mesh;
             assert_eq!(rotor37_mesh(own, 1.0), own, "{name}");

@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_is_made_once_per_name_and_options() {
+    fn model_is_reduced_once_per_name_and_options() {
         let bench = Bench::new();
         for (name, stiffness, made) in
             [("a", 1.0, 1), ("a", 1.0, 1), ("a", 1.0 + f64::EPSILON, 2), ("b", 1.0, 3), ("a", 1.0, 3), ("b", 1.0, 3)]
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_happened_to_a_file_the_model_is_right() {
+    fn damaged_cache_files_never_give_a_wrong_model() {
         let bench = Bench::new();
         bench.get("a", 1.0);
         let path = &bench.files()[0];
@@ -275,7 +275,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_pipe_in_place_of_a_kept_model_is_not_waited_for() {
+    fn named_pipe_in_the_cache_does_not_block() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join(format!("a-{}.rom", &key("a", &1)[..32]));
         assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn old_versions_go_and_other_models_stay() {
+    fn old_versions_are_removed_and_other_models_kept() {
         let bench = Bench::new();
         bench.get("a-fine", 0.5);
         for version in 0..KEPT + 3 {
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn off_keeps_nothing() {
+    fn disabled_cache_still_returns_the_model() {
         let made = RomCache::off().get("a", &1, &Console::new(true, false), &|| Ok(rom(1.0)));
         assert_eq!(made, Ok(rom(1.0)));
     }

@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn every_embedded_scene_is_valid_and_made_of_embedded_models() {
+    fn embedded_scenes_are_valid_and_use_embedded_models() {
         for (name, text) in BUILTIN_SCENES {
             let settings = tiprub_format::parse_scene(text, name).unwrap();
             assert!(settings.structures.iter().all(|structure| structure.rom.starts_with(BUILTIN)), "{name}");
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn scene_and_model_of_one_name_belong_together() {
+    fn scene_uses_the_model_of_the_same_name() {
         let shared = ["rotor37", "rotor37-one-row", "rotor37-paper", "stage", "stage-nodes"];
         for name in shared {
             let (_, text) = BUILTIN_SCENES.iter().find(|(scene, _)| *scene == name).unwrap();
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_is_refused_is_found_in_the_scene() {
+    fn rejected_step_is_located_in_the_scene_file() {
         let failure = |remedy: &str| Failure::new("scene `a`", "refused: too long", remedy);
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("scene.toml");
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_scene_names_line_and_field() {
+    fn invalid_scene_reports_line_and_field() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("scene.toml");
         fs::write(&path, ROTOR37_SCENE.replace("gap = ", "gapp = ")).unwrap();

@@ -41,7 +41,7 @@ fn numbers(line: &str) -> Vec<usize> {
 }
 
 #[test]
-fn a_calculix_file_holds_the_mesh_again() {
+fn calculix_file_reproduces_the_mesh() {
     let ring = ring_mesh(
         &RingGeometry {
             contour: InnerContour::new(&[[-0.02, 0.3], [0.02, 0.29]]).unwrap(),
@@ -130,7 +130,7 @@ fn reals(text: &str, name: &str) -> Vec<f64> {
 }
 
 #[test]
-fn a_vtk_file_holds_mesh_sets_and_fields() {
+fn vtk_file_contains_mesh_sets_and_fields() {
     let mesh = coarse();
     let heights: Vec<f64> = mesh.nodes.iter().map(|node| node[2]).collect();
     let shape: Vec<[Complex<f64>; 3]> = mesh.nodes.iter().map(|node| node.map(|x| Complex::new(x, 2.0 * x))).collect();
@@ -162,7 +162,7 @@ fn a_vtk_file_holds_mesh_sets_and_fields() {
 }
 
 #[test]
-fn fields_that_do_not_fit_are_refused() {
+fn rejects_invalid_nodal_fields() {
     let mesh = coarse();
     let count = mesh.nodes.len();
     let short = NodalField { name: "short".into(), values: Values::Vectors(vec![[0.0; 3]; count - 1]) };

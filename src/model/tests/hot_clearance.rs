@@ -110,7 +110,7 @@ fn clearance(scene: &Scene, speed: f64, [rotor, casing]: [f64; 2]) -> f64 {
 }
 
 #[test]
-fn the_hot_running_clearance_is_that_of_the_closed_forms() {
+fn hot_running_clearance_matches_closed_form() {
     let (casing, casing_expansion) = ring();
     let scene = scene(bar(12, ReductionKind::FixedInterface), casing);
     let material = metal();
@@ -144,7 +144,7 @@ fn the_hot_running_clearance_is_that_of_the_closed_forms() {
 /// Whatever modes a reduction keeps, free expansion at the contact nodes is that of the mesh, which comes to the closed form: static
 /// responses to forces there are among them.
 #[test]
-fn both_reductions_expand_as_the_mesh_does() {
+fn both_reductions_reproduce_thermal_expansion_of_the_mesh() {
     let expected = metal().expansion * 100.0 * (TIP - ROOT);
     for (elements, tolerance) in [(3, 1e-3), (12, 1e-6)] {
         let kinds = [ReductionKind::FixedInterface, ReductionKind::FreeInterface];
@@ -165,7 +165,7 @@ fn both_reductions_expand_as_the_mesh_does() {
 /// A bar that turns and is warm is pulled by what stands outside: σ = ρΩ²(b² − x²)/2, whatever heat leaves of its stiffness, and with few
 /// modes too. The modes alone say a constant, since an end force is what they resolve.
 #[test]
-fn the_stress_of_a_hot_turning_bar_is_that_of_its_pull() {
+fn stress_of_hot_rotating_bar_matches_closed_form() {
     let root = metal().density * SPEED * SPEED * (TIP * TIP - ROOT * ROOT) / 2.0;
     for (kind, softening, factor) in
         [(ReductionKind::FixedInterface, 0.0, 1.0), (ReductionKind::FreeInterface, 3e-4, 1.1)]

@@ -107,7 +107,7 @@ fn assert_fit(stations: &[Station], what: &str) {
 }
 
 #[test]
-fn fit_is_within_two_hundredths_of_a_millimetre_of_the_sample() {
+fn fit_is_within_20_micrometres_of_the_sample() {
     let stations = sample();
     assert_eq!(stations.len(), 12 * 17);
     assert_fit(&stations, "thinned table");
@@ -135,7 +135,7 @@ fn detects_a_displaced_blade() {
 /// Area inside the outline (shoelace) against the area of the mesh's cross-section: the flat ends keep it to 0.1 %.
 /// Ending the mesh at the arcs' centres would lose 0.3 %.
 #[test]
-fn mesh_volume_is_that_of_the_rounded_sections() {
+fn mesh_volume_matches_rounded_sections() {
     let areas: Vec<f64> = sections()
         .iter()
         .map(|section| {
@@ -157,7 +157,7 @@ fn mesh_volume_is_that_of_the_rounded_sections() {
 }
 
 #[test]
-fn mesh_is_sound_and_its_surface_closed() {
+fn mesh_is_valid_and_surface_is_closed() {
     let counts = MeshCounts::default();
     let blade = blade_mesh(counts).unwrap();
     blade.mesh.validate().unwrap();
@@ -238,7 +238,7 @@ fn default_reduction() -> &'static Reduction {
 }
 
 #[test]
-fn default_blade_agrees_with_calculix_and_its_reduction_with_it() {
+fn default_blade_and_its_reduction_agree_with_calculix() {
     let reduction = default_reduction();
     let mesh = reduction.mesh.as_ref().unwrap();
     assert_eq!((mesh.nodes.len(), mesh.elements.len()), (3813, 640), "the mesh of the reference");
@@ -310,7 +310,7 @@ fn exported_file_is_complete_or_absent() {
 }
 
 #[test]
-fn the_rom_has_the_same_bits_on_any_number_of_threads() {
+fn rom_is_bit_identical_for_any_thread_count() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| reduce_rotor37(&Rotor37Options::paper(), &silent)).unwrap().rom

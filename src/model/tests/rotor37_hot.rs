@@ -74,7 +74,7 @@ fn clearances(rom: &Rom, stiffening: bool, [speed, temperature, softening]: [f64
 }
 
 #[test]
-fn the_hot_running_clearance_of_rotor37_is_that_of_calculix() {
+fn hot_running_clearance_of_rotor37_matches_calculix() {
     let rom = reduced();
     for (analysis, stiffening) in ANALYSES {
         for (state, of) in STATES {

@@ -153,7 +153,7 @@ fn the_reduced_model_under_spin_agrees_with_calculix() {
 
 /// Unit forces on the contact nodes: the reduced model yields as the full one does about the same spinning state.
 #[test]
-fn contact_nodes_yield_under_spin_as_in_the_full_model() {
+fn contact_compliance_under_spin_matches_full_model() {
     let (blade, rom) = (full(), &reduced().rom);
     let spin = rom.extras.spin.as_ref().unwrap();
     let nodes = [103, 1927, 3751].map(|number: usize| number - 1);
@@ -182,7 +182,7 @@ fn contact_nodes_yield_under_spin_as_in_the_full_model() {
 /// small, since the blade hardly moves across its flat sides, and sensitive to the shapes: 20 component modes of the
 /// default mesh leave 6 % of the largest, 80 leave 0.2 %, 1 % on the mesh of this test.
 #[test]
-fn coriolis_couples_the_modes_as_in_the_full_model() {
+fn coriolis_coupling_matches_full_model() {
     let mesh = COARSE;
     let options = Rotor37Options { mesh, modes: 80, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
     let (blade, rom) = (SpinBlade::new(mesh), reduce_rotor37(&options, &silent).unwrap().rom);
@@ -203,7 +203,7 @@ fn coriolis_couples_the_modes_as_in_the_full_model() {
 /// Campbell table: frequencies over the speed rise by stress stiffness; the Coriolis force shifts them little, more the
 /// faster it turns, and not at rest.
 #[test]
-fn the_campbell_table_rises_and_coriolis_shifts_it_little() {
+fn campbell_table_rises_and_coriolis_shift_is_small() {
     let rom = &reduced().rom;
     println!("rad/s   without Coriolis (Hz)                      with (Hz)");
     let mut before: Option<Vec<f64>> = None;
@@ -220,7 +220,7 @@ fn the_campbell_table_rises_and_coriolis_shifts_it_little() {
 }
 
 #[test]
-fn the_checks_that_come_with_the_blade_hold() {
+fn built_in_blade_passes_its_spin_checks() {
     let reduction = reduced();
     assert_eq!(reduction.rom.order(), 29, "spin costs no coordinates");
     reduction.rom.validate().unwrap();
@@ -248,7 +248,7 @@ fn the_checks_that_come_with_the_blade_hold() {
 }
 
 #[test]
-fn the_spin_arrays_have_the_same_bits_on_any_number_of_threads() {
+fn spin_arrays_are_bit_identical_for_any_thread_count() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let options = Rotor37Options { mesh: COARSE, spin: Some(DESIGN_SPEED), ..Rotor37Options::paper() };
@@ -266,7 +266,7 @@ const COARSE: MeshCounts = MeshCounts { chord: 8, thickness: 1, span: 10 };
 /// Named cases in which an earlier way to align the modes failed: more contact nodes, other numbers of modes; on a mesh with
 /// two fifths of the elements.
 #[test]
-fn other_reductions_hold_as_well() {
+fn spin_checks_pass_for_other_reductions() {
     use ReductionKind::{FixedInterface, FreeInterface};
     for (tip, kind, modes) in [
         (TipContact::Patches(5), FixedInterface, 20),

@@ -47,7 +47,7 @@ pub fn exact() -> Exact {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn published_figures() {
+    fn exact_solution_matches_published_values() {
         // Figures as stated for this benchmark: 133,452.9 N, 49.46 µs, 148.39 µs, 13.203 N·s, 33.906 J.
         let exact = super::exact();
         assert!((exact.force - 133_452.9).abs() < 1.0, "{}", exact.force);

@@ -29,7 +29,7 @@ fn the_bouncing_bar_solves_the_wave_equation_in_every_phase() {
 }
 
 #[test]
-fn the_bouncing_bar_keeps_its_energy_and_its_phases_join() {
+fn bouncing_bar_conserves_energy_and_is_continuous() {
     for time in [0.5, 1.2, 1.5, 2.0, 3.0, 3.9, 4.2, 5.0] {
         let (dt, dx, mut energy) = (1e-4, 0.025, 0.0);
         for i in 0..400 {
@@ -52,7 +52,7 @@ fn the_bouncing_bar_keeps_its_energy_and_its_phases_join() {
 }
 
 #[test]
-fn the_ground_takes_the_momentum_of_the_bouncing_bar() {
+fn contact_impulse_matches_momentum_of_the_bouncing_bar() {
     for [from, to] in bar::CONTACTS {
         let steps = 100_000;
         let dt = (to - from) / f64::from(steps);
@@ -92,7 +92,7 @@ fn bouncing_error(n: usize) -> f64 {
 }
 
 #[test]
-fn the_papers_algorithm_converges_to_the_bouncing_bar() {
+fn paper_algorithm_converges_to_bouncing_bar_solution() {
     let errors = [25, 50, 100].map(bouncing_error);
     println!("largest error of the bottom with 25, 50, 100 elements: {errors:.3?} m of {} m", bar::HEIGHT);
     assert!(errors[2] < 0.6 * errors[1] && errors[1] < 0.75 * errors[0], "{errors:?}");
@@ -161,7 +161,7 @@ fn the_block_on_the_belt_follows_its_equation_of_motion() {
 }
 
 #[test]
-fn roots_of_the_cantilever_and_its_frequency_by_finite_elements() {
+fn cantilever_roots_match_finite_element_frequency() {
     for (n, root) in [(1, 1.8751), (2, 4.6941), (3, 7.8548)] {
         assert!((cantilever_root(n) - root).abs() < 5e-5, "root {n}: {}", cantilever_root(n));
     }

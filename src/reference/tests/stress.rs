@@ -19,7 +19,7 @@ fn recorded() -> Vec<StressRow> {
 /// Displacements are CalculiX's, and so is the stress of these displacements at the points of reduced integration, carried to the nodes by its
 /// code. What it makes of the 27 points of its own bricks is another reading of the same field.
 #[test]
-fn stress_of_a_pushed_blade_is_that_of_calculix() {
+fn stress_of_loaded_blade_matches_calculix() {
     let blade = PushedBlade::new().unwrap();
     let reported = blade.unit_stresses().unwrap();
     let rows = recorded();

@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_terminal_would_obey_is_shown_instead() {
+    fn control_characters_are_escaped() {
         assert!(matches!(printable("36 Schaufeln, µ = 0.15\n\tso"), Cow::Borrowed(_)));
         assert_eq!(printable("a\u{1b}[31m\u{7}b\rc\u{9b}d\u{202e}"), "a\\u{1b}[31m\\u{7}b\\u{d}c\\u{9b}d\\u{202e}");
         let json = serde_json::json!({ "name": "a\u{1b}\u{7f}\u{9b}\u{202e}b\n" });

@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn each_is_found_with_its_first_time() {
+    fn reports_each_extreme_with_its_first_time() {
         let names = ["clearance_minimum", "normal_force_peak", "normal_impulse", "contact_count"];
         let rows: [&[f64]; 4] =
             [&[1e-3, 0.0, 0.0, 0.0], &[1.234_567e-5, 30.0, 4.0, 2.0], &[0.0, 80.0, 3.0, 5.0], &[0.0, 20.0, 4.0, 5.0]];
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_recorded_is_not_told_and_nothing_is_no_event() {
+    fn omits_unrecorded_extremes_and_times_of_zero_values() {
         let found = extremes(&recording(&["normal_impulse", "torque"], &[&[0.0, 1.0], &[0.0, 2.0]]));
         assert_eq!(found.len(), 1);
         assert!(found[0].line().ends_with("communication step: 0 N"), "{}", found[0].line());

@@ -129,14 +129,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_is_what_problem_remedy() {
+    fn text_has_subject_problem_and_remedy() {
         let failure = Failure::new("a.toml", "no such field `gapp`", "Did you mean `gap`?");
         assert_eq!(failure.to_string(), "a.toml: no such field `gapp`. Did you mean `gap`?");
         assert_eq!(Failure::from_below("x.fmu", "truncated.").to_string(), "x.fmu: truncated.");
     }
 
     #[test]
-    fn another_place_is_proposed_for_what_is_written_alone() {
+    fn proposes_another_location_only_for_write_failures() {
         let denied = std::io::Error::from(std::io::ErrorKind::PermissionDenied);
         let remedy = |doing| Failure::file(Path::new("a.so"), doing, &denied).remedy;
         assert_eq!(remedy("cannot be read"), "Check the permissions");

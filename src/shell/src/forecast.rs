@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rest_follows_what_was_measured() {
+    fn remaining_time_follows_measured_speed() {
         let mut ledger = WorkPlan::new(1.0);
         ledger.plan(0, 10.0);
         ledger.plan(1, 10.0);
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn forecasts_have_few_digits() {
+    fn forecasts_are_rounded_to_few_digits() {
         assert_eq!([3.0, 61.0, 200.0, 9000.0].map(duration), ["10 s", "70 s", "4 min", "2.5 h"]);
     }
 }

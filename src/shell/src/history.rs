@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_linear_between_rows_and_rest_outside() {
+    fn columns_are_interpolated_linearly_and_held_outside() {
         let history = parsed("\u{feff}time, a,b\r\n0.5,1,-1\r\n1.5,3,-1\r\n2,0,1e3\r\n").unwrap();
         let at = |time: f64| [history.at(0, time), history.at(1, time)];
         for (time, expected) in [
@@ -266,7 +266,7 @@ mod tests {
 
     /// Names that are compared with each other would take 10 s here.
     #[test]
-    fn a_hundred_thousand_columns_are_read_in_no_time() {
+    fn reads_a_hundred_thousand_columns_quickly() {
         let names = (0..100_000).map(|column| format!(",n{column}")).collect::<String>();
         let clock = std::time::Instant::now();
         let history = parsed(&format!("time{names}\n0{}\n", ",1".repeat(100_000))).unwrap();
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_line() {
+    fn errors_report_their_line() {
         for (text, reported) in [
             ("", "its first line \"\" is not a header"),
             ("t,a\n0,1\n", "its first line \"t,a\" is not a header"),

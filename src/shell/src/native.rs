@@ -232,14 +232,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_near_miss_is_suggested_and_a_far_one_lists_all() {
+    fn suggests_similar_name_or_lists_all_names() {
         let names = ["speed", "friction_coefficient"];
         assert_eq!(suggestion("sped", &names), "Did you mean `speed`?");
         assert_eq!(suggestion("xyz", &names), "Inputs and parameters are: speed, friction_coefficient");
     }
 
     #[test]
-    fn a_list_fills_an_array_of_its_length_alone() {
+    fn list_must_match_array_length() {
         assert_eq!(texts("heat", "3.5", None).unwrap(), ["3.5"]);
         assert_eq!(texts("heat", "3.5", Some(2)).unwrap(), ["3.5", "3.5"]);
         assert_eq!(texts("heat", "[1, -2e3]", Some(2)).unwrap(), ["1", "-2e3"]);
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_values_say_what_is_wanted() {
+    fn invalid_values_report_the_expected_type() {
         let failure = number::<f64>("--set speed=fast", "fast").unwrap_err();
         assert_eq!(
             failure.to_string(),

@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn one_file_under_two_names_is_found_whatever_the_names() {
+    fn recognises_one_file_under_different_names() {
         let root = tempfile::tempdir().unwrap();
         let root = root.path();
         fs::create_dir(root.join("a")).unwrap();
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn an_open_file_is_the_file() {
+    fn recognises_a_file_by_its_descriptor_path() {
         use std::os::fd::AsRawFd;
         let root = tempfile::tempdir().unwrap();
         let file = fs::File::create(root.path().join("x")).unwrap();

@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn comparison_sees_a_single_bit_and_the_sign_of_zero() {
+    fn comparison_detects_a_single_bit_and_the_sign_of_zero() {
         let one = sample();
         assert!(one.compare(&one).unwrap().is_exact());
         let mut two = one.clone();
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_beyond_the_memory_is_refused_with_its_size() {
+    fn rejects_table_larger_than_memory_with_its_size() {
         let names = || vec!["clearance".to_owned(); 185];
         for (rows, size) in [(50_000_001, "74.4 GB"), (usize::MAX, "GB")] {
             let failure = Recording::with_columns(names(), rows).unwrap_err();
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_holds_the_same_text() {
+    fn csv_file_equals_csv_text() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("x.csv");
         sample().write_csv(&path).unwrap();

@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_counted_not_accumulated() {
+    fn times_are_multiples_of_the_step_without_accumulation() {
         let schedule = schedule(0.0, 1.0, 0.1);
         assert_eq!(schedule.count, 10);
         assert_eq!(schedule.time(3).to_bits(), (3.0_f64 * 0.1).to_bits());
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_does_not_divide_ends_with_a_shorter_one() {
+    fn last_step_is_shortened_to_reach_the_stop_time() {
         let schedule = schedule(2.0, 2.25, 0.1);
         assert_eq!(schedule.count, 3);
         assert_eq!(schedule.time(3).to_bits(), 2.25_f64.to_bits());
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_times_name_the_option_or_the_field() {
+    fn invalid_times_name_the_option_or_field() {
         let experiment = ExperimentSettings { start: 0.0, stop: 1.0, communication_step: 1e-3 };
         let stop = Schedule::new(&experiment, Some(-1.0), None).unwrap_err();
         assert_eq!((stop.what.as_str(), stop.usage), ("--stop", true));

@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn results_come_in_order_and_progress_counts_all() {
+    fn results_keep_order_and_progress_counts_all_items() {
         let items: Vec<u64> = (0..100).collect();
         for threads in [1, 2, 7, 1000] {
             let seen = Cell::new(0);
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failure_stops_the_rest_and_is_told() {
+    fn failure_stops_the_sweep_and_is_returned() {
         let items: Vec<usize> = (0..1000).collect();
         let tried = AtomicUsize::new(0);
         let work = |item: &usize| {

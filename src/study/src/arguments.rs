@@ -284,7 +284,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn transients_that_never_end_are_refused() {
+    fn rejects_invalid_or_excessive_transients() {
         assert_eq!(transient("0"), Ok(0));
         for wrong in ["1000001", "18446744073709551616", "-1", ""] {
             assert!(transient(wrong).is_err(), "{wrong}");

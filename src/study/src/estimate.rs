@@ -287,7 +287,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_rest_of_a_power_is_its_sum_and_of_none_unknown() {
+    fn remaining_error_of_a_power_law_is_extrapolated() {
         // Values 1 + h^p at h = 4, 2, 1: what is left at 1 is 1.
         for order in [1.0, 2.0, 3.5_f64] {
             let value = |level: f64| level.powf(order);
@@ -303,14 +303,14 @@ mod tests {
     }
 
     #[test]
-    fn a_line_tells_what_is_known() {
+    fn error_line_lists_known_and_unknown_estimates() {
         let of = |direction, left| Estimate { direction, left: Ok(left), found_on: None };
         let all = [of("steps", 1.2e-3), Estimate::unknown("mesh", "no other")];
         assert_eq!(errors_text(&all), "estimated error of the displacements: steps 0.12 %, mesh unknown");
     }
 
     #[test]
-    fn what_is_not_known_here_is_what_the_rom_says() {
+    fn uses_error_estimates_stored_in_the_rom() {
         let mesh = MeshCounts { chord: 2, thickness: 1, span: 2 };
         let options = Rotor37Options { mesh, tip: TipContact::Nodes(2), modes: 2, ..Rotor37Options::paper() };
         let mut rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;

@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn verdicts_are_told() {
+    fn statements_print_their_verdict() {
         let yes = Statement::tested("a", true, "b");
         assert_eq!(
             [yes.verdict(), Statement::tested("a", false, "b").verdict(), Statement::remark("a", "b").verdict()],

@@ -43,7 +43,7 @@ fn date(seconds: u64) -> String {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn days_have_their_dates() {
+    fn converts_seconds_to_calendar_dates() {
         for (seconds, date) in [
             (0, "1970-01-01"),
             (951_782_400, "2000-02-29"),

@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn functions_are_their_integrals_near_zero_and_far_from_it() {
+    fn phi_functions_match_their_integrals() {
         for x in [0.0, -1e-12, -1e-3, -0.4, -0.999, -1.0, -1.001, -3.0, -40.0, 0.1] {
             let Phi(phi) = Phi::new(x);
             assert!((phi[0] - f64::exp(x)).abs() < 4e-16, "{x}");
@@ -78,7 +78,7 @@ mod tests {
 
     /// The integral is that of a value found by fine steps of another kind.
     #[test]
-    fn the_integral_belongs_to_the_value() {
+    fn integral_and_end_value_match_closed_form() {
         let (rate, length, start, load, change) = (3.0, 0.7, 2.0, -1.0, 5.0);
         let [end, integral] = Phi::new(-rate * length).step(length, start, load, change);
         // d/dt: x(H) − x(0) = −λ∫x + ∫load.

@@ -117,7 +117,7 @@ fn runge_kutta(
 }
 
 #[test]
-fn one_long_step_is_what_runge_kutta_finds_in_many() {
+fn one_long_step_matches_many_runge_kutta_steps() {
     let model = model();
     let mut simulation = warm();
     let heat = [5.0, -2.0, 40.0];
@@ -138,7 +138,7 @@ fn one_long_step_is_what_runge_kutta_finds_in_many() {
 
 /// The same inputs over time in steps of other lengths: the same temperatures and heats, to rounding.
 #[test]
-fn steps_of_any_length_lead_to_the_same() {
+fn result_is_independent_of_step_length() {
     let run = |count: u32| {
         let mut simulation = warm();
         set(&mut simulation, "casing_heat", 7.0);
@@ -171,7 +171,7 @@ fn steps_of_any_length_lead_to_the_same() {
 }
 
 #[test]
-fn a_derivative_given_is_a_ramp_whatever_the_interpolation() {
+fn input_derivative_gives_a_ramp_for_every_interpolation() {
     let run = |choice: i32| {
         let mut simulation = ThermalSimulation::new(model()).unwrap();
         let interpolation = reference(&simulation, "input_interpolation");
@@ -197,7 +197,7 @@ fn a_derivative_given_is_a_ramp_whatever_the_interpolation() {
 
 /// Heat flows by another road: film coefficient times the difference of temperatures, by Simpson's rule over short steps.
 #[test]
-fn heat_from_gas_and_air_is_what_their_films_let_through() {
+fn convective_heat_equals_film_conductance_times_difference() {
     let (model, mut simulation) = (model(), warm());
     let flow = |simulation: &ThermalSimulation| {
         ["gas_heat", "ambient_heat"].map(|name| simulation.output_derivative(reference(simulation, name), 1).unwrap())
@@ -229,7 +229,7 @@ fn heat_from_gas_and_air_is_what_their_films_let_through() {
 }
 
 #[test]
-fn derivatives_over_a_step_are_differences_exactly() {
+fn step_derivatives_equal_finite_differences() {
     let mut simulation = warm();
     simulation.do_step(0.0, 3.0).unwrap();
     let mut state = vec![0; simulation.state_size()];
@@ -277,7 +277,7 @@ fn derivatives_over_a_step_are_differences_exactly() {
 }
 
 #[test]
-fn output_derivatives_are_rates() {
+fn output_derivatives_are_time_derivatives() {
     let mut simulation = warm();
     set(&mut simulation, "casing_heat", 30.0);
     simulation.do_step(0.0, 2.0).unwrap();
@@ -337,7 +337,7 @@ fn saved_states_and_resets_give_the_same_bits() {
 }
 
 #[test]
-fn steady_starts_stay_and_need_cooling() {
+fn steady_start_stays_steady_and_requires_cooling() {
     let mut simulation = ThermalSimulation::new(model()).unwrap();
     let choice = reference(&simulation, "initial_state");
     simulation.set_integer(choice, 2).unwrap();
@@ -358,7 +358,7 @@ fn steady_starts_stay_and_need_cooling() {
 
 /// Without any film heat stays: what is supplied is stored.
 #[test]
-fn a_casing_that_nothing_cools_keeps_its_heat() {
+fn uncooled_casing_keeps_its_heat() {
     let mut simulation = ThermalSimulation::new(model()).unwrap();
     set(&mut simulation, "gas_convection_factor", 0.0);
     set(&mut simulation, "ambient_convection_factor", 0.0);
@@ -370,7 +370,7 @@ fn a_casing_that_nothing_cools_keeps_its_heat() {
 }
 
 #[test]
-fn what_means_nothing_is_refused() {
+fn rejects_invalid_inputs_and_steps() {
     let mut simulation = warm();
     let heat = reference(&simulation, "casing_heat");
     for (reference, value) in [

@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn options_of_another_study_are_refused() {
+    fn rejects_options_of_another_study() {
         for (line, right) in [
             ("modes --speed 900", true),
             ("stage --speeds 400:900:3 --threads 1", true),

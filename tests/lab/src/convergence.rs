@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_is_reached_where_it_is_kept_from_then_on() {
+    fn criterion_counts_only_if_satisfied_from_then_on() {
         let rows = rows();
         // One component mode alone is good by chance: two are worse again.
         assert_eq!(CRITERIA[0].enough(&rows).unwrap().modes, 3);
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn pairs_and_rises_are_seen() {
+    fn detects_broken_mode_pairs_and_rising_errors() {
         let rows = rows();
         // One family of 56 blades: nodal diameters 0, 1, 1, 2, 2, ... 28.
         let order: Vec<usize> = (0..56_usize).map(|mode| mode.div_ceil(2)).collect();
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_hold_what_they_show() {
+    fn figures_contain_the_data_they_show() {
         let rows = rows();
         let figure = CRITERIA[0].figure(&rows);
         assert_eq!(figure.sheet.rows.len(), 5 * 56);

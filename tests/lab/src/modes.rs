@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_order_of_a_nodal_diameter_is_found() {
+    fn finds_the_nearest_engine_order_of_a_nodal_diameter() {
         // 10 turns a second, 12 sectors: n = 2 is excited by the orders 2, 10, 14, 22 ...
         assert_eq!(nearest_order(2, 95.0, 10.0, 12), Some(10));
         assert_eq!(nearest_order(2, 130.0, 10.0, 12), Some(14));
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn the_diagram_holds_all_modes_and_both_kinds_of_dots() {
+    fn diagram_contains_all_modes_and_both_kinds_of_dots() {
         let diameters: Vec<_> = (0..=6).map(|number| chain(number, 12)).collect();
         let figure = diagram(&diameters, 12, 62.831_853_071_795_86).unwrap();
         assert_eq!(figure.sheet.rows.len(), 14);
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shape_is_shown_at_its_largest() {
+    fn mode_shape_is_shown_at_maximum_displacement() {
         let complex = nalgebra::Complex::new;
         let zero = complex(0.0, 0.0);
         let shape = [[complex(0.0, 2.0), zero, zero], [complex(1.0, 0.0), zero, zero]];

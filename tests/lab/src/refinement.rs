@@ -437,7 +437,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_stage_is_refined_as_it_ships_and_with_nodes() {
+    fn refines_the_built_in_stage_with_patches_and_nodes() {
         let all = standards().unwrap();
         let of = |name: &str| all.iter().find(|standard| standard.name == name).unwrap();
         let friction = |name: &str| of(name).settings.contacts[0].friction.to_bits();

@@ -89,7 +89,7 @@ fn a_sticking_block_converges_to_its_closed_form() {
 }
 
 #[test]
-fn film_levels_off_in_a_rub_where_lcp_converges() {
+fn film_error_stagnates_where_lcp_converges() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), &["rotor37-paper-light"]);
     let scene = &json["results"]["scenes"][0];
@@ -110,7 +110,7 @@ fn film_levels_off_in_a_rub_where_lcp_converges() {
 }
 
 #[test]
-fn the_cube_comes_nearer_to_the_full_model_with_steps_and_modes() {
+fn cube_converges_to_full_model_with_steps_and_modes() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), &["cube"]);
     let scene = &json["results"]["scenes"][0];
@@ -127,7 +127,7 @@ fn the_cube_comes_nearer_to_the_full_model_with_steps_and_modes() {
 }
 
 #[test]
-fn adaptive_steps_converge_faster_than_the_papers_method() {
+fn adaptive_steps_converge_faster_than_the_paper_method() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), &["rotor37-light"]);
     let scene = &json["results"]["scenes"][0];

@@ -19,7 +19,7 @@ fn random(arguments: &[&str], code: i32) -> Value {
 }
 
 #[test]
-fn oracles_hold_in_300_random_scenes() {
+fn all_invariants_hold_in_300_random_scenes() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("out");
     random(&["--scenes", "300", "--seed", "1", "--fmu", "5", "--out", out.to_str().unwrap()], 0);
@@ -53,13 +53,13 @@ fn a_scene_follows_from_its_seed_alone() {
 
 /// Massless nodes of a free body that swing between the points of the shortest steps: such steps miss the tolerance, and are counted.
 #[test]
-fn gaps_between_the_points_of_shortest_steps_keep_the_tolerance() {
+fn gaps_within_shortest_steps_respect_the_tolerance() {
     random(&["--only", "3119184997545909494", "--fmu", "0"], 0);
 }
 
 /// Blades that turn slowly in their cut: the force of the cut would feed them.
 #[test]
-fn cutting_that_feeds_tips_ends_a_run_by_name() {
+fn cutting_that_adds_energy_ends_the_run_with_reason() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("out");
     let found = random(&["--only", "12103802028229366479", "--fmu", "0", "--out", out.to_str().unwrap()], 0);

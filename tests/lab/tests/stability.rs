@@ -18,7 +18,7 @@ fn stability(root: &Path, arguments: &[&str], code: i32) -> Value {
 }
 
 #[test]
-fn every_quick_case_is_right_or_refused() {
+fn every_quick_case_is_correct_or_rejected() {
     let root = tempfile::tempdir().unwrap();
     let json = stability(root.path(), &["--quick"], 0);
     for row in json["rows"].as_array().unwrap() {
@@ -53,7 +53,7 @@ fn every_family_meets_galerkin(methods: &[Value]) {
 }
 
 #[test]
-fn the_judge_sees_every_way_to_fail() {
+fn judge_detects_every_kind_of_failure() {
     let root = tempfile::tempdir().unwrap();
     // What is not sound is a failure of the command, with the table written all the same.
     let failure = stability(root.path(), &["--case", "judge/"], 1);
@@ -113,7 +113,7 @@ fn the_judge_sees_every_way_to_fail() {
 
 /// Whatever would fail after an hour of cases fails before the first, and leaves nothing.
 #[test]
-fn wrong_places_for_results_are_told_before_the_first_case() {
+fn rejects_invalid_result_paths_before_the_first_case() {
     let root = tempfile::tempdir().unwrap();
     let path = |name: &str| root.path().join(name);
     std::fs::write(path("file"), "").unwrap();

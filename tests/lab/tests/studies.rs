@@ -112,7 +112,7 @@ fn quick_stage_study_separates_rigid_and_flexible_casings() {
 
 /// The first 0.2 ms: two rows of nodes touch. Statements hold, and the numbers are those of methods that are near and not equal.
 #[test]
-fn the_quick_study_of_the_cube_meets_independent_methods() {
+fn quick_cube_study_agrees_with_independent_methods() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "cube", &[]);
     only_no(&json, &[]);
@@ -168,7 +168,7 @@ fn quick_conjugacy_study_finds_agreement() {
 
 /// Ways and steps of all four inputs; the table of the guide has a row of each run.
 #[test]
-fn the_quick_study_of_inputs_tells_ramps_from_hammers() {
+fn quick_input_study_shows_impacts_only_for_held_inputs() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "inputs", &[]);
     let force = |input: &str, way: &str, step: usize| {
@@ -190,7 +190,7 @@ fn the_quick_study_of_inputs_tells_ramps_from_hammers() {
 }
 
 #[test]
-fn quick_coupling_study_needs_derivatives_without_mass() {
+fn quick_coupling_study_requires_derivatives_without_mass() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "coupling", &[]);
     only_no(&json, &[]);
@@ -216,7 +216,7 @@ fn quick_coupling_study_needs_derivatives_without_mass() {
 
 /// The blade dips into the coating, which wears; statements hold, and depths are of the size of the closing.
 #[test]
-fn the_quick_study_of_wear_counts_lobes_beside_vibrations() {
+fn quick_wear_study_counts_lobes_and_vibrations() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "wear", &[]);
     only_no(&json, &[]);
@@ -235,7 +235,7 @@ fn the_quick_study_of_wear_counts_lobes_beside_vibrations() {
 
 /// Told at once: nothing is reduced for it, and no directory stays.
 #[test]
-fn what_a_study_cannot_do_is_told_before_the_work() {
+fn rejects_unsupported_studies_before_running() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("file"), "").unwrap();
     let refuse = |arguments: &[&str], code: i32| {
@@ -275,7 +275,7 @@ fn studies_named(page: &str) -> impl Iterator<Item = &str> {
 }
 
 #[test]
-fn the_quick_study_of_estimates_meets_the_truth() {
+fn quick_estimate_study_matches_true_errors() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "estimates", &[]);
     only_no(&json, &[]);
@@ -292,7 +292,7 @@ fn the_quick_study_of_estimates_meets_the_truth() {
 /// The full model, which nothing was reduced of, and the product on reduced models: with the same contact they are one, with another they
 /// are not. Three patches on this coarse mesh are too few to be better than three nodes.
 #[test]
-fn the_quick_study_of_the_witness_meets_reduced_models() {
+fn quick_witness_study_matches_reduced_models() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "witness", &[]);
     only_no(&json, &["The default model is closer"]);
@@ -312,7 +312,7 @@ fn the_quick_study_of_the_witness_meets_reduced_models() {
 
 /// Stress of the full model under the same contact forces comes back as modes are added, faster than in a rub where time steps differ too.
 #[test]
-fn the_quick_study_of_stress_recovers_that_of_the_full_model() {
+fn quick_stress_study_recovers_full_model_stress() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "stress", &[]);
     only_no(&json, &[]);
@@ -333,7 +333,7 @@ fn the_quick_study_of_stress_recovers_that_of_the_full_model() {
 /// Blades of different clearances and frequencies, bumps that begin elsewhere, a cylinder: own geometry, modes, contact and steps agree. What
 /// the witness does not know it says.
 #[test]
-fn any_scene_of_blades_meets_a_witness_of_its_own() {
+fn independent_witness_agrees_with_any_blade_scene() {
     let root = tempfile::tempdir().unwrap();
     let list =
         |value: &dyn Fn(i32) -> f64| (0..36).map(|blade| format!("{:e}", value(blade))).collect::<Vec<_>>().join(", ");
@@ -366,7 +366,7 @@ fn any_scene_of_blades_meets_a_witness_of_its_own() {
 }
 
 #[test]
-fn the_quick_study_of_random_rubs_keeps_tolerance_and_energy() {
+fn quick_random_rub_study_meets_tolerance_and_energy_bounds() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "scatter", &[]);
     only_no(&json, &[]);
@@ -391,7 +391,7 @@ fn the_quick_study_of_random_rubs_keeps_tolerance_and_energy() {
 }
 
 #[test]
-fn the_quick_study_of_bases_tells_free_from_held_modes() {
+fn quick_basis_study_compares_free_and_fixed_interface() {
     let root = tempfile::tempdir().unwrap();
     let json = study(root.path(), "bases", &[]);
     only_no(&json, &[]);
@@ -413,7 +413,7 @@ fn the_quick_study_of_bases_tells_free_from_held_modes() {
 }
 
 #[test]
-fn the_guide_names_every_study_and_no_other() {
+fn guide_lists_exactly_the_existing_studies() {
     let root = tempfile::tempdir().unwrap();
     let (help, _) = lab(root.path(), "", &["--help"]);
     let list = help.split_once("\nCommands:\n").unwrap().1.split("\n\n").next().unwrap();
@@ -425,7 +425,7 @@ fn the_guide_names_every_study_and_no_other() {
 }
 
 #[test]
-fn command_lines_that_are_not_understood_are_json_too() {
+fn invalid_command_lines_are_reported_as_json() {
     for (line, what) in [("cube --jsn --json", "--jsn"), ("--json error --scene bar", "--scene"), ("--json", "lab")] {
         let output = Command::new(env!("CARGO_BIN_EXE_lab")).args(line.split(' ')).output().unwrap();
         let error = &serde_json::from_slice::<Value>(&output.stdout).unwrap()["error"];

@@ -177,7 +177,7 @@ fn call2(api: &Fmi2Api, slave: &fmi2::Fmi2TestSlave<'_>, name: &str, known: Call
 }
 
 #[test]
-fn fmi2_pair_by_pair() {
+fn fmi2_call_pairs_respect_the_state_machine() {
     complete(FMI2, FMI2_APART, Fmi2Api::NAMES);
     fmi2_pairs(&subject(false));
     fmi2_pairs(&subject(true));
@@ -334,7 +334,7 @@ unsafe extern "C" fn call_inside<const THERMAL: bool>(
 }
 
 #[test]
-fn fmi3_pair_by_pair() {
+fn fmi3_call_pairs_respect_the_state_machine() {
     complete(FMI3, FMI3_APART, Fmi3Api::NAMES);
     fmi3_pairs::<false>();
     fmi3_pairs::<true>();
@@ -385,7 +385,7 @@ fn fmi3_pairs<const THERMAL: bool>() {
 }
 
 #[test]
-fn after_calls_in_any_order_a_reset_instance_is_as_new() {
+fn reset_after_calls_in_any_order_restores_initial_state() {
     [false, true].into_iter().for_each(|thermal| random_calls(&subject(thermal)));
 }
 
@@ -434,7 +434,7 @@ fn random_calls(subject: &Subject) {
 }
 
 #[test]
-fn versions_and_platform() {
+fn reports_fmi_versions_and_platform() {
     let path = shipped();
     let (two, three) = (fmi2::load(&path), fmi3::load(&path));
     // SAFETY: static texts.

@@ -15,7 +15,7 @@ fn run(program: &str, arguments: &[&str], path: &Path) -> String {
 }
 
 #[test]
-fn exactly_the_functions_of_both_standards() {
+fn library_exports_exactly_the_fmi_functions() {
     assert_eq!((Fmi2Api::NAMES.len(), Fmi3Api::NAMES.len()), (44, 75), "counts of the standards' headers");
     let expected: BTreeSet<_> = Fmi2Api::NAMES.iter().chain(Fmi3Api::NAMES).map(|name| (*name).to_owned()).collect();
     for path in [shipped(), thermal()] {
@@ -30,7 +30,7 @@ fn exactly_the_functions_of_both_standards() {
 }
 
 #[test]
-fn only_the_system_libraries_are_needed() {
+fn library_depends_only_on_system_libraries() {
     [shipped(), thermal()].iter().for_each(|path| needs_only_the_system(path));
 }
 
@@ -53,7 +53,7 @@ fn needs_only_the_system(path: &Path) {
 
 /// The library must not print, start threads, or change process-wide state: it does not even import the means.
 #[test]
-fn nothing_that_prints_forks_or_changes_the_process() {
+fn library_does_not_print_fork_or_change_the_process() {
     [shipped(), thermal()].iter().for_each(|path| imports_no_such_means(path));
 }
 

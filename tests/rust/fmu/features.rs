@@ -23,7 +23,7 @@ fn refused(status: i32, log: &str, reason: &str) {
 const START: [f64; PATCHES] = [3.0, -2.0, 0.5, 7.0];
 
 #[test]
-fn an_array_input_is_set_whole_or_not_at_all() {
+fn array_input_is_set_completely_or_not_at_all() {
     let (path, scene) = (shipped(), warm_scene());
     let (array, speed) = (of(&scene, "casing_temperature"), of(&scene, "speed"));
     let (api, resources) = (fmi3::load(&path), UnpackedResources::of(&scene, true));
@@ -63,7 +63,7 @@ fn an_array_input_is_set_whole_or_not_at_all() {
 }
 
 #[test]
-fn elements_are_scalars_in_fmi2_and_where_fmi3_is_packaged_so() {
+fn array_elements_are_scalars_in_fmi2_and_on_request_in_fmi3() {
     let (path, scene) = (shipped(), warm_scene());
     let array = of(&scene, "casing_temperature");
     let references: Vec<u32> = (array..array + 4).collect();
@@ -136,7 +136,7 @@ const OF_FEATURES: [&str; 25] = [
 ];
 
 #[test]
-fn features_that_are_off_have_no_variables_and_no_data() {
+fn disabled_features_have_no_variables_or_data() {
     let plain = scene();
     let simulation = Simulation::new(&plain).unwrap();
     for name in OF_FEATURES {
@@ -206,7 +206,7 @@ fn packaged_scene_runs_as_unpackaged() {
 
 /// An importer multiplies mean torque and speed, step after step, while the rotor slows down.
 #[test]
-fn mean_torque_times_speed_is_the_work_of_the_shaft() {
+fn mean_torque_times_speed_equals_shaft_work() {
     let (path, mut scene) = (shipped(), scene());
     scene.settings.outputs.energies = true;
     let [speed, torque, work] = ["speed", "torque", "shaft_work"].map(|name| of(&scene, name));

@@ -11,7 +11,7 @@ use tiprub_tests::scene::{UnpackedResources, reference};
 use tiprub_tests::{ERROR, OK, fmi2, fmi3, shipped};
 
 #[test]
-fn loggers() {
+fn log_categories_control_the_logger() {
     let path = shipped();
     let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
     let slave = fmi2::Fmi2TestSlave::new(&api, &resources);
@@ -109,7 +109,7 @@ unsafe extern "C" fn misbehave(
 }
 
 #[test]
-fn an_intermediate_update_cannot_pull_the_rug() {
+fn forbidden_calls_within_intermediate_update_are_rejected() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), UnpackedResources::new(false));
     for early_return in [false, true] {
@@ -170,7 +170,7 @@ struct Shared(*mut c_void);
 unsafe impl Sync for Shared {}
 
 #[test]
-fn two_threads_with_an_instance_each_and_two_on_one() {
+fn threads_use_separate_instances_but_cannot_share_one() {
     let path = shipped();
     let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), UnpackedResources::new(false));
     let references =

@@ -15,7 +15,7 @@ fn text(text: &str) -> Option<CString> {
 }
 
 #[test]
-fn instantiation_of_fmi2_refuses_and_says_why() {
+fn fmi2_instantiation_is_rejected_with_reason() {
     let (api2, resources) = (fmi2::load(&shipped()), UnpackedResources::new(true));
     let empty = tempfile::tempdir().expect("a temporary directory");
     let good = fmi2::Fmi2Arguments::new(&resources);
@@ -58,7 +58,7 @@ fn instantiation_of_fmi2_refuses_and_says_why() {
 }
 
 #[test]
-fn instantiation_of_fmi3_refuses_and_says_why() {
+fn fmi3_instantiation_is_rejected_with_reason() {
     let (api3, resources) = (fmi3::load(&shipped()), UnpackedResources::new(true));
     let good = fmi3::Fmi3Arguments::new(&resources);
     let cases3 = [
@@ -104,7 +104,7 @@ fn other_interfaces(api3: &Fmi3Api) {
 }
 
 #[test]
-fn damaged_resources_are_refused() {
+fn rejects_damaged_resources() {
     let api = fmi2::load(&shipped());
     for (name, content, reason) in [
         ("scene.toml", b"name = \"x\"\nwrong = 1\n".to_vec(), "wrong"),
@@ -138,7 +138,7 @@ fn damaged_resources_are_refused() {
 }
 
 #[test]
-fn a_null_instance_is_refused_everywhere() {
+fn every_function_rejects_a_null_instance() {
     let path = shipped();
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
     let null = std::ptr::null_mut();
@@ -167,7 +167,7 @@ fn a_null_instance_is_refused_everywhere() {
 }
 
 #[test]
-fn arguments_of_get_and_set() {
+fn rejects_invalid_arguments_of_get_and_set() {
     let path = shipped();
     let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
     let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
@@ -233,7 +233,7 @@ fn arguments_of_get_and_set() {
 }
 
 #[test]
-fn arrays_of_fmi3() {
+fn fmi3_array_arguments_are_validated() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), UnpackedResources::new(true));
     let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
@@ -277,7 +277,7 @@ fn arrays_of_fmi3() {
 }
 
 #[test]
-fn texts_enumerations_and_booleans() {
+fn string_enumeration_and_boolean_access_is_validated() {
     let path = shipped();
     let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), UnpackedResources::new(false));
     let simulation = tiprub_core::Simulation::new(&tiprub_tests::scene::scene()).expect("valid");
@@ -318,7 +318,7 @@ fn texts_enumerations_and_booleans() {
 }
 
 #[test]
-fn steps_at_wrong_times_and_of_wrong_sizes() {
+fn rejects_steps_with_wrong_time_or_size() {
     let path = shipped();
     let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
     let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
@@ -382,7 +382,7 @@ fn steps_at_wrong_times_and_of_wrong_sizes() {
 }
 
 #[test]
-fn calls_twice_and_on_the_wrong_version() {
+fn rejects_repeated_calls_and_wrong_version() {
     let path = shipped();
     let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), UnpackedResources::new(false));
     let slave = fmi2::Fmi2TestSlave::initialised(&api2, &resources);

@@ -64,7 +64,7 @@ fn child() {
 }
 
 #[test]
-fn a_forced_panic_leaves_the_host_alive_and_prints_nothing() {
+fn forced_panic_neither_kills_the_host_nor_prints() {
     let path = library("release", &["test-panic"]);
     assert!(path.exists());
     let mut child = Command::new(std::env::current_exe().expect("this binary"));
@@ -80,7 +80,7 @@ fn a_forced_panic_leaves_the_host_alive_and_prints_nothing() {
 }
 
 #[test]
-fn the_shipped_library_steps_by_the_magic_size() {
+fn release_library_ignores_the_panic_test_step_size() {
     let api = fmi2::load(&shipped());
     let slave = fmi2::Fmi2TestSlave::initialised(&api, &UnpackedResources::new(false));
     slave.expect(slave.step(0.0, PANIC));

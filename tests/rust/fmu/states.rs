@@ -50,7 +50,7 @@ fn march_into_contact(slave: &fmi2::Fmi2TestSlave<'_>, references: &[u32]) -> u3
 }
 
 #[test]
-fn save_in_contact_run_restore_run_gives_the_same_bits() {
+fn rerun_from_state_saved_in_contact_is_bit_identical() {
     let api = fmi2::load(&shipped());
     let (resources, references) = (UnpackedResources::new(false), references());
     let slave = fmi2::Fmi2TestSlave::initialised(&api, &resources);
@@ -140,7 +140,7 @@ fn a_thousand_resets_give_the_same_bits() {
 }
 
 #[test]
-fn the_phase_of_life_is_part_of_the_state() {
+fn fmi_phase_is_part_of_the_saved_state() {
     let api = fmi3::load(&shipped());
     let resources = UnpackedResources::new(true);
     let slave = fmi3::Fmi3TestSlave::new(&api, &resources);
@@ -170,7 +170,7 @@ fn the_phase_of_life_is_part_of_the_state() {
 }
 
 #[test]
-fn wrong_damaged_and_foreign_states_are_refused() {
+fn rejects_invalid_damaged_and_foreign_states() {
     let path = shipped();
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
     let (scalars, arrays) = (UnpackedResources::new(false), UnpackedResources::new(true));

@@ -38,7 +38,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
 }
 
 #[test]
-fn both_versions_give_the_bits_of_the_core_with_contact() {
+fn fmi2_and_fmi3_match_the_core_with_contact() {
     let path = shipped();
     let (api2, api3) = (fmi2::load(&path), fmi3::load(&path));
     let resources = UnpackedResources::new(false);
@@ -206,7 +206,7 @@ fn intermediate_updates_see_every_internal_step() {
 }
 
 #[test]
-fn early_return_ends_the_step_where_the_importer_wants() {
+fn early_return_ends_the_step_at_the_requested_time() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), UnpackedResources::new(true));
     let slave = fmi3::Fmi3TestSlave::try_new(&api, &watched(&resources, true)).unwrap_or_else(|log| panic!("{log}"));
@@ -231,7 +231,7 @@ fn early_return_ends_the_step_where_the_importer_wants() {
 }
 
 #[test]
-fn inputs_set_during_intermediate_updates_count_from_there() {
+fn inputs_set_during_intermediate_updates_act_from_then_on() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), UnpackedResources::new(true));
     let core = simulation();
@@ -253,7 +253,7 @@ fn inputs_set_during_intermediate_updates_count_from_there() {
 }
 
 #[test]
-fn the_stop_time_is_respected_with_room_for_rounding() {
+fn stop_time_is_respected_up_to_rounding() {
     let path = shipped();
     let (api, resources) = (fmi2::load(&path), UnpackedResources::new(false));
     let slave = fmi2::Fmi2TestSlave::new(&api, &resources);
@@ -299,7 +299,7 @@ fn values_set_before_initialisation_are_start_values() {
 }
 
 #[test]
-fn steps_of_any_length_are_refused_or_leave_numbers_only() {
+fn steps_of_any_length_are_rejected_or_give_finite_outputs() {
     let path = shipped();
     let (api2, api3, resources) = (fmi2::load(&path), fmi3::load(&path), UnpackedResources::new(false));
     let references = all_reals(&simulation());
@@ -362,7 +362,7 @@ fn rejects_a_scheme_without_modes_reversibly() {
 }
 
 #[test]
-fn what_holds_for_the_step_taken_is_logged_once() {
+fn warnings_of_the_actual_step_are_logged_once() {
     let mut scene = scene();
     // ω_max·h = 2 lies near 6e-5 s.
     scene.settings.contacts[0].friction = 0.0;
@@ -415,7 +415,7 @@ fn whirling() -> tiprub_core::Scene {
 }
 
 #[test]
-fn rejected_values_within_a_step_leave_the_ramps() {
+fn rejected_values_within_a_step_do_not_change_ramps() {
     let path = shipped();
     let (api, resources) = (fmi3::load(&path), UnpackedResources::of(&whirling(), true));
     let core = Simulation::new(&whirling()).expect("the scene is valid");

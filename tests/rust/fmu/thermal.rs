@@ -59,7 +59,7 @@ fn inputs(step: u32) -> ([f64; PATCHES], f64, f64) {
 }
 
 #[test]
-fn both_faces_give_the_bits_of_the_native_simulation() {
+fn fmi2_and_fmi3_match_the_native_simulation() {
     let path = thermal();
     let (two, three) = (fmi2::load(&path), fmi3::load(&path));
     let (heat, factor, reals) = references();
@@ -94,7 +94,7 @@ fn both_faces_give_the_bits_of_the_native_simulation() {
 }
 
 #[test]
-fn states_go_back_go_on_and_go_to_others() {
+fn states_restore_continue_and_transfer_between_instances() {
     let api = fmi2::load(&thermal());
     let (heat, factor, reals) = references();
     let resources = UnpackedResources::of_thermal(&model(), false);
@@ -128,7 +128,7 @@ fn states_go_back_go_on_and_go_to_others() {
 
 /// Steps in which heat does not pass an element: a message of each instance, once, with what to do.
 #[test]
-fn short_steps_are_warned_of_once_through_both_faces() {
+fn short_steps_are_warned_of_once_in_fmi2_and_fmi3() {
     let path = thermal();
     let (two, three) = (fmi2::load(&path), fmi3::load(&path));
     let resources = UnpackedResources::of_thermal(&ConductionModel { element_time: 0.5, ..model() }, false);
@@ -152,7 +152,7 @@ fn short_steps_are_warned_of_once_through_both_faces() {
 
 /// Both libraries in one process, with the resources of the other.
 #[test]
-fn a_library_does_not_take_the_model_of_the_other() {
+fn library_rejects_the_model_of_the_other_library() {
     let (contact, conduction) = (fmi2::load(&shipped()), fmi2::load(&thermal()));
     let (scene, model) = (UnpackedResources::new(false), UnpackedResources::of_thermal(&model(), false));
     let refused = |api, resources: &UnpackedResources| {
@@ -170,7 +170,7 @@ fn a_library_does_not_take_the_model_of_the_other() {
 }
 
 #[test]
-fn derivatives_are_those_of_the_native_simulation() {
+fn derivatives_match_the_native_simulation() {
     let api = fmi2::load(&thermal());
     let (heat, factor, _) = references();
     let resources = UnpackedResources::of_thermal(&model(), false);

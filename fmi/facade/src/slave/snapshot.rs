@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn phases_that_were_never_written_are_refused() {
+    fn rejects_invalid_encoded_phases() {
         let read = |bytes: &[u8]| decode_phase(&mut SnapshotReader(bytes)).is_ok();
         for tag in 0..5 {
             assert!(read(&bytes([tag, 1, 0, 0], 0.25, 1.0)) && read(&bytes([tag, 0, 0, 0], 0.25, 0.0)), "{tag}");

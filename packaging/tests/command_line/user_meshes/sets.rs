@@ -44,7 +44,7 @@ fn warnings(project: &ModelProject, mesh: &str, options: &str) -> String {
 }
 
 #[test]
-fn sets_with_a_part_of_tip_or_root_are_asked_about() {
+fn warns_of_sets_that_cover_only_part_of_tip_or_root() {
     let project = ModelProject::new(&[]);
     let mesh = exported(&project);
     let both = "--contact-set TIP --clamp-set HUB";
@@ -66,7 +66,7 @@ fn sets_with_a_part_of_tip_or_root_are_asked_about() {
 }
 
 #[test]
-fn a_blade_for_the_other_sense_of_rotation_is_asked_about() {
+fn warns_of_blade_staggered_for_opposite_rotation() {
     let project = ModelProject::new(&[]);
     let mesh = exported(&project);
     let right = warnings(&project, &mesh, "--clamp-set HUB");

@@ -8,7 +8,7 @@ use super::{ModelProject, data, guide};
 
 /// Patches over the whole tip of an exported mesh: those of the blade itself; a scene runs with them.
 #[test]
-fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
+fn user_mesh_patches_match_the_built_in_blade() {
     let project = ModelProject::new(&[]);
     let own = project
         .succeed("reduce rotor37 --mesh 6x1x6 --inp blade.inp --contact-patches 4 --contact-rows 1 --modes 20 -o own.rom.safetensors");
@@ -57,7 +57,7 @@ fn patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
 
 /// Rows of patches across the thickness of an exported mesh: those of the blade itself, with a row in every name and their number in the ROM.
 #[test]
-fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
+fn user_mesh_patch_rows_match_the_built_in_blade() {
     let project = ModelProject::new(&[]);
     let line = "reduce rotor37 --mesh 6x2x4 --inp blade.inp --contact-patches 4 --contact-rows 2 --modes 20 -o own.rom.safetensors";
     let own = project.succeed(line);
@@ -126,7 +126,7 @@ fn rows_of_patches_of_a_mesh_of_ones_own_are_those_of_the_blade() {
 
 /// The tip is found where no set names it: the nodes of the set TIP, of every kind of element; five patches, free-interface modes.
 #[test]
-fn the_tip_of_a_mesh_is_found_and_told() {
+fn finds_and_reports_the_tip_of_a_mesh() {
     let files = [
         "blade_tet10.inp",
         "blade_hex20.inp",
@@ -174,7 +174,7 @@ fn the_tip_of_a_mesh_is_found_and_told() {
 
 /// Contact at points is warned of where the mesh could carry more, and at one place always.
 #[test]
-fn contact_at_points_of_a_fine_tip_is_warned_of() {
+fn warns_of_point_contact_on_a_fine_tip() {
     let project = ModelProject::new(&["blade_hex20.inp", "bar.inp", "blade_tet10.msh"]);
     let warned = |line: &str| -> String {
         let common = "--units mm-t-s --material titanium --modes 4 --clamp-set ROOT --force -o w.rom.safetensors";
@@ -240,7 +240,7 @@ fn two_blades(farther_in: f64) -> String {
 
 /// A second surface as far out is told of, one well inside is not; the tip is that of one blade. The texts are those of the guide.
 #[test]
-fn a_second_surface_as_far_out_is_told_of() {
+fn reports_a_second_surface_at_the_tip_radius() {
     let project = ModelProject::new(&[]);
     let reduce = |farther_in: f64| -> Value {
         project.write("two.inp", two_blades(farther_in));
@@ -268,7 +268,7 @@ fn a_second_surface_as_far_out_is_told_of() {
 
 /// Of a sector the tip is found as well, and both kinds take patches; static flexibility at them is one.
 #[test]
-fn a_sector_has_patches_of_both_kinds() {
+fn both_reduction_kinds_support_patches_on_a_sector() {
     let project = ModelProject::new(&["sector.msh"]);
     let line = "reduce sector sector.msh --clamp-set BORE --sectors 12 --cyclic-low LOW --cyclic-high HIGH --units mm-t-s --material steel \
                 --modes 6";

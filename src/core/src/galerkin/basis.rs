@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_projection_keeps_moments_and_lower_degrees() {
+    fn projection_preserves_moments_and_lower_degrees() {
         for degree in 1..=MOST {
             let basis = TimeBasis::new(degree);
             for i in 0..=degree {
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_of_lower_degrees_is_nothing() {
+    fn omitted_term_vanishes_for_lower_degrees() {
         for degree in 1..=MOST {
             let basis = TimeBasis::new(degree);
             for power in 0..=degree {

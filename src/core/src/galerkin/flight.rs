@@ -87,7 +87,7 @@ mod tests {
 
     /// Against the matrix exponential, and energy at long times, where that overflows.
     #[test]
-    fn it_is_what_the_steps_do() {
+    fn flight_propagation_matches_the_step_response() {
         for (frequency, ratio) in [(4e3, 0.0), (5e3, 0.005), (3e3, 0.3), (8e2, 0.99), (0.0, 0.0)] {
             let (swing, response) = (Swing::new(frequency, ratio, 7e-4), ModalResponse::new(frequency, ratio, 7e-4));
             let scale: f64 = if frequency == 0.0 { 1.0 } else { frequency };

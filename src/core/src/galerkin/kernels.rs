@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn sums_of_columns_are_those_sums_with_every_instruction_set() {
+    fn column_sums_are_correct_with_every_instruction_set() {
         let (stride, columns) = (5 * PADDED, [3, 0, 7, 7, 2]);
         let (table, coefficients) = (numbers(8 * stride), [numbers(5), numbers(9)[4..].to_vec()]);
         let run = |instructions: InstructionSet| {
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_without_forces_and_columns_are_projections() {
+    fn force_free_gaps_and_columns_are_normal_projections() {
         let width = 2 * PADDED;
         let (parts, normals) = ([0, 1, 2].map(|i| numbers(3 * width + i)[i..].to_vec()), numbers(3 * width));
         let run = |instructions: InstructionSet| {

@@ -225,7 +225,7 @@ mod tests {
 
     /// All combinations of closed points of one node have one solution, with as little residual flexibility as degree 3 is taken for.
     #[test]
-    fn contact_problems_of_the_degree_taken_are_solvable() {
+    fn selected_degree_gives_solvable_contact_problems() {
         let (frequency, mut threes) = (1e4, 0);
         for place in 1..=84 {
             let step = 0.1 * f64::from(place) / frequency;

@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_response_is_that_of_the_equation() {
+    fn modal_response_satisfies_the_equation_of_motion() {
         for (frequency, ratio) in [(0.0, 0.0), (1.0, 0.02), (3e4, 0.0), (4e4, 0.01), (9e5, 0.005)] {
             let step = 4e-5;
             let response = ModalResponse::new(frequency, ratio, step);
@@ -180,7 +180,7 @@ mod tests {
 
     /// ΔE = ∫p q̇ − loss, with the work told by the points.
     #[test]
-    fn energy_is_what_the_force_puts_in_less_the_loss() {
+    fn energy_change_equals_work_minus_loss() {
         let mut worst: f64 = 0.0;
         for degree in 1..=MOST {
             let basis = TimeBasis::new(degree);

@@ -182,7 +182,7 @@ mod tests {
 
     /// Decaying vibration stays within reach, and without damping goes there.
     #[test]
-    fn free_motion_goes_as_far_as_its_reach_and_no_farther() {
+    fn free_motion_bound_is_valid_and_tight() {
         let mut random = SeededRandom(6);
         for case in 0..200 {
             let ratio = random.of(&[0.0, 0.02, 0.3, 0.7]);

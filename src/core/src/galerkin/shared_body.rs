@@ -319,7 +319,7 @@ mod tests {
     /// Forces at the points do the work Σ p_i S_ik q_k on a body; kept as energy or lost to damping to round-off. And steps of any
     /// length go where those half as long go, if forces are polynomials.
     #[test]
-    fn work_on_a_body_is_its_energy_and_what_damping_takes() {
+    fn work_on_body_equals_stored_plus_damped_energy() {
         let mut random = SeededRandom(11);
         for case in 0..120 {
             let degree = 1 + case % MOST;

@@ -201,7 +201,7 @@ fn energy_balance_closes_with_all_losses() {
 
 /// Statistics: single impacts may be missed by more.
 #[test]
-fn errors_are_those_asked_for() {
+fn errors_meet_the_requested_tolerance() {
     let mut random = RandomNumbers(1234);
     let mut ratios: [Vec<f64>; 3] = Default::default();
     for _ in 0..40 {

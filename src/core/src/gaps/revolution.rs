@@ -380,7 +380,7 @@ mod tests {
 
     /// Lanes are nodes at instants: what one node's gap is at one of them.
     #[test]
-    fn lanes_are_single_nodes_at_their_instants() {
+    fn vector_lanes_match_scalar_gaps_of_nodes() {
         let shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: 0.3 };
         let law = |instruction_set| RevolutionGap {
             surface: CompiledShape::new(&shape, 3.56e-4).unwrap(),

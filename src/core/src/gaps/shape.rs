@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn no_value_between_two_angles_is_below_the_bound() {
+    fn lower_bound_holds_between_two_angles() {
         for shape in shapes().into_iter().chain([Shape::TwoLobe { depth: -0.7, width: 0.4, phase: 0.1 }]) {
             let surface = CompiledShape::new(&shape, 3.56e-4).unwrap();
             let (mut tightest, mut lowest) = (f64::INFINITY, 0.0_f64);
@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn smallest_values_are_those_of_the_shape() {
+    fn minimum_values_match_the_shape() {
         let dents = Shape::TwoLobe { depth: -0.7, width: 0.4, phase: 0.1 };
         let turned = Shape::Lobes { amplitude: -1e-4, order: 2, phase: 0.3 };
         for shape in shapes().into_iter().chain([dents, turned]) {
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_the_same_as_single_values() {
+    fn row_evaluation_equals_single_evaluations() {
         for shape in shapes() {
             let surface = CompiledShape::new(&shape, 3.56e-4).unwrap();
             let angles: Vec<f64> = (0..40).map(|i| 0.37 * f64::from(i) - 5.0).collect();

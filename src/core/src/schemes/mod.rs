@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn the_velocity_of_the_instant_is_that_of_the_exact_motion() {
+    fn instantaneous_velocity_matches_exact_motion() {
         for (frequency, ratio) in CASES {
             for step in [1e-6, 1e-5, 4e-5] {
                 let (q, v, force) = (1e-4, 0.3, force_for(frequency));
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn the_velocity_of_central_differences_is_of_second_order() {
+    fn central_difference_velocity_is_second_order() {
         let (frequency, ratio) = (3e4_f64, 0.01);
         let error = |step: f64| {
             let k = ModeCoefficients::new(Scheme::CentralDifference, frequency, ratio, step);
@@ -378,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn the_energy_balance_is_an_identity() {
+    fn energy_balance_closes_to_rounding() {
         for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
             for (frequency, ratio) in CASES {
                 let k = ModeCoefficients::new(scheme, frequency, ratio, 2e-5);

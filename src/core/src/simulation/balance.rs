@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn curvature_work_is_held_against_the_net_that_users_read() {
+    fn curvature_work_is_compared_with_the_net_input_work() {
         let ledger = |shaft: f64, casing: f64, curvature: f64, turnover: f64| {
             let mut ledger = Ledger::default();
             ledger.shaft_work.add(shaft);

@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_derivative_that_fits_gives_the_line() {
+    fn consistent_derivative_gives_linear_interpolation() {
         let (mut input, slope, length) = (held(1.0), 2.5, 0.125);
         for step in 0..4 {
             let start = 1.0 + slope * length * f64::from(step);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_set_within_a_ramp_turns_it_where_it_is() {
+    fn value_set_within_a_ramp_redirects_the_ramp() {
         let mut input = held(0.0);
         input.ask(1.0, 0.0);
         input.aim(0.0, 1.0);
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_change_within_the_step_counts_from_there() {
+    fn speed_change_within_the_step_acts_from_that_time() {
         let mut speed = held(10.0);
         let mut rotor = RotorAngle::new(0.0);
         rotor.rebase(&speed, 0.25);

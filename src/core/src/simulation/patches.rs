@@ -77,7 +77,7 @@ mod tests {
 
     /// Quarters in two rows, listed from −45° on, as a structure gives them: every place is in the one whose bounds hold it.
     #[test]
-    fn a_place_is_in_the_patch_whose_bounds_hold_it() {
+    fn positions_map_to_the_patch_that_contains_them() {
         let quarter = std::f64::consts::FRAC_PI_2;
         let patch = |index: usize| {
             let (around, along) =

@@ -43,7 +43,7 @@ mod tests {
 
     /// One mode along (−1, c): (ω² + k(1 − τc)) q = 0 has real roots once τc > 1 + ω²/k, and the growth √(k(τc − 1) − ω²).
     #[test]
-    fn a_tip_that_is_drawn_in_faster_than_its_force_grows_diverges() {
+    fn cutting_tip_diverges_when_drawn_in() {
         let (omega, spring) = (1000.0, 3e6);
         let found = |along: f64| {
             let shapes = [[-1.0, along, 0.0]];
@@ -62,7 +62,7 @@ mod tests {
 
     /// A radial and a tangential mode of one frequency do not couple back: nothing grows. Coupled by an oblique third they flutter.
     #[test]
-    fn modes_that_meet_under_the_cut_flutter() {
+    fn coupled_modes_of_similar_frequency_flutter_when_cutting() {
         let spring = DMatrix::from_element(1, 1, 1e6);
         let stable =
             growth(&model(&[900.0, 1100.0], &[[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 0.0), &radial(), &spring, 1.0);

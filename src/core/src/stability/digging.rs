@@ -35,7 +35,7 @@ mod tests {
     use crate::stability::tests::{model, radial};
 
     #[test]
-    fn one_contact_digs_in_beyond_the_ratio_of_its_flexibilities() {
+    fn contact_locks_up_above_the_flexibility_ratio() {
         // w_rr = 1/100² + 0.81/1e10 and w_rt = 0.9·2/1e10 − 0.5/100²; of free masses the ratio has the other sign.
         let shapes = [[1.0, -0.5, 0.0], [0.9, 2.0, 0.0]];
         let model = model(&[100.0, 1e5], &shapes, 0.02);

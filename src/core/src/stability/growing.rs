@@ -198,7 +198,7 @@ mod tests {
 
     /// Zeros of the small determinant against eigenvalues of the dense matrix: growth, and what is concluded from it.
     #[test]
-    fn growth_found_by_zeros_is_that_of_the_dense_matrix() {
+    fn growth_from_determinant_zeros_matches_dense_matrix() {
         let mut random = SeededRandom(37);
         let (mut tried, mut proven, mut verdicts) = (0.0, 0.0, [0; 4]);
         for _ in 0..1200 {
@@ -271,7 +271,7 @@ mod tests {
     const FRICTION: f64 = 2.0;
 
     #[test]
-    fn the_recurrence_grows_as_found() {
+    fn simulated_growth_matches_the_predicted_rate() {
         let mut random = SeededRandom(8);
         for scheme in Scheme::RECURRENCES {
             let mut compared = 0;
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn damped_contact_decays_and_says_so_at_every_step_size() {
+    fn damped_contact_decays_at_every_step_size() {
         // The constraint used to add zero eigenvalues, whose rounding looked like flutter at large steps.
         let shapes = [[1.0, 0.2, 0.0], [0.3, -0.8, 0.1], [0.7, 0.4, 0.0], [0.2, 0.9, 0.0]];
         let model = model(&[900.0, 2300.0, 8000.0, 90_000.0], &shapes, 0.005);
@@ -332,7 +332,7 @@ mod tests {
 
     /// Without the mass of the node, the rest leans: with µ > 0.5 it yields to no force, and there is no such limit.
     #[test]
-    fn without_its_mass_a_node_that_digs_in_has_no_motion() {
+    fn massless_node_that_locks_up_has_no_growth_rate() {
         let leaning = ModalModel { quasi_static: 1, ..model(&[1e3, 1e5], &[[1.0, 0.2, 0.0], [0.5, -1.0, 0.0]], 0.01) };
         let found = |friction: f64| without_node_mass(&leaning, 1e-5, friction, &radial());
         assert!(found(0.49).is_some() && found(0.51).is_none(), "{:?}, {:?}", found(0.49), found(0.51));

@@ -147,7 +147,7 @@ mod tests {
 
     /// Contact that the equations bring to rest: steps that are accepted leave it there, and those that are refused let it go.
     #[test]
-    fn what_is_accepted_stays_closed_and_what_is_refused_does_not() {
+    fn accepted_steps_keep_contact_closed_and_rejected_open_it() {
         let mut random = SeededRandom(11);
         let (mut accepted, mut refused, mut farthest) = (0, 0, 0.0_f64);
         for _ in 0..4000 {
@@ -183,7 +183,7 @@ mod tests {
 
     /// Two modes along the normal, of 1000 rad/s with 4/5 of the flexibility and 2000 rad/s with 1/5.
     #[test]
-    fn a_motion_is_shared_by_the_modes_from_half_an_octave_below_it() {
+    fn flexibility_share_counts_modes_above_half_octave_below() {
         let model = ModalModel { quasi_static: 0, ..crate::stability::tests::model(&[1e3, 2e3], &[[1.0; 3]; 2], 0.0) };
         for (frequency, share) in [(1400.0, 1.0), (1430.0, 0.2), (2800.0, 0.2), (2850.0, 0.0)] {
             assert!((share_of(&model, &radial(), frequency) - share).abs() < 1e-15, "{frequency}");
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn a_longer_time_and_more_growth_are_a_larger_error() {
+    fn error_increases_with_time_and_growth() {
         let of = |continuous: f64, stepped: f64, share: f64| SetGrowth {
             growth: GrowthRates { continuous, frequency: 1e4, stepped, swing: 1e4, noise: 0.0 },
             share,

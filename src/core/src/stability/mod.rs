@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn too_much_friction_is_refused_and_the_bound_is_the_exact_one() {
+    fn rejects_excessive_friction_at_the_exact_bound() {
         // n·G(n − µt) = Grr + µ Grt > 0 fails at µ = −Grr/Grt.
         let model = model(&[1000.0], &[[0.5, -1.0, 0.0]], 0.0);
         let step = 1e-6;
@@ -309,7 +309,7 @@ mod tests {
     /// µτ < 2. Few contacts are solvable beyond, as the minors of a triangular matrix are those of its diagonal; of many that is
     /// not shown, nor of the nodal diameters of a disk.
     #[test]
-    fn many_contacts_and_disks_need_a_definite_symmetric_part() {
+    fn many_contacts_require_a_definite_symmetric_part() {
         let (turned, step) = (2.5, 1e-5);
         let pressed = |nodes: usize| ModalModel {
             frequencies: vec![1000.0; nodes],
@@ -349,7 +349,7 @@ mod tests {
 
     /// Two nodes on one mode, of which one leans: the symmetric part of W, 1 − (µτ)²/8 at most, is definite without friction alone.
     #[test]
-    fn less_friction_than_there_is_anywhere_is_not_proposed() {
+    fn reports_when_no_friction_coefficient_is_safe() {
         let model = ModalModel {
             contact_modes: DMatrix::from_column_slice(6, 1, &[-1.0, 0.0, 0.0, -1.0, 1.0, 0.0]),
             ..model(&[1000.0], &[[0.0; 3]], 0.0)
@@ -362,7 +362,7 @@ mod tests {
 
     /// A definite symmetric part spares the minors: what it lets pass they do, and they alone decide on the rest.
     #[test]
-    fn what_is_definite_has_positive_minors() {
+    fn positive_definite_matrices_have_positive_minors() {
         let mut random = SeededRandom(5);
         let (mut definite, mut solvable, mut refused) = (0, 0, 0);
         for _ in 0..600 {
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_below_the_largest_are_looked_at() {
+    fn solvability_is_checked_for_shorter_steps() {
         // At h = 1e-3 the stiff mode is static and Grt ≈ 0; at small h it moves freely and turns the tip inwards.
         let model = model(&[100.0, 1e5], &[[1.0, 0.0, 0.0], [0.9, -2.0, 0.0]], 0.0);
         let solvable = |step| is_solvable(&delassus(&model, Scheme::ModalExact, step, 1.1, &radial()));

@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_counts_is_what_carries_the_contact() {
+    fn step_limit_ignores_modes_that_carry_little_contact() {
         let radial = [[-1.0, 0.0, 0.0]];
         // One oscillator: ωh = 10. A rigid mode carries no flexibility.
         let near =
@@ -153,7 +153,7 @@ mod tests {
 
     /// Errors go with the square of the step: some four per cent at the limit, a tenth of that is not worth telling.
     #[test]
-    fn a_fifth_of_the_limit_is_near_it() {
+    fn warns_above_a_fifth_of_the_limit() {
         let near = |share: f64| warning(share * 1e-5, 1e-5).is_some();
         assert!(near(0.21) && near(0.9) && !near(0.19));
     }

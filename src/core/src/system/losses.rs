@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn losses_are_held_against_the_most_that_was_taken() {
+    fn losses_are_compared_with_their_previous_maximum() {
         let (mut taken, mut ledger) = (LargestLosses::default(), Ledger::default());
         for (friction, impact, given, paid) in [
             (2.0, 1.0, [0.0, 0.0], 0.0),

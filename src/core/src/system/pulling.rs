@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn compares_the_most_pulled_node_with_the_most_pushed() {
+    fn ratio_compares_largest_tension_with_largest_compression() {
         let mut pulling = Pulling::new(3);
         assert_eq!(pulling.most(0), None);
         for (node, impulse) in [(0, 3.0), (1, -0.5), (2, -0.25), (0, 1.0), (1, 2.0), (2, -0.5)] {

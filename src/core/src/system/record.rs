@@ -251,7 +251,7 @@ mod tests {
 
     /// A rotor that is run up on a shaft that is accelerated: places are those of the motion at any time, velocities its rates.
     #[test]
-    fn a_course_moves_at_the_rates_that_it_tells() {
+    fn prescribed_motion_is_consistent_with_its_rates() {
         let span = 4e-5;
         let at = |time: f64| PrescribedMotion {
             rotor_angle: 0.3 + 1300.0 * time + 4e6 * time * time,

@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn a_distance_that_motion_does_not_explain_ends_the_step() {
+    fn inconsistent_gap_change_fails_the_step() {
         let mut system = flying();
         let mut honest = system.clone();
         while system.events().is_empty() {

@@ -131,7 +131,7 @@ fn print(scheme: Scheme, solver: Solver, elements: usize, outcome: &BouncingRun)
 }
 
 #[test]
-fn the_bar_bounces_as_the_series_says() {
+fn bouncing_bar_matches_series_solution() {
     print_row!("exact: contacts {CONTACTS:.4?}, period {PERIOD:.4}, loss 0");
     print_row!(
         "| scheme | solver | elements | h (ms) | bottom, largest error (m) | L2, period 1 | L2, period 3 | impulse | force L2 | contacts (s) | loss after each period (%) | ledger |"

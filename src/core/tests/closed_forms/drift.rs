@@ -122,20 +122,20 @@ fn measure(steps: u64) {
 }
 
 #[test]
-fn a_hundred_thousand_undamped_steps_keep_the_energy() {
+fn energy_is_conserved_over_100000_undamped_steps() {
     measure(100_000);
     crate::guide::hold("cargo test -p tiprub-core --test closed_forms drift");
 }
 
 #[test]
 #[ignore = "half a minute"]
-fn ten_million_undamped_steps_keep_the_energy() {
+fn energy_is_conserved_over_ten_million_undamped_steps() {
     measure(10_000_000);
 }
 
 /// A thousandth of a rounding error a million times, and a term larger than the sum so far: no term is lost, nor by a saved state.
 #[test]
-fn sums_keep_what_rounding_would_drop() {
+fn compensated_sums_keep_small_terms() {
     let mut sum = Sum::default();
     sum.add(1.0);
     let term = 1e-3 * f64::EPSILON;

@@ -80,7 +80,7 @@ fn smooth_error(scheme: Scheme, solver: Solver, step: f64, force: Option<(f64, f
 }
 
 #[test]
-fn free_flight_and_forced_vibration() {
+fn free_flight_and_forced_vibration_have_expected_order() {
     head();
     for scheme in SCHEMES {
         let solver = Solver::Lcp;
@@ -268,7 +268,7 @@ impl PressedMassless {
 }
 
 #[test]
-fn contact_that_stays_closed() {
+fn contact_that_stays_closed_has_expected_order() {
     head();
     let steps = [4e-4, 2e-4, 1e-4, 5e-5];
     let (pressed, massless) = (PressedChain::new(), PressedMassless::new());
@@ -337,7 +337,7 @@ fn elastic_error(solver: Solver, step: f64, shift: f64, factor: f64) -> [f64; 2]
 }
 
 #[test]
-fn through_impacts() {
+fn order_through_impacts_is_as_expected() {
     head();
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
         for solver in solvers(scheme) {
@@ -356,5 +356,5 @@ fn through_impacts() {
             assert!((1.7..2.3).contains(&order), "{errors:?}");
         }
     }
-    crate::guide::hold("cargo test -p tiprub-core --test closed_forms through_impacts");
+    crate::guide::hold("cargo test -p tiprub-core --test closed_forms order_through_impacts_is_as_expected");
 }

@@ -74,7 +74,7 @@ const KINDS: [Kind; 3] = [
 
 /// Each kind of surface, each input alone and all of them together.
 #[test]
-fn gaps_are_distances_in_space_whatever_moves_casing_and_shaft() {
+fn gaps_are_distances_for_any_casing_and_shaft_motion() {
     for (kind, change) in KINDS {
         let mut scene = movable();
         change(&mut scene);
@@ -150,7 +150,7 @@ fn a_point_at_a_contact_node_has_its_clearance_in_a_rub() {
 /// Two pairs of one rotor: a point is held against the surface of the contact node next to it; without friction or watched sectors there
 /// is nothing to pay for.
 #[test]
-fn a_point_faces_the_surface_of_the_contact_node_next_to_it() {
+fn output_point_uses_the_surface_of_its_nearest_contact_node() {
     let mut scene = movable();
     scene.settings.contacts[0].nodes = Some("leading".into());
     scene.settings.contacts[0].sector_gaps.clear();
@@ -266,7 +266,7 @@ fn friction_opposes_whirl_and_axial_motion_of_the_shaft() {
 
 /// A load of one nodal diameter that grows moves the casing as a whole; the blades stand still and are dragged along.
 #[test]
-fn friction_drags_the_blades_along_with_a_casing_that_moves() {
+fn friction_drags_blades_along_with_a_moving_casing() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
         // From rest tips vibrate faster than they slide, where the law of `lcp` puts energy in, and its run ends.
         let solver = Solver::Coulomb;
@@ -346,7 +346,7 @@ fn swinging_plane(scheme: Scheme, friction: f64, settings: SystemSettings) -> Sy
 
 /// Friction F on a mass on a spring k takes 2F/k of the amplitude at every turn, whichever of the two bodies swings.
 #[test]
-fn friction_takes_equal_amplitude_every_half_period() {
+fn friction_reduces_amplitude_equally_every_half_period() {
     println!("| swings | scheme | solver | amplitudes (mm) | largest error |\n|---|---|---|---|---|");
     let (friction, amplitude, step) = (0.1, 4e-3, 5e-5);
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact, Scheme::MasslessBoundary] {
@@ -399,7 +399,7 @@ fn friction_takes_equal_amplitude_every_half_period() {
 
 /// Two bumps are as deep as the mean of the clearances says, on a surface of revolution, on a spline and in the nominal values.
 #[test]
-fn clearances_of_sectors_alone_stand_for_the_clearance() {
+fn sector_gaps_replace_the_common_gap() {
     for spline in [None, Some(SplineSettings::default())] {
         let mut scene = models::rub(SECTORS);
         (scene.settings.surfaces[0].spline, scene.settings.surfaces[0].ramp_time) = (spline, 0.0);
@@ -489,7 +489,7 @@ fn damping_parameters_belong_to_their_own_structures() {
 
 /// What is let go decays by its own damping, whatever the scene said: the casing by its load, the blades by their speed.
 #[test]
-fn casing_and_blades_swing_out_at_the_rate_of_their_parameters() {
+fn casing_and_blades_decay_at_their_damping_parameters() {
     let (casing, rotor) = (0.06, 0.03);
     let mut scene = blades(Scheme::ModalExact, Solver::Lcp, 0.0);
     models::flexible(&mut scene);

@@ -47,7 +47,7 @@ fn dead_stop(case: DeadStop, methods: (Scheme, Solver), step: f64, turns: f64) -
 }
 
 #[test]
-fn what_touches_a_rigid_stop_stays_and_the_spring_takes_it_back() {
+fn mass_stays_at_rigid_stop_until_the_spring_returns_it() {
     print_row!("| scheme | solver | d/A | h (µs) | position | touch (steps) | loss | exact | ledger |");
     print_row!("|---|---|---|---|---|---|---|---|---|");
     for scheme in RIGID {
@@ -117,7 +117,7 @@ fn a_preloaded_mass_stays_on_its_stop() {
 
 /// A unit mass that flies into a stop in the first step of another length: the stop takes ½v², and nothing turns or curves.
 #[test]
-fn an_impact_after_a_change_of_step_is_booked_as_an_impact() {
+fn impact_after_step_change_is_recorded_as_impact_loss() {
     let (step, speed) = (1e-5, 2.0);
     for methods in RIGID.into_iter().flat_map(|scheme| SOLVERS.map(|solver| (scheme, solver))) {
         for ratio in [0.1, 0.9, 1.7, 12.0] {
@@ -155,7 +155,7 @@ fn on_a_spring(omega: f64, compliance: f64) -> ModalModel {
 }
 
 #[test]
-fn a_ball_bounces_on_a_spring_for_ever() {
+fn ball_on_a_spring_bounces_without_loss() {
     print_row!("| solver | h (µs) | height, 20 bounces | time of touch 20 (s) | largest force | energy | ledger |");
     print_row!("|---|---|---|---|---|---|---|");
     let ball = Ball { omega: 200.0, gravity: 9.81, height: 0.05 };

@@ -123,7 +123,7 @@ fn wave_error(simulation: &mut Simulation, n: u32, omega: f64, amplitude: f64, m
 /// The rotor turns in a casing of n lobes and is pressed on it all around: every sector is moved by the lobes, and the force is
 /// the dynamic stiffness of nodal diameter n, also at its resonance, where damping alone is left.
 #[test]
-fn lobes_meet_the_dynamic_stiffness_of_a_pressed_chain() {
+fn lobe_response_matches_chain_dynamic_stiffness() {
     println!("| scheme | n | nω/ω_n | dynamic stiffness (N/m) | error with 128, 256, 512 steps per turn | order |");
     println!("|---|---|---|---|---|---|");
     for scheme in SCHEMES {
@@ -158,7 +158,7 @@ fn lobes_meet_the_dynamic_stiffness_of_a_pressed_chain() {
 /// Shaft on a circle in a round casing that presses the turning rotor all around: nodal diameter 1 travels at the speed of the
 /// shaft less that of the rotor.
 #[test]
-fn whirl_meets_the_dynamic_stiffness_of_a_chain() {
+fn whirl_response_matches_chain_dynamic_stiffness() {
     println!("| scheme | whirl/ω_1 | rotor/ω_1 | error at h = 20, 10, 5 µs | order |");
     println!("|---|---|---|---|---|");
     for scheme in SCHEMES {
@@ -225,7 +225,7 @@ fn whirl_error(simulation: &mut Simulation, whirl: f64, rotor: f64, step: f64) -
 
 /// A load of n nodal diameters that turns around the flexible casing: a wave of the amplitude and lag of its pair of modes.
 #[test]
-fn travelling_load_moves_the_casing_as_a_harmonic_force() {
+fn travelling_load_acts_as_a_harmonic_force() {
     println!("| scheme | n | ω/ω_n | amplitude (m) | error at h = 5, 2.5, 1.25 µs | order |");
     println!("|---|---|---|---|---|---|");
     for scheme in SCHEMES {

@@ -45,7 +45,7 @@ fn start_up_time_grows_in_proportion_to_the_number_of_rotors() {
 
 /// A name, a column and a place in memory each: no reader has so many.
 #[test]
-fn more_values_than_anything_reads_are_refused_by_name() {
+fn rejects_too_many_output_values_by_name() {
     let mut scene = rub(4);
     scene.settings.contacts[0].coating = Some(coating_of(1.5e-4, [2000, 1000]));
     scene.settings.outputs.wear = true;
@@ -72,7 +72,7 @@ fn refused(scene: &Scene) -> (Simulation, String) {
 /// Normals that turn too far within a step, and modes that the step does not resolve, of the front rotor; the rear one exchanges a
 /// hundred times as much.
 #[test]
-fn energy_out_of_nothing_ends_a_run_whatever_turns_beside() {
+fn energy_gain_of_one_rotor_ends_the_run() {
     let rubbing = |scene: &mut Scene| {
         scene.settings.surfaces[1].shape = lobes(4.2e-4, 3);
         scene.settings.surfaces[1].ramp_time = 1e-4;
@@ -125,7 +125,7 @@ fn one_between_two() -> Scene {
 
 /// A scene of two sets continues from its state with the same bits, ledgers and energies of the start included.
 #[test]
-fn a_state_holds_the_energies_of_every_set() {
+fn saved_state_contains_energies_of_every_coupled_set() {
     let all = Scheme::RECURRENCES.into_iter().flat_map(|scheme| [(scheme, two(|_| ())), (scheme, one_between_two())]);
     for (scheme, mut scene) in all.filter(|(scheme, scene)| *scheme != Scheme::MasslessBoundary || scene.roms.len() < 3)
     {
@@ -155,7 +155,7 @@ fn a_state_holds_the_energies_of_every_set() {
 /// A tip that meets a stiff ring, and a seal that meets a lighter one: the step of massless-boundary is that of both together, in
 /// whichever order they are written.
 #[test]
-fn massless_boundary_looks_at_every_structure_under_a_blade() {
+fn massless_limit_includes_every_casing_of_a_blade() {
     let scene = |light: f64, seal_first: bool| {
         let mut scene = rub(6);
         scene.roms[0] = rich_blade(6);
@@ -186,7 +186,7 @@ fn massless_boundary_looks_at_every_structure_under_a_blade() {
 
 /// As many contacts as are solved together at most are counted where they push each other.
 #[test]
-fn contacts_are_counted_where_they_push_each_other() {
+fn only_coupled_contacts_count_towards_the_limit() {
     let both = several::in_one_casing(rub(350), Solver::Lcp, 0.0);
     let reported = Simulation::new(&both).unwrap_err().to_string();
     assert!(
@@ -209,7 +209,7 @@ fn flutter(texts: &[Warning], name: &str) -> usize {
 
 /// Turning backwards either rotor flutters with friction; the front one starts with it, the rear one gets it later.
 #[test]
-fn flutter_of_each_rotor_is_told() {
+fn flutter_is_reported_for_each_rotor() {
     let scene = two(|scene| {
         scene.settings.structures[0].speed = -1300.0;
         scene.settings.contacts[1].friction = 0.001;
@@ -232,7 +232,7 @@ fn flutter_of_each_rotor_is_told() {
 
 /// Rotors bent aside by their rub, each in its turn: what linear gaps miss is told of each.
 #[test]
-fn what_linear_gaps_miss_is_told_of_each_rotor() {
+fn linear_gap_error_is_reported_for_each_rotor() {
     let scene = two(|scene| {
         for (surface, ramp_time) in scene.settings.surfaces.iter_mut().zip([2e-3, 4e-3]) {
             (surface.shape, surface.ramp_time) = (lobes(2e-3, 3), ramp_time);
@@ -256,7 +256,7 @@ fn what_linear_gaps_miss_is_told_of_each_rotor() {
 
 /// A rotor that fails is not told to flutter because another one does.
 #[test]
-fn a_failure_is_put_down_to_flutter_of_the_same_structure() {
+fn failure_is_attributed_to_flutter_of_the_same_structure() {
     let fails = |front: f64| {
         let scene = two(|scene| {
             scene.settings.structures[0].speed = -1300.0;
@@ -274,7 +274,7 @@ fn a_failure_is_put_down_to_flutter_of_the_same_structure() {
 
 /// A warning that holds for the step is told of each structure that it holds for.
 #[test]
-fn steps_that_modes_do_not_resolve_are_told_of_each_structure() {
+fn unresolved_modes_are_reported_for_each_structure() {
     let mut scene = two(|scene| {
         scene.settings.contacts.iter_mut().for_each(|contact| contact.friction = 0.0);
         scene.settings.time.step = 8e-6;
@@ -293,7 +293,7 @@ fn steps_that_modes_do_not_resolve_are_told_of_each_structure() {
 
 /// Radial displacement of a flexible casing is an output of rotors; another pair's open surface has none.
 #[test]
-fn an_output_that_no_pair_has_is_refused() {
+fn rejects_output_that_no_pair_provides() {
     let mut scene = lattice::squeezed();
     let rotor = rub(3);
     scene.settings.structures.extend(rotor.settings.structures);
@@ -317,7 +317,7 @@ fn an_output_that_no_pair_has_is_refused() {
 
 /// What is wrong is told with its number or its name.
 #[test]
-fn messages_say_which_contact_surface_or_structure_is_meant() {
+fn messages_name_the_contact_surface_or_structure() {
     let reported = |change: fn(&mut Scene)| Simulation::new(&two(change)).unwrap_err().to_string();
     for (beginning, change) in [
         ("contact[2].gap: ", (|scene| scene.settings.contacts[1].gap = 0.03) as fn(&mut Scene)),
@@ -368,7 +368,7 @@ fn messages_say_which_contact_surface_or_structure_is_meant() {
 
 /// A disk with one node per blade: that node alone is all of them.
 #[test]
-fn flutter_of_a_disk_with_one_node_per_blade_is_told_once() {
+fn warns_once_of_disk_flutter_with_one_node_per_blade() {
     let mut scene = disk::with_rotor(disk::TestDisk::random(6, 1, 9, 0.25, 6).cyclic());
     scene.settings.contacts[0].friction = 0.5;
     let warnings = started(&scene).warnings().to_vec();
@@ -377,7 +377,7 @@ fn flutter_of_a_disk_with_one_node_per_blade_is_told_once() {
 
 /// A node that leans digs in beyond µ = 0.5; that of the other pair does not, and may have more.
 #[test]
-fn friction_of_one_pair_is_not_that_of_the_other() {
+fn contact_pairs_have_independent_friction() {
     let outcome = |leaning: f64, upright: f64| {
         // Both nodes on springs of their own, along all axes.
         let shape = |row: usize, mode: usize| match (mode, row) {

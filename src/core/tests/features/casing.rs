@@ -92,12 +92,12 @@ fn every_combination(mut check: impl FnMut(&str, Scene)) {
 }
 
 #[test]
-fn the_energy_ledger_closes_for_every_combination() {
+fn energy_balance_closes_for_every_combination() {
     every_combination(|name, scene| ledger_closes(name, started(&scene), 1e-13));
 }
 
 #[test]
-fn a_saved_state_continues_with_identical_bits_whatever_is_on() {
+fn saved_state_is_bit_identical_with_every_feature() {
     every_combination(|name, scene| {
         let richest = if name.contains("coating") { Solver::Lcp } else { Solver::Coulomb };
         if scene.settings.contacts[0].solver == richest && scene.settings.time.scheme != Scheme::CentralDifference {
@@ -107,12 +107,12 @@ fn a_saved_state_continues_with_identical_bits_whatever_is_on() {
 }
 
 #[test]
-fn a_step_asks_for_no_memory_whatever_is_on() {
+fn step_does_not_allocate_with_any_feature() {
     every_combination(|name, scene| allocates_nothing(name, started(&scene)));
 }
 
 #[test]
-fn a_load_that_the_contact_grid_cannot_carry_is_refused() {
+fn rejects_casing_load_that_the_grid_cannot_resolve() {
     let with = |order| {
         let mut scene = scene_with(("flexible casing", flexible), Scheme::ModalExact, Solver::Lcp);
         scene.settings.structures[1].load = Some(LoadSettings { order, amplitude: 0.0, phase: 0.0 });
@@ -127,7 +127,7 @@ fn a_load_that_the_contact_grid_cannot_carry_is_refused() {
 }
 
 #[test]
-fn a_state_with_any_bit_changed_is_refused_and_changes_nothing() {
+fn rejects_state_with_any_bit_changed_without_changes() {
     let (name, all) = FEATURES[FEATURES.len() - 1];
     let mut scene = scene_with((name, all), Scheme::ModalExact, Solver::Lcp);
     coating(&mut scene);
@@ -255,7 +255,7 @@ fn the_order_of_the_casing_load_is_a_parameter() {
 }
 
 #[test]
-fn wear_takes_at_least_yield_stress_times_volume() {
+fn wear_energy_is_at_least_yield_stress_times_volume() {
     let mut simulation = started(&scene_with(("coating", coating), Scheme::ModalExact, Solver::Lcp));
     let mut before = 0.0;
     for _ in 0..60 {
@@ -293,7 +293,7 @@ fn friction_power_is_shared_between_blades_and_patches() {
 
 /// Friction forces where there is friction, forces of the last step where they are asked for.
 #[test]
-fn a_blade_has_the_outputs_that_its_scene_asks_for() {
+fn blade_has_the_outputs_requested_by_its_scene() {
     let of = |friction: f64, instantaneous: bool| {
         let mut scene = scene_with(("plain", |_| {}), Scheme::ModalExact, Solver::Lcp);
         scene.settings.contacts[0].friction = friction;

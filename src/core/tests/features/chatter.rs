@@ -169,7 +169,7 @@ fn chatter_grows_beyond_the_limit_of_its_lobe() {
 /// What cells leave is of second order in their width, also where the ends of steps lie on their borders; two blades are as one that
 /// turns twice as fast.
 #[test]
-fn waves_do_not_know_the_width_of_cells() {
+fn chatter_growth_is_independent_of_cell_width() {
     let (limit, delay) = limit(1.03 * OMEGA);
     let cutting = 1.1 * limit;
     let off = |blades: usize, cells: usize, steps: usize| {
@@ -188,7 +188,7 @@ fn waves_do_not_know_the_width_of_cells() {
 
 /// Below 2kζ(1 + ζ) no speed makes it grow.
 #[test]
-fn below_the_least_limit_every_speed_is_stable() {
+fn every_speed_is_stable_below_the_minimum_limit() {
     let least = 2.0 * STIFFNESS * DAMPING * (1.0 + DAMPING);
     let at = OMEGA * (1.0 + 2.0 * DAMPING).sqrt();
     assert!((limit(at).0 / least - 1.0).abs() < 1e-12);

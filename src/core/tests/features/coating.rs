@@ -46,7 +46,7 @@ fn rub(coating: &mut Coating, problem: &mut CoatedProblem, angle: f64, gap: f64)
 
 /// All around a steep cone, evenly deep: 2π r̄ L of the mean radius, times the depth, and its work.
 #[test]
-fn what_is_worn_off_a_cone_has_the_volume_of_the_cone() {
+fn uniform_wear_of_a_cone_has_the_closed_form_volume() {
     let radii = AXIAL.map(|z| 0.1 + 4.0 * z);
     let mut coating = Coating::new(&settings(), &BladeTip::new(&AXIAL, &radii, 1e-4), 1).unwrap();
     let (mut problem, mut work) = (coating.problem(1), 0.0);

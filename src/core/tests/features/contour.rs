@@ -43,7 +43,7 @@ fn rejects_slopes_that_contradict_the_positions() {
 
 /// Zeros are a cylinder where the surface takes its normals from slopes, and nothing where it follows the positions.
 #[test]
-fn slopes_left_out_are_those_of_a_cylinder() {
+fn missing_slopes_default_to_a_cylinder() {
     let mut scene = tapered([0.0; 3]);
     refused(&scene, &["slopes 0 and 0", "rise by -0.2 m per m", "meridian = \"cylinder\""]);
     scene.settings.contacts[0].meridian = Meridian::Cylinder;

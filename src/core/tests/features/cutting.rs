@@ -99,7 +99,7 @@ fn steady_incursion_follows_its_kinematics() {
 
 /// A shaft that stands off the middle cuts a sickle: e cos θ − g deep, 2RL(√(e² − g²) − g arccos(g/e)) in volume.
 #[test]
-fn a_displaced_shaft_cuts_a_sickle_and_then_runs_free() {
+fn displaced_shaft_cuts_a_crescent_and_then_runs_free() {
     println!("| cells | step (s) | largest error of depth / deepest | volume | (shaft + whirl) work / losses |");
     let (eccentricity, turn) = (8.0 * GAP, TAU / SPEED);
     let deepest = eccentricity - GAP;
@@ -146,7 +146,7 @@ fn a_displaced_shaft_cuts_a_sickle_and_then_runs_free() {
 
 /// Force of a cut does not know the width of cells; what is pressed in is another law, and the hard casing has its own friction.
 #[test]
-fn beyond_the_coating_is_the_hard_casing_with_its_friction() {
+fn hard_casing_with_friction_acts_beyond_the_coating() {
     let mut scene = scene([200, 2], 2e-6);
     let contact = &mut scene.settings.contacts[0];
     contact.friction = 0.1;
@@ -167,7 +167,7 @@ fn beyond_the_coating_is_the_hard_casing_with_its_friction() {
 }
 
 #[test]
-fn cutting_keeps_to_states_and_asks_for_no_memory() {
+fn cutting_state_is_restored_without_allocation() {
     let start = || {
         let mut scene = scene([300, 3], 2e-6);
         scene.settings.contacts[0].friction = 0.1;
@@ -212,7 +212,7 @@ fn warns_of_growth_under_a_cut_when_it_ends_a_run() {
 }
 
 #[test]
-fn what_does_not_go_with_cutting_is_refused_by_name() {
+fn rejects_features_incompatible_with_cutting() {
     let refused = |change: &dyn Fn(&mut Scene), parts: &[&str]| {
         let mut scene = scene([200, 1], 2e-6);
         change(&mut scene);

@@ -130,7 +130,7 @@ fn thousand_contact_steps_equal_the_whole_disk() {
 /// Blades that bounce between each other amplify rounding with every impact, whoever computes it: the same disk
 /// stepped by the same code with the casing 1e-19 m away is the measure.
 #[test]
-fn bouncing_disk_differs_only_as_by_rounding() {
+fn bouncing_disk_differs_only_by_rounding() {
     println!(
         "| sectors x nodes x coordinates | scheme | solver | µ | most contacts | displacement | energies | nudged |"
     );
@@ -146,7 +146,7 @@ fn bouncing_disk_differs_only_as_by_rounding() {
 }
 
 #[test]
-fn frequencies_of_a_chain_are_the_closed_form() {
+fn chain_frequencies_match_closed_form() {
     // Masses m on springs k to the ground and k_c to the neighbours: ω_n² = (k + 4 k_c sin²(πn/N))/m.
     for sectors in [2, 3, 5, 8, 56] {
         let (mass, ground, between) = (0.3, 2e6, 7e5);

@@ -77,7 +77,7 @@ fn without_coupling(rom: &Rom) -> Rom {
 }
 
 #[test]
-fn without_coupling_a_disk_is_its_sectors() {
+fn uncoupled_disk_equals_independent_sectors() {
     println!(
         "| feature | scheme | solver | N | contact steps | displacement | energies |\n|---|---|---|---|---|---|---|"
     );
@@ -133,7 +133,7 @@ fn without_coupling_a_disk_is_its_sectors() {
 
 /// Blades without coupling, on a ring that yields as they do: written as a disk they have the same largest step.
 #[test]
-fn without_coupling_a_disk_has_the_steps_of_its_sectors() {
+fn uncoupled_disk_has_the_step_limit_of_its_sectors() {
     let rom = models::rich_blade(12);
     let named = [without_coupling(&rom), rom].map(|rom| {
         let mut scene = scene_with(rom, ("flexible casing", flexible), Scheme::MasslessBoundary, Solver::Lcp);
@@ -164,7 +164,7 @@ fn every_combination(mut check: impl FnMut(&str, Scene)) {
 }
 
 #[test]
-fn the_energy_ledger_closes_for_every_combination() {
+fn energy_balance_closes_for_every_combination() {
     every_combination(|name, scene| ledger_closes(name, started(&scene), 1e-12));
 }
 
@@ -188,7 +188,7 @@ fn a_step_allocates_nothing() {
 }
 
 #[test]
-fn a_casing_turned_by_sectors_turns_the_answer() {
+fn rotating_the_casing_by_sectors_rotates_the_response() {
     for (sectors, shift) in [(5, 2), (8, 3), (2, 1), (56, 11)] {
         let disk = TestDisk::random(sectors, 1, 5, 0.2, 11);
         let run = |shift: usize| {
@@ -220,7 +220,7 @@ fn a_casing_turned_by_sectors_turns_the_answer() {
 }
 
 #[test]
-fn looking_at_outputs_inside_a_step_changes_no_bit() {
+fn reading_outputs_within_a_step_changes_nothing() {
     let disk = TestDisk::random(6, 1, 5, 0.25, 5);
     let run = |look: bool| {
         let mut simulation = started(&scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp));
@@ -276,7 +276,7 @@ fn a_change_of_step_keeps_the_order_of_the_scheme() {
 }
 
 #[test]
-fn what_coupled_sectors_do_not_take_is_refused() {
+fn rejects_features_unsupported_for_coupled_sectors() {
     let disk = TestDisk::random(6, 1, 5, 0.2, 3);
     let refusal = |change: fn(&mut Scene)| {
         let mut scene = scene_with(disk.cyclic(), FEATURES[0], Scheme::ModalExact, Solver::Lcp);
@@ -321,7 +321,7 @@ fn what_coupled_sectors_do_not_take_is_refused() {
 type Damage = (&'static str, fn(&mut Rom));
 
 #[test]
-fn bad_harmonics_are_refused_by_name() {
+fn rejects_invalid_harmonics_by_name() {
     let disk = TestDisk::random(6, 1, 5, 0.2, 3);
     let refusal = |change: fn(&mut Rom)| {
         let mut rom = disk.cyclic();
@@ -351,7 +351,7 @@ proptest! {
     /// Random disks, frictionless and undamped: ledgers close, gaps and multipliers keep their sign, and the reaction on
     /// one sector moves the others as the reciprocal one moves it.
     #[test]
-    fn random_disks_obey_the_laws(
+    fn random_disks_satisfy_energy_contact_and_reciprocity(
         sectors in 2..=23_usize,
         nodes in 1..=2_usize,
         more in 1..=5_usize,

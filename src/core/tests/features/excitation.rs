@@ -94,7 +94,7 @@ fn mode_at_resonance_has_the_closed_form_amplitude() {
 
 /// The same where the excitation turns by most of a radian in one step, near the limit: a force that is held would make 7 % more of it.
 #[test]
-fn resonance_keeps_its_amplitude_on_long_steps() {
+fn resonance_amplitude_is_correct_for_long_steps() {
     for (scheme, mode, turn) in [(Scheme::ModalExact, 4, 0.95), (Scheme::MasslessBoundary, 5, 0.3)] {
         let rom = if scheme.is_massless() { models::rich_blade(5) } else { models::blade(5) };
         let model = ModalModel::from_rom(&rom, 0.05).unwrap();
@@ -169,7 +169,7 @@ fn force_at_a_node_follows_the_frequency_response() {
 
 /// Coupled sectors under every engine order against the whole disk as one structure, whose modes know no nodal diameters.
 #[test]
-fn engine_orders_travel_as_on_the_whole_disk() {
+fn engine_order_excitation_matches_full_disk() {
     let mut worst = 0.0_f64;
     for (sectors, orders) in [(5, 0..11_u32), (6, 0..13)] {
         let disk = TestDisk::random(sectors, 1, 6, 0.2, 11);
@@ -287,7 +287,7 @@ fn excitation_work_is_force_times_displacement() {
 }
 
 #[test]
-fn state_keeps_the_excitation_over_other_steps() {
+fn restored_state_keeps_the_excitation_phase() {
     for rom in [models::blade(5), TestDisk::random(5, 1, 6, 0.2, 3).cyclic()] {
         let scene = scene(rom, Scheme::ModalExact, 6, 800.0);
         let mut run = started(&scene);
@@ -319,7 +319,7 @@ fn state_keeps_the_excitation_over_other_steps() {
 }
 
 #[test]
-fn an_excitation_that_cannot_be_is_refused() {
+fn rejects_invalid_excitations() {
     let reported = |change: fn(&mut ExcitationSettings)| {
         let mut scene = scene(models::blade(3), Scheme::ModalExact, 2, 500.0);
         change(scene.settings.structures[0].excitation.as_mut().unwrap());
@@ -347,7 +347,7 @@ fn an_excitation_that_cannot_be_is_refused() {
 
 /// The pattern turns by the speed and by its phase: what the phase adds counts, either way round.
 #[test]
-fn rejects_an_excitation_phase_that_turns_too_far() {
+fn rejects_excessive_excitation_phase_change() {
     let mut scene = scene(models::blade(3), Scheme::ModalExact, 2, 500.0);
     scene.settings.time.step = 1e-6;
     for (turn, refused) in [(1.9, false), (2.1, true), (-1.9, false), (-2.1, true)] {

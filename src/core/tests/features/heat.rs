@@ -44,7 +44,7 @@ fn apart(found: &[f64], expected: &[f64]) -> f64 {
 
 /// CΦω⁻²Φᵀf T, the free expansion: at the start, and once warmed up slowly; of coupled sectors all alike. Softening leaves it.
 #[test]
-fn warm_blades_rest_where_their_free_expansion_is() {
+fn warm_blades_rest_at_their_free_expansion() {
     for rom in [models::blade(3), TestDisk::random(3, 1, 6, 0.2, 3).cyclic()] {
         let stiffness = rom.stiffness.clone().cholesky().unwrap();
         let load = heated(rom.clone()).extras.thermal.unwrap().loads;
@@ -76,7 +76,7 @@ fn warm_blades_rest_where_their_free_expansion_is() {
 /// A blade that turns and stiffens expands as it does at rest: growth K(Ω)⁻¹(Ω²c + Ω⁴c₂) plus free expansion, at the start and where
 /// speed and temperature come to later. Softening leaves the expansion and not the growth.
 #[test]
-fn blades_that_turn_expand_as_at_rest() {
+fn rotation_does_not_change_thermal_expansion() {
     let mut rom = models::blade(3);
     rom.extras.spin = Some(models::spin(rom.order()));
     let (speed, temperature) = (1600.0_f64, 250.0);
@@ -122,7 +122,7 @@ fn blades_that_turn_expand_as_at_rest() {
 
 /// A softened blade rings at ω√(1 − sT): as it starts, and when it is warmed up on the way, where its energy changes by what heat takes.
 #[test]
-fn softened_blades_ring_lower_by_the_root_of_the_stiffness_left() {
+fn softening_lowers_frequency_by_root_of_stiffness() {
     let (temperature, first) = (300.0, ModalModel::from_rom(&models::blade(1), 0.0).unwrap().frequencies[0]);
     let left = (1.0 - SOFTENING * temperature).sqrt();
     for (starts_warm, hold, scheme) in [
@@ -216,7 +216,7 @@ fn speed_and_temperature_act_together() {
 }
 
 #[test]
-fn temperatures_beyond_all_stiffness_are_refused() {
+fn rejects_temperatures_that_remove_all_stiffness() {
     let mut given = scene(models::blade(1));
     given.settings.structures[0].softening = 1e-3;
     let mut run = warm(&given, 100.0);
@@ -237,7 +237,7 @@ fn in_lanes(run: &Simulation, rows: &DMatrix<f64>) -> Vec<f64> {
 /// α T L for any stiffness: blades of other frequencies rest where the others do, at the start and once they are warmed up, also where
 /// speed and heat change their stiffness.
 #[test]
-fn mistuned_blades_expand_alike() {
+fn mistuned_blades_expand_equally() {
     let factors = vec![0.9, 1.0, 1.1];
     for (softening, stiffening, scheme) in [
         (0.0, false, Scheme::ModalExact),
@@ -275,7 +275,7 @@ fn mistuned_blades_expand_alike() {
 /// Modes that a step does not resolve, and quasi-static ones, soften as the others do: free expansion is that of any temperature, and a
 /// force moves the blade as far as the softened one.
 #[test]
-fn unresolved_and_quasi_static_modes_soften_too() {
+fn softening_applies_to_unresolved_and_quasi_static_modes() {
     for (scheme, step) in
         [(Scheme::ModalExact, 1e-5), (Scheme::MasslessBoundary, 1e-6), (Scheme::MasslessBoundary, 4e-6)]
     {

@@ -35,7 +35,7 @@ fn most(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Two modes of all blades in patterns, and one of one blade: each goes on as free vibration to rounding, whatever the first step.
 #[test]
-fn blades_go_on_from_where_they_start_as_free_vibration() {
+fn initial_motion_continues_as_free_vibration() {
     for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary, Scheme::Galerkin, Scheme::CentralDifference] {
         let rom = if scheme.is_massless() { models::rich_blade(6) } else { models::blade(6) };
         let model = ModalModel::from_rom(&rom, 0.02).unwrap();
@@ -83,7 +83,7 @@ fn blades_go_on_from_where_they_start_as_free_vibration() {
 }
 
 #[test]
-fn nodal_diameter_starts_as_set_and_decays_alone() {
+fn initial_nodal_diameter_decays_without_exciting_others() {
     for scheme in [Scheme::ModalExact, Scheme::Galerkin] {
         let rom = TestDisk::random(6, 1, 7, 0.2, 3).cyclic();
         let model = CyclicModel::from_rom(&rom, 0.02).unwrap();
@@ -113,7 +113,7 @@ fn nodal_diameter_starts_as_set_and_decays_alone() {
 
 /// Logarithmic decrement of each mode: its own ratio where it has one, the common one where not. Of uncoupled and coupled sectors.
 #[test]
-fn every_mode_decays_by_its_own_ratio() {
+fn every_mode_decays_at_its_damping_ratio() {
     let ratios = [0.003, 0.05];
     for rom in [models::blade(4), TestDisk::random(4, 1, 5, 0.2, 3).cyclic()] {
         for (mode, ratio) in [(1, ratios[0]), (2, ratios[1]), (3, 0.02)] {

@@ -53,7 +53,7 @@ fn run_closing(scene: &Scene, steps: u32, length: f64, mut each: impl FnMut(&Sim
 }
 
 #[test]
-fn a_pair_split_into_three_gives_the_bits_of_one() {
+fn splitting_a_contact_pair_keeps_bit_identical_results() {
     for scheme in SCHEMES {
         for solver in SOLVERS {
             let mut whole = rub(6);
@@ -76,7 +76,7 @@ fn a_pair_split_into_three_gives_the_bits_of_one() {
 }
 
 #[test]
-fn rotors_in_rigid_casings_are_each_what_they_are_alone() {
+fn rotors_in_rigid_casings_are_independent() {
     let slower = |rear: &mut StructureSettings| rear.speed = -900.0;
     let mut scene = several::two_rotors(rub(6), 0.1, slower);
     scene.settings.surfaces[1].shape = Shape::Lobes { amplitude: 4.5e-4, order: 3, phase: 0.3 };
@@ -108,7 +108,7 @@ fn rotors_in_rigid_casings_are_each_what_they_are_alone() {
 }
 
 #[test]
-fn two_rotors_in_one_casing_keep_the_books() {
+fn energy_balance_of_two_rotors_in_one_casing_closes() {
     for (solver, friction) in [(Solver::Lcp, 0.15), (Solver::Coulomb, 0.15), (Solver::Film, 0.1), (Solver::Lcp, 0.0)] {
         let mut scene = several::in_one_casing(rub(6), solver, friction);
         scene.settings.surfaces.iter_mut().for_each(|surface| surface.shape = Shape::Circular {});
@@ -150,7 +150,7 @@ fn two_rotors_in_one_casing_keep_the_books() {
 
 /// The torque of each rotor times its speed, summed over the run, is the work of the shafts.
 #[test]
-fn torques_of_two_rotors_are_the_work_of_their_shafts() {
+fn torques_of_two_rotors_match_their_shaft_work() {
     let scene = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
     let mut work = 0.0;
     let simulation = run(&scene, 80, |simulation, finished| {
@@ -169,7 +169,7 @@ fn torques_of_two_rotors_are_the_work_of_their_shafts() {
 
 /// What one rotor does to the casing the other one feels; with a casing a hundred times as stiff much less.
 #[test]
-fn a_rub_is_felt_by_the_other_rotor_through_the_casing() {
+fn rub_affects_the_other_rotor_through_the_casing() {
     let felt = |stiffness: f64| {
         let mut scene = several::in_one_casing(rub(6), Solver::Lcp, 0.15);
         scene.roms[2].stiffness *= stiffness;
@@ -194,7 +194,7 @@ fn a_rub_is_felt_by_the_other_rotor_through_the_casing() {
 
 /// The leading edge meets a casing, the trailing edge a seal of smaller radius and other friction.
 #[test]
-fn a_tip_and_a_seal_on_one_blade_each_have_their_own_friction() {
+fn tip_and_seal_on_one_blade_have_separate_friction() {
     for solver in [Solver::Lcp, Solver::Film] {
         let scene = several::tip_and_seal(rub(6), solver);
         let mut seen = [0; 2];
@@ -222,7 +222,7 @@ fn a_tip_and_a_seal_on_one_blade_each_have_their_own_friction() {
 
 /// Two blocks between two pairs of plates, in one scene or two.
 #[test]
-fn free_bodies_are_each_what_they_are_alone() {
+fn free_bodies_are_independent() {
     let one = lattice::squeezed();
     let mut both = one.clone();
     let renamed = |name: &str| format!("other_{name}");
@@ -288,7 +288,7 @@ fn a_saved_state_of_two_rotors_continues_with_the_same_bits() {
 /// Bytes with a right checksum that one of two rotors refuses: its speed is beyond what its stiffness was fitted for. The other
 /// rotor would take its own.
 #[test]
-fn a_state_that_one_of_two_rotors_refuses_changes_nothing() {
+fn state_rejected_by_one_rotor_changes_nothing() {
     let mut scene = rub(6);
     scene.roms[0] = rich_blade(6);
     scene.roms[0].extras.spin = Some(spin(scene.roms[0].order()));
@@ -322,7 +322,7 @@ fn a_state_that_one_of_two_rotors_refuses_changes_nothing() {
 }
 
 #[test]
-fn a_step_asks_for_no_memory() {
+fn step_does_not_allocate() {
     for scene in [
         several::in_one_casing(rub(6), Solver::Lcp, 0.15),
         several::in_one_casing(rub(6), Solver::Coulomb, 0.15),
@@ -338,7 +338,7 @@ fn a_step_asks_for_no_memory() {
 }
 
 #[test]
-fn what_does_not_go_together_is_refused_by_name() {
+fn rejects_incompatible_combinations_by_name() {
     let refused = |scene: &Scene, part: &str| {
         let message = Simulation::new(scene).map(|_| ()).unwrap_err().to_string();
         assert!(message.contains(part), "{part:?} is not in {message:?}");

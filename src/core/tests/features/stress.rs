@@ -28,7 +28,7 @@ fn scene() -> Scene {
 }
 
 #[test]
-fn stress_is_that_of_the_displacements() {
+fn stress_follows_from_the_displacements() {
     let scene = scene();
     let nodes = scene.roms[0].contact_nodes.len();
     let mut run = started(&scene);
@@ -65,7 +65,7 @@ fn stress_is_that_of_the_displacements() {
 }
 
 #[test]
-fn stress_that_is_not_asked_for_costs_nothing() {
+fn unrequested_stress_costs_nothing() {
     let with = scene();
     let mut without = with.clone();
     without.settings.outputs.stress = false;
@@ -79,7 +79,7 @@ fn stress_that_is_not_asked_for_costs_nothing() {
 }
 
 #[test]
-fn stress_without_places_is_refused() {
+fn rejects_stress_output_without_stress_points() {
     let reported = |change: fn(&mut Scene)| {
         let mut scene = scene();
         change(&mut scene);
@@ -127,7 +127,7 @@ fn warm(scene: &Scene, temperature: f64) -> Simulation {
 /// At rest it is the static stress of the full model, none where that expands freely; with softening as much less as there is stiffness,
 /// and of a stiffer blade as much more.
 #[test]
-fn a_warm_blade_has_the_thermal_stress_of_the_full_model() {
+fn thermal_stress_of_warm_blade_matches_full_model() {
     for thermal in [(|_| 0.0) as fn(usize) -> f64, |row| 1e5 * (row as f64 - 4.5)] {
         for (softening, stiffening, factor) in
             [(0.0, false, 1.0), (3e-4, false, 1.0), (3e-4, true, 1.0), (3e-4, false, 1.1), (0.0, true, 0.9)]
@@ -158,7 +158,7 @@ fn a_warm_blade_has_the_thermal_stress_of_the_full_model() {
 /// Forces decide the stress of what is held one way only: pulled by its own weight as it turns, a blade has the static stress of the full
 /// model whatever heat and mistuning leave of its stiffness, although it stretches by 13.6 % more.
 #[test]
-fn stress_that_forces_decide_does_not_depend_on_the_stiffness() {
+fn statically_determinate_stress_ignores_stiffness() {
     let mut scene = heated(|_| 0.0);
     let growth = |row: usize| 3.0 * (row as f64 - 4.5);
     scene.roms[0].extras.stress_centrifugal = Some(DMatrix::from_fn(2 * STRESSES, 1, |row, _| growth(row)));
@@ -193,7 +193,7 @@ fn stress_that_forces_decide_does_not_depend_on_the_stiffness() {
 
 /// Displacements alone say nothing of the stress of what expands: it is refused by name, and never told wrongly.
 #[test]
-fn stress_of_a_heated_blade_needs_its_static_thermal_stress() {
+fn heated_blade_stress_requires_static_thermal_stress() {
     let mut scene = heated(|_| 0.0);
     scene.roms[0].extras.stress_thermal = None;
     let reported = |scene: &Scene| Simulation::new(scene).map(|_| ()).unwrap_err().to_string();

@@ -54,7 +54,7 @@ fn place(run: &Simulation) -> [f64; 2] {
 
 /// Force of the blades plus that of the support is mass times acceleration, step by step: second differences of the places.
 #[test]
-fn forces_on_a_casing_are_its_momentum() {
+fn casing_forces_equal_its_momentum_change() {
     let mut run = started(&scene(Scheme::CentralDifference));
     let (mut places, mut worst, mut largest) = (vec![place(&run)], [0.0_f64; 2], 0.0_f64);
     let mut before = [0.0; 2];
@@ -87,7 +87,7 @@ fn forces_on_a_casing_are_its_momentum() {
 
 /// The moment about the axis is that on the rotor turned round, displaced by the shaft; on a rigid casing as well.
 #[test]
-fn moments_on_a_casing_are_those_on_the_rotor_about_the_origin() {
+fn casing_moments_balance_rotor_moments_about_origin() {
     for flexible in [true, false] {
         let mut scene = scene(Scheme::ModalExact);
         if !flexible {
@@ -119,7 +119,7 @@ fn moments_on_a_casing_are_those_on_the_rotor_about_the_origin() {
 
 /// A load that stays: the support takes all of it, the casing's own motion nothing.
 #[test]
-fn at_rest_the_support_takes_the_contact_force() {
+fn support_balances_static_contact_force() {
     let mut scene = scene(Scheme::ModalExact);
     // A blade that stands pressed into the casing, damped.
     scene.settings.structures[0].speed = 0.0;
@@ -140,7 +140,7 @@ fn at_rest_the_support_takes_the_contact_force() {
 /// Friction turns the casing: its support takes the moment of the contact, also where the mesh is larger than the surface, since a lining
 /// lies between them.
 #[test]
-fn at_rest_the_support_takes_the_contact_moment() {
+fn support_balances_static_contact_moment() {
     for larger in [0.0, 0.07] {
         let mut scene = scene(Scheme::ModalExact);
         scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -182,7 +182,7 @@ fn at_rest_the_support_takes_the_contact_moment() {
 
 /// Contact displacements are the modes' sum, of modes with unit modal mass.
 #[test]
-fn tips_move_by_the_modes_that_are_told() {
+fn tip_displacement_matches_modal_amplitudes() {
     let mut scene = models::bumps(models::blade(4));
     let modes = scene.roms[0].order();
     scene.settings.outputs.watched_sectors = vec![3];

@@ -40,7 +40,7 @@ fn events() -> Vec<(&'static str, Scene, usize)> {
 
 /// What counts as a small displacement is so beside the smallest surface that the body meets, for both of its pairs.
 #[test]
-fn displacements_are_small_beside_the_smallest_surface() {
+fn displacement_limit_scales_with_the_smallest_surface() {
     let mut both = scene(block([0.0; 3], 3e6), &[(BlockSide::Left, 0.06), (BlockSide::Right, 0.06)], false, [0.0; 3]);
     let wide = largest_of_pairs(&both);
     assert!(wide[0] > 0.0 && wide[0].to_bits() == wide[1].to_bits(), "{wide:?}");
@@ -61,7 +61,7 @@ fn largest_of_pairs(scene: &Scene) -> Vec<f64> {
 }
 
 #[test]
-fn momentum_and_energy_are_kept_by_every_scheme_and_solver() {
+fn every_scheme_and_solver_conserves_momentum_and_energy() {
     println!("| scene | scheme | solver | µ | momentum | residual / energy |\n|---|---|---|---|---|---|");
     let (mut momentum_off, mut residual_off) = (0.0_f64, 0.0_f64);
     for (name, scene, steps) in events() {
@@ -121,7 +121,7 @@ fn angular_momentum(simulation: &Simulation, rom: &tiprub_core::Rom) -> f64 {
 }
 
 #[test]
-fn edge_impact_turns_the_body_by_its_moment() {
+fn off_centre_impact_rotates_the_body() {
     for (scheme, friction) in [(Scheme::CentralDifference, 0.0), (Scheme::ModalExact, 0.3)] {
         let (_, scene, _) = events().swap_remove(1);
         let scene = with(scene, friction, Solver::Lcp, scheme);
@@ -178,7 +178,7 @@ fn a_symmetric_scene_stays_symmetric_to_rounding() {
 }
 
 #[test]
-fn film_with_central_differences_is_the_papers_form() {
+fn film_with_central_differences_matches_the_paper() {
     use nalgebra::{DMatrix, DVector};
     let (h, friction, velocity) = (1e-6, 0.2, [-12.0, 6.0, 1.0]);
     let distances = [0.0203, 0.0205];
@@ -225,7 +225,7 @@ fn film_with_central_differences_is_the_papers_form() {
 }
 
 #[test]
-fn a_pair_far_away_changes_nothing() {
+fn distant_contact_pair_has_no_effect() {
     let (body, velocity) = (|| block([0.0; 3], 3e6), [-12.0, 6.0, 1.0]);
     let one = scene(body(), &[(BlockSide::Left, 0.0203)], true, velocity);
     let two = scene(body(), &[(BlockSide::Left, 0.0203), (BlockSide::Right, 5.0)], true, velocity);
@@ -248,7 +248,7 @@ fn a_pair_far_away_changes_nothing() {
 }
 
 #[test]
-fn friction_with_sticking_blocks_the_body() {
+fn sticking_friction_stops_the_body() {
     let mut scene = with(squeezed_by(6e-4, [0.0, -14.0, 0.0]), 0.9, Solver::Coulomb, Scheme::ModalExact);
     scene.settings.structures.iter_mut().for_each(|structure| structure.damping_ratio = Some(0.05));
     let mut simulation = started(&scene);
@@ -296,7 +296,7 @@ fn saved_state_continues_with_equal_bits_and_reset_restarts() {
 }
 
 #[test]
-fn the_books_close_when_the_step_changes() {
+fn energy_balance_closes_when_the_step_changes() {
     for scheme in SCHEMES {
         let mut simulation = started(&with(squeezed(), 0.15, Solver::Lcp, scheme));
         for index in 0..120 {
@@ -322,7 +322,7 @@ fn the_initial_velocity_is_a_parameter() {
 }
 
 #[test]
-fn a_step_asks_for_no_memory() {
+fn step_does_not_allocate() {
     for solver in SOLVERS {
         let mut simulation = started(&with(squeezed(), 0.15, solver, Scheme::ModalExact));
         let mut time = 0.0;
@@ -391,7 +391,7 @@ fn carried_elsewhere(scene: &Scene, r: [[f64; 3]; 3], shift: [f64; 3]) -> Scene 
 }
 
 #[test]
-fn the_answer_does_not_depend_on_where_and_how_the_scene_stands() {
+fn result_is_independent_of_scene_position_and_orientation() {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let about_z = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
     let oblique = [[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]];

@@ -57,7 +57,7 @@ fn marched(mut scene: Scene, tolerance: f64, friction: f64) -> Scene {
 
 /// It touches for half a period and leaves as fast as it came, less what friction takes along the wall: 2µ of it.
 #[test]
-fn a_mass_on_springs_leaves_a_wall_after_half_a_period() {
+fn mass_on_springs_rebounds_after_half_a_period() {
     let frequency = (STIFFNESS / MASS).sqrt();
     let along = 3.0;
     for friction in [0.0, 0.2] {
@@ -106,7 +106,7 @@ fn events() -> Vec<(&'static str, Scene, usize)> {
 }
 
 #[test]
-fn momentum_and_energy_are_kept_within_every_tolerance() {
+fn momentum_and_energy_are_conserved_within_tolerance() {
     let total: f64 = places().map(node_mass).sum();
     let size = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     for (name, scene, steps) in events() {
@@ -168,7 +168,7 @@ const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 
 /// What remains goes down with the tolerance, on plates that give way, with friction.
 #[test]
-fn the_error_follows_the_tolerance() {
+fn error_stays_below_the_tolerance() {
     for (name, scene, steps) in events().drain(..2) {
         for friction in [0.0, 0.2] {
             let of = |tolerance: f64| marched(scene.clone(), tolerance, friction);
@@ -183,7 +183,7 @@ fn the_error_follows_the_tolerance() {
 
 /// The same body by other equations: with the mass of its contact nodes. Both tend to the same flight, but for that mass.
 #[test]
-fn light_contact_nodes_fly_as_massless_ones() {
+fn light_contact_nodes_converge_to_massless_ones() {
     let mut thrown = thrown_at_wall(sprung(), DISTANCE, [-VELOCITY, 3.0, 0.0]);
     thrown.settings.structures[1].damping_ratio = Some(0.0);
     let by_steps = |h: f64| {
@@ -223,7 +223,7 @@ fn goes_on(scene: &Scene, steps: usize) {
 
 /// Over a free edge, and behind the surface already.
 #[test]
-fn what_comes_over_an_edge_behind_the_surface_ends_the_run() {
+fn node_passing_behind_the_surface_ends_the_run() {
     let distance = 0.5 * SIDE - 3e-3;
     let plates = [(BlockSide::Left, distance), (BlockSide::Right, distance)];
     let scene = marched(scene(faces([0.0, 0.12, 0.0]), &plates, false, [0.0, -40.0, 0.0]), 1e-3, 0.0);
@@ -234,7 +234,7 @@ fn what_comes_over_an_edge_behind_the_surface_ends_the_run() {
 
 /// Some of its nodes go off the plate along z while they touch.
 #[test]
-fn what_slides_off_an_edge_goes_on() {
+fn body_sliding_off_an_edge_continues() {
     for friction in [0.0, 0.2] {
         let thrown = scene(faces([0.0, 0.0, 0.0295]), &[(BlockSide::Left, 0.0201)], false, [-4.0, 0.0, 20.0]);
         let mut simulation = started(&marched(thrown, 1e-3, friction));
@@ -256,7 +256,7 @@ fn what_slides_off_an_edge_goes_on() {
 
 /// Thrown at a plate more across than along it: vibration turns sliding round, and friction of sliding would put energy in.
 #[test]
-fn friction_that_puts_energy_in_ends_the_run() {
+fn friction_that_adds_energy_ends_the_run() {
     for (rigid, tolerance) in [(false, 1e-1), (false, 1e-3), (true, 1e-1), (true, 1e-3)] {
         let mut thrown = scene(faces([0.0; 3]), &[(BlockSide::Left, 0.0201)], false, [-20.0, 3.0, 1.0]);
         thrown.settings.surfaces[0].rigid = rigid;
@@ -277,7 +277,7 @@ fn friction_that_puts_energy_in_ends_the_run() {
 
 /// The same throws with a law that knows sticking: friction takes, and what remains goes down with the tolerance.
 #[test]
-fn with_sticking_friction_takes_energy_alone() {
+fn sticking_friction_only_dissipates_energy() {
     for rigid in [true, false] {
         let of = |tolerance: f64| {
             let mut thrown = scene(faces([0.0; 3]), &[(BlockSide::Left, 0.0201)], false, [-20.0, 3.0, 1.0]);
@@ -311,7 +311,7 @@ fn with_sticking_friction_takes_energy_alone() {
 
 /// Slower along the wall than friction stops: by other equations, with the mass of its contact nodes, it sticks as well.
 #[test]
-fn what_sticks_flies_off_as_with_light_contact_nodes() {
+fn rebound_after_stick_matches_light_contact_nodes() {
     let mut thrown = thrown_at_wall(sprung(), DISTANCE, [-VELOCITY, 0.05, 0.0]);
     thrown.settings.structures[1].damping_ratio = Some(0.0);
     let by_steps = |h: f64| {
@@ -330,7 +330,7 @@ fn what_sticks_flies_off_as_with_light_contact_nodes() {
 /// The modes that follow contact at once leave some directions rigid. Of a body whose contact nodes are where all springs end they leave
 /// none.
 #[test]
-fn contact_without_flexibility_of_its_own_is_told() {
+fn warns_of_contact_without_independent_flexibility() {
     let reported = |rom: Rom| {
         let scene = thrown_at_wall(rom, 0.0203, [-6.0, 30.0, 4.0]);
         let simulation = started(&marched(scene, 1e-3, 0.0));

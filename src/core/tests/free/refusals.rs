@@ -6,7 +6,7 @@ use tiprub_core::{Rom, Scene, Simulation};
 use tiprub_test_models::{go, lattice, real, started};
 
 #[test]
-fn what_flies_into_a_surface_too_deep_ends_with_the_reason() {
+fn excessive_penetration_of_free_body_ends_with_reason() {
     let fast = scene(block([0.0; 3], 1e3), &[(BlockSide::Left, 0.0203)], false, [-400.0, 0.0, 0.0]);
     let mut simulation = started(&fast);
     let error = (0..200).find_map(|_| simulation.do_step(simulation.time(), 1e-5).err()).unwrap().to_string();
@@ -25,7 +25,7 @@ fn refusal(change: impl FnOnce(&mut Scene)) -> String {
 }
 
 #[test]
-fn scenes_that_make_no_sense_are_refused_with_the_reason() {
+fn rejects_meaningless_scenes_with_reason() {
     type Case = (&'static str, fn(&mut Scene));
     let cases: [Case; 24] = [
         ("the structure is constrained", |scene| scene.roms[0].stiffness[(4, 4)] += 1e3),
@@ -92,7 +92,7 @@ fn with_local_mode(distance: f64, shape: &[(usize, [f64; 3])]) -> Scene {
 }
 
 #[test]
-fn friction_that_jams_a_contact_on_the_flight_is_refused() {
+fn rejects_friction_that_jams_a_free_body() {
     // Near, and after two lengths of the block.
     for distance in [0.0203, 0.1] {
         // Pushed in, the node moves along its slip: friction against the slip pushes it in further.
@@ -106,7 +106,7 @@ fn friction_that_jams_a_contact_on_the_flight_is_refused() {
 
 /// The same where it is the plate that yields along its slip.
 #[test]
-fn friction_that_jams_a_contact_on_a_plate_is_refused() {
+fn rejects_friction_that_jams_contact_on_a_plate() {
     let with_plate = |sideways: f64| {
         let mut scene = at_plate(0.0203);
         let nodes = scene.roms[1].contact_nodes.len();
@@ -152,7 +152,7 @@ fn rejects_a_body_that_is_too_fast_for_the_step() {
 }
 
 #[test]
-fn a_node_that_comes_over_an_edge_from_behind_is_refused() {
+fn rejects_node_that_crosses_an_edge_from_behind() {
     let thrown = |distance, velocity, steps: u32| {
         let scene = scene(block([0.0, 0.1101, 0.0], 3e6), &[(BlockSide::Left, distance)], false, velocity);
         let mut simulation = started(&with(scene, 0.15, Solver::Lcp, Scheme::ModalExact));

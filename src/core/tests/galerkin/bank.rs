@@ -7,7 +7,7 @@ use tiprub_test_models::{go, real, set, started};
 
 /// Blades without damping and friction that are squeezed by a round casing, and then swing against it.
 #[test]
-fn blades_keep_their_energy_over_thousands_of_impacts() {
+fn blades_conserve_energy_over_thousands_of_impacts() {
     let (longest, turns) = (8e-5, 40.0);
     for tolerance in [1e-1, 1e-2, 1e-3] {
         let mut scene = scene(Scheme::Galerkin, longest, tolerance);

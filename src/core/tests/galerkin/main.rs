@@ -88,7 +88,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn is_the_limit_of_massless_boundary_within_its_tolerance() {
+fn massless_boundary_converges_to_galerkin_within_tolerance() {
     let exact = run(&scene(Scheme::Galerkin, H, 1e-7), still);
     assert!(exact.residual < 1e-13 && exact.lowest > -1e-9, "{:e}, {:e}", exact.residual, exact.lowest);
     // The longest step changes nothing, a shape that grows in included.
@@ -193,7 +193,7 @@ fn every_combination_agrees_with_massless_boundary() {
 
 /// Coupled sectors step together, by nodal diameters; as one structure they are one sector that steps by itself.
 #[test]
-fn a_disk_of_coupled_sectors_is_what_it_is_as_one_structure() {
+fn coupled_sectors_match_the_disk_as_one_structure() {
     for (sectors, nodes, friction) in [(5, 2, 0.0), (6, 1, 0.15)] {
         let disk = TestDisk::random(sectors, nodes, 3 * nodes + 5, 0.25, 3);
         let of = |rom: Rom, tolerance: f64| {
@@ -256,7 +256,7 @@ fn elastic_casing_with_blades_at_rest_gains_no_energy() {
 
 /// Slip that is small against what casings and blades swing by, and gaps that cannot be closer than rounding.
 #[test]
-fn slow_rotors_and_smallest_tolerances_find_their_contacts() {
+fn converges_for_slow_rotors_and_small_tolerances() {
     for (speed, tolerance, carried) in
         [(0.0, 1e-4, true), (30.0, 1e-4, true), (1300.0, 1e-9, true), (1300.0, 1e-9, false)]
     {
@@ -280,7 +280,7 @@ fn slow_rotors_and_smallest_tolerances_find_their_contacts() {
 }
 
 #[test]
-fn sectors_that_step_together_keep_the_bound_on_steps() {
+fn coupled_sectors_respect_the_step_count_limit() {
     let mut scene = scene(Scheme::Galerkin, H, 1e-4);
     flexible(&mut scene);
     for most in [1, 3, 4, 7, 90] {
@@ -301,7 +301,7 @@ fn sectors_that_step_together_keep_the_bound_on_steps() {
 }
 
 #[test]
-fn what_is_not_sound_is_refused_by_name() {
+fn rejects_unsupported_scenes_by_name() {
     let cases: [(&str, Combination); 3] = [
         ("coating", tiprub_test_models::coating),
         ("more than three modes", |scene| scene.roms[0] = blade(SECTORS)),
@@ -354,7 +354,7 @@ fn goes_on_with_the_same_bits(scene: &Scene) {
 
 /// A blade that nothing comes near takes one step a span, and no gap is looked at.
 #[test]
-fn free_flight_takes_spans_as_they_are() {
+fn free_flight_takes_one_step_per_span() {
     let mut scene = scene(Scheme::Galerkin, H, 1e-3);
     scene.settings.surfaces[0].shape = Shape::Circular {};
     scene.settings.surfaces[0].ramp_time = 0.0;
@@ -374,7 +374,7 @@ fn free_flight_takes_spans_as_they_are() {
 }
 
 #[test]
-fn damping_is_that_of_the_parameter() {
+fn damping_follows_the_parameter() {
     let of = |ratio: f64, by_importer: bool| {
         let mut scene = scene(Scheme::Galerkin, H, 1e-4);
         scene.settings.structures[0].damping_ratio = Some(if by_importer { 0.001 } else { ratio });
@@ -398,7 +398,7 @@ fn damping_is_that_of_the_parameter() {
 }
 
 #[test]
-fn a_tolerance_that_is_missed_is_counted_and_told_once() {
+fn missed_tolerance_is_counted_and_warned_of_once() {
     let run = |tolerance: f64| {
         let mut simulation = started(&scene(Scheme::Galerkin, 8e-5, tolerance));
         let notes: Vec<tiprub_core::Warning> = (0..40)
@@ -511,7 +511,7 @@ fn discarded_step_changes_nothing() {
 }
 
 #[test]
-fn every_scheme_keeps_the_bound_and_wrong_ones_are_refused() {
+fn schemes_respect_the_step_limit_and_reject_invalid_ones() {
     for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary, Scheme::CentralDifference] {
         let mut scene = scene(scheme, 1e-7, 1e-3);
         scene.settings.time.max_internal_steps = Some(400);
@@ -554,7 +554,7 @@ fn every_scheme_keeps_the_bound_and_wrong_ones_are_refused() {
 
 /// A casing that closes and opens in the middle of long communication steps, against spans of the longest step.
 #[test]
-fn what_rests_far_away_flies_over_whole_communication_steps() {
+fn distant_bodies_take_whole_communication_steps() {
     let mut scene = scene(Scheme::Galerkin, 8e-5, 1e-3);
     scene.settings.structures[0].damping_ratio = Some(0.05);
     scene.settings.surfaces[0].ramp_time = 0.0;
@@ -610,7 +610,7 @@ fn least_clearance(simulation: &Simulation) -> f64 {
 
 /// From far away onto blades at rest within one span: it does not pass for free flight.
 #[test]
-fn a_casing_that_closes_within_a_span_is_met() {
+fn detects_casing_that_closes_within_one_span() {
     let mut scene = scene(Scheme::Galerkin, H, 1e-3);
     scene.settings.surfaces[0].shape = Shape::Circular {};
     scene.settings.surfaces[0].ramp_time = 0.0;
@@ -627,7 +627,7 @@ fn a_casing_that_closes_within_a_span_is_met() {
 
 /// Peaks and means over a span are those of a thousand short steps.
 #[test]
-fn outputs_of_a_span_are_those_of_many_steps() {
+fn span_outputs_match_many_short_steps() {
     let of = |scheme: Scheme, step: f64| {
         let mut simulation = started(&scene(scheme, step, 1e-5));
         let (mut peaks, mut sliding) = (0.0, 0.0);

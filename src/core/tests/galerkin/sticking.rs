@@ -10,7 +10,7 @@ use tiprub_test_models::{GAP, RADIUS, bumps, flexible, go, modal, node, real, st
 /// The solver that knows sticking, on a rub where all slides: it tends to what massless-boundary tends to with it, and errors are those
 /// asked for.
 #[test]
-fn errors_of_friction_that_may_stick_are_those_asked_for() {
+fn sticking_friction_meets_the_requested_tolerance() {
     for (name, change) in [("rigid", (|_: &mut Scene| {}) as Combination), ("flexible", flexible)] {
         let of = |scheme: Scheme, step: f64, tolerance: f64| {
             let mut scene = scene(scheme, step, tolerance);
@@ -37,7 +37,7 @@ fn errors_of_friction_that_may_stick_are_those_asked_for() {
 
 /// Sectors that step together are what they are as one structure, where they slide and where they are slow enough to stick.
 #[test]
-fn coupled_sectors_stick_as_one_structure_does() {
+fn sticking_of_coupled_sectors_matches_one_structure() {
     let disk = TestDisk::random(6, 1, 8, 0.25, 3);
     for speed in [1300.0, 300.0] {
         let of = |rom: Rom, tolerance: f64| {
@@ -59,7 +59,7 @@ fn coupled_sectors_stick_as_one_structure_does() {
 }
 
 #[test]
-fn what_sticks_is_saved_and_asks_for_no_memory() {
+fn sticking_state_is_saved_without_allocation() {
     let mut alone = scene(Scheme::Galerkin, H, 1e-4);
     alone.settings.contacts[0].solver = Solver::Coulomb;
     let (mut carried, mut coupled) = (alone.clone(), alone.clone());

@@ -28,7 +28,7 @@ fn rejects_a_rotor_that_skips_over_the_lobes() {
 }
 
 #[test]
-fn casings_that_small_displacements_cannot_describe_are_refused() {
+fn rejects_casing_shapes_too_large_for_small_displacements() {
     let mut scene = models::rub(12);
     for depth in [100.0, 1e6, 1e12] {
         scene.settings.surfaces[0].shape = Shape::TwoLobe { depth, width: 0.15, phase: 0.0 };
@@ -112,7 +112,7 @@ fn rejects_a_speed_beyond_the_fitted_one() {
 }
 
 #[test]
-fn what_counts_is_the_step_in_use_not_the_largest_allowed() {
+fn checks_the_actual_step_rather_than_the_maximum_step() {
     // Central differences far beyond their limit by internal_step_max, well within it by the communication step.
     let mut scene = models::rub(12);
     scene.settings.time.scheme = Scheme::CentralDifference;
@@ -131,7 +131,7 @@ fn what_counts_is_the_step_in_use_not_the_largest_allowed() {
 }
 
 #[test]
-fn growth_is_told_in_the_sense_of_rotation_and_by_node() {
+fn growth_warning_names_node_and_sense_of_rotation() {
     let mut scene = models::rub(12);
     scene.settings.time.scheme = Scheme::CentralDifference;
     scene.settings.time.step = 7.2e-6;
@@ -148,7 +148,7 @@ fn growth_is_told_in_the_sense_of_rotation_and_by_node() {
 }
 
 #[test]
-fn the_friction_a_refusal_proposes_is_accepted() {
+fn accepts_the_friction_proposed_by_the_error_message() {
     let mut scene = models::rub(12);
     for friction in [0.5, 1.0, 2.0] {
         scene.settings.contacts[0].friction = friction;
@@ -232,7 +232,7 @@ fn unbounded(simulation: &Simulation) -> Vec<String> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
-    fn no_output_is_ever_anything_but_a_number(
+    fn outputs_are_always_finite_numbers(
         starts in prop::collection::vec((-320.0..15.0_f64, any::<bool>()), 2),
         lengths in prop::collection::vec((-320.0..300.0_f64, any::<bool>()), 6),
     ) {
@@ -331,7 +331,7 @@ fn in_si(name: &str) -> (f64, [i32; 5]) {
 }
 
 #[test]
-fn units_are_what_their_names_say() {
+fn unit_definitions_match_their_names() {
     let mut seen = std::collections::BTreeSet::new();
     for scene in kinds() {
         for row in Simulation::new(&scene).unwrap().table().variables() {
@@ -351,7 +351,7 @@ fn units_are_what_their_names_say() {
 
 /// Flanks of teeth by their slope: 44° is rubbed on, 46° is refused, by its angle in a step, and by itself as a contact.
 #[test]
-fn flanks_steeper_than_45_degrees_are_refused() {
+fn rejects_flanks_steeper_than_45_degrees() {
     let mut scene = models::rub(4);
     let mut through_points = scene.clone();
     through_points.settings.surfaces[0].spline = Some(SplineSettings::default());

@@ -34,7 +34,7 @@ fn squeeze(simulation: &mut Simulation, depth: f64, steps: u32, mut look: impl F
 }
 
 #[test]
-fn friction_that_feeds_a_vibration_ends_the_run() {
+fn run_fails_when_friction_adds_energy_to_vibration() {
     for (scheme, solver) in [
         (Scheme::ModalExact, Solver::Lcp),
         (Scheme::ModalExact, Solver::Film),
@@ -59,7 +59,7 @@ fn friction_that_feeds_a_vibration_ends_the_run() {
 }
 
 #[test]
-fn friction_that_may_stick_takes_whatever_turns_round() {
+fn sticking_friction_dissipates_when_sliding_reverses() {
     for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary, Scheme::Galerkin] {
         let mut simulation = started(&slow(scheme, Solver::Coulomb));
         let mut before = [0.0; 2];

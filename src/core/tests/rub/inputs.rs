@@ -98,7 +98,7 @@ fn peak(scene: &Scene, derivatives: bool, length: f64, delay: f64) -> f64 {
 }
 
 #[test]
-fn a_whirl_given_as_a_staircase_does_not_hit() {
+fn stepwise_whirl_input_causes_no_impact() {
     for length in [1e-5, 1e-4] {
         // Ramps are late by H, where the rotor is elsewhere.
         let [fine, late] = [0.0, length].map(|delay| peak(&whirling(), true, STEP, delay));
@@ -167,7 +167,7 @@ fn value_is_reached_exactly_at_the_end_of_the_step() {
 }
 
 #[test]
-fn held_inputs_act_at_once() {
+fn held_inputs_act_immediately() {
     let mut simulation = started(&held(bumps()));
     set(&mut simulation, "casing_shape_factor", 0.25);
     acts(&simulation, 0.25);
@@ -187,7 +187,7 @@ fn held_inputs_act_at_once() {
 }
 
 #[test]
-fn derivatives_say_where_the_step_ends_and_do_not_make_it_jump() {
+fn input_derivatives_define_the_end_value_without_jumps() {
     let (mut simulation, length) = (started(&bumps()), 1e-5);
     // Consistent ones give the line itself.
     for index in 0..5 {
@@ -211,7 +211,7 @@ fn derivatives_say_where_the_step_ends_and_do_not_make_it_jump() {
 }
 
 #[test]
-fn value_set_within_a_step_turns_the_ramp() {
+fn value_set_within_a_step_redirects_the_ramp() {
     let mut simulation = started(&bumps());
     set(&mut simulation, "casing_shape_factor", 0.0);
     simulation.begin_step(0.0, 1e-5).unwrap();
@@ -262,7 +262,7 @@ fn disturb(simulation: &mut Simulation, index: u32) {
 }
 
 #[test]
-fn a_state_saved_within_a_ramp_goes_on_bit_by_bit_elsewhere() {
+fn state_saved_within_a_ramp_continues_bit_identically() {
     let scene = rich();
     let mut simulation = started(&scene);
     for index in 0..5 {
@@ -294,7 +294,7 @@ fn a_state_saved_within_a_ramp_goes_on_bit_by_bit_elsewhere() {
 }
 
 #[test]
-fn a_thousand_resets_within_a_ramp_leave_nothing() {
+fn a_thousand_resets_within_a_ramp_clear_all_state() {
     let mut scene = bumps();
     scene.settings.structures[0].whirl = true;
     let mut simulation = Simulation::new(&scene).unwrap();
@@ -323,7 +323,7 @@ fn refused(simulation: &mut Simulation, length: f64, words: &[&str]) {
 }
 
 #[test]
-fn refused_steps_name_the_input_and_change_nothing() {
+fn rejected_steps_name_the_input_and_change_nothing() {
     let mut simulation = started(&bumps());
     set(&mut simulation, "casing_radius_change", 0.02);
     slope(&mut simulation, "casing_radius_change", 100.0);
@@ -346,7 +346,7 @@ fn refused_steps_name_the_input_and_change_nothing() {
 }
 
 #[test]
-fn refused_values_within_a_step_change_nothing() {
+fn rejected_values_within_a_step_change_nothing() {
     let mut simulation = started(&bumps());
     set(&mut simulation, "casing_shape_rotation", 0.001);
     simulation.begin_step(0.0, 3e-6).unwrap();
@@ -362,7 +362,7 @@ fn refused_values_within_a_step_change_nothing() {
 }
 
 #[test]
-fn a_scene_without_such_inputs_has_no_choice_of_them() {
+fn interpolation_choice_exists_only_with_ramped_inputs() {
     let mut scene = models::rub(6);
     let has = |scene: &Scene| Simulation::new(scene).unwrap().table().find("input_interpolation").is_some();
     assert!(has(&scene) && has(&whirling()));
@@ -380,7 +380,7 @@ fn a_scene_without_such_inputs_has_no_choice_of_them() {
 }
 
 #[test]
-fn one_short_step_among_longer_ones_does_not_hit() {
+fn single_short_step_causes_no_impact() {
     let whirl = |short: Option<f64>| {
         let mut simulation = started(&whirling());
         let mut most = 0.0_f64;
@@ -420,7 +420,7 @@ fn the_angle_is_the_integral_of_the_speed_with_whole_turns() {
 }
 
 #[test]
-fn an_early_return_is_a_communication_step_of_the_length_done() {
+fn early_return_equals_a_shorter_communication_step() {
     let mut scene = bumps();
     scene.settings.outputs.energies = true;
     let mut simulation = started(&scene);

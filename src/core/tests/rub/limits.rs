@@ -16,7 +16,7 @@ fn usable_step(scene: Scene) -> f64 {
 }
 
 #[test]
-fn massless_boundary_knows_the_stiffest_blade() {
+fn massless_boundary_limit_uses_the_stiffest_blade() {
     let tuned = usable_step(round(Scheme::MasslessBoundary));
     let mut scene = round(Scheme::MasslessBoundary);
     scene.settings.structures[0].frequency_factors = vec![1.0; 12];
@@ -91,7 +91,7 @@ fn stiff_casing_gains_no_energy_at_the_massless_limit() {
 }
 
 #[test]
-fn flutter_is_told_with_massless_boundary_as_with_modal_exact() {
+fn flutter_warning_agrees_for_massless_and_modal_exact() {
     let rate = |scheme| {
         let mut scene = with_step(round(scheme), 2e-7);
         scene.settings.contacts[0].friction = 0.15;
@@ -108,7 +108,7 @@ fn flutter_is_told_with_massless_boundary_as_with_modal_exact() {
 }
 
 #[test]
-fn a_restored_state_brings_the_limits_of_its_own_parameters() {
+fn restored_state_uses_the_limits_of_its_parameters() {
     let mut scene = with_step(round(Scheme::CentralDifference), 1e-3);
     scene.settings.experiment.communication_step = 1e-6;
     scene.settings.contacts[0].solver = Solver::Lcp;
@@ -129,7 +129,7 @@ fn a_restored_state_brings_the_limits_of_its_own_parameters() {
 }
 
 #[test]
-fn a_refused_friction_leaves_the_limits_of_the_one_in_use() {
+fn rejected_friction_keeps_the_current_limits() {
     // Growth by friction forbids steps from 2.3e-5 s on.
     let (short, long) = (1e-6, 3e-5);
     let mut scene = with_step(models::rub(3), 1e-4);
@@ -150,7 +150,7 @@ fn a_refused_friction_leaves_the_limits_of_the_one_in_use() {
 }
 
 #[test]
-fn fast_rotors_with_the_stiffness_of_rest_are_warned_of() {
+fn warns_of_fast_rotor_with_stiffness_at_rest() {
     let mut scene = models::rub(3);
     let model = ModalModel::from_rom(&scene.roms[0], 1e-3).unwrap();
     let lowest = model.frequencies.iter().copied().fold(f64::INFINITY, f64::min);
@@ -185,7 +185,7 @@ fn fast_rotors_with_the_stiffness_of_rest_are_warned_of() {
 }
 
 #[test]
-fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
+fn warnings_refer_to_the_actual_step_and_appear_once() {
     let mut scene = with_step(models::rub(3), 8e-6);
     scene.settings.contacts[0].friction = 0.0;
     scene.settings.silence = vec![Topic::StiffnessAtRest.id().to_owned()];
@@ -214,7 +214,7 @@ fn warnings_hold_for_the_step_that_is_taken_and_are_told_once() {
 }
 
 #[test]
-fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
+fn warns_of_reverse_rotation_when_the_rotor_reverses() {
     // Slip in one sense only makes this blade flutter.
     let mut scene = with_step(models::rub(3), 1e-6);
     let flutters = |scene: &Scene| {
@@ -240,7 +240,7 @@ fn the_other_sense_is_told_of_when_the_rotor_turns_that_way() {
 
 /// What is too large to be looked at is told, and only where friction makes it matter.
 #[test]
-fn growth_that_is_not_looked_at_is_told() {
+fn warns_when_growth_was_not_checked() {
     let reported = |scheme: Scheme, modes: usize, friction: f64| {
         let mut scene = models::rub(2);
         scene.settings.time.scheme = scheme;
@@ -265,7 +265,7 @@ fn growth_that_is_not_looked_at_is_told() {
 
 /// What a shorter step is refused for, a longer one is too; the step that the refusal names is taken.
 #[test]
-fn steps_that_add_growth_are_refused_from_one_length_on() {
+fn rejects_all_steps_above_the_growth_limit() {
     let mut named = 0;
     for (seed, nodes) in (1..13).zip([2, 3, 1].into_iter().cycle()) {
         let plain = crowded(nodes, 12, seed);
@@ -300,7 +300,7 @@ fn steps_that_add_growth_are_refused_from_one_length_on() {
 
 /// Where a fixed step is refused, the remedy names adaptive steps first, if the scene allows them.
 #[test]
-fn refused_steps_name_adaptive_steps_first() {
+fn rejected_steps_suggest_adaptive_steps_first() {
     let remedy = |change: &dyn Fn(&mut Scene)| {
         let mut scene = with_step(round(Scheme::CentralDifference), 1e-3);
         scene.roms[0] = models::rich_blade(12);
@@ -334,7 +334,7 @@ fn refused_steps_name_adaptive_steps_first() {
 
 /// Remedies work under the preset, and name the keys of the scene.
 #[test]
-fn remedies_are_those_that_the_preset_leaves() {
+fn remedies_are_compatible_with_the_preset() {
     let mut scene = with_step(round(Scheme::CentralDifference), 1e-5);
     let reported = |scene: &Scene| try_started(scene).unwrap_err().to_string();
     let plain = reported(&scene);
@@ -347,7 +347,7 @@ fn remedies_are_those_that_the_preset_leaves() {
 
 /// A blade that friction bends into the casing: the warning names the µ* above which it does, and there is one only.
 #[test]
-fn digging_in_is_told_with_its_friction() {
+fn lock_up_warning_names_its_friction() {
     // A node on one leaning spring: w_nn/w_nt = cot of its lean.
     let place = models::node("tip", [models::RADIUS, 0.0, 0.0], 0.0);
     let shape =
@@ -375,7 +375,7 @@ fn digging_in_is_told_with_its_friction() {
 
 /// A casing that turns as it yields: under one blade its part of W is the rank-one matrix c(1 − µτ), whatever the angle.
 #[test]
-fn what_a_casing_does_to_solvability_is_told_with_its_place() {
+fn unsolvable_contact_on_casing_names_its_position() {
     let reported = |turned: f64, friction: f64| {
         let mut ring = models::ring(36, 3);
         let shape = |row: usize, _: usize| [1.0, turned, 0.0][row % 3];
@@ -402,7 +402,7 @@ fn what_a_casing_does_to_solvability_is_told_with_its_place() {
 
 /// Blades of four nodes, of many alone and together: what grows most when all are closed is told of all.
 #[test]
-fn growth_of_many_nodes_together_is_told_of_them_all() {
+fn growth_warning_lists_all_participating_nodes() {
     let (mut alone, mut together) = (0, 0);
     for seed in 1..12 {
         let mut scene = with_step(crowded(4, 16, seed), 1e-7);
@@ -417,7 +417,7 @@ fn growth_of_many_nodes_together_is_told_of_them_all() {
 
 /// The number of blades that is told may press on the casing at once, each adding as much as the first.
 #[test]
-fn massless_boundary_tells_how_many_blades_may_press_at_once() {
+fn massless_boundary_reports_the_stable_number_of_blades() {
     let reported = |blades: usize, share: f64| {
         let mut scene = on_a_ring(round(Scheme::MasslessBoundary));
         scene.roms[0] = models::rich_blade(blades);
@@ -434,7 +434,7 @@ fn massless_boundary_tells_how_many_blades_may_press_at_once() {
 
 /// Of coupled sectors the sense of the start alone is looked at: the other takes as long again.
 #[test]
-fn the_other_sense_of_a_disk_is_told_to_be_unknown() {
+fn warns_that_reverse_rotation_of_a_disk_is_unchecked() {
     let mut simulation = models::started(&disk::with_rotor(disk::TestDisk::random(6, 1, 9, 0.25, 6).cyclic()));
     assert!(simulation.if_reversed().is_empty(), "{:?}", simulation.if_reversed());
     for (speed, expected) in [(1300.0, 0), (-1300.0, 1), (1300.0, 0), (-1300.0, 0)] {

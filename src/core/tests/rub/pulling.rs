@@ -58,7 +58,7 @@ fn about_film(notes: Vec<Warning>) -> Vec<Warning> {
 /// Steps that see each node by its own mass leave the second open, as statics does. Longer ones would close both, with the force of the
 /// second a third of that of the first, and pulling. So would all where masses couple the nodes as springs do.
 #[test]
-fn a_run_ends_where_film_pulls_and_goes_on_where_it_does_not() {
+fn run_fails_only_when_film_forces_are_tensile() {
     for (whole, scheme, product, pulls) in [
         (false, Scheme::ModalExact, 0.5, false),
         (false, Scheme::ModalExact, 1.9, false),
@@ -92,7 +92,7 @@ fn a_run_ends_where_film_pulls_and_goes_on_where_it_does_not() {
 
 /// λ of nodes pressed alike are as 3 − c and 1 − c, c the coupling. The paper's method is stepped as it is.
 #[test]
-fn little_pulling_is_told_once_and_so_is_that_of_the_paper() {
+fn warns_once_of_small_tensile_forces_and_paper_preset() {
     for (coupling, preset, expected) in
         [(1.02, Preset::None, None), (1.1, Preset::None, Some(", 5 %")), (1.5, Preset::Paper, Some(", 33 %"))]
     {
@@ -112,7 +112,7 @@ fn little_pulling_is_told_once_and_so_is_that_of_the_paper() {
 
 /// What was pulled so far is part of a state, and the next start has none.
 #[test]
-fn a_state_remembers_what_was_pulled() {
+fn saved_state_includes_tensile_impulses() {
     let scene = scene(1.5, true, Scheme::ModalExact, 1.0);
     let (mut simulation, outcome) = pressed(&scene);
     let expected = outcome.unwrap_err().to_string();

@@ -71,7 +71,7 @@ fn rejects_central_differences_beyond_stiffened_limit() {
 }
 
 #[test]
-fn a_change_of_step_leaves_the_pressed_casing_at_rest() {
+fn step_change_keeps_pressed_casing_at_rest() {
     for scheme in [Scheme::ModalExact, Scheme::MasslessBoundary] {
         let mut scene = on_a_ring(round(scheme));
         scene.settings.structures[0].damping_ratio = Some(0.3);
@@ -91,7 +91,7 @@ fn a_change_of_step_leaves_the_pressed_casing_at_rest() {
 }
 
 #[test]
-fn node_over_the_edge_and_back_rubs_as_on_a_wide_surface() {
+fn node_returning_over_the_edge_rubs_as_on_a_wide_surface() {
     // A cylinder, whose extension beyond the edge is the cylinder: a surface of revolution has no edge at all.
     let run = |spline: Option<SplineSettings>, reach: f64| {
         let mut scene = round(Scheme::ModalExact);
@@ -133,7 +133,7 @@ fn node_over_the_edge_and_back_rubs_as_on_a_wide_surface() {
 }
 
 #[test]
-fn node_over_the_edge_of_a_casing_keeps_the_energy_bound() {
+fn node_over_the_casing_edge_respects_the_energy_bound() {
     for slope in [0.0, -0.2] {
         let mut scene = on_a_ring(round(Scheme::ModalExact));
         for node in &mut scene.roms[0].contact_nodes {
@@ -176,7 +176,7 @@ fn rejects_a_node_that_starts_beyond_the_surface() {
 }
 
 #[test]
-fn a_casing_that_small_displacements_cannot_describe_is_refused() {
+fn rejects_casing_displacements_that_are_too_large() {
     let mut scene = on_a_ring(round(Scheme::ModalExact));
     scene.settings.structures[1].thermal = true;
     // Radial forces outwards on every node: the casing flees from the blades.
@@ -201,7 +201,7 @@ fn a_casing_that_small_displacements_cannot_describe_is_refused() {
 }
 
 #[test]
-fn coating_cells_that_the_blades_would_skip_are_refused() {
+fn rejects_coating_cells_that_blades_would_skip() {
     let narrow = [(4800, 1e-4, false), (5000, 1e-4, true), (100_000, 1e-4, true)];
     // The tips turn by 0.325 mm in a step.
     for (cells, width, refused) in narrow.into_iter().chain([(100_000, 3.0e-4, true), (100_000, 3.5e-4, false)]) {
@@ -220,7 +220,7 @@ fn coating_cells_that_the_blades_would_skip_are_refused() {
 }
 
 #[test]
-fn a_speed_given_within_a_communication_step_is_checked_as_well() {
+fn checks_speed_set_within_a_communication_step() {
     let mut simulation = try_started(&models::rub(12)).unwrap();
     let speed = reference(&simulation, "speed");
     simulation.begin_step(0.0, 5e-5).unwrap();
@@ -264,7 +264,7 @@ fn refusing() -> Vec<Scene> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
-    fn what_is_refused_leaves_nothing_behind(
+    fn rejected_calls_change_nothing(
         scene in 0..4_usize,
         asked in prop::collection::vec((0..9_u8, 1..4_i32, 0.0..1.0_f64), 14),
     ) {
@@ -380,7 +380,7 @@ fn runs_with_more_contact_nodes_than_modes() {
 
 /// Two contact nodes of which the only mode takes one out of the casing by as much as it takes the other in.
 #[test]
-fn names_nodes_that_no_mode_takes_out() {
+fn reports_nodes_that_no_mode_can_separate() {
     let shape = |row: usize, _: usize| if row.is_multiple_of(3) { 1.0 - 2.0 * (row / 3) as f64 } else { 0.0 };
     let place = |node: usize| [models::RADIUS, 0.02 * node as f64, 0.015 * node as f64];
     let nodes = (0..2).map(|node| models::node(format!("node_{}", node + 1), place(node), 0.0)).collect();

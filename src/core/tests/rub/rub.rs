@@ -108,7 +108,7 @@ fn forces_and_torque_are_in_the_fixed_frame() {
 }
 
 #[test]
-fn a_pressed_blade_stays_at_rest_however_time_is_divided() {
+fn pressed_blade_stays_at_rest_for_any_step_sizes() {
     // Closed contact under a constant force: carrying (q, d) to another h must neither push nor pull.
     let mut scene = models::rub(1);
     scene.settings.contacts[0].friction = 0.0;
@@ -137,7 +137,7 @@ fn a_pressed_blade_stays_at_rest_however_time_is_divided() {
 
 /// Clearances in a round casing that opens, and above lobes that pass: their rates by the closed form and by differences.
 #[test]
-fn rates_of_clearances_and_of_the_angle_are_those_of_the_motion() {
+fn clearance_and_angle_rates_match_the_motion() {
     let rate = |simulation: &Simulation, reference| simulation.output_derivative(reference, 1).unwrap();
     let mut scene = models::rub(4);
     scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -247,7 +247,7 @@ fn outputs_cover_all_internal_steps() {
 }
 
 #[test]
-fn any_division_of_time_lands_exactly_and_converges() {
+fn any_step_sequence_ends_exactly_and_converges() {
     let scene = models::rub(12);
     let end = 6e-3;
     let result = |lengths: &dyn Fn(u32) -> f64, step: f64| {
@@ -306,7 +306,7 @@ fn a_tiny_communication_step_at_an_impact_adds_no_energy() {
 }
 
 #[test]
-fn one_sixtieth_computed_in_three_ways_is_one_step() {
+fn one_sixtieth_with_rounding_is_a_single_step() {
     let mut scene = models::rub(6);
     scene.settings.time.step = 1e-5;
     let ways = [1.0 / 60.0, 0.016_666_666_666_666_677, 2.0 / 60.0 - 1.0 / 60.0 + 1e-17];
@@ -347,7 +347,7 @@ fn inputs_are_linear_where_derivatives_are_given() {
 }
 
 #[test]
-fn nothing_unsound_enters() {
+fn rejects_every_invalid_value_and_call() {
     let scene = models::rub(6);
     let mut simulation = Simulation::new(&scene).unwrap();
     let rows = simulation.table().variables().to_vec();
@@ -374,7 +374,7 @@ fn nothing_unsound_enters() {
 }
 
 #[test]
-fn unstable_or_penetrating_starts_are_refused_with_numbers() {
+fn rejects_unstable_or_penetrating_starts_with_numbers() {
     let mut scene = models::rub(6);
     scene.settings.time.scheme = Scheme::CentralDifference;
     scene.settings.time.step = 2.002 / (std::f64::consts::TAU * 40_000.0);
@@ -405,7 +405,7 @@ fn round_casing_never_touches_an_undisturbed_disk() {
 
 /// An importer takes lengths as differences of times, which late ones round: to 1e-5 of H here.
 #[test]
-fn a_rub_that_begins_late_is_that_of_one_that_begins_at_zero() {
+fn rub_is_independent_of_the_start_time() {
     let (scene, length) = (models::rub(6), 1e-5);
     let run = |begin: f64| {
         let mut simulation = Simulation::new(&scene).unwrap();

@@ -102,7 +102,7 @@ fn whirl_has_the_closed_form_frequency() {
 }
 
 #[test]
-fn whirl_goes_on_over_changes_of_step() {
+fn whirl_continues_across_step_size_changes() {
     for (stiffening, coriolis) in [(false, true), (true, false), (true, true)] {
         let rate = whirl(stiffening, coriolis);
         let mut bank = bank(Scheme::ModalExact, stiffening, coriolis);
@@ -126,7 +126,7 @@ fn whirl_goes_on_over_changes_of_step() {
 
 /// Growth: one blade under Ω²c, as a speed that jumps and as the same speed ramped.
 #[test]
-fn growth_and_stiffening_follow_a_speed_without_its_jumps() {
+fn growth_and_stiffening_smooth_out_speed_jumps() {
     let mut scene = whirling();
     scene.roms[0] = spinning_rom();
     (scene.settings.structures[0].spin.growth, scene.settings.structures[0].spin.stiffening) = (true, true);
@@ -154,7 +154,7 @@ fn growth_and_stiffening_follow_a_speed_without_its_jumps() {
 
 /// Blades stretched by a speed stand where K(Ω)u = Ω²c₂ + Ω⁴c₄ says, solved in the coordinates of the ROM, and stay there.
 #[test]
-fn blades_grow_by_the_stiffness_at_speed() {
+fn centrifugal_growth_uses_the_stiffness_at_speed() {
     let mut scene = whirling();
     scene.roms[0] = spinning_rom();
     scene.settings.contacts[0].gap = 5e-3;
@@ -195,7 +195,7 @@ fn blades_grow_by_the_stiffness_at_speed() {
 
 /// A blade left vibrating while its rotor speeds up, its stiffness that of the middle of each step: of second order in H.
 #[test]
-fn held_inputs_follow_a_speed_by_its_mean_over_the_step() {
+fn held_speed_input_acts_by_its_mean_over_the_step() {
     let mut scene = held(models::rub(1));
     let order = scene.roms[0].order();
     let mut spin = models::spin(order);

@@ -173,7 +173,7 @@ fn survives_damage_under_a_valid_checksum() {
 
 /// Every undamaged moment of every scene is taken, by any other moment.
 #[test]
-fn what_was_saved_is_restored_whatever_was_there() {
+fn saved_state_restores_from_any_other_state() {
     for (name, scene) in scenes() {
         let states = moments(&scene, scene.settings.experiment.communication_step);
         let mut twin = Simulation::new(&scene).unwrap();
@@ -244,7 +244,7 @@ fn derivatives(simulation: &Simulation) -> BTreeMap<u32, u64> {
 
 /// Steps of other lengths lie behind the instance that takes the state over: none of them counts.
 #[test]
-fn a_restored_state_gives_the_derivatives_of_its_own_steps() {
+fn restored_state_reproduces_step_derivatives() {
     let scene = models::rub(12);
     let names = ["force_x", "torque", "kinetic_energy", "external_work"];
     let read = |simulation: &Simulation| names.map(|name| real(simulation, name));
@@ -283,7 +283,7 @@ fn a_restored_state_gives_the_derivatives_of_its_own_steps() {
 }
 
 #[test]
-fn states_of_another_scene_are_refused_and_change_nothing() {
+fn rejects_states_of_another_scene_without_changes() {
     let mut simulation = started(&models::rub(12));
     run(&mut simulation, 30, 5e-5);
     let (mut state, before) = (saved(&simulation), bits(&simulation));
@@ -341,7 +341,7 @@ fn adaptive_steps_continue_from_states_with_the_same_bits() {
 
 /// A free body that touches in its first internal step, which is not as long as the scene proposes.
 #[test]
-fn the_ledger_of_a_free_body_closes_from_the_first_step_on() {
+fn energy_balance_of_free_body_closes_from_the_first_step() {
     for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
         for share in [1.0, 0.6, 0.41] {
             let side = 0.5 * lattice::SIDE;

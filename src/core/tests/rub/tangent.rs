@@ -142,7 +142,7 @@ fn errors(simulation: &mut Simulation, state: &[u8], [inputs, outputs]: [&[u32];
 }
 
 #[test]
-fn derivatives_over_a_step_are_those_of_central_differences() {
+fn step_derivatives_match_central_differences() {
     let mut lines = Vec::new();
     for (name, scene) in scenes() {
         let mut simulation = switched_on(&scene);
@@ -204,7 +204,7 @@ fn a_rigid_casing_moves_clearances_by_the_cosine_of_its_slope() {
 }
 
 #[test]
-fn seeds_add_up() {
+fn derivatives_are_linear_in_the_seeds() {
     let (_, scene) = scenes().swap_remove(0);
     let mut simulation = switched_on(&scene);
     let outputs = ["torque", "force_x", "force_y", "friction_power"].map(|name| reference(&simulation, name));
@@ -231,7 +231,7 @@ fn seeds_add_up() {
 }
 
 #[test]
-fn derivatives_leave_the_simulation_alone() {
+fn derivatives_do_not_change_the_simulation() {
     for (name, scene) in scenes() {
         let (mut plain, mut asked) = (models::started(&scene), switched_on(&scene));
         let (inputs, outputs) = (references(&plain, Causality::Input), references(&plain, Causality::Output));
@@ -282,7 +282,7 @@ fn a_step_repeated_from_a_saved_state_has_the_same_derivatives() {
 }
 
 #[test]
-fn what_has_no_derivative_is_refused() {
+fn rejects_variables_without_derivatives() {
     let (_, scene) = scenes().swap_remove(2);
     let off = &mut models::started(&scene);
     let on = &mut switched_on(&scene);
@@ -317,7 +317,7 @@ fn what_has_no_derivative_is_refused() {
 
 /// Steps far shorter than those before: ramps act in part, inputs are moved by more, and contacts open or close beside.
 #[test]
-fn a_kink_beside_the_step_is_not_stepped_over() {
+fn derivatives_stay_one_sided_near_a_kink() {
     for solver in [Solver::Lcp, Solver::Film] {
         let (_, mut scene) = scenes().swap_remove(2);
         scene.settings.contacts[0].solver = solver;

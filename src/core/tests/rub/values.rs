@@ -9,7 +9,7 @@ use crate::blades::refusal;
 
 /// Every number of a scene and its ROM, beyond the table of ranges.
 #[test]
-fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
+fn rejects_out_of_range_values_by_name() {
     type Change = fn(&mut Scene, f64);
     let changes: [(&str, f64, Change); 21] = [
         ("speed", 2e6, |scene, value| scene.settings.structures[0].speed = value),
@@ -56,7 +56,7 @@ fn numbers_beyond_the_table_of_ranges_are_refused_by_name() {
 }
 
 #[test]
-fn rejects_thermal_loads_that_do_not_fit() {
+fn rejects_inconsistent_thermal_loads() {
     let heated = |change: fn(&mut nalgebra::DMatrix<f64>)| {
         let mut rom = models::ring(8, 2);
         change(&mut rom.extras.thermal.as_mut().expect("it is heated").loads);
@@ -75,7 +75,7 @@ fn rejects_thermal_loads_that_do_not_fit() {
 }
 
 #[test]
-fn what_does_not_belong_to_the_sectors_is_refused_by_name() {
+fn rejects_values_that_do_not_match_the_sector_count() {
     type Change = fn(&mut Scene);
     let changes: [(&[&str], Change); 7] = [
         (&["frequency_factors", "3 values for 4"], |scene| {
@@ -103,7 +103,7 @@ fn what_does_not_belong_to_the_sectors_is_refused_by_name() {
 }
 
 #[test]
-fn refusals_write_numbers_of_any_size_in_short() {
+fn error_messages_print_short_numbers_of_any_size() {
     let mut scene = models::rub(12);
     scene.settings.structures[0].damping_ratio = Some(1e308);
     let message = refusal(&scene);
@@ -120,7 +120,7 @@ fn refusals_write_numbers_of_any_size_in_short() {
 }
 
 #[test]
-fn rejects_wrong_units_and_axes_unless_the_scene_accepts_them() {
+fn rejects_suspect_units_and_axes_unless_explicitly_accepted() {
     type Change = fn(&mut Scene);
     let slips: [(&str, Change); 6] = [
         ("rpm", |scene| scene.settings.structures[0].speed = 17_188.0),

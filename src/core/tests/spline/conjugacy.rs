@@ -79,7 +79,7 @@ fn drive(simulation: &mut Simulation) -> f64 {
 /// The shaft's centre is off the axis: a force through the axis of the casing has the moment e × F about it. Works of all inputs sum
 /// to the external work.
 #[test]
-fn whirl_turns_the_shaft_and_its_work_is_one_of_all_inputs() {
+fn whirl_adds_shaft_torque_and_external_work() {
     for feature in FEATURES.into_iter().filter(|feature| feature.0.contains("whirl")) {
         let mut scene = scene(feature, Scheme::ModalExact, Solver::Lcp, 0.0, 1e-6);
         scene.settings.surfaces[0].shape = Shape::Circular {};
@@ -227,7 +227,7 @@ fn friction_heat_goes_to_the_patch_facing_the_node() {
 }
 
 #[test]
-fn energy_that_no_input_brings_ends_the_run() {
+fn unexplained_energy_gain_ends_the_run() {
     let ends = |step: f64| {
         let scene = scene(FEATURES[2], Scheme::ModalExact, Solver::Lcp, 0.0, step);
         let mut simulation = started(&scene);

@@ -129,7 +129,7 @@ fn parameters(place: ClosestPoint) -> [f64; 2] {
 }
 
 #[test]
-fn closest_points_and_gaps_are_those_of_the_reference() {
+fn closest_points_and_gaps_match_the_reference() {
     for (kind, reference) in
         [(Interpolation::Spline, SurfaceKind::Spline), (Interpolation::Facets, SurfaceKind::Facets)]
     {
@@ -167,7 +167,7 @@ fn closest_points_and_gaps_are_those_of_the_reference() {
 }
 
 #[test]
-fn the_normal_is_that_of_rows_and_columns() {
+fn normal_direction_follows_grid_orientation() {
     // s along x, t along y: S_t × S_s points to −z.
     let points: Vec<[f64; 3]> = (0..12).map(|index| [f64::from(index % 4), f64::from(index / 4), 0.0]).collect();
     for kind in KINDS {
@@ -182,7 +182,7 @@ fn the_normal_is_that_of_rows_and_columns() {
 }
 
 #[test]
-fn nodes_beyond_any_of_the_four_edges_have_left() {
+fn nodes_beyond_any_edge_are_off_the_surface() {
     let points: Vec<[f64; 3]> = (0..12).map(|index| [f64::from(index % 4), f64::from(index / 4), 0.0]).collect();
     for kind in KINDS {
         let surface = SurfaceSpline::open(&points, 4, 3, kind).unwrap();
@@ -230,7 +230,7 @@ fn warm_starts_follow_a_node_across_the_surface_and_off_it() {
 }
 
 #[test]
-fn surfaces_far_away_are_projected_to_as_well() {
+fn projects_onto_distant_surfaces() {
     for kind in KINDS {
         let (surface, _) = open(9, 41, kind);
         let mut random = SeededRandom(23);
@@ -255,7 +255,7 @@ fn surfaces_far_away_are_projected_to_as_well() {
 }
 
 #[test]
-fn grids_that_are_none_are_refused() {
+fn rejects_invalid_grids() {
     let refused = |points: &[[f64; 3]], around, along| {
         SurfaceSpline::open(points, around, along, Interpolation::Spline).unwrap_err().to_string()
     };

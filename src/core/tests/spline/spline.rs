@@ -74,7 +74,7 @@ fn a_patch_is_the_matrix_form_of_equation_7() {
 }
 
 #[test]
-fn the_surface_passes_through_its_data() {
+fn surface_interpolates_its_data() {
     let mut error: f64 = 0.0;
     for (surface, points) in every_surface() {
         let (around, along) = (surface.around(), surface.along());
@@ -129,7 +129,7 @@ fn the_smooth_surface_is_c2_across_every_border_and_the_seam() {
 }
 
 #[test]
-fn edges_and_free_ends_have_no_second_derivative() {
+fn second_derivative_vanishes_at_edges_and_free_ends() {
     let (mut edge, mut seam): (f64, f64) = (0.0, 0.0);
     for (surface, _) in every_surface().into_iter().step_by(3).chain(every_surface().into_iter().skip(1).step_by(3)) {
         let last = surface.along() - 2;
@@ -189,7 +189,7 @@ fn beyond_the_edges() -> ([f64; 3], f64) {
 }
 
 #[test]
-fn derivatives_are_those_of_the_point() {
+fn derivatives_match_the_surface_point() {
     let mut random = SeededRandom(3);
     for (surface, _) in every_surface() {
         let step = 1e-3;
@@ -291,7 +291,7 @@ fn control_points_are_linear_in_the_data() {
 }
 
 #[test]
-fn a_round_casing_is_met_to_fourth_order() {
+fn spline_converges_to_round_casing_at_fourth_order() {
     let error = |around| off_the_circle(around, Closure::Smooth, Interpolation::Spline);
     let errors: Vec<f64> = [24, 36, 72, 144, 288].into_iter().map(error).collect();
     for (count, error) in [24, 36, 72, 144, 288].into_iter().zip(&errors) {
@@ -316,7 +316,7 @@ fn off_the_circle(around: usize, closure: Closure, interpolation: Interpolation)
 }
 
 #[test]
-fn free_ends_and_facets_miss_a_circle_by_the_second_order() {
+fn free_ends_and_facets_converge_at_second_order() {
     let kinds = [(Closure::FreeEnds, Interpolation::Spline), (Closure::Smooth, Interpolation::Facets)];
     for (closure, interpolation) in kinds {
         let errors = [36, 72].map(|around| off_the_circle(around, closure, interpolation));
@@ -328,7 +328,7 @@ fn free_ends_and_facets_miss_a_circle_by_the_second_order() {
 }
 
 #[test]
-fn bad_data_is_refused_with_its_place() {
+fn rejects_invalid_data_with_its_position() {
     let make = |points: &[[f64; 3]], around: usize, along: usize| {
         SurfaceSpline::new(points, around, along, Closure::Smooth, Interpolation::Spline).map_err(|e| e.to_string())
     };

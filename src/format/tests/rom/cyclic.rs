@@ -57,7 +57,7 @@ pub fn disks() -> impl Strategy<Value = Rom> {
 
 /// Real and imaginary part lie beside each other, last; rows before columns.
 #[test]
-fn the_layout_is_that_of_numpy_with_a_last_axis_for_the_parts() {
+fn complex_arrays_use_numpy_layout_with_parts_last() {
     let rom = disk(7, 4, 1, |number| 2 + number);
     let file = Loose::of(&rom);
     let (shape, values) = &file.arrays["mass_1"];
@@ -83,14 +83,14 @@ impl MapBits for [f64] {
 
 /// 34 coordinates at 29 nodal diameters, three contact nodes: the matrices of all nodal diameters, and little besides.
 #[test]
-fn a_disk_of_the_reference_size_takes_a_few_megabytes() {
+fn reference_disk_takes_a_few_megabytes() {
     let size = write_rom(&disk(2, 56, 3, |_| 34)).len();
     let matrices = 28 * 2 * 8 * (2 * 34 * 34 + 9 * 34);
     assert!((matrices..matrices + 40_000).contains(&size), "{size} bytes, matrices above 0 take {matrices}");
 }
 
 #[test]
-fn units_of_the_arrays_are_told_once_for_all_nodal_diameters() {
+fn array_units_are_listed_once_for_all_nodal_diameters() {
     let units = |rom: &Rom| Loose::of(rom).entries["units"].clone();
     let coupled = units(&disk(3, 6, 1, |_| 2));
     assert!(coupled.contains("\nmass_<n> [m, m, 2]: kg\n"), "{coupled}");
@@ -108,7 +108,7 @@ fn refused(sectors: usize, change: impl FnOnce(&mut Loose), parts: &[&str]) {
 }
 
 #[test]
-fn nodal_diameters_are_all_there_or_none() {
+fn rejects_missing_nodal_diameters() {
     for missing in ["mass_1", "stiffness_2", "contact_map_3"] {
         let part = format!("array `{missing}`: missing, although `");
         refused(6, |file| drop(file.arrays.remove(missing)), &[&part, "for every n from 1 to 3"]);
@@ -126,7 +126,7 @@ fn nodal_diameters_are_all_there_or_none() {
 }
 
 #[test]
-fn names_that_only_look_like_nodal_diameters_are_unknown() {
+fn rejects_names_that_resemble_nodal_diameters() {
     for name in ["mass_01", "mass_+1", "mass_", "stiffness_1a", "mass_<n>", "contact_map_99999999999999999999999"] {
         let change = |file: &mut Loose| drop(file.arrays.insert(name.into(), (vec![1], vec![0.0])));
         refused(6, change, &[&format!("array `{name}`: ")]);
@@ -136,7 +136,7 @@ fn names_that_only_look_like_nodal_diameters_are_unknown() {
 }
 
 #[test]
-fn wrong_shapes_are_refused_by_name() {
+fn rejects_wrong_shapes_by_name() {
     for name in ["mass_2", "stiffness_2"] {
         let part = format!("array `{name}`: found shape [");
         refused(6, |file| file.array(name).0 = vec![2, 4], &[&part, "expected [2, 2, 2]"]);
@@ -158,7 +158,7 @@ fn wrong_shapes_are_refused_by_name() {
 }
 
 #[test]
-fn values_that_cannot_be_are_refused_by_name() {
+fn rejects_impossible_values_by_name() {
     refused(7, |file| file.array("mass_2").1[3] += 1.0, &["array `mass_2`", "not Hermitian"]);
     refused(7, |file| file.array("stiffness_3").1[1] += 1e6, &["array `stiffness_3`", "not Hermitian"]);
     refused(7, |file| file.array("mass_1").1[0] = -9.0, &["array `mass_1`", "not positive definite"]);
@@ -168,7 +168,7 @@ fn values_that_cannot_be_are_refused_by_name() {
 }
 
 #[test]
-fn nodal_diameters_of_the_checks_fit_sectors_and_checks() {
+fn rejects_inconsistent_nodal_diameters_of_the_checks() {
     let name = "array `nodal_diameters`: ";
     let set = |index: usize, value: f64| move |file: &mut Loose| file.array("nodal_diameters").1[index] = value;
     for (value, text) in [(0.5, "entry 1 is 0.5"), (-1.0, "entry 1 is -1"), (4.0, "not a whole number from 0 to 3")] {

@@ -135,7 +135,7 @@ fn reads_back_known_rub_errors() {
 }
 
 #[test]
-fn watched_points_come_whole_and_only_where_they_can() {
+fn rejects_incomplete_or_unsupported_watched_points() {
     let rom = complete(5, 3, 1);
     let refused = |change: &dyn Fn(&mut Loose)| {
         let mut file = Loose::of(&rom);
@@ -189,7 +189,7 @@ pub fn with_extras() -> impl Strategy<Value = Rom> {
 
 /// Rows of patches are whole rows of two or more, of patches with areas; one row is none.
 #[test]
-fn rows_of_patches_fit_the_patches() {
+fn rejects_patch_rows_that_do_not_match_the_patches() {
     let mut rom = complete(7, 3, 1);
     (rom.extras.grid, rom.extras.rows) = (None, Some(2));
     let nodes = rom.contact_nodes.len();
@@ -222,7 +222,7 @@ fn panel(order: usize, value: &mut dyn FnMut() -> f64) -> Rom {
 }
 
 #[test]
-fn an_open_grid_says_so_in_a_third_word() {
+fn open_grid_is_marked_in_the_metadata() {
     let mut value = numbers(11);
     let rom = panel(5, &mut value);
     let mut file = Loose::of(&rom);
@@ -246,7 +246,7 @@ fn an_open_grid_says_so_in_a_third_word() {
 
 /// Written by the release before there were extras.
 #[test]
-fn a_file_without_extras_is_what_it_always_was() {
+fn file_without_extras_is_unchanged() {
     let mut value = numbers(5);
     let bytes = write_rom(&ring(3, &mut value));
     let digest: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
@@ -281,7 +281,7 @@ fn refused(change: impl FnOnce(&mut Loose), parts: &[&str]) {
 }
 
 #[test]
-fn groups_of_arrays_are_all_there_or_none() {
+fn rejects_incomplete_groups_of_arrays() {
     for name in ["stiffness_speed2", "stiffness_speed4", "coriolis", "centrifugal_load", "centrifugal_load_speed4"] {
         let missing = format!("array `{name}`: missing, although `");
         refused(|file| drop(file.arrays.remove(name)), &[&missing, "Give all of `stiffness_speed2`, "]);
@@ -304,7 +304,7 @@ fn groups_of_arrays_are_all_there_or_none() {
 }
 
 #[test]
-fn wrong_shapes_are_refused_by_name() {
+fn rejects_wrong_shapes_by_name() {
     for name in ["stiffness_speed2", "stiffness_speed4", "coriolis"] {
         let shape = format!("array `{name}`: found shape [4, 1], expected [2, 2]");
         refused(|file| file.array(name).0 = vec![4, 1], &[&shape]);
@@ -321,7 +321,7 @@ fn wrong_shapes_are_refused_by_name() {
 }
 
 #[test]
-fn values_that_cannot_be_are_refused() {
+fn rejects_impossible_values() {
     refused(|file| file.array("stiffness_speed2").1[1] += 1.0, &["array `stiffness_speed2`: not symmetric"]);
     refused(|file| file.array("coriolis").1[0] += 1.0, &["array `coriolis`: not skew-symmetric"]);
     refused(|file| file.array("centrifugal_load").1[0] = f64::NAN, &["array `centrifugal_load`"]);

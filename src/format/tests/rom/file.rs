@@ -63,7 +63,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 3 * 256, ..ProptestConfig::default() })]
 
     #[test]
-    fn a_rom_survives_writing_and_reading_bit_for_bit(rom in roms()) {
+    fn rom_round_trips_bit_for_bit(rom in roms()) {
         let bytes = write_rom(&rom);
         let again = read_rom(&bytes, "rom").unwrap();
         prop_assert_eq!(&again, &rom);
@@ -72,7 +72,7 @@ proptest! {
     }
 
     #[test]
-    fn any_changed_byte_is_refused_or_harmless(rom in roms(), at in any::<prop::sample::Index>(), change in 1..=255u8) {
+    fn corrupted_byte_is_rejected_or_harmless(rom in roms(), at in any::<prop::sample::Index>(), change in 1..=255u8) {
         let mut bytes = write_rom(&rom);
         let index = at.index(bytes.len());
         bytes[index] ^= change;
@@ -82,19 +82,19 @@ proptest! {
     }
 
     #[test]
-    fn any_truncation_is_refused(rom in roms(), at in any::<prop::sample::Index>()) {
+    fn rejects_every_truncation(rom in roms(), at in any::<prop::sample::Index>()) {
         let bytes = write_rom(&rom);
         prop_assert!(read_rom(&bytes[..at.index(bytes.len())], "rom").is_err());
     }
 
     #[test]
-    fn any_bytes_are_refused_without_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+    fn rejects_arbitrary_bytes_without_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         prop_assert!(read_rom(&bytes, "rom").is_err());
     }
 }
 
 #[test]
-fn every_changed_byte_of_a_header_is_refused_or_harmless() {
+fn corrupted_header_byte_is_rejected_or_harmless() {
     let rom = random_rom(3, 2, 2, 2, "a blade".into());
     let bytes = write_rom(&rom);
     let mut refused = 0;
@@ -112,7 +112,7 @@ fn every_changed_byte_of_a_header_is_refused_or_harmless() {
 }
 
 #[test]
-fn negative_zero_keeps_its_sign() {
+fn negative_zero_round_trips() {
     let mut rom = random_rom(4, 2, 1, 0, String::new());
     rom.contact_map[(0, 1)] = -0.0;
     let read = read_rom(&write_rom(&rom), "rom").unwrap();
@@ -192,7 +192,7 @@ impl ByHand {
 }
 
 #[test]
-fn a_file_written_by_hand_needs_only_the_required_parts() {
+fn accepts_file_with_only_the_required_arrays() {
     let rom = read_rom(&ByHand::example().bytes(), "my.rom").unwrap();
     assert_eq!((rom.name.as_str(), rom.origin.as_str(), rom.sectors), ("pendulum", "", 12));
     assert_eq!(rom.frame, DisplacementFrame::Cylindrical);
@@ -211,7 +211,7 @@ fn a_file_written_by_hand_needs_only_the_required_parts() {
 }
 
 #[test]
-fn wrong_arrays_are_refused_by_name_with_both_shapes() {
+fn rejects_wrong_array_shapes_with_name_and_both_shapes() {
     ByHand::example().without("mass").refused_with(&["array `mass`: missing", "`stiffness`", "[n, n]"]);
     let mut file = ByHand::example();
     file.array("stiffness").2 = vec![4, 1];
@@ -237,7 +237,7 @@ fn wrong_arrays_are_refused_by_name_with_both_shapes() {
 }
 
 #[test]
-fn values_that_are_no_structure_are_refused() {
+fn rejects_values_that_do_not_describe_a_structure() {
     let mut file = ByHand::example();
     file.array("mass").3[3] = f64::INFINITY;
     file.refused_with(&["`mass`", "non-finite entry at (1, 1)"]);
@@ -253,7 +253,7 @@ fn values_that_are_no_structure_are_refused() {
 }
 
 #[test]
-fn wrong_metadata_is_refused_by_key() {
+fn rejects_invalid_metadata_by_key() {
     ByHand::example().with("format", "pt").refused_with(&["metadata `format`: found \"pt\"", "not a tiprub ROM file"]);
     ByHand::example().without("format").refused_with(&["metadata `format`: found nothing"]);
     ByHand::example().with("format_version", "2").refused_with(&["metadata `format_version`: found \"2\"", "release"]);
@@ -272,7 +272,7 @@ fn wrong_metadata_is_refused_by_key() {
 }
 
 #[test]
-fn a_truncated_file_says_so() {
+fn reports_that_a_file_is_truncated() {
     let bytes = ByHand::example().bytes();
     let message = |length| read_rom(&bytes[..length], "my.rom").unwrap_err().to_string();
     assert!(message(bytes.len() - 1).contains("truncated"), "{}", message(bytes.len() - 1));

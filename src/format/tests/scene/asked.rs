@@ -7,7 +7,7 @@ use crate::common;
 use crate::features;
 
 #[test]
-fn a_scene_with_every_feature_survives_writing_and_reading() {
+fn scene_with_every_feature_round_trips() {
     let scene = features::scene_with_every_feature();
     let text = write_scene(&scene);
     let again = parse_scene(&text, "written").unwrap();
@@ -18,7 +18,7 @@ fn a_scene_with_every_feature_survives_writing_and_reading() {
 }
 
 #[test]
-fn a_scene_with_a_free_master_survives_writing_and_reading() {
+fn scene_with_free_master_round_trips() {
     let scene = features::scene_with_a_free_master();
     let text = write_scene(&scene);
     assert_eq!(parse_scene(&text, "written").unwrap(), scene);
@@ -30,7 +30,7 @@ fn a_scene_with_a_free_master_survives_writing_and_reading() {
 
 /// Line and column of what is wrong, and what to do.
 #[test]
-fn slips_of_free_masters_are_located() {
+fn free_master_errors_report_their_location() {
     let text = write_scene(&features::scene_with_a_free_master());
     let reported = |from: &str, to: &str, parts: &[&str]| {
         assert!(text.contains(from), "{from:?} in:\n{text}");
@@ -62,7 +62,7 @@ fn slips_of_free_masters_are_located() {
 }
 
 #[test]
-fn features_that_are_off_are_not_written() {
+fn disabled_features_are_not_written() {
     let text = write_scene(&common::complete_scene());
     let off = "velocity rigid nodes spin whirl axial_shift frequency_factors thermal load structure spline patches coating slave_heat_fraction wear \
                slave_displacement input_interpolation modal_amplitudes tip_displacements casing_forces support_reaction \
@@ -122,7 +122,7 @@ fn refused(change: impl FnOnce(&mut SceneSettings), parts: &[&str]) {
 }
 
 #[test]
-fn a_structure_that_stands_still_does_not_spin() {
+fn rejects_rotor_settings_on_a_stationary_structure() {
     let rotor = |change: fn(&mut StructureSettings)| {
         move |scene: &mut SceneSettings| {
             let structure = &mut scene.structures[0];
@@ -143,7 +143,7 @@ fn a_structure_that_stands_still_does_not_spin() {
 }
 
 #[test]
-fn a_rotating_structure_carries_no_load_or_surface() {
+fn rejects_load_or_surface_on_a_rotating_structure() {
     let rotate = |scene: &mut SceneSettings| {
         scene.surfaces[0].structure = None;
         scene.structures[1].motion = BodyMotion::Rotating;
@@ -163,7 +163,7 @@ fn a_rotating_structure_carries_no_load_or_surface() {
 }
 
 #[test]
-fn numbers_of_structures_and_surfaces_have_their_ranges() {
+fn checks_ranges_of_structure_and_surface_values() {
     for factor in [0.49, 2.01, f64::NAN] {
         let parts = ["structure[1].frequency_factors[2]", "between 0.5 and 2"];
         refused(|scene| scene.structures[0].frequency_factors = vec![1.0, factor], &parts);
@@ -192,7 +192,7 @@ fn numbers_of_structures_and_surfaces_have_their_ranges() {
 }
 
 #[test]
-fn numbers_of_coatings_have_their_ranges() {
+fn checks_ranges_of_coating_values() {
     let coating = |change: fn(&mut CoatingSettings)| {
         move |scene: &mut SceneSettings| change(scene.contacts[0].coating.as_mut().unwrap())
     };
@@ -217,7 +217,7 @@ fn numbers_of_coatings_have_their_ranges() {
 }
 
 #[test]
-fn features_that_exclude_each_other_are_refused() {
+fn rejects_mutually_exclusive_features() {
     let parts = ["contact[1].solver: `film` excludes a coating", "Use solver = \"lcp\""];
     refused(|scene| scene.contacts[0].solver = Solver::Film, &parts);
     let parts = ["contact[1].solver: `coulomb` excludes a coating", "Use solver = \"lcp\""];
@@ -236,7 +236,7 @@ fn features_that_exclude_each_other_are_refused() {
 
 /// It comes back as it was, without the figures of what yields, which it need not give.
 #[test]
-fn a_coating_that_is_cut_is_written_without_what_yields() {
+fn cutting_coating_is_written_without_plasticity_values() {
     let mut scene = features::scene_with_every_feature();
     let coating = scene.contacts[0].coating.as_mut().unwrap();
     (coating.modulus, coating.yield_stress, coating.hardening) = (0.0, 0.0, 0.0);
@@ -249,7 +249,7 @@ fn a_coating_that_is_cut_is_written_without_what_yields() {
 }
 
 #[test]
-fn outputs_of_what_the_scene_does_not_have_are_refused() {
+fn rejects_outputs_of_missing_features() {
     let parts = ["outputs.wear: needs `contact.coating`", "Add a `coating` to the contact"];
     refused(|scene| scene.contacts[0].coating = None, &parts);
     let parts =
@@ -281,7 +281,7 @@ fn largest_and_smallest_values_are_accepted() {
 }
 
 #[test]
-fn inner_tables_are_tables_with_all_they_need() {
+fn rejects_malformed_or_incomplete_inner_tables() {
     let text = write_scene(&common::complete_scene());
     let reported = |from: &str, to: &str, parts: &[&str]| {
         assert_eq!(text.matches(from).count(), 1, "{from:?} in:\n{text}");

@@ -43,7 +43,7 @@ const FIXED: [(&str, &str, &str); 6] = [
 ];
 
 #[test]
-fn a_rigid_casing_has_adaptive_steps_and_needs_no_time_table() {
+fn rigid_casing_defaults_to_adaptive_steps() {
     let settings = parse_scene(SCENE, "demo.toml").unwrap();
     assert_eq!((settings.time.scheme, settings.time.step), (Scheme::Galerkin, ADAPTIVE_STEP));
     assert!(settings.time.scheme_reason.as_ref().unwrap().contains("the default for rigid surfaces"));
@@ -72,7 +72,7 @@ fn chooses_fixed_steps_with_a_reason_where_galerkin_is_excluded() {
 }
 
 #[test]
-fn named_schemes_have_no_reason_and_fixed_steps_need_a_length() {
+fn explicit_schemes_have_no_reason_and_may_require_a_step() {
     for scheme in Scheme::ALL {
         let text = format!("{SCENE}[time]\nscheme = \"{}\"\n", scheme.name());
         let settings = parse_scene(&format!("{text}step = 1e-6\n"), "demo.toml").unwrap();
@@ -90,7 +90,7 @@ fn named_schemes_have_no_reason_and_fixed_steps_need_a_length() {
 }
 
 #[test]
-fn the_rom_decides_too() {
+fn default_scheme_depends_on_the_rom() {
     let choice = |rom: Rom| {
         let text = format!("{SCENE}[time]\nstep = 1e-6\n");
         let scene = read_scene::<Error>(&text, "demo.toml", |_, _| Ok(rom.clone())).unwrap();

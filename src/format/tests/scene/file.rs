@@ -52,7 +52,7 @@ fn defaults_are_as_documented() {
 /// `preset = "paper"` says what the file leaves out, keeps what says the same, and bears nothing else.
 /// A parser makes far more of short tables than their text has bytes; a measured casing is long and still read.
 #[test]
-fn scene_files_beyond_any_scene_are_refused() {
+fn rejects_oversized_scene_files() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("scene.toml");
     std::fs::write(&path, "[[structure]]\n".repeat(80_000)).unwrap();
@@ -65,7 +65,7 @@ fn scene_files_beyond_any_scene_are_refused() {
 }
 
 #[test]
-fn the_papers_preset_is_the_method_whole() {
+fn paper_preset_sets_scheme_and_solver_and_rejects_others() {
     let preset = GOOD.replace("name = \"demo\"", "name = \"demo\"\npreset = \"paper\"");
     let scene = parse_scene(&preset, "demo.toml").unwrap();
     assert_eq!((scene.time.scheme, scene.contacts[0].solver), (Scheme::CentralDifference, Solver::Film));
@@ -102,7 +102,7 @@ fn unknown_keys_get_a_suggestion() {
 }
 
 #[test]
-fn wrong_words_get_a_suggestion() {
+fn invalid_keywords_get_a_suggestion() {
     let list = ["surface[1].shape.kind", "\"lobs\" is not an accepted value", "Did you mean `lobes`?", "`two-lobe`"];
     refused("\"lobes\"", "\"lobs\"", ":7:18", &list);
     refused("step = 1e-6", "scheme = \"modal_exact\"\nstep = 1", ":13:10", &["time.scheme", "`modal-exact`?"]);
@@ -126,7 +126,7 @@ fn missing_keys_are_named_with_their_unit_and_range() {
 }
 
 #[test]
-fn wrong_types_say_found_and_expected() {
+fn wrong_types_report_found_and_expected_type() {
     refused("gap = 1e-3", "gap = \"1 mm\"", ":11:7", &["contact[1].gap: found string \"1 mm\", expected a number"]);
     let both = ["surface[1].shape.order: found integer `-2`, expected a non-negative whole number", "number of lobes"];
     refused("order = 2", "order = -2", ":7:53", &both);
@@ -145,7 +145,7 @@ fn wrong_types_say_found_and_expected() {
 }
 
 #[test]
-fn wrong_syntax_is_located() {
+fn syntax_errors_report_their_location() {
     refused("step = 1e-6", "step = ", ":13:8", &["TOML syntax"]);
     refused("step = 1e-6", "step = 1e-6\nstep = 1e-7", ":14:1", &["TOML syntax: duplicate key"]);
     let error = parse_scene("name = \"ü\" x", "u.toml").unwrap_err().to_string();
@@ -153,14 +153,14 @@ fn wrong_syntax_is_located() {
 }
 
 #[test]
-fn a_shape_is_a_table_of_named_values() {
+fn rejects_shapes_that_are_not_tables() {
     let shape = "{ kind = \"lobes\", amplitude = 1e-4, order = 2 }";
     refused(shape, "[\"lobes\", 1e-4, 2, 0.0]", ":7:1", &["surface[1].shape: found array, expected a table"]);
     refused(shape, "\"circular\"", ":7:1", &["surface[1].shape: found string", "{ kind = \"circular\" }"]);
 }
 
 #[test]
-fn values_out_of_range_are_located() {
+fn out_of_range_values_report_their_location() {
     refused("gap = 1e-3", "gap = -1e-3", ":11:1", &["contact[1].gap: -0.001", "> 0"]);
     refused("gap = 1e-3", "gap = nan", ":11:1", &["contact[1].gap: NaN"]);
     refused("gap = 1e-3", "gap = 1\nsector_gaps = [1, inf]", ":12:1", &["contact[1].sector_gaps: inf"]);
@@ -173,7 +173,7 @@ fn values_out_of_range_are_located() {
 }
 
 #[test]
-fn no_text_panics() {
+fn arbitrary_text_never_panics() {
     for text in
         ["", "\n", "[", "[[structure]]", "structure = 3", "time = []", "shape", "\u{feff}", "name = nan", "a.b.c = 1"]
     {
@@ -189,7 +189,7 @@ fn no_text_panics() {
 
 proptest! {
     #[test]
-    fn no_slip_of_the_pen_panics(at in any::<prop::sample::Index>(), length in 0..12usize, text in "[\\PC\n\"\\[\\]{}=.]{0,6}") {
+    fn random_edits_of_a_scene_never_panic(at in any::<prop::sample::Index>(), length in 0..12usize, text in "[\\PC\n\"\\[\\]{}=.]{0,6}") {
         let start = at.index(GOOD.len());
         let end = (start + length).min(GOOD.len());
         let changed = format!("{}{text}{}", &GOOD[..start], &GOOD[end..]);
@@ -199,7 +199,7 @@ proptest! {
     }
 
     #[test]
-    fn a_scene_survives_writing_and_reading(
+    fn scene_round_trips(
         name in "[a-z][a-z0-9_]{0,8}",
         description in any::<String>(),
         numbers in prop::array::uniform8(1e-12..1e3f64),

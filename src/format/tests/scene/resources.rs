@@ -33,7 +33,7 @@ fn write(directory: &Path, files: &[(String, Vec<u8>)]) {
 }
 
 #[test]
-fn resources_come_back_with_their_token() {
+fn resources_round_trip_with_their_token() {
     let directory = tempfile::tempdir().unwrap();
     let mut scene = scene();
     scene.settings.structures[0].rom = "../elsewhere/some file.safetensors".into();
@@ -54,7 +54,7 @@ fn resources_come_back_with_their_token() {
 }
 
 #[test]
-fn the_token_is_a_guid_and_sees_every_change() {
+fn token_is_a_guid_and_changes_with_every_edit() {
     let files = resource_files(&scene(), true);
     let token = instantiation_token(&files);
     let groups: Vec<_> = token.trim_matches(['{', '}']).split('-').map(str::len).collect();
@@ -81,7 +81,7 @@ fn structure_names_become_distinct_plain_file_names() {
 }
 
 #[test]
-fn damaged_resources_are_refused_with_the_path() {
+fn rejects_damaged_resources_with_their_path() {
     let refused = |change: &dyn Fn(&Path), parts: &[&str]| {
         let directory = tempfile::tempdir().unwrap();
         write(directory.path(), &resource_files(&scene(), true));
@@ -120,7 +120,7 @@ fn damaged_resources_are_refused_with_the_path() {
 }
 
 #[test]
-fn a_scene_finds_its_roms_beside_it_or_built_in() {
+fn scene_loads_roms_from_its_directory_or_built_in() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("my scene.toml");
     let mut settings = common::complete_scene();
@@ -154,7 +154,7 @@ fn a_scene_finds_its_roms_beside_it_or_built_in() {
 }
 
 #[test]
-fn what_a_scene_leaves_off_leaves_no_data_in_the_fmu() {
+fn fmu_contains_no_data_of_disabled_features() {
     let mut scene = scene();
     let node = |index: u32| {
         let (along, i) = (index / 4, index % 4);

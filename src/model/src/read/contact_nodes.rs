@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn face_gives_mid_thickness_nodes_with_contour_slopes() {
+    fn face_set_yields_mid_thickness_nodes_with_contour_slopes() {
         let nodes = tip(21, 3);
         let set: Vec<usize> = (0..nodes.len()).collect();
         let points = choose_contact_nodes(&nodes, &set, &ContactChoice::default()).unwrap();
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_set_is_taken_whole_by_growing_z() {
+    fn small_set_is_used_entirely_and_sorted_by_z() {
         let nodes: Vec<[f64; 3]> = tip(3, 1).into_iter().rev().collect();
         let choice = ContactChoice { count: None, names: ["le", "mid", "te"].map(String::from).to_vec() };
         let points = choose_contact_nodes(&nodes, &[0, 1, 2], &choice).unwrap();
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_and_names_that_do_not_fit_are_refused() {
+    fn rejects_invalid_counts_and_names() {
         let nodes = tip(3, 1);
         let refused = |count, names: &[&str]| {
             let names = names.iter().map(ToString::to_string).collect();

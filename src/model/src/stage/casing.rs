@@ -247,7 +247,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_section_has_the_papers_counts() {
+    fn section_has_the_element_and_node_counts_of_the_paper() {
         let section = MeridionalSection::new();
         let mut corners: Vec<[usize; 2]> =
             section.cells.iter().flat_map(|&[i, j]| [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]]).collect();

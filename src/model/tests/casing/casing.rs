@@ -56,7 +56,7 @@ fn cylindrical(mesh: &Mesh, grid: &GridNodes, displacement: impl Fn(usize) -> f6
 }
 
 #[test]
-fn thermal_loads_are_stiffness_times_free_growth() {
+fn thermal_loads_equal_stiffness_times_free_expansion() {
     let material = Material::titanium();
     for kind in ElementKind::ALL {
         let mesh = distorted_box(kind, [2, 2, 2], [0.3, 0.2, 0.25], wobble(0.15));
@@ -105,7 +105,7 @@ fn patch_loads_are_in_equilibrium_and_sum_to_uniform_heating() {
 }
 
 #[test]
-fn uniform_temperature_grows_a_free_ring_without_stress() {
+fn uniform_heating_expands_free_ring_without_stress() {
     let options = coarse(RingSupport::Free);
     let (rom, rise) = (&reduced(RingSupport::Free).rom, 100.0);
     let displacement = heated(rom, &[rise; 24]);
@@ -207,7 +207,7 @@ fn static_responses_match_the_full_model() {
 
 /// The support of a casing at rest takes forces and moments of its contact nodes, and those alone: heat has none.
 #[test]
-fn a_support_takes_what_acts_on_its_casing() {
+fn static_support_reaction_balances_contact_loads() {
     for support in [RingSupport::Low, RingSupport::Both] {
         let rom = &reduced(support).rom;
         let rows = rom.extras.support.as_ref().unwrap();
@@ -359,7 +359,7 @@ fn condensation_equals_free_interface_reduction() {
 
 /// A mesh from elsewhere: other node numbers, contact nodes as an unordered set, prisms.
 #[test]
-fn a_mesh_of_ones_own_is_reduced_alike() {
+fn reduction_is_independent_of_node_numbering() {
     let options = coarse(RingSupport::Low);
     let ring = supported_ring(&options).unwrap();
     let count = ring.mesh.nodes.len();
@@ -421,7 +421,7 @@ fn a_mesh_of_ones_own_is_reduced_alike() {
 
 /// With no mode at all the static response is still that of the full model, and rigid-body modes stay.
 #[test]
-fn a_casing_without_modes_is_still_exact_at_rest() {
+fn casing_without_modes_keeps_exact_static_response() {
     let full = &reduced(RingSupport::Free).rom;
     let options = CasingOptions { fixed_interface_modes: 0, modes: 0, ..coarse(RingSupport::Free) };
     let rom = reduce_ring(&options, &silent).unwrap().rom;
@@ -434,7 +434,7 @@ fn a_casing_without_modes_is_still_exact_at_rest() {
 }
 
 #[test]
-fn the_rom_has_the_same_bits_on_any_number_of_threads() {
+fn rom_is_bit_identical_for_any_thread_count() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| reduce_ring(&coarse(RingSupport::Low), &silent)).unwrap().rom

@@ -17,7 +17,7 @@ use tiprub_model::{CasingOptions, Material, Reduction, reduce_ring};
 
 /// In-plane bending of a thin ring (Love): ω² = n²(n² − 1)²/(n² + 1) · EI/(ρAR⁴).
 #[test]
-fn a_thin_free_ring_bends_as_in_the_books() {
+fn thin_free_ring_has_textbook_bending_frequencies() {
     let (radius, length) = (0.25, 10e-3);
     let mut deviations = Vec::new();
     for thickness in [20e-3, 10e-3, 5e-3] {
@@ -84,7 +84,7 @@ fn reference(kind: &str) -> Vec<[f64; 2]> {
 }
 
 #[test]
-fn casing37_agrees_with_calculix_and_its_reduction_with_it() {
+fn casing37_and_its_reduction_agree_with_calculix() {
     let reduction = default_casing();
     let mesh = reduction.mesh.as_ref().unwrap();
     assert_eq!((mesh.nodes.len(), mesh.elements.len()), (7920, 1080), "the mesh of the reference");
@@ -121,7 +121,7 @@ fn casing37_agrees_with_calculix_and_its_reduction_with_it() {
 }
 
 #[test]
-fn double_modes_of_casing37_stay_double() {
+fn reduction_keeps_double_modes_of_casing37() {
     let reduction = default_casing();
     let splits =
         |frequencies: &[f64]| -> Vec<f64> { frequencies.as_chunks::<2>().0.iter().map(|[a, b]| b / a - 1.0).collect() };
@@ -166,7 +166,7 @@ fn casing37_follows_the_tip() {
 }
 
 #[test]
-fn contours_run_through_their_points_without_overshoot() {
+fn contours_interpolate_points_without_overshoot() {
     let cone = InnerContour::new(&[[0.1, 0.3], [0.2, 0.25]]).unwrap();
     assert!((cone.radius(0.15) - 0.275).abs() < 1e-15 && (cone.slope(0.13) + 0.5).abs() < 1e-14);
     let points = [[0.0, 0.30], [0.01, 0.30], [0.02, 0.29], [0.05, 0.288], [0.06, 0.295]];
@@ -188,7 +188,7 @@ fn contours_run_through_their_points_without_overshoot() {
 }
 
 #[test]
-fn rings_have_exact_sets_and_the_volume_of_their_parts() {
+fn rings_have_exact_node_sets_and_volume() {
     let flange = Flange { thickness: 5e-3, height: 10e-3 };
     let geometry = RingGeometry {
         contour: InnerContour::new(&[[0.0, 0.25], [0.06, 0.25]]).unwrap(),
@@ -233,7 +233,7 @@ fn rings_have_exact_sets_and_the_volume_of_their_parts() {
 }
 
 #[test]
-fn centroids_on_an_edge_belong_to_the_patch_that_begins_there() {
+fn centroid_on_an_edge_belongs_to_the_following_patch() {
     let options = coarse(RingSupport::Free);
     let mesh = supported_ring(&options).unwrap().mesh;
     // 24 elements and 16 patches around: every second edge halves an element.
@@ -245,7 +245,7 @@ fn centroids_on_an_edge_belong_to_the_patch_that_begins_there() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_by_name() {
+fn rejects_invalid_ring_options_by_name() {
     let refused = |change: &dyn Fn(&mut CasingOptions), hint: &str| {
         let mut options = coarse(RingSupport::Low);
         change(&mut options);

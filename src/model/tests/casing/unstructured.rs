@@ -85,7 +85,7 @@ fn of_mesh(mesh: usize) -> &'static Rom {
 /// Displacements are held against the largest under a unit force. At the point force itself they depend on the elements around it in any mesh: they
 /// grow without bounds with refinement.
 #[test]
-fn tetrahedra_converge_to_the_casing_of_bricks() {
+fn tetrahedral_casing_converges_to_brick_casing() {
     let reference = of_bricks();
     let temperatures: Vec<f64> = (0..PATCHES[0]).map(|patch| (patch * patch % 5) as f64).collect();
     let growth = heated(reference, &temperatures);
@@ -108,7 +108,7 @@ fn tetrahedra_converge_to_the_casing_of_bricks() {
 
 /// The answer at rest to forces on the grid and to heat is that of the whole finite-element model with the same weights.
 #[test]
-fn static_answers_between_nodes_are_those_of_the_mesh() {
+fn static_response_between_nodes_matches_full_model() {
     let counts = [24, 1, 4];
     let (rom, mesh) = (tetrahedra(counts, RingSupport::Low).rom, RING.tetrahedra(counts));
     let clamped = mesh.set("low").unwrap();
@@ -146,7 +146,7 @@ fn static_answers_between_nodes_are_those_of_the_mesh() {
 }
 
 #[test]
-fn interpolation_keeps_rigid_motions_forces_and_moments() {
+fn interpolation_preserves_rigid_motion_force_and_moment() {
     let mesh = RING.tetrahedra([24, 1, 4]);
     let surface = InnerSurface::find(&mesh, mesh.set("inner").ok(), None).unwrap();
     let (mut inside, mut largest) = (0, [0.0_f64; 4]);
@@ -189,7 +189,7 @@ fn interpolation_keeps_rigid_motions_forces_and_moments() {
 
 /// Modes of a free casing at 0 Hz move the grid as a rigid body, with the mass of the mesh.
 #[test]
-fn a_free_casing_of_tetrahedra_has_its_mass_and_rigid_motions() {
+fn free_tetrahedral_casing_has_correct_mass_and_rigid_modes() {
     let Reduction { rom, mesh, .. } = tetrahedra([24, 1, 4], RingSupport::Free);
     let mesh = mesh.unwrap();
     let mass: f64 = mesh
@@ -241,7 +241,7 @@ fn rub(casing: Rom) -> [f64; 2] {
 }
 
 #[test]
-fn a_rub_in_tetrahedra_is_that_in_bricks() {
+fn rub_on_tetrahedral_casing_matches_brick_casing() {
     let expected = rub(of_bricks().clone());
     let found = [0, 1].map(|mesh| rub(of_mesh(mesh).clone()));
     println!("impulse and heat: {expected:?} in bricks, {found:?}");
@@ -251,7 +251,7 @@ fn a_rub_in_tetrahedra_is_that_in_bricks() {
 
 /// What is not a full, single inner surface about the axis is refused with its place, and so are grids off it or too fine for it.
 #[test]
-fn rejects_what_is_no_single_full_inner_surface() {
+fn rejects_incomplete_or_multiple_inner_surfaces() {
     let counts = [24, 1, 6];
     let good = RING.tetrahedra(counts);
     let refused = |mesh: &Mesh, set: &str, axial: [f64; 2], parts: &[&str]| {

@@ -67,7 +67,7 @@ fn deviation(elements: usize, modes: usize, fouriers: &[f64]) -> f64 {
 }
 
 #[test]
-fn wall_cools_as_its_series() {
+fn wall_cooling_matches_series_solution() {
     let times = [0.1, 0.3, 1.0, 3.0];
     let meshes = [1, 2, 4, 8].map(|elements| deviation(elements, 3 * elements, &times));
     println!("wall, by elements: {meshes:?}");
@@ -83,7 +83,7 @@ fn wall_cools_as_its_series() {
 /// A thick wall from 0 K under a constant flux q, by single steps: T = 2q/k √(αt/π) at its surface (Carslaw and Jaeger, 2.9). Elements
 /// resolve it from their diffusion time on, and steps that are shorter are warned of, once.
 #[test]
-fn steps_shorter_than_elements_resolve_are_warned_of() {
+fn warns_of_steps_below_the_diffusion_time_of_an_element() {
     let (thickness, elements) = (0.04, 8);
     let Conductor { conductivity, specific_heat } = Conductor::steel();
     let diffusivity = conductivity / (7850.0 * specific_heat);
@@ -171,7 +171,7 @@ fn heat_flow_through_a_cylinder_is_logarithmic() {
 
 /// At small Biot numbers the wall is a lump: what is left is of the size of the Biot number.
 #[test]
-fn a_wall_with_thin_films_is_a_lump() {
+fn wall_at_small_biot_number_behaves_as_lumped_mass() {
     let thickness = 0.02;
     let Conductor { conductivity, specific_heat } = Conductor::steel();
     let deviations = [1e-2, 1e-3, 1e-4].map(|biot: f64| {
@@ -190,7 +190,7 @@ fn a_wall_with_thin_films_is_a_lump() {
 
 /// Heat switched on for a while, then soak with the gas standing still: the decay is that of the air alone.
 #[test]
-fn after_shutdown_a_casing_soaks_exponentially_through_the_air() {
+fn after_shutdown_heat_decays_exponentially_to_ambient() {
     let mesh = wall(0.02, 4);
     let films = [500.0, 30.0];
     let model = reduced(&mesh, &options(films, [-1.0, 1.0], 8)).model;

@@ -25,7 +25,7 @@ fn of_casing(modes: usize) -> ConductionOptions {
 }
 
 #[test]
-fn steady_states_are_those_of_the_full_model() {
+fn steady_states_match_full_model() {
     let reduced = reduce_ring_conduction(&casing(), &of_casing(20), &silent).unwrap();
     println!("{} coordinates; {:?}", reduced.model.order(), reduced.checks);
     for check in &reduced.checks {
@@ -39,7 +39,7 @@ fn steady_states_are_those_of_the_full_model() {
 
 /// A titanium cylinder conducts so badly along itself that its slowest rates are nearly one: the smaller basis of fewer modes finds them too.
 #[test]
-fn reduces_a_casing_whose_rates_stand_close_together() {
+fn reduces_a_casing_with_nearly_equal_decay_rates() {
     let cylinder = CasingOptions {
         name: "cylinder".into(),
         geometry: RingGeometry {
@@ -72,7 +72,7 @@ fn reduces_a_casing_whose_rates_stand_close_together() {
 
 /// Areas, capacity and conductance against those of a cylinder with flanges: the mesh is round.
 #[test]
-fn a_casing_has_its_mass_and_its_surfaces() {
+fn casing_has_correct_heat_capacity_areas_and_conductance() {
     let options = CasingOptions::default();
     let reduced = reduce_ring_conduction(&options, &of_casing(4), &silent).unwrap();
     let [low, high] = options.geometry.contour.axial();
@@ -184,7 +184,7 @@ fn transients_match_the_full_model() {
 }
 
 #[test]
-fn what_means_nothing_is_refused_by_name() {
+fn rejects_invalid_options_by_name() {
     let refused = |mesh: &Mesh, options: &ConductionOptions, what: &str| {
         let error = reduce_conduction(mesh, &whole(), options, &silent).unwrap_err().to_string();
         assert!(error.contains(what), "{error}");

@@ -29,7 +29,7 @@ fn sum(values: impl Iterator<Item = f64>) -> f64 {
 
 /// The heat of a patch goes to nodes in all, evenly over its area between its borders, wherever the faces are.
 #[test]
-fn patches_take_their_heat_within_their_borders() {
+fn patch_heat_is_distributed_within_the_patch_borders() {
     for patches in [equal_patches(5, 1, RING.axial), equal_patches(3, 2, RING.axial)] {
         let moments = COUNTS.map(|counts| {
             let mesh = RING.tetrahedra(counts);
@@ -61,7 +61,7 @@ fn patches_take_their_heat_within_their_borders() {
 
 /// The temperature that grows linearly along an axis has known means over patches, of surfaces and of volumes.
 #[test]
-fn patch_means_are_those_of_the_patches_of_a_cylinder() {
+fn patch_means_match_those_of_a_cylinder() {
     let patches = equal_patches(5, 1, RING.axial);
     let found = COUNTS.map(|counts| {
         let mesh = RING.tetrahedra(counts);
@@ -86,7 +86,7 @@ fn patch_means_are_those_of_the_patches_of_a_cylinder() {
 
 /// Steady heat from the gas to the air: the temperature goes with the logarithm of the radius.
 #[test]
-fn heat_through_tetrahedra_follows_the_logarithm_of_the_radius() {
+fn radial_conduction_in_tetrahedra_is_logarithmic() {
     let (a, b, length) = (RING.radius, RING.radius + RING.thickness, RING.axial[1]);
     let k = Conductor::steel().conductivity;
     let [gas, air] = [400.0 * 2.0 * PI * a * length, 60.0 * 2.0 * PI * b * length];
@@ -109,7 +109,7 @@ fn heat_through_tetrahedra_follows_the_logarithm_of_the_radius() {
 
 /// The reduced model of tetrahedra is that of bricks whose faces end at all borders.
 #[test]
-fn a_casing_of_tetrahedra_conducts_as_one_of_bricks() {
+fn conduction_in_tetrahedra_matches_bricks() {
     let rings = ContactRings { around: 20, along: 2, axial: HEATED };
     let of_bricks = CasingOptions { patches: PATCHES, ..RING.bricks([40, 2, 12], rings, RingSupport::Free) };
     let settings = ConductionOptions { ..options([400.0, 60.0], HEATED, 12) };

@@ -19,7 +19,7 @@ fn paired(mesh: &Mesh, low: &str, high: &str, tolerance: f64) -> Result<(CyclicB
 }
 
 #[test]
-fn faces_are_paired_whichever_way_round_they_are_named() {
+fn pairs_cyclic_faces_in_either_order() {
     let mesh = coarse();
     let (forward, report) = paired(&mesh, "LOW", "HIGH", 1e-9).unwrap();
     assert!(!report.swapped);
@@ -42,7 +42,7 @@ fn faces_are_paired_whichever_way_round_they_are_named() {
 }
 
 #[test]
-fn the_largest_mismatch_and_its_node_are_told() {
+fn reports_the_largest_mismatch_and_its_node() {
     let mut mesh = coarse();
     let (exact, _) = paired(&mesh, "LOW", "HIGH", 1e-9).unwrap();
     let [low, high] = exact.pairs[3];
@@ -58,7 +58,7 @@ fn the_largest_mismatch_and_its_node_are_told() {
 }
 
 #[test]
-fn what_is_no_pair_of_faces_is_refused() {
+fn rejects_invalid_pairs_of_cyclic_faces() {
     let mesh = coarse();
     let (low, high) = (mesh.set("LOW").unwrap().to_vec(), mesh.set("HIGH").unwrap().to_vec());
     let refusal = |nodes: &[[f64; 3]], low: &[usize], high: &[usize], sectors, tolerance| {
@@ -90,7 +90,7 @@ fn what_is_no_pair_of_faces_is_refused() {
 }
 
 #[test]
-fn no_tolerance_pairs_the_faces_of_another_number_of_sectors() {
+fn rejects_wrong_sector_count_at_any_tolerance() {
     let mesh = coarse();
     let (low, high) = (mesh.set("LOW").unwrap(), mesh.set("HIGH").unwrap());
     for sectors in [2, 6, 8, 14] {
@@ -102,7 +102,7 @@ fn no_tolerance_pairs_the_faces_of_another_number_of_sectors() {
 }
 
 #[test]
-fn contact_on_a_face_and_loose_structures_are_refused() {
+fn rejects_contact_on_cyclic_faces_and_loose_structures() {
     let mesh = coarse();
     let (faces, bore) = (boundary(&mesh, SECTORS), mesh.set("BORE").unwrap().to_vec());
     let options = options(ModeSelection::Count(2), 2);
@@ -146,7 +146,7 @@ fn clamping_one_face_node_clamps_its_partner() {
 }
 
 #[test]
-fn the_disk_is_closed() {
+fn sectors_assemble_into_a_closed_disk() {
     let mesh = coarse();
     let disk = whole_disk(&mesh, &boundary(&mesh, SECTORS)).unwrap();
     let per_sector = mesh.nodes.len() - mesh.set("LOW").unwrap().len();
@@ -163,7 +163,7 @@ fn the_disk_is_closed() {
 }
 
 #[test]
-fn two_sectors_held_at_two_points_turn_about_a_line() {
+fn rejects_two_sectors_that_can_rotate_about_a_line() {
     let mesh = sector(ElementKind::Hex8, 2, CellCounts { around: 5, ..COARSE });
     let options = options(ModeSelection::Count(2), 0);
     let faces = boundary(&mesh, 2);

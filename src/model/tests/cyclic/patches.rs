@@ -44,7 +44,7 @@ fn directions([x, y, _]: [f64; 3]) -> [[f64; 3]; 3] {
 
 /// Displacements of all patches of the disk by forces on those of one sector, in the disk itself and through the nodal diameters.
 #[test]
-fn patch_forces_bend_the_disk_as_the_full_model() {
+fn static_response_to_patch_forces_matches_full_disk() {
     let force = [1.0, -0.4, 0.3, 0.2, 0.7, -0.9];
     for (sectors, element) in [(7, ElementKind::Penta15), (6, ElementKind::Hex8)] {
         let mesh = sector(element, sectors, COARSE);
@@ -95,7 +95,7 @@ fn patch_forces_bend_the_disk_as_the_full_model() {
 
 /// Kept modes stay those of the full model, on a held disk and on a free one, where rigid-body motions are among them.
 #[test]
-fn free_interface_modes_of_sectors_are_those_of_the_full_model() {
+fn free_interface_sector_modes_match_full_disk() {
     let sectors = 5;
     let mesh = sector(ElementKind::Hex8, sectors, COARSE);
     let contact = patches(&mesh, 2);
@@ -122,7 +122,7 @@ fn free_interface_modes_of_sectors_are_those_of_the_full_model() {
 
 /// Recovered shapes move the nodes of patches as the full model does: its modes are the same whatever touches.
 #[test]
-fn shapes_of_a_sector_with_patches_are_those_without() {
+fn patches_do_not_change_sector_mode_shapes() {
     let sectors = 5;
     let mesh = sector(ElementKind::Penta6, sectors, COARSE);
     let bore = mesh.set("BORE").unwrap();
@@ -150,7 +150,7 @@ fn receptance([mass, stiffness, map]: &[DMatrix<Complex<f64>>; 3], angular: f64)
 /// Forced responses between the second and the third frequency, against a reduction with all modes: those of free-interface modes are nearer with
 /// fewer of them, and inertia relief makes them so where the disk is free.
 #[test]
-fn patch_responses_converge_faster_with_free_interface() {
+fn free_interface_modes_converge_faster_for_patches() {
     let sectors = 5;
     let mesh = sector(ElementKind::Hex8, sectors, CellCounts { along: 1, ..COARSE });
     let contact = patches(&mesh, 2);
@@ -181,7 +181,7 @@ fn patch_responses_converge_faster_with_free_interface() {
 }
 
 #[test]
-fn five_patches_of_the_stage() {
+fn stage_reduces_with_five_tip_patches() {
     for kind in KINDS {
         let options = StageOptions {
             tip: TipContact::Patches(5),
@@ -221,7 +221,7 @@ fn rejects_dependent_patches_and_a_patch_on_a_face() {
 
 /// The tip is the outermost connected face: of the sector's blade as its set names it, not the rim beside it.
 #[test]
-fn the_tip_of_a_sector_is_found() {
+fn finds_the_tip_of_a_sector() {
     for kind in ElementKind::ALL {
         let mesh = sector(kind, 8, COARSE);
         let mut fixed = [mesh.set("LOW").unwrap(), mesh.set("HIGH").unwrap(), mesh.set("BORE").unwrap()].concat();

@@ -63,7 +63,7 @@ fn assert_close(name: &str, one: &[f64], other: &[f64], relative: f64, absolute:
 }
 
 #[test]
-fn criteria_are_those_of_the_whole_disk() {
+fn quality_criteria_match_full_disk() {
     let sectors = 5;
     let mesh = sector(ElementKind::Hex8, sectors, COARSE);
     let reduction = reduced(&mesh, sectors, true, &options(ModeSelection::UpTo(21_000.0), 4));
@@ -89,7 +89,7 @@ fn criteria_are_those_of_the_whole_disk() {
 }
 
 #[test]
-fn a_row_of_the_convergence_is_a_reduction_with_that_many_modes() {
+fn convergence_table_rows_match_separate_reductions() {
     let sectors = 7;
     let mesh = sector(ElementKind::Penta6, sectors, COARSE);
     let most = reduced(&mesh, sectors, true, &options(ModeSelection::Count(8), 10));
@@ -113,7 +113,7 @@ fn a_row_of_the_convergence_is_a_reduction_with_that_many_modes() {
 }
 
 #[test]
-fn matrices_are_hermitian_and_real_where_nothing_travels() {
+fn matrices_are_hermitian_and_real_for_standing_waves() {
     for sectors in [7, 12] {
         let mesh = sector(ElementKind::Tet4, sectors, COARSE);
         let rom = reduced(&mesh, sectors, true, &options(ModeSelection::Count(5), 3)).rom;
@@ -143,7 +143,7 @@ fn mirrored(mesh: &Mesh) -> Mesh {
 }
 
 #[test]
-fn in_the_mirror_waves_travel_the_other_way() {
+fn mirrored_sector_reverses_travelling_waves() {
     let sectors = 7;
     let mesh = sector(ElementKind::Hex8, sectors, COARSE);
     let one = reduced(&mesh, sectors, true, &options(ModeSelection::Count(5), 5));
@@ -171,7 +171,7 @@ fn in_the_mirror_waves_travel_the_other_way() {
 }
 
 #[test]
-fn bits_do_not_depend_on_the_number_of_threads() {
+fn reduction_is_bit_identical_for_any_thread_count() {
     let mesh = sector(ElementKind::Penta15, 9, COARSE);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -210,7 +210,7 @@ fn a_free_disk_has_six_rigid_body_modes() {
 }
 
 #[test]
-fn shapes_are_modes_of_the_sector() {
+fn mode_shapes_satisfy_the_sector_eigenproblem() {
     let sectors = 6;
     let mesh = sector(ElementKind::Hex8, sectors, COARSE);
     let reduction = reduced(&mesh, sectors, true, &options(ModeSelection::Count(3), 3));
@@ -242,7 +242,7 @@ fn shapes_are_modes_of_the_sector() {
 }
 
 #[test]
-fn families_are_cut_in_a_gap() {
+fn mode_families_are_truncated_at_a_spectral_gap() {
     let sectors = 16;
     let mesh = sector(ElementKind::Hex8, sectors, COARSE);
     let reduction = reduced(&mesh, sectors, true, &options(ModeSelection::Families(5), 2));
@@ -259,7 +259,7 @@ fn families_are_cut_in_a_gap() {
 }
 
 #[test]
-fn progress_is_told_from_the_calling_thread_and_ends_full() {
+fn progress_comes_from_calling_thread_and_reaches_100_percent() {
     let mesh = sector(ElementKind::Hex8, 7, COARSE);
     let caller = std::thread::current().id();
     let reported = std::cell::RefCell::new(Vec::new());

@@ -65,31 +65,31 @@ fn assert_same_frequencies(kind: ElementKind, sectors: usize, counts: CellCounts
 }
 
 #[test]
-fn frequencies_of_twelve_sectors_are_those_of_the_disk() {
+fn frequencies_of_twelve_sectors_match_full_disk() {
     for kind in [ElementKind::Hex8, ElementKind::Penta6, ElementKind::Tet4] {
         assert_same_frequencies(kind, 12, COARSE);
     }
 }
 
 #[test]
-fn frequencies_of_quadratic_elements_are_those_of_the_disk() {
+fn frequencies_with_quadratic_elements_match_full_disk() {
     assert_same_frequencies(ElementKind::Penta15, 5, COARSE);
 }
 
 #[test]
-fn frequencies_of_seven_sectors_are_those_of_the_disk() {
+fn frequencies_of_seven_sectors_match_full_disk() {
     assert_same_frequencies(ElementKind::Hex8, 7, COARSE);
 }
 
 #[test]
-fn frequencies_of_two_and_three_sectors_are_those_of_the_disk() {
+fn frequencies_of_two_and_three_sectors_match_full_disk() {
     let counts = CellCounts { around: 5, ..COARSE };
     assert_same_frequencies(ElementKind::Hex8, 2, counts);
     assert_same_frequencies(ElementKind::Hex8, 3, counts);
 }
 
 #[test]
-fn frequencies_of_fifty_six_sectors_are_those_of_the_disk() {
+fn frequencies_of_fifty_six_sectors_match_full_disk() {
     assert_same_frequencies(ElementKind::Hex8, 56, CellCounts { hub: 1, along: 1, ..COARSE });
 }
 
@@ -107,7 +107,7 @@ fn squares([mass, stiffness, _]: &[DMatrix<Complex<f64>>; 3]) -> Vec<f64> {
 }
 
 #[test]
-fn craig_bampton_of_the_sector_is_that_of_the_disk() {
+fn craig_bampton_of_the_sector_matches_full_disk() {
     let sectors = 12;
     let mesh = sector(ElementKind::Hex8, sectors, COARSE);
     let (contact, limit) = (tips(&mesh, 2), 14_000.0);
@@ -140,7 +140,7 @@ fn craig_bampton_of_the_sector_is_that_of_the_disk() {
 }
 
 #[test]
-fn a_force_on_one_blade_bends_the_disk_as_in_the_full_model() {
+fn static_response_to_one_blade_force_matches_full_disk() {
     for sectors in [7, 12] {
         let mesh = sector(ElementKind::Penta6, sectors, COARSE);
         let contact = tips(&mesh, 2);

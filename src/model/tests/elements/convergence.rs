@@ -29,7 +29,7 @@ fn axial_frequency(kind: ElementKind, count: usize) -> f64 {
 /// Second order for the linear elements, fourth for the quadratic ones (error in frequency, consistent mass): the
 /// setup is axial vibration of a clamped-free bar, ν = 0, transverse motion held, f = √(E/ρ)/4L.
 #[test]
-fn axial_frequencies_converge_at_the_elements_rate() {
+fn axial_frequencies_converge_at_the_order_of_the_element() {
     let exact = (material().young_modulus / material().density).sqrt() / (4.0 * LENGTH);
     for kind in ElementKind::ALL {
         let expected = if kind == kind.quadratic() { 4.0 } else { 2.0 };
@@ -56,7 +56,7 @@ fn cantilever(kind: ElementKind, counts: [usize; 3], side: f64, modes: usize) ->
 }
 
 #[test]
-fn slender_cantilever_meets_euler_bernoulli() {
+fn slender_cantilever_matches_euler_bernoulli() {
     let side = 0.01;
     let frequencies = cantilever(ElementKind::Hex20, [40, 1, 1], side, 6);
     let inertia_over_area = side * side / 12.0;
@@ -90,7 +90,7 @@ fn half_beam(kind: ElementKind, count: usize) -> f64 {
 /// Uniform refinement in bending: differences of successive frequencies shrink at order 2 and 4. The supports let the
 /// sections warp, so that no corner is singular (a clamped face in bending is, and would cap the order).
 #[test]
-fn bending_frequencies_converge_at_the_elements_rate() {
+fn bending_frequencies_converge_at_the_order_of_the_element() {
     for (kind, expected) in [(ElementKind::Hex8, 2.0), (ElementKind::Hex20, 4.0)] {
         let frequencies = [4, 8, 16].map(|count| half_beam(kind, count));
         let steps = [0, 1].map(|i| frequencies[i] - frequencies[i + 1]);

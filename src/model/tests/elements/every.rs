@@ -195,7 +195,7 @@ fn consistent_mass_is_positive_definite() {
 }
 
 #[test]
-fn an_inverted_element_is_refused_by_name() {
+fn rejects_inverted_element_and_names_it() {
     for kind in ElementKind::ALL {
         let mut mesh = distorted_box(kind, [2, 1, 1], [0.2, 0.1, 0.1], |_| [0.0; 3]);
         let last = mesh.elements.len() - 1;
@@ -215,7 +215,7 @@ fn an_inverted_element_is_refused_by_name() {
 }
 
 #[test]
-fn unsound_meshes_are_refused_by_name() {
+fn rejects_invalid_meshes_and_names_the_problem() {
     let sound = || distorted_box(ElementKind::Hex8, [1, 1, 1], [0.1; 3], |_| [0.0; 3]);
     let refusal = |change: fn(&mut tiprub_model::Mesh)| {
         let mut mesh = sound();

@@ -57,7 +57,7 @@ fn patch_test() {
 }
 
 #[test]
-fn free_growth_in_uniform_heat_is_without_stress() {
+fn free_expansion_at_uniform_temperature_is_stress_free() {
     let (nodes, material) = (distorted_nodes(KIND), Material::steel());
     let matrix = incompatible_stiffness(&nodes, &material, 0).unwrap();
     let load = thermal_load(KIND, &nodes, &material, 0).unwrap();
@@ -72,7 +72,7 @@ fn free_growth_in_uniform_heat_is_without_stress() {
 /// First bending frequency of a slender cantilever, one layer of bricks four times as long as they are thick:
 /// f = 1.8751²/2π √(EI/ρAL⁴).
 #[test]
-fn one_layer_of_long_bricks_bends() {
+fn incompatible_modes_avoid_shear_locking_of_long_bricks() {
     let material =
         Material { name: "plain".into(), young_modulus: 200e9, poisson_ratio: 0.0, density: 8000.0, expansion: 0.0 };
     let (length, side) = (1.0, 0.01);

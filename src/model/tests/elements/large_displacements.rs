@@ -29,7 +29,7 @@ fn volume(kind: ElementKind, coordinates: &[[f64; 3]]) -> f64 {
 }
 
 #[test]
-fn the_tangent_of_the_resting_element_is_the_linear_stiffness() {
+fn tangent_of_undeformed_element_is_the_linear_stiffness() {
     for kind in ElementKind::ALL {
         let (coordinates, steel) = (element(kind), blade_steel(0.3));
         let at_rest = tangent(kind, &coordinates, &vec![[0.0; 3]; kind.node_count()], &steel, 0).unwrap();
@@ -60,7 +60,7 @@ fn the_tangent_is_the_derivative_of_the_force() {
 }
 
 #[test]
-fn a_turned_element_has_no_stress_and_a_turned_stiffness() {
+fn rigid_rotation_is_stress_free_and_rotates_the_stiffness() {
     let rotation = Rotation3::from_euler_angles(0.7, -1.1, 2.0);
     for kind in ElementKind::ALL {
         let (coordinates, steel) = (element(kind), blade_steel(0.3));
@@ -113,7 +113,7 @@ fn stress_stiffness_is_exact_for_linear_motions() {
 }
 
 #[test]
-fn the_stress_of_a_stretched_bar_is_that_of_its_green_strain() {
+fn stress_of_stretched_bar_follows_from_green_strain() {
     let (stretch, steel) = (0.01, blade_steel(0.0));
     for kind in ElementKind::ALL {
         let coordinates = element(kind);
@@ -128,7 +128,7 @@ fn the_stress_of_a_stretched_bar_is_that_of_its_green_strain() {
 
 /// A bar between two hinges under tension N: ω² = (π/L)⁴EI/ρA + (π/L)²N/ρA, so that N adds (π/L)²σ/ρ.
 #[test]
-fn a_tensioned_beam_sings_as_the_closed_form_says() {
+fn tensioned_beam_frequency_matches_closed_form() {
     let (length, height, tension) = (1.0, 0.03, 4e8);
     for kind in [ElementKind::Hex20, ElementKind::Penta15, ElementKind::Tet10] {
         let mesh = straight_box(kind, [20, 1, 1], [length, height, height]);

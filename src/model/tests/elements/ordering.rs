@@ -43,7 +43,7 @@ fn nested_dissection_beats_minimum_degree_on_a_block() {
 }
 
 #[test]
-fn every_order_solves_the_same_system() {
+fn every_ordering_gives_the_same_solution() {
     let matrix = block([12, 10, 9]);
     let right = Mat::from_fn(matrix.order(), 19, |i, j| ((i * 7 + j * 13) % 11) as f64 - 5.0);
     let solutions = [Ordering::NestedDissection, Ordering::MinimumDegree].map(|ordering| {
@@ -59,7 +59,7 @@ fn every_order_solves_the_same_system() {
 }
 
 #[test]
-fn the_order_is_a_permutation_whatever_the_graph() {
+fn ordering_is_a_permutation_for_every_graph() {
     // A block; two blocks that nothing joins; a diagonal; a star; a complete graph.
     let arrow = |size: usize, rows: &dyn Fn(usize) -> Vec<usize>| {
         let lists: Vec<Vec<usize>> = (0..size).map(rows).collect();
@@ -106,7 +106,7 @@ fn the_order_is_a_permutation_whatever_the_graph() {
 }
 
 #[test]
-fn order_and_factor_are_the_same_on_any_number_of_threads() {
+fn ordering_and_factor_are_independent_of_thread_count() {
     let matrix = block([20, 16, 14]);
     let right = Mat::from_fn(matrix.order(), 21, |i, j| ((i * 7 + j * 13) % 11) as f64 - 5.0);
     let solve = || {

@@ -40,7 +40,7 @@ fn tried(name: &str, bytes: &[u8]) -> bool {
 }
 
 #[test]
-fn beginnings_of_mesh_files() {
+fn truncated_mesh_files_never_panic() {
     for name in MESHES {
         let whole = data(name);
         assert!(tried(name, &whole));
@@ -51,7 +51,7 @@ fn beginnings_of_mesh_files() {
 }
 
 #[test]
-fn changed_bytes_of_mesh_files() {
+fn corrupted_mesh_files_never_panic() {
     let mut draws = Draws(0x9e37_79b9_7f4a_7c15);
     for name in MESHES {
         let whole = data(name);
@@ -74,7 +74,7 @@ fn changed_bytes_of_mesh_files() {
 }
 
 #[test]
-fn damaged_matrices_and_node_tables() {
+fn corrupted_matrices_and_node_tables_never_panic() {
     let root = tempfile::tempdir().unwrap();
     let written = |name: &str, bytes: &[u8]| std::fs::write(root.path().join(name), bytes).unwrap();
     let table = "node,x,y,z,sets\n1,0.1,0,0,A\n2,0.2,0,0,A B\n";

@@ -48,7 +48,7 @@ fn imported(text: &str) -> Imported {
 }
 
 #[test]
-fn reads_gaps_continued_records_and_empty_fields() {
+fn reads_numbering_gaps_continued_lines_and_empty_fields() {
     let mesh = mesh(&deck());
     assert_eq!((mesh.nodes.len(), mesh.elements.len()), (12, 2));
     assert_eq!(mesh.elements[1].nodes, [4, 5, 6, 7, 8, 9, 10, 11]);
@@ -82,7 +82,7 @@ fn sets_are_lists_ranges_other_sets_and_sets_of_elements() {
 }
 
 #[test]
-fn faces_are_left_out_and_give_sets() {
+fn shell_elements_are_skipped_but_define_node_sets() {
     let text = format!("{}*ELEMENT, TYPE=S4, ELSET=SKIN\n900, 110, 120, 130, 140\n", deck());
     let imported = imported(&text);
     assert_eq!(imported.model.set("skin").unwrap(), [8, 9, 10, 11]);
@@ -90,7 +90,7 @@ fn faces_are_left_out_and_give_sets() {
 }
 
 #[test]
-fn one_part_and_its_instance_are_read() {
+fn reads_a_part_with_one_instance() {
     let text = format!(
         "*Heading\nx\n*Part, name=Blade\n*NODE\n{NODES}*ELEMENT, TYPE=C3D8, ELSET=EALL\n{ELEMENTS}\
          *Solid Section, elset=EALL, material=STEEL\n*End Part\n*Assembly, name=A\n*Instance, name=Blade-1, part=Blade\n\
@@ -104,7 +104,7 @@ fn one_part_and_its_instance_are_read() {
 }
 
 #[test]
-fn includes_are_found_beside_the_file_that_names_them() {
+fn includes_are_resolved_relative_to_the_including_file() {
     let files = [
         ("a.inp", "*NODE\n*INCLUDE, INPUT=parts/nodes.txt\n*INCLUDE, INPUT=\"parts\\rest.inp\"\n"),
         ("parts/nodes.txt", NODES),
@@ -123,7 +123,7 @@ fn includes_are_found_beside_the_file_that_names_them() {
 
 /// A few kilobytes that include one file again and again must not become gigabytes, however its path is written.
 #[test]
-fn a_file_that_is_included_too_often_is_refused() {
+fn rejects_repeated_includes_beyond_the_size_limit() {
     let list: String = (0..20_000).map(|_| "10, 20\n").collect();
     let include = |path: &str, count: usize| format!("*INCLUDE, INPUT={path}\n").repeat(count);
     let head = format!("{}*NSET, NSET=TIP\n", deck());
@@ -159,7 +159,7 @@ fn materials_are_converted_and_tables_read_at_a_temperature() {
 }
 
 #[test]
-fn several_materials_are_assembled_each_with_its_own() {
+fn elements_are_assembled_with_their_own_material() {
     let text =
         deck().replace("ELSET=EALL\n1,", "ELSET=E1\n1,").replace("5, 50", "*ELEMENT, TYPE=C3D8, ELSET=E5\n5, 50");
     let sections = "*Solid Section, elset=E1, material=STEEL\n*Solid Section, elset=E5, material=LIGHT\n\
@@ -179,7 +179,7 @@ fn several_materials_are_assembled_each_with_its_own() {
 }
 
 #[test]
-fn wrong_files_are_refused_with_line_and_remedy() {
+fn rejects_invalid_files_with_line_and_remedy() {
     let with = |more: &str| format!("{}{more}", deck());
     let swap = |from: &str, to: &str| {
         let text = deck().replacen(from, to, 1);
@@ -232,7 +232,7 @@ fn wrong_files_are_refused_with_line_and_remedy() {
 }
 
 #[test]
-fn gmsh_files_of_other_versions_and_kinds_are_refused() {
+fn rejects_unsupported_gmsh_versions_and_elements() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/models/bar.msh");
     let text = fs::read_to_string(data).unwrap();
     for (from, to, wanted) in [
@@ -253,7 +253,7 @@ fn gmsh_files_of_other_versions_and_kinds_are_refused() {
 }
 
 #[test]
-fn two_elements_on_the_same_nodes_are_refused() {
+fn rejects_duplicate_elements() {
     // The second is numbered from another corner.
     let text = deck().replace(ELEMENTS, &format!("{ELEMENTS}7, 20, 30, 40, 10, 60, 70, 80, 50\n"));
     let error = read(&[("a.inp", &text)], &MeshOptions::default()).unwrap_err().to_string();

@@ -68,7 +68,7 @@ fn files(directory: &Path, stiffness: &str, mass: &str, nodes: &str) -> MatrixFi
 }
 
 #[test]
-fn matrices_of_calculix_give_the_model_of_the_mesh() {
+fn calculix_matrices_give_the_same_model_as_the_mesh() {
     let expected = rom(&bar());
     for (name, absent) in [("bar", 0), ("bar_held", 8)] {
         let files = MatrixFiles {
@@ -162,7 +162,7 @@ impl Written {
 }
 
 #[test]
-fn matrix_market_triangles_give_equal_bits() {
+fn both_matrix_market_triangles_are_bit_identical() {
     let bar = bar();
     let expected = rom(&bar);
     for triangle in [Triangle::Lower, Triangle::Upper, Triangle::Both] {
@@ -193,7 +193,7 @@ fn labelled(imported: &Imported, mass: bool, keep: &dyn Fn(usize) -> bool) -> St
 }
 
 #[test]
-fn reads_labelled_abaqus_text_with_held_dofs() {
+fn reads_labelled_abaqus_text_with_constrained_dofs() {
     let bar = bar();
     let expected = rom(&bar);
     let root = bar.model.set("ROOT").unwrap().to_vec();
@@ -217,7 +217,7 @@ fn reads_labelled_abaqus_text_with_held_dofs() {
 }
 
 #[test]
-fn places_coordinates_without_clamped_nodes_by_their_set() {
+fn accepts_matrices_without_clamped_nodes_given_their_set() {
     let bar = bar();
     let root = bar.model.set("ROOT").unwrap().to_vec();
     let free: Vec<usize> = (0..bar.model.nodes.len()).filter(|node| !root.contains(node)).collect();
@@ -240,7 +240,7 @@ fn places_coordinates_without_clamped_nodes_by_their_set() {
 }
 
 #[test]
-fn wrong_matrices_are_refused_with_the_remedy() {
+fn rejects_invalid_matrices_with_remedy() {
     let bar = bar();
     let (k, m) = (market(&bar, false, Triangle::Lower), market(&bar, true, Triangle::Lower));
     let table = node_table(&bar);
@@ -296,7 +296,7 @@ fn wrong_matrices_are_refused_with_the_remedy() {
 }
 
 #[test]
-fn exchanged_matrices_without_the_clamped_nodes_are_noticed() {
+fn warns_of_swapped_mass_and_stiffness_matrices() {
     let names = ["bar_held.mas", "bar_held.sti"];
     let files = MatrixFiles {
         dofs: Some(data("bar_held.dof")),
@@ -308,7 +308,7 @@ fn exchanged_matrices_without_the_clamped_nodes_are_noticed() {
 }
 
 #[test]
-fn nodes_in_another_order_than_the_rows_are_noticed() {
+fn detects_node_order_that_differs_from_matrix_rows() {
     let bar = bar();
     let mut lines: Vec<String> = node_table(&bar).lines().map(str::to_owned).collect();
     lines[2..].reverse();
@@ -319,7 +319,7 @@ fn nodes_in_another_order_than_the_rows_are_noticed() {
 }
 
 #[test]
-fn another_engine_axis_turns_the_model_and_its_matrices_alike() {
+fn engine_axis_option_rotates_model_and_matrices() {
     let bar = bar();
     let expected = rom(&bar);
     // What stands along z here stands along x there, and so on: (x, y, z) there is (z, x, y) of the bar.
@@ -350,7 +350,7 @@ fn another_engine_axis_turns_the_model_and_its_matrices_alike() {
 }
 
 #[test]
-fn a_matrix_of_calculix_cut_off_between_two_lines_is_noticed() {
+fn detects_calculix_matrix_truncated_at_a_line_end() {
     let whole = std::fs::read_to_string(data("bar.sti")).unwrap();
     let lines: Vec<&str> = whole.lines().collect();
     let directory = tempfile::tempdir().unwrap();

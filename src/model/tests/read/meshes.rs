@@ -37,7 +37,7 @@ const MESHES: [(&str, ElementKind); 6] = [
 ];
 
 #[test]
-fn both_formats_of_a_mesh_are_the_same_model() {
+fn inp_and_msh_files_give_the_same_model() {
     for (name, kind) in MESHES {
         let (input, gmsh) = (imported(&format!("blade_{name}.inp")), imported(&format!("blade_{name}.msh")));
         let (mesh, _) = input.model.mesh.as_ref().unwrap();
@@ -76,7 +76,7 @@ fn both_formats_of_a_mesh_are_the_same_model() {
 }
 
 #[test]
-fn binary_and_text_of_a_gmsh_mesh_are_the_same() {
+fn binary_and_text_gmsh_files_give_the_same_mesh() {
     for name in ["tet10", "hex20"] {
         let (text, binary) = (imported(&format!("blade_{name}.msh")), imported(&format!("blade_{name}_binary.msh")));
         let (a, b) = (text.model.mesh.unwrap().0, binary.model.mesh.unwrap().0);
@@ -104,7 +104,7 @@ fn worst(found: &[f64], expected: &[f64]) -> f64 {
 }
 
 #[test]
-fn bricks_have_the_frequencies_of_calculix() {
+fn brick_frequencies_match_calculix() {
     for name in ["hex8", "hex20"] {
         let model = imported(&format!("blade_{name}.msh")).model;
         let off = worst(&frequencies(&model, &model.stiffness, &model.mass), &reference(name));
@@ -190,7 +190,7 @@ fn tetrahedra_and_prisms_match_calculix_frequencies() {
 }
 
 #[test]
-fn exact_mass_of_quadratic_elements_is_near_calculix() {
+fn consistent_mass_of_quadratic_elements_is_close_to_calculix() {
     for name in ["tet10", "penta15"] {
         let model = imported(&format!("blade_{name}.inp")).model;
         let off = worst(&frequencies(&model, &model.stiffness, &model.mass), &reference(name));
@@ -206,7 +206,7 @@ fn units_are_converted() {
 }
 
 #[test]
-fn another_engine_axis_turns_the_mesh_without_mirroring_it() {
+fn engine_axis_option_rotates_the_mesh_without_mirroring() {
     let z = imported("blade_hex8.inp").model;
     for (axis, from) in [(EngineAxis::X, [1, 2, 0]), (EngineAxis::Y, [2, 0, 1])] {
         let units = Units::MillimetreTonneSecond;
@@ -220,13 +220,13 @@ fn another_engine_axis_turns_the_mesh_without_mirroring_it() {
 }
 
 #[test]
-fn a_mesh_without_material_asks_for_one() {
+fn rejects_mesh_without_material() {
     let error = read_mesh(&data("blade_hex8.inp"), &MeshOptions::default(), &silent).unwrap_err();
     assert!(matches!(&error, Error::Read { remedy, .. } if remedy.contains("--material")), "{error}");
 }
 
 #[test]
-fn contact_nodes_of_a_tip_one_element_thick_stand_in_its_middle() {
+fn contact_nodes_of_single_layer_tip_are_at_mid_thickness() {
     let model = imported("sector.inp").model;
     for count in [1, 2, 3] {
         let choice = ContactChoice { count: Some(count), ..ContactChoice::default() };

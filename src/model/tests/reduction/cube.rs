@@ -53,7 +53,7 @@ fn equal(a: &DMatrix<f64>, b: &DMatrix<f64>, bound: f64) {
 }
 
 #[test]
-fn a_free_body_moves_as_a_whole_without_strain() {
+fn rigid_motion_of_free_body_is_strain_free() {
     let rom = cube(3, MassMatrix::Lumped, Some(8)).rom;
     assert_eq!((rom.frame, rom.contact_nodes.len(), rom.order()), (DisplacementFrame::Cartesian, 32, 96 + 8));
     let zeros = (0..rom.order()).filter(|&mode| rom.stiffness[(mode, mode)] == 0.0).count();
@@ -74,7 +74,7 @@ fn a_free_body_moves_as_a_whole_without_strain() {
 
 /// With all modes both reductions are changes of coordinates: contact meets the full model at any rate.
 #[test]
-fn with_all_modes_nothing_is_lost() {
+fn reduction_with_all_modes_is_exact() {
     let shift = 1e9;
     for mass in MASSES {
         let [stiffness, inertia] = dense(cube_of(3), &cube_material(), mass);
@@ -118,7 +118,7 @@ fn ring_rows(side: RingSide) -> (Vec<usize>, Vec<Option<usize>>) {
 }
 
 #[test]
-fn static_responses_make_the_panel_exact_at_rest() {
+fn static_responses_make_static_panel_compliance_exact() {
     let (side, mass) = (RingSide::Left, MassMatrix::Lumped);
     let [stiffness, _] = dense(ring_of(side, COARSE), &ring_material(), mass);
     let (free, rows) = ring_rows(side);
@@ -165,7 +165,7 @@ fn patch_rows() -> DMatrix<f64> {
 
 /// Duals stand where hats have their peaks, on the edges of the face too; on a grid of linear elements that has no more nodes they are these.
 #[test]
-fn patches_of_a_face_stand_on_its_edges() {
+fn face_patches_include_positions_on_the_edges() {
     let rom = patched(ReductionKind::FreeInterface, Some(4)).rom;
     assert_eq!(rom.contact_nodes.len(), 12);
     let (start, side) = (cube_of(4).nodes[0][1], 0.05);
@@ -279,7 +279,7 @@ fn normals_point_to_the_cube() {
 }
 
 #[test]
-fn what_cannot_be_reduced_is_refused() {
+fn rejects_invalid_reduction_options() {
     let options = RingOptions { elements: COARSE, static_responses: 76, modes: 4, ..RingOptions::new(RingSide::Left) };
     let error = reduce_cube_ring(&options, &silent).unwrap_err().to_string();
     assert!(error.contains("only 75 displacements"), "{error}");

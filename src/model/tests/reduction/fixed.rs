@@ -28,7 +28,7 @@ fn clamped_pencil(mesh: &Mesh) -> (SparseMatrix, SparseMatrix) {
 }
 
 #[test]
-fn lanczos_finds_what_a_dense_solver_finds() {
+fn lanczos_matches_dense_solver() {
     let (stiffness, mass) = clamped_pencil(&distorted_box(ElementKind::Hex8, [5, 2, 2], SIZE, wobble(0.1)));
     let (exact, _) = dense_modes(&dense(&stiffness), &dense(&mass)).unwrap();
     let factor = stiffness.factor("K", "").unwrap();
@@ -48,7 +48,7 @@ fn lanczos_finds_what_a_dense_solver_finds() {
 }
 
 #[test]
-fn lanczos_finds_both_of_a_double_eigenvalue() {
+fn lanczos_finds_both_modes_of_a_double_eigenvalue() {
     // A square section without distortion bends alike in two directions.
     let (stiffness, mass) = clamped_pencil(&straight_box(ElementKind::Hex20, [6, 2, 2], [0.3, 0.04, 0.04]));
     let frequencies = full_modes(&stiffness, &mass, false, 4, &silent).unwrap().modes.frequencies();
@@ -57,7 +57,7 @@ fn lanczos_finds_both_of_a_double_eigenvalue() {
 }
 
 #[test]
-fn a_free_body_has_six_rigid_modes_and_the_dense_elastic_ones() {
+fn free_body_has_six_rigid_modes_and_correct_elastic_modes() {
     let mesh = distorted_box(ElementKind::Hex8, [4, 2, 2], SIZE, wobble(0.1));
     let assembled = assemble(&mesh, &steel(), &silent).unwrap();
     let (stiffness, mass) = (assembled.stiffness, assembled.mass);
@@ -76,7 +76,7 @@ fn a_free_body_has_six_rigid_modes_and_the_dense_elastic_ones() {
 
 /// Held along one edge the body can still turn about it, whether or not round-off lets the factorisation pass.
 #[test]
-fn a_hinged_body_is_refused_as_a_mechanism() {
+fn rejects_hinged_body_as_a_mechanism() {
     for kind in ElementKind::ALL {
         let mesh = distorted_box(kind, [4, 2, 2], SIZE, wobble(0.1));
         let edge: Vec<usize> =
@@ -87,7 +87,7 @@ fn a_hinged_body_is_refused_as_a_mechanism() {
 }
 
 #[test]
-fn a_free_body_held_by_two_contact_nodes_is_refused() {
+fn rejects_free_body_constrained_by_two_contact_nodes() {
     let mesh = beam();
     let contact = contact(&mesh);
     let error = reduce(mesh, &steel(), &[], &contact, &options(3, DisplacementFrame::Cartesian), &silent).unwrap_err();
@@ -99,7 +99,7 @@ proptest! {
 
     /// Any small pencil K = AᵀA + I, M diagonal: Lanczos must find the dense spectrum, clusters included.
     #[test]
-    fn lanczos_on_random_pencils(entries in prop::collection::vec(-1.0..1.0_f64, 400), masses in prop::collection::vec(0.1..10.0_f64, 20), count in 1..20_usize) {
+    fn lanczos_converges_on_random_pencils(entries in prop::collection::vec(-1.0..1.0_f64, 400), masses in prop::collection::vec(0.1..10.0_f64, 20), count in 1..20_usize) {
         let root = DMatrix::from_vec(20, 20, entries);
         let stiffness_dense = root.transpose() * &root + DMatrix::identity(20, 20);
         let pattern = std::sync::Arc::new(tiprub_model::sparse::Pattern {
@@ -118,7 +118,7 @@ proptest! {
 }
 
 #[test]
-fn more_modes_than_dofs_are_refused() {
+fn rejects_more_modes_than_dofs() {
     let (stiffness, mass) = clamped_pencil(&straight_box(ElementKind::Hex8, [1, 1, 1], [0.1; 3]));
     let factor = stiffness.factor("K", "").unwrap();
     let error = lowest_modes(&mass, &factor, 0.0, 13, ReductionStage::FullModes, &silent).unwrap_err().to_string();
@@ -240,7 +240,7 @@ fn residual_criterion_is_equation_12() {
 }
 
 #[test]
-fn the_frame_turns_displacements_and_leaves_frequencies() {
+fn frame_rotates_displacements_and_keeps_frequencies() {
     let (cartesian, cylindrical) =
         (reduced_beam(10, DisplacementFrame::Cartesian), reduced_beam(10, DisplacementFrame::Cylindrical));
     let pairs = cartesian.rom.checks.reduced_frequencies.iter().zip(&cylindrical.rom.checks.reduced_frequencies);
@@ -272,7 +272,7 @@ fn a_free_structure_keeps_its_rigid_modes() {
 }
 
 #[test]
-fn wrong_contact_nodes_are_refused_by_name() {
+fn rejects_invalid_contact_nodes_by_name() {
     let refusal = |change: fn(&Mesh, &mut Vec<ContactPoint>)| {
         let mesh = beam();
         let (clamped, mut contact) = (nodes_at(&mesh, 0, 0.0), contact(&mesh));
@@ -292,7 +292,7 @@ fn wrong_contact_nodes_are_refused_by_name() {
 }
 
 #[test]
-fn a_contact_node_on_the_axis_has_no_cylindrical_frame() {
+fn rejects_cylindrical_frame_for_contact_node_on_axis() {
     let mesh = straight_box(ElementKind::Hex8, [2, 1, 1], [0.2, 0.1, 0.1]);
     let clamped = nodes_at(&mesh, 0, 0.2);
     let contact = [ContactPoint::at("centre", 0, 0.0)];

@@ -227,7 +227,7 @@ fn table(meshes: &[usize]) -> Vec<[f64; 3]> {
 }
 
 #[test]
-fn a_sphere_pressed_on_a_block_meets_hertz() {
+fn pressed_sphere_on_block_matches_hertz() {
     let errors = table(&[2, 3, 4]);
     let [force, radius, pressure] = [0, 1, 2].map(|i| errors[0][i] / errors[2][i]);
     // At least of first order in the size of elements.
@@ -238,7 +238,7 @@ fn a_sphere_pressed_on_a_block_meets_hertz() {
 
 /// A heavy sphere that hits the block slowly: the block follows at rest, which is what Hertz's impact supposes.
 #[test]
-fn a_sphere_that_hits_a_block_meets_hertz() {
+fn sphere_impact_on_block_matches_hertz() {
     print_row!(
         "| scheme | h (µs) | duration | largest force | deepest | impulse | energy left in the sphere | ledger |"
     );

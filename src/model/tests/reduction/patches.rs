@@ -45,7 +45,7 @@ fn reduced(mesh: Mesh, contact: &[ContactPoint], kind: ReductionKind, modes: usi
 
 /// Hat functions over the length 1 have their middles at 1/6, 1/2 and 5/6, whatever the elements.
 #[test]
-fn a_patch_stands_in_the_middle_of_its_hat_function() {
+fn patch_position_is_the_centre_of_its_hat_function() {
     for kind in ElementKind::ALL {
         let mesh = straight_box(kind, [2, 2, 4], SIZE);
         let patches = tip(&mesh, 3);
@@ -66,7 +66,7 @@ fn a_patch_stands_in_the_middle_of_its_hat_function() {
 
 /// Two rows stand at the sides of the tip, a third between them, and together rows are the patches over the whole of it, on boxes and on rotor 37.
 #[test]
-fn rows_of_patches_across_the_thickness_add_up() {
+fn rows_of_patches_sum_to_a_single_row() {
     let name = |index: usize| format!("patch_{index}");
     for kind in ElementKind::ALL {
         let mesh = straight_box(kind, [2, 2, 4], SIZE);
@@ -119,7 +119,7 @@ fn rows_of_patches_across_the_thickness_add_up() {
 
 /// Displacements at rest by forces on patches are those of the full model, with any number of modes.
 #[test]
-fn responses_at_rest_to_patch_forces_are_exact() {
+fn static_responses_to_patch_forces_are_exact() {
     let mesh = beam();
     let contact = tip(&mesh, 3);
     let assembled = assemble(&mesh, &steel(), &silent).unwrap();
@@ -150,7 +150,7 @@ fn responses_at_rest_to_patch_forces_are_exact() {
 
 /// Kept modes are those of the full model; the others, one per contact coordinate, lie above them.
 #[test]
-fn free_interface_modes_are_those_of_the_full_model() {
+fn free_interface_modes_match_full_model() {
     let mesh = beam();
     for contact in [tip(&mesh, 2), vec![ContactPoint::at("corner", nodes_at(&mesh, 0, SIZE[0])[0], 0.0)]] {
         let reduction = reduced(mesh.clone(), &contact, ReductionKind::FreeInterface, 8).unwrap();
@@ -167,7 +167,7 @@ fn free_interface_modes_are_those_of_the_full_model() {
 
 /// With patches held Craig-Bampton has the frequencies of the full model in the end, and its shapes are displacements of nodes.
 #[test]
-fn modes_with_patches_held_converge() {
+fn fixed_interface_modes_with_patches_converge() {
     let mesh = straight_box(ElementKind::Hex8, [3, 1, 2], SIZE);
     let free = 3 * (mesh.nodes.len() - nodes_at(&mesh, 0, 0.0).len());
     let deviation = |modes: usize| -> [f64; 2] {
@@ -180,7 +180,7 @@ fn modes_with_patches_held_converge() {
 
 /// A structure that nothing clamps keeps its rigid-body motions and its own modes beside patches and a node.
 #[test]
-fn a_free_structure_keeps_its_modes_beside_patches() {
+fn free_structure_with_patches_keeps_all_modes() {
     let mesh = beam();
     let root = ContactPoint::at("root", *nodes_at(&mesh, 0, 0.0).last().unwrap(), 0.0);
     let contact = [tip(&mesh, 2), vec![root]].concat();
@@ -230,7 +230,7 @@ fn patch_flexibility_converges_and_point_flexibility_does_not() {
 
 /// A mean of Cartesian positions would lie inside the arc of the chord.
 #[test]
-fn a_patch_of_rotor_37_stands_on_the_arc_of_its_chord() {
+fn patch_position_of_rotor37_lies_on_the_chord_arc() {
     let blade = blade_mesh(MeshCounts { chord: 8, thickness: 1, span: 4 }).unwrap();
     let patches = blade.contact_patches(3).unwrap();
     assert_eq!(patches.iter().map(|patch| patch.name.as_str()).collect::<Vec<_>>(), ["patch_1", "patch_2", "patch_3"]);
@@ -263,7 +263,7 @@ fn a_patch_of_rotor_37_stands_on_the_arc_of_its_chord() {
 }
 
 #[test]
-fn what_cannot_be_divided_or_held_is_refused() {
+fn rejects_invalid_and_dependent_patches() {
     let mesh = beam();
     let all = nodes_at(&mesh, 0, SIZE[0]);
     let refused =
@@ -286,7 +286,7 @@ fn what_cannot_be_divided_or_held_is_refused() {
 
 /// What a ROM says of its forced response is so: against dense solutions with the full matrices, between the frequencies checked.
 #[test]
-fn the_forced_response_is_off_by_as_much_as_the_rom_says() {
+fn forced_response_error_matches_rom_estimate() {
     let mesh = beam();
     let contact = tip(&mesh, 2);
     let free = free_dofs(mesh.nodes.len(), &nodes_at(&mesh, 0, 0.0));

@@ -22,7 +22,7 @@ fn column(rows: usize, entry: impl Fn(usize) -> f64) -> Mat<f64> {
 
 /// A rigid body at speed Ω: its Coriolis force is 2m Ω×v, its centrifugal force mΩ² times the centre's distance.
 #[test]
-fn forces_on_a_rigid_body_are_those_of_its_mass_at_its_centre() {
+fn spin_forces_on_rigid_body_act_at_its_centre_of_mass() {
     let (size, corner) = ([0.3, 0.04, 0.05], [0.2, -0.1, 0.4]);
     for kind in ElementKind::ALL {
         let mut mesh = distorted_box(kind, [3, 2, 2], size, wobble(0.1));
@@ -53,7 +53,7 @@ fn forces_on_a_rigid_body_are_those_of_its_mass_at_its_centre() {
 
 /// A mass on springs k_x and k_y in the rotating frame has (ω² - k_x/m + Ω²)(ω² - k_y/m + Ω²) = 4Ω²ω².
 #[test]
-fn a_mass_on_two_springs_whirls_as_the_closed_form_says() {
+fn whirl_of_mass_on_two_springs_matches_closed_form() {
     let (kx, ky, speed): (f64, f64, f64) = (900.0, 1600.0, 11.0);
     let squares = [kx - speed * speed, ky - speed * speed];
     let gyroscopic = DMatrix::from_row_slice(2, 2, &[0.0, -2.0 * speed, 2.0 * speed, 0.0]);
@@ -70,7 +70,7 @@ fn a_mass_on_two_springs_whirls_as_the_closed_form_says() {
 
 /// Spin softening alone: a bar that only stretches along x has ω² - Ω².
 #[test]
-fn motion_across_the_axis_softens_by_the_square_of_the_speed() {
+fn spin_softening_is_the_square_of_the_speed() {
     let mesh = straight_box(ElementKind::Hex8, [8, 1, 1], [0.4, 0.05, 0.05]);
     let assembled = assemble(&mesh, &blade_steel(0.0), &silent).unwrap();
     let free: Vec<usize> =
@@ -120,7 +120,7 @@ fn beam(elements: usize, length: f64, height: f64, poisson_ratio: f64) -> Spinni
 /// A thin rod stretched by 3 %: with P = E(λ³ - λ)/2 and ρΩ²x along it, (3λ⁴ - 2λ²)/8 + ρΩ²x²/2E is constant, and λ = 1 at
 /// the tip; so L = ∫dx/λ(x) from the root to the tip's new place.
 #[test]
-fn a_spinning_rod_stretches_as_the_closed_form_says() {
+fn stretch_of_spinning_rod_matches_closed_form() {
     let (length, speed) = (0.5, 3.2e3);
     let body = beam(10, length, 0.002, 0.0);
     let state = body.at(speed).unwrap();
@@ -150,7 +150,7 @@ fn a_spinning_rod_stretches_as_the_closed_form_says() {
 /// Rotating cantilever from the axis, frequency parameters ω L² √(ρA/EI) of out-of-plane bending at η = Ω L² √(ρA/EI):
 /// Wright, Smith, Thresher, Wang, J. Appl. Mech. 49, 1982. In the plane ω² is less by Ω².
 #[test]
-fn a_rotating_cantilever_has_the_frequencies_of_the_literature() {
+fn rotating_cantilever_frequencies_match_literature() {
     let (length, height) = (1.0, 0.01);
     let body = beam(24, length, height, 0.0);
     let unit = (200e9 * height * height / 12.0 / 8000.0_f64).sqrt() / (length * length);
@@ -169,7 +169,7 @@ fn a_rotating_cantilever_has_the_frequencies_of_the_literature() {
 }
 
 #[test]
-fn what_cannot_spin_is_refused() {
+fn rejects_invalid_spin_requests() {
     let body = beam(4, 0.5, 0.02, 0.3);
     let too_fast = body.at(1e6).unwrap_err().to_string();
     assert!(
@@ -241,7 +241,7 @@ fn options(frame: DisplacementFrame) -> ReductionOptions {
 /// What does not depend on the coordinates: frequencies and growth at any speed are the same in both frames; and the
 /// resting part of the ROM is that without spin, bit for bit.
 #[test]
-fn spin_adds_its_arrays_and_changes_nothing_else() {
+fn spin_adds_arrays_without_changing_the_rest_of_the_rom() {
     let steel = blade_steel(0.3);
     let both = [DisplacementFrame::Cartesian, DisplacementFrame::Cylindrical].map(|frame| {
         let (mesh, clamped, contact) = blade();
@@ -276,7 +276,7 @@ fn spin_adds_its_arrays_and_changes_nothing_else() {
 }
 
 #[test]
-fn a_blade_without_component_modes_still_spins() {
+fn spin_works_without_component_modes() {
     let (mesh, clamped, contact) = blade();
     let options = ReductionOptions { modes: 0, ..options(DisplacementFrame::Cylindrical) };
     let reduction = spinning(mesh, &clamped, &contact, &options, 1200.0).unwrap();
@@ -288,7 +288,7 @@ fn a_blade_without_component_modes_still_spins() {
 /// With all modes kept the reduced model about a spinning state must have the spinning state's own spectrum, but for the
 /// neglected change of the interface's residual mass, which there is none of then.
 #[test]
-fn with_all_modes_the_fitted_speed_is_exact() {
+fn all_modes_reproduce_the_fitted_speed_exactly() {
     let mesh = straight_box(ElementKind::Hex8, [4, 1, 2], [0.12, 0.006, 0.05]);
     let mut mesh = mesh;
     mesh.nodes.iter_mut().for_each(|x| x[0] += 0.2);

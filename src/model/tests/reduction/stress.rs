@@ -48,7 +48,7 @@ fn nearest(mesh: &Mesh, point: [f64; 3]) -> usize {
 
 /// A cantilever pushed at its end: σxx = M y / I at half its length, whatever the number of modes.
 #[test]
-fn a_cantilever_has_the_bending_stress_of_beam_theory() {
+fn cantilever_bending_stress_matches_beam_theory() {
     let mesh = straight_box(ElementKind::Hex20, [12, 2, 3], SIZE);
     let tip = contact_patches(&mesh, &nodes_at(&mesh, 0, SIZE[0]), 1, |_| "end".into()).unwrap();
     let middle = [0.5 * SIZE[0], 0.0, 0.5 * SIZE[2]];
@@ -73,7 +73,7 @@ fn a_cantilever_has_the_bending_stress_of_beam_theory() {
 
 /// Directions turn with the place: a cylindrical frame has the same invariants, and its normal stresses along its own axes.
 #[test]
-fn directions_follow_the_frame() {
+fn stress_directions_follow_the_displacement_frame() {
     let mut mesh = distorted_box(ElementKind::Hex20, [4, 1, 3], SIZE, wobble(0.1));
     // Off the x axis, so that the directions differ.
     mesh.nodes.iter_mut().for_each(|node| node[1] += 0.2);
@@ -122,7 +122,7 @@ fn directions_follow_the_frame() {
 
 /// Where a mode has its largest stress: bending of a cantilever at its root, away from the clamped elements.
 #[test]
-fn places_of_modes_are_where_their_stress_is_largest() {
+fn modal_stress_points_lie_at_the_largest_stress() {
     let mesh = straight_box(ElementKind::Hex20, [12, 1, 3], SIZE);
     let tip = contact_patches(&mesh, &nodes_at(&mesh, 0, SIZE[0]), 2, |index| format!("patch_{index}")).unwrap();
     let places = StressPlaces { nodes: vec![("mine".into(), nearest(&mesh, [0.15, 0.02, 0.03]))], modes: 2 };
@@ -273,7 +273,7 @@ fn full_thermal_stress(mesh: &Mesh, material: &Material, clamped: &[usize], node
 /// The array for heated structures is the static stress of the full model. A cantilever is free of stress away from its root, a bar held at
 /// both ends has −EαT along it, and a structure that nothing holds has none.
 #[test]
-fn a_heated_structure_has_the_thermal_stress_of_the_full_model() {
+fn thermal_stress_of_heated_structure_matches_full_model() {
     let mesh = straight_box(ElementKind::Hex20, [12, 1, 2], SIZE);
     // Without lateral contraction the mean over each section is −EαT, however the ends are held.
     let material = Material { expansion: 12e-6, poisson_ratio: 0.0, ..steel() };
@@ -316,7 +316,7 @@ fn a_heated_structure_has_the_thermal_stress_of_the_full_model() {
 /// In a scene the stress of a warm blade is that of the full model at rest, however few modes the ROM has, and not that which the
 /// displacements have alone: −EαT/(1 − 2ν) more than none.
 #[test]
-fn a_warm_blade_in_a_scene_has_the_stress_of_the_full_model() {
+fn stress_of_warm_blade_in_scene_matches_full_model() {
     let mut mesh = straight_box(ElementKind::Hex20, [10, 1, 2], [0.07, 0.006, 0.012]);
     mesh.nodes.iter_mut().for_each(|x| *x = [x[0] + 0.18, x[1] - 0.003, x[2] - 0.006]);
     let clamped = nodes_at(&mesh, 0, 0.18);

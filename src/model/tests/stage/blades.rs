@@ -27,7 +27,7 @@ fn mass(mesh: &Mesh) -> f64 {
 }
 
 #[test]
-fn counts_are_those_of_the_guide() {
+fn mesh_counts_match_the_guide() {
     let expected = [(6734, 1832, 635, 181), (13205, 3764, 1297, 249), (294, 60, 45, 29), (1948, 2544, 178, 77)];
     for ((name, options), (nodes, elements, face, bore)) in all_options().into_iter().zip(expected) {
         let mesh = sector_mesh(&options).unwrap().mesh;
@@ -46,7 +46,7 @@ fn counts_are_those_of_the_guide() {
 }
 
 #[test]
-fn faces_differ_by_a_turn_to_round_off() {
+fn cyclic_faces_match_after_rotation_to_rounding() {
     for (name, options) in all_options() {
         let mesh = sector_mesh(&options).unwrap().mesh;
         let (sin, cos) = options.geometry.pitch().sin_cos();
@@ -122,7 +122,7 @@ fn tip_contact_is_at_mid_thickness_of_a_cylinder() {
 /// Every edge of the outer faces belongs to two of them, run through both ways: faces between cells are cut by the same
 /// diagonals, there is no gap and no node twice.
 #[test]
-fn elements_fit_each_other() {
+fn mesh_has_no_gaps_or_duplicate_nodes() {
     for (name, options) in all_options() {
         let mesh = sector_mesh(&options).unwrap().mesh;
         let mut edges = std::collections::HashMap::<[usize; 2], [i32; 2]>::new();
@@ -147,7 +147,7 @@ fn elements_fit_each_other() {
 /// The blade's volume is the integral of thickness over the camber surface, by the midpoint rule and independently of the
 /// mesh: offsets to both sides of a curve enclose its length times the thickness.
 #[test]
-fn the_blade_has_the_mass_of_its_sections() {
+fn blade_mass_matches_its_sections() {
     let mut options = SectorOptions::default();
     options.geometry.blade.fillet = 0.0;
     let (blade, hub) = (&options.geometry.blade, options.geometry.disk.hub_radius);
@@ -190,7 +190,7 @@ fn frequencies(mesh: &Mesh, count: usize) -> Vec<f64> {
 }
 
 #[test]
-fn the_blade_alone_agrees_with_calculix() {
+fn blade_without_disk_agrees_with_calculix() {
     let found = frequencies(&blade_mesh(&SectorOptions::default()).unwrap().mesh, 10);
     let reference: Vec<f64> = include_str!("../data/stage_blade_calculix.csv")
         .lines()
@@ -219,7 +219,7 @@ fn the_default_mesh_of_the_blade_is_converged() {
 }
 
 #[test]
-fn what_makes_no_stage_is_refused_by_name() {
+fn rejects_invalid_stage_options_by_name() {
     type Change = fn(&mut SectorOptions);
     let wrong: [(Change, &str); 16] = [
         (|o| o.counts.chord = 5, "`chord`: 5 is odd"),

@@ -11,7 +11,7 @@ use tiprub_model::stage::{GAP, TIP_AXIAL, TIP_RADIUS};
 
 /// Section 6.1: 44,800 elements, 68,768 nodes, 206,304 degrees of freedom.
 #[test]
-fn the_default_has_the_papers_size() {
+fn default_mesh_has_the_size_of_the_paper() {
     let ring = stage_casing_mesh(&StageCasingOptions::default()).unwrap();
     ring.mesh.validate().unwrap();
     let counts = (ring.mesh.elements.len(), ring.mesh.nodes.len(), 3 * ring.mesh.nodes.len());
@@ -78,7 +78,7 @@ fn the_reduced_casing_has_its_modes() {
 }
 
 #[test]
-fn counts_that_do_not_fit_are_refused() {
+fn rejects_invalid_element_and_contact_counts() {
     let refusal = |options: StageCasingOptions| stage_casing_mesh(&options).err().unwrap().to_string();
     let default = StageCasingOptions::default;
     assert!(

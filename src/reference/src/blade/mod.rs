@@ -133,7 +133,7 @@ mod tests {
     /// Points of faces see a displacement of the whole tip along the axis as it is, and slope as the tip does; nothing touches a casing
     /// that is far away, and what touches is pushed inwards.
     #[test]
-    fn parts_of_a_tip_see_what_it_does() {
+    fn tip_points_follow_the_displacement_of_the_tip() {
         let blade = blade_mesh(MeshCounts { chord: 3, thickness: 1, span: 2 }).unwrap();
         let tip = blade.mesh.set("tip").unwrap();
         let [low, high] = blade

@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn surface_interpolates_and_feet_are_perpendicular() {
+    fn surface_interpolates_and_projection_is_perpendicular() {
         let ring = Ring::new(28, 3).unwrap();
         let data = round(28, 3);
         let control = ring.control(&data);

@@ -4,7 +4,7 @@ use tiprub_reference::compare::{agreement, asymmetry, relative_l2, sample, windo
 use tiprub_reference::cube::history::CubeHistory;
 
 #[test]
-fn windows_hold_the_impulse() {
+fn windowed_forces_conserve_the_impulse() {
     // 3 N in the first half of every millisecond, recorded at the end of each of 40 intervals.
     let times: Vec<f64> = (0..=40).map(|i| 1e-4 * f64::from(i)).collect();
     let force: Vec<f64> = (0..=40).map(|i| if (i + 9) % 10 < 5 { 3.0 } else { 0.0 }).collect();
@@ -17,7 +17,7 @@ fn windows_hold_the_impulse() {
 }
 
 #[test]
-fn samples_lie_on_straight_lines_and_differences_are_relative() {
+fn samples_are_interpolated_linearly_and_errors_are_relative() {
     let (coarse, fine) = ([0.0, 1.0, 2.0], [0.0, 0.5, 1.0, 1.5, 2.0]);
     assert!((sample(&coarse, &[0.0, 2.0, 0.0], 1.25) - 1.5).abs() < 1e-15);
     let at = [0.1, 0.7, 1.2, 1.9];
@@ -44,7 +44,7 @@ fn history(scale: f64) -> CubeHistory {
 }
 
 #[test]
-fn agreement_tells_by_how_much() {
+fn agreement_measures_relative_differences() {
     let found = agreement(&history(1.1), &history(1.0), 100.0, 5e-5, 1e-4);
     let tenths = [found.touching[0], found.touching[1], found.touching[2], found.contact[1], found.windows];
     assert!(tenths.iter().all(|x| (x - 0.1).abs() < 1e-6), "{found:?}");
@@ -55,7 +55,7 @@ fn agreement_tells_by_how_much() {
 }
 
 #[test]
-fn asymmetry_sees_one_corner() {
+fn asymmetry_detects_a_change_at_one_corner() {
     let mut one = history(1.0);
     assert!(asymmetry(&one, 1.0).iter().all(|x| *x == 0.0));
     one.corners[50][6][0] += 1e-6;

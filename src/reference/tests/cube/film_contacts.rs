@@ -17,7 +17,7 @@ fn deepest(history: &CubeHistory) -> f64 {
 
 /// With consistent mass a force on one node moves its neighbours: some that the prediction leaves outside are pushed in.
 #[test]
-fn complementarity_closes_the_gaps_of_a_consistent_mass() {
+fn complementarity_prevents_penetration_with_consistent_mass() {
     let [paper, all] = [false, true].map(|complementary| run(Mass::Consistent, complementary));
     println!("deepest: {:.2e} m, complementarity {:.2e} m", deepest(&paper), deepest(&all));
     assert!(deepest(&paper) > 5e-7, "{:e}", deepest(&paper));

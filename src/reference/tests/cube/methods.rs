@@ -21,7 +21,7 @@ fn run(method: CubeMethod, setting: CubeSetting, step: f64, end: f64, stride: us
 /// Within the first 0.2 ms two rows of nodes touch; here all methods have the same mesh, mass and surface. Film and
 /// bi-potential keep gaps closed; the other two let nodes in by some micrometres, which is what keeps them apart.
 #[test]
-fn all_methods_meet_while_in_contact() {
+fn all_methods_agree_while_in_contact() {
     let (setting, end) = (CubeSetting::default(), 2e-4);
     let film = run(FILM(), setting, 2e-7, end, 5);
     for (method, step, stride, bounds) in [
@@ -40,7 +40,7 @@ fn all_methods_meet_while_in_contact() {
 }
 
 #[test]
-fn left_and_right_are_equal_to_rounding() {
+fn left_and_right_are_symmetric_to_rounding() {
     for (method, mass) in [
         (FILM(), Mass::Lumped),
         (FILM(), Mass::Consistent),
@@ -59,7 +59,7 @@ fn left_and_right_are_equal_to_rounding() {
 }
 
 #[test]
-fn gaps_stay_closed_and_friction_takes_its_share_of_the_energy() {
+fn gaps_do_not_penetrate_and_friction_dissipates_energy() {
     for (surface, friction) in [(SurfaceKind::Spline, 0.0), (SurfaceKind::Facets, 0.0), (SurfaceKind::Spline, 0.15)] {
         for (method, step) in [(FILM(), 5e-7), (CubeMethod::Bipotential, 1e-6)] {
             let setting = CubeSetting { surface, friction, ..CubeSetting::default() };
@@ -82,7 +82,7 @@ fn gaps_stay_closed_and_friction_takes_its_share_of_the_energy() {
 }
 
 #[test]
-fn an_explicit_step_beyond_the_limit_is_refused() {
+fn rejects_explicit_step_above_the_stability_limit() {
     let scene = CubeScene::new(CubeSetting::default()).unwrap();
     for method in [FILM(), PENALTY()] {
         let error =

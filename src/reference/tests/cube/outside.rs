@@ -46,7 +46,7 @@ const TOUCHING: f64 = 3.58e-4;
 
 /// GetFEM's rays, normals and tangents with Newmark's method without friction against c with the same contact stiffness.
 #[test]
-fn getfem_has_the_same_contact_without_friction() {
+fn agrees_with_getfem_without_friction() {
     let theirs = table(include_str!("../data/cube_getfem_newmark.csv"));
     let found = compare("c and GetFEM, µ = 0", &theirs, &run(spring(9.42e7, 1.0), 0.0, 2e-6, &theirs), TOUCHING);
     assert_within(&found, [2e-5; 3], "GetFEM");
@@ -55,7 +55,7 @@ fn getfem_has_the_same_contact_without_friction() {
 
 /// The same with its Coulomb law and 5e8 N/m a node, µ = 0.15: nodes rebound from the springs, one by one.
 #[test]
-fn getfem_has_the_same_penalty_and_friction() {
+fn agrees_with_getfem_with_penalty_and_friction() {
     let theirs = table(include_str!("../data/cube_getfem_penalty.csv"));
     let found = compare("c and GetFEM", &theirs, &run(spring(5e8, 1.0), 0.15, 1e-6, &theirs), TOUCHING);
     assert_within(&found, [2e-3, 1e-3, 1e-3], "GetFEM");
@@ -65,7 +65,7 @@ fn getfem_has_the_same_penalty_and_friction() {
 
 /// The same with 1e11 N/m a node, so that gaps close to 20 nm, in b's time stepping, against b.
 #[test]
-fn getfem_holds_gaps_like_the_bipotential() {
+fn bipotential_agrees_with_stiff_getfem_penalty() {
     let theirs = table(include_str!("../data/cube_getfem_held.csv"));
     let end = theirs.times[theirs.times.len() - 1];
     let found = compare("b and GetFEM", &theirs, &run(CubeMethod::Bipotential, 0.15, 1e-6, &theirs), end);
@@ -75,7 +75,7 @@ fn getfem_holds_gaps_like_the_bipotential() {
 
 /// CalculiX with small strains against c with the stiffness that CalculiX has: 1e12 Pa/m over its areas.
 #[test]
-fn calculix_has_the_same_contact_with_small_strains() {
+fn agrees_with_calculix_for_small_strains() {
     let theirs = table(include_str!("../data/cube_calculix_small.csv"));
     let found = compare("c and CalculiX", &theirs, &run(spring(1e8, 0.75), 0.0, 2e-6, &theirs), 3.6e-4);
     assert_within(&found, [2.5e-3, 2e-3, 1.5e-3], "CalculiX");
@@ -84,7 +84,7 @@ fn calculix_has_the_same_contact_with_small_strains() {
 
 /// Finite strains with one contact stiffness: CalculiX and GetFEM agree with each other, small strains do not.
 #[test]
-fn finite_strains_are_what_keeps_calculix_apart() {
+fn finite_strains_explain_the_difference_from_calculix() {
     let calculix = table(include_str!("../data/cube_calculix.csv"));
     let getfem = table(include_str!("../data/cube_getfem_stvk.csv"));
     let together = compare("CalculiX and GetFEM", &calculix, &getfem, 3.6e-4);

@@ -8,7 +8,7 @@ use tiprub_reference::cube::{cube_mesh, cube_of, ring_mesh, ring_of};
 use tiprub_reference::surface::{SplineSurface, SurfaceKind};
 
 #[test]
-fn the_meshes_are_the_papers() {
+fn meshes_match_the_paper() {
     let cube = cube_mesh();
     cube.validate().unwrap();
     assert_eq!((cube.nodes.len(), cube.elements.len()), (216, 125));
@@ -75,7 +75,7 @@ fn guess(side: RingSide, arc: usize, wide: usize, [x, y, z]: [f64; 3]) -> [f64; 
 }
 
 #[test]
-fn spline_nears_the_cylinder_at_fourth_order() {
+fn spline_converges_to_cylinder_at_fourth_order() {
     for side in RingSide::BOTH {
         let mut errors = Vec::new();
         for arc in [20, 40, 80] {
@@ -109,7 +109,7 @@ fn spline_nears_the_cylinder_at_fourth_order() {
 
 /// An uneven surface, so that nodes on its ends and edges are met only with the right end conditions.
 #[test]
-fn the_spline_meets_the_nodes_of_ends_and_edges() {
+fn spline_interpolates_nodes_at_ends_and_edges() {
     let (rows, columns) = (7, 6);
     let place = |i: usize, j: usize| [i as f64, j as f64, 0.3 * (2.0 * i as f64 + 3.1 * j as f64).sin()];
     let nodes: Vec<[f64; 3]> = (0..rows).flat_map(|i| (0..columns).map(move |j| place(i, j))).collect();
@@ -143,7 +143,7 @@ fn facets_are_the_chords_of_the_cylinder() {
 }
 
 #[test]
-fn spread_forces_do_the_work_of_the_carriers() {
+fn distributed_forces_conserve_work() {
     let surface = SplineSurface::new(SurfaceKind::Spline, 41, 9, 1.0);
     let irregular = |seed: f64| -> Vec<[f64; 3]> {
         (0..surface.count()).map(|i| core::array::from_fn(|k| (seed * (i as f64 + 0.3) + k as f64).sin())).collect()
@@ -157,7 +157,7 @@ fn spread_forces_do_the_work_of_the_carriers() {
 }
 
 #[test]
-fn matrices_come_back_from_their_file() {
+fn matrices_round_trip_through_a_file() {
     let setting = CubeSetting { mass: Mass::Consistent, ..CubeSetting::default() };
     let rings = RingSide::BOTH.map(|side| ring_of(side, [1, 2, 6]));
     let scene = CubeScene::of(setting, cube_of(2), rings, [6, 2]).unwrap();

@@ -8,7 +8,7 @@ fn names(directory: &Path) -> Vec<String> {
 }
 
 #[test]
-fn missing_directories_are_created_and_only_the_target_stays() {
+fn creates_missing_directories_and_leaves_only_the_target() {
     let root = tempfile::tempdir().unwrap();
     let target = root.path().join("a/b/result.csv");
     write(&target, "1\n").unwrap();
@@ -18,7 +18,7 @@ fn missing_directories_are_created_and_only_the_target_stays() {
 }
 
 #[test]
-fn an_abandoned_file_leaves_nothing_and_keeps_the_old_one() {
+fn abandoned_file_is_removed_and_old_file_is_kept() {
     let root = tempfile::tempdir().unwrap();
     let target = root.path().join("rom.safetensors");
     write(&target, "old").unwrap();
@@ -31,7 +31,7 @@ fn an_abandoned_file_leaves_nothing_and_keeps_the_old_one() {
 
 #[test]
 #[cfg(unix)]
-fn links_are_followed_and_stay_links() {
+fn symlinks_are_followed_and_preserved() {
     let root = tempfile::tempdir().unwrap();
     let (real, link) = (root.path().join("elsewhere/real.csv"), root.path().join("link.csv"));
     write(&real, "old").unwrap();
@@ -43,7 +43,7 @@ fn links_are_followed_and_stay_links() {
 
 #[test]
 #[cfg(unix)]
-fn links_to_nothing_are_followed_and_circles_are_named() {
+fn dangling_links_are_followed_and_link_loops_reported() {
     let root = tempfile::tempdir().unwrap();
     let [link, chain, circle] = ["link.csv", "chain.csv", "circle"].map(|name| root.path().join(name));
     std::os::unix::fs::symlink("new.csv", &link).unwrap();
@@ -81,7 +81,7 @@ fn files_follow_the_umask_or_keep_permissions() {
 /// Where files without a name are not to be had, hidden ones do.
 #[test]
 #[cfg(unix)]
-fn hidden_files_become_the_same_as_files_without_a_name() {
+fn hidden_temporary_file_gives_the_same_result() {
     let root = tempfile::tempdir().unwrap();
     let [plain, target] = ["plain", "target"].map(|name| root.path().join(name));
     fs::write(&plain, "").unwrap();
@@ -95,7 +95,7 @@ fn hidden_files_become_the_same_as_files_without_a_name() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn an_unfinished_file_has_no_name() {
+fn unfinished_file_is_not_visible_in_the_directory() {
     let root = tempfile::tempdir().unwrap();
     let draft = begin(&root.path().join("x")).unwrap();
     // Where the file system knows such files.
@@ -103,7 +103,7 @@ fn an_unfinished_file_has_no_name() {
 }
 
 #[test]
-fn impossible_names_are_refused_before_any_work() {
+fn rejects_invalid_names_before_any_work() {
     let root = tempfile::tempdir().unwrap();
     for name in ["", ".", "..", "missing/", &"l".repeat(300)] {
         let target = if name.is_empty() { PathBuf::new() } else { root.path().join(name) };
@@ -139,7 +139,7 @@ fn a_directory_is_not_a_target() {
 }
 
 #[test]
-fn only_a_file_with_other_contents_is_protected() {
+fn protects_only_files_with_different_contents() {
     let root = tempfile::tempdir().unwrap();
     let target = root.path().join("scene.toml");
     refuse_to_replace(&target, "old", "Move it").unwrap();
@@ -150,7 +150,7 @@ fn only_a_file_with_other_contents_is_protected() {
 }
 
 #[test]
-fn a_directory_is_tried_and_nothing_stays() {
+fn write_check_of_a_directory_leaves_no_files() {
     let root = tempfile::tempdir().unwrap();
     try_directory(&root.path().join("a/b")).unwrap();
     assert_eq!(names(root.path()).len(), 0);
@@ -169,7 +169,7 @@ fn a_directory_is_tried_and_nothing_stays() {
 }
 
 #[test]
-fn a_target_that_cannot_be_written_says_so() {
+fn reports_a_target_that_cannot_be_written() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("file"), "").unwrap();
     let failure = write(&root.path().join("file/inside.csv"), "x").unwrap_err();

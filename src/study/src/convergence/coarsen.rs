@@ -168,7 +168,7 @@ mod tests {
 
     /// Hat functions are nested: patches of patches are the patches of half as many, where the mesh integrates both alike.
     #[test]
-    fn merged_patches_equal_a_reduction_with_half_as_many() {
+    fn merged_patches_equal_a_reduction_with_half_the_patches() {
         let of = |patches: usize| {
             let options = Rotor37Options {
                 mesh: MeshCounts { chord: 8, thickness: 1, span: 4 },
@@ -204,7 +204,7 @@ mod tests {
 
     /// Duals of hat functions are nested across the thickness, and hats along the chord within each row.
     #[test]
-    fn fewer_rows_of_patches_are_those_of_the_reduction_with_fewer() {
+    fn merged_rows_equal_a_reduction_with_fewer_rows() {
         let of = |counts: [usize; 2]| {
             let options = Rotor37Options {
                 mesh: MeshCounts { chord: 8, thickness: 2, span: 2 },

@@ -98,7 +98,7 @@ mod tests {
 
     /// 7 + 3 hᵖ at sizes that do not fall evenly: the limit is 7.
     #[test]
-    fn a_power_is_read_from_any_three_sizes() {
+    fn convergence_order_is_found_from_any_three_sizes() {
         for power in [0.6, 1.0, 1.7, 2.0_f64] {
             for sizes in [[4.0, 2.0, 1.0], [3.0, 2.0, 0.5], [1.0, 0.9, 0.7]] {
                 let values = sizes.map(|size: f64| 7.0 + 3.0 * size.powf(power));
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_that_are_read_are_apart() {
+    fn selected_refinement_levels_are_well_separated() {
         let of_modes = [20.0, 40.0, 60.0, 80.0, 120.0, 160.0_f64].map(|modes| 1.0 / modes);
         assert_eq!(chosen(&of_modes), [1, 3, 5]);
         assert_eq!(chosen(&of_modes[3..]), [0, 1, 2]);
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_orders_up_to_two_and_none_without_decrease() {
+    fn limits_orders_to_two_and_requires_decreasing_changes() {
         let sizes = [4.0, 2.0, 1.0];
         let fast = of_changes(sizes, [100.0, 1.0], LEAST).unwrap();
         assert_eq!((fast.order, fast.rest), (MOST, 1.0 / 3.0));

@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_are_those_of_the_nodes_that_both_have() {
+    fn changes_compare_only_common_nodes() {
         let (few, many) = (marched(&[0.1, 0.3], 1.0, 2.0), marched(&[0.1, 0.2, 0.3], 1.25, 1.0));
         let [moved, impulse, friction, peak, strain] = few.changes(&many);
         assert!((moved.unwrap() - 0.2).abs() < 1e-12, "{moved:?}");

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn contact_nodes_stay_with_other_modes_and_meshes() {
+    fn contact_nodes_are_kept_for_other_modes_and_meshes() {
         let own = ["tip_3", "seal", "tip_1"];
         let [modes, _, mesh] = refined(own, &["tip", "seal"]);
         assert_eq!(names(&modes), [own, own, own], "{:?}", modes.missing);
@@ -116,7 +116,7 @@ mod tests {
 
     /// Tips as fine as asked, as far as the mesh has places for them; what it has none for is told. Only what is asked is made.
     #[test]
-    fn finer_tips_end_where_the_mesh_has_no_more_places() {
+    fn tip_refinement_stops_at_the_mesh_resolution() {
         let console = Console::new(true, false);
         let scene =
             scene_source::rotor37_scene_with(CoarseBlade.reduce(None, 4, TipContact::Nodes(3), &console).unwrap().rom)
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn new_nodes_between_those_of_one_pair_are_its_own() {
+    fn new_nodes_within_a_pair_belong_to_that_pair() {
         let [_, nodes, _] = refined(["tip_a", "tip_b", "tip_c"], &["tip_"]);
         let found = names(&nodes);
         assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [2, 3, 5], "{}", nodes.missing);
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn new_nodes_of_which_no_pair_is_known_are_not_made() {
+    fn does_not_add_nodes_without_a_known_contact_pair() {
         let own = ["leading", "mid", "trailing"];
         for (pairs, reported) in [
             (&["leading"][..], "`leading` (contact[1]) and `mid` (no contact)"),

@@ -105,7 +105,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn rows_are_refined_from_the_rom_and_from_the_mesh() {
+    fn rows_are_coarsened_from_the_rom_or_refined_from_the_mesh() {
         let (console, cache) = (Console::new(true, false), RomCache::off());
         let found = |rows: usize, source: Option<&dyn RomSource>| {
             let scene = scene(rows);
@@ -130,7 +130,7 @@ pub(crate) mod tests {
     /// The first finer model has one row more, the next has as many rows as needed to see whether the tip stays straight, as far as its mesh has
     /// places for them.
     #[test]
-    fn finer_models_have_more_rows() {
+    fn finer_models_have_more_patch_rows() {
         let (console, cache) = (Console::new(true, false), RomCache::off());
         for (rows, finer) in [(1, [(5, 2), (9, 3)]), (2, [(5, 3), (9, 3)]), (3, [(5, 3), (9, 3)])] {
             let scene = scene(rows);
@@ -155,7 +155,7 @@ pub(crate) mod tests {
 
     /// Three rows are needed for an estimate.
     #[test]
-    fn an_estimate_of_rows_needs_three() {
+    fn row_error_estimate_requires_three_rows() {
         let levels = crate::estimate::rows(&scene(3), 1).unwrap().levels;
         assert_eq!(levels.iter().map(|level| level.scene.roms[0].rows()).collect::<Vec<_>>(), [1, 2, 3]);
         for rows in [1, 2] {

@@ -216,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_front_holds_what_nothing_beats() {
+    fn pareto_front_contains_only_undominated_points() {
         let points = [(3.0, 1e-3), (1.0, 1e-1), (2.0, 2e-1), (2.0, 1e-2), (4.0, 1e-3), (0.5, f64::NAN)];
         assert_eq!(front(&points), [(1.0, 1e-1), (2.0, 1e-2), (3.0, 1e-3)]);
     }

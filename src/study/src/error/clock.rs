@@ -23,7 +23,7 @@ pub fn now() -> Duration {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn work_takes_time() {
+    fn clock_advances_during_work() {
         let before = super::now();
         let mut sum = 0.0_f64;
         for i in 0..2_000_000 {

@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_structure_counts_by_its_own_size() {
+    fn error_is_relative_to_the_size_of_the_worst_structure() {
         let (found, truth) = (trace([1e-3, 1.2e-6], [5.0, 0.03]), trace([1e-3, 1.0e-6], [5.0, 0.02]));
         assert!((apart(&found, &truth) - 0.2).abs() < 1e-12 && (windows_apart(&found, &truth, 1) - 0.5).abs() < 1e-12);
         // What hardly moves is rounding; a number that is none stays so.

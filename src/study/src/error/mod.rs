@@ -474,7 +474,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_parts_what_is_refused_from_what_runs() {
+    fn step_limit_separates_rejected_from_successful_runs() {
         use RunOutcome::{Failed, Ran, Unstable};
         let tried = [(0, 4.0, Unstable), (0, 2.0, Ran), (1, 2.0, Unstable), (1, 1.0, Ran)];
         let with = |more: (usize, f64, RunOutcome)| [&tried[..], &[more]].concat();

@@ -284,7 +284,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_power_law_is_found_again() {
+    fn recovers_the_exponent_of_a_power_law() {
         let points: Vec<(f64, f64)> = [1.0, 0.5, 0.2].iter().map(|h: &f64| (*h, 3.0 * h.powf(1.7))).collect();
         assert!((slope(&points) - 1.7).abs() < 1e-12);
     }

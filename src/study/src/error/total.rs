@@ -354,7 +354,7 @@ mod tests {
 
     /// One row is held against more, two are taken apart into one, and where none can be added the error is not called total.
     #[test]
-    fn rows_are_part_of_a_total_error() {
+    fn patch_rows_contribute_to_the_total_error() {
         let (console, cache) = (Console::new(true, false), RomCache::off());
         let total = |rows: usize, source: Option<&dyn crate::convergence::refine::RomSource>| {
             let case = UserScene::of("a blade", scene(rows), &[], (Some(1.2e-3), true), &console).unwrap();

@@ -366,7 +366,7 @@ mod tests {
 
     /// The base of the fixed steps is one that the whole window accepts, so that half of it and more can be compared.
     #[test]
-    fn fixed_steps_beside_adaptive_ones_run_the_whole_window() {
+    fn fixed_reference_steps_cover_the_whole_window() {
         let console = Console::new(true, false);
         let mut scene = scene(2);
         scene.roms[0] = PatchedBlade.reduce(None, 10, TipContact::patches([5, 2]), &console).unwrap().rom;

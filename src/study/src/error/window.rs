@@ -141,7 +141,7 @@ fn shortened(problem: &str) -> String {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn long_reasons_end_between_words() {
+    fn long_reasons_are_truncated_at_word_boundaries() {
         let long = "refused: µ ".repeat(20);
         let short = super::shortened(&long);
         assert!(short.chars().count() <= 82 && short.ends_with(" µ …"), "{short}");
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_ends_where_runs_part() {
+    fn window_ends_where_runs_diverge() {
         assert_eq!(super::samples(&[1e-9, 1e-8, 1e-7, 1e-5, 1e-8], 10), 3);
         assert_eq!(super::samples(&[1e-9; 5], 4), 4);
     }

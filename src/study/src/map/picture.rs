@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_of_the_spectrum_is_one_rectangle_at_its_place() {
+    fn spectral_line_is_drawn_as_one_rectangle() {
         let mut amplitudes = vec![0.0; 101];
         amplitudes[50] = 200.0;
         let column = |speed| SpeedColumn { speed, resolution: 1.0, amplitudes: Some(&amplitudes) };
@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn refused_runs_are_marked_and_labels_are_there() {
+    fn rejected_runs_are_marked_and_labels_are_present() {
         let amplitudes = vec![1.0; 101];
         let columns = vec![
             SpeedColumn { speed: 90.0, resolution: 1.0, amplitudes: Some(&amplitudes) },
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_grow_lighter_and_levels_span_the_range() {
+    fn colours_lighten_and_levels_span_the_range() {
         let map = map(Vec::new());
         assert_eq!([0.0, 0.0101, 1.01, 99.0, 1e9].map(|value| map.level(value)), [0, 0, 16, 31, 31]);
         assert_eq!((color(0.0), color(1.0)), ("rgb(68,1,84)".into(), "rgb(253,231,37)".into()));

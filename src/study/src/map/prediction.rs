@@ -207,7 +207,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn two_lobes_excite_even_orders_and_what_acts_adds_its_own() {
+    fn two_lobes_excite_even_orders_plus_those_of_loads() {
         let mut scene = scene(100.0, 4);
         let with = |scene: &Scene, start: &MapStart| FrequencyPrediction::new(scene, start, 1.0).unwrap().base_order;
         let base = |scene: &Scene| with(scene, &MapStart::default());
@@ -225,7 +225,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn engine_orders_meet_modes_where_they_should() {
+    fn engine_order_crossings_are_at_the_expected_speeds() {
         let prediction = FrequencyPrediction::new(&scene(100.0, 4), &MapStart::default(), 1.0).unwrap();
         let found = prediction.crossings([140.0, 160.0], 1100.0);
         let of_first: Vec<_> = found.iter().filter(|crossing| crossing.mode == 0).collect();

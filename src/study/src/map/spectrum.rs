@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sine_has_its_amplitude_wherever_it_lies_between_the_bins() {
+    fn sine_amplitude_is_correct_between_frequency_bins() {
         for place in [17.0, 40.25, 99.5, 100.73] {
             let decimator = decimated(7, |time| 5.0 + 3e-5 * (std::f64::consts::TAU * place * time + 0.3).sin());
             for (channel, amplitude) in [(0, 3e-5), (1, 6e-5)] {
@@ -195,7 +195,7 @@ mod tests {
 
     /// Frequencies near the sampling rate would fold down; plain sampling at the same rate shows how much.
     #[test]
-    fn frequencies_near_the_sampling_rate_do_not_fold_down() {
+    fn frequencies_near_the_sampling_rate_do_not_alias() {
         let high = COUNT as f64 - 100.0;
         let signal = |time: f64| (std::f64::consts::TAU * high * time).sin();
         let filtered = spectrum(&decimated(7, signal), 0)[100];

@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loads_whirl_and_uneven_heat_have_orders() {
+    fn loads_whirl_and_uneven_heat_contribute_orders() {
         assert_eq!(orders(None, false, &[]), [0; 0]);
         assert_eq!(orders(Some(6), false, &[20.0; 8]), [6]);
         assert_eq!(orders(Some(6), true, &[]), [6, 1]);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn what_acts_is_told() {
+    fn lists_the_omitted_effects() {
         let of = |acting: &[&'static str]| MapStart { acting: acting.to_vec(), ..MapStart::default() }.without();
         assert_eq!(of(&[]), "");
         assert_eq!(of(&["heat"]), ", without heat");

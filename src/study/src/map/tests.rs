@@ -135,7 +135,7 @@ fn bell(speed: f64, middle: f64, height: f64) -> f64 {
 
 /// A branch that leans to +18 %, with a small maximum on the way, and another beyond the range.
 #[test]
-fn a_resonance_is_followed_as_far_as_it_leans() {
+fn follows_a_leaning_resonance_branch_to_its_end() {
     let prediction = FrequencyPrediction::new(&scene(FIRST, 4), &MapStart::default(), 0.0).unwrap();
     let speeds = around(CROSSING, 0.3, 61).values();
     let [low, high] = [speeds[0], speeds[60]];
@@ -156,7 +156,7 @@ fn a_resonance_is_followed_as_far_as_it_leans() {
 
 /// Two modes a tenth apart, the lower one responding more: each crossing keeps its own maximum.
 #[test]
-fn neighbouring_resonances_are_told_apart() {
+fn distinguishes_neighbouring_resonances() {
     let mut scene = scene(FIRST, 4);
     let rom = &mut scene.roms[0];
     rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.1_f64.powi(2);
@@ -176,7 +176,7 @@ fn neighbouring_resonances_are_told_apart() {
 
 /// Whatever the scene: a fifth above the resonance sought, there is room for a branch that leans by another fifth.
 #[test]
-fn the_speeds_chosen_leave_room_above_the_resonance() {
+fn default_speeds_extend_above_the_resonance() {
     let mut scene = scene(FIRST, 4);
     let chosen = |scene: &Scene, quick| {
         let request = MapRequest { quick, ..MapRequest::default() };
@@ -207,7 +207,7 @@ fn the_speeds_chosen_leave_room_above_the_resonance() {
 }
 
 #[test]
-fn scenes_with_more_than_one_thing_to_vary_are_refused() {
+fn rejects_scenes_with_several_rotors_or_frictions() {
     let mut settings = scene_source::settings("builtin:rotor37").unwrap();
     assert_eq!(crate::one_rotor_and_friction(&settings), Ok(()));
     let mut other = settings.contacts[0].clone();
@@ -247,7 +247,7 @@ fn numbers_do_not_depend_on_threads() {
 }
 
 #[test]
-fn refused_speeds_are_marked_and_all_refused_is_a_failure() {
+fn rejected_speeds_are_marked_and_fail_if_all_rejected() {
     let mut scene = scene(FIRST, 2);
     let rom = &mut scene.roms[0];
     rom.extras.spin = Some(Spin {
@@ -278,7 +278,7 @@ fn refused_speeds_are_marked_and_all_refused_is_a_failure() {
 }
 
 #[test]
-fn steps_too_coarse_for_the_filter_and_a_speed_set_are_refused() {
+fn rejects_too_coarse_steps_and_a_speed_override() {
     let mut coarse = request(BUMP, around(CROSSING, 0.1, 2));
     coarse.settings.retain(|(name, _)| name != "internal_step_max");
     coarse.settings.push(("internal_step_max".into(), "1e-4".into()));
@@ -290,7 +290,7 @@ fn steps_too_coarse_for_the_filter_and_a_speed_set_are_refused() {
 
 /// With friction the sense matters; a blade mirrored about its middle, turning the other way, is the same in a mirror.
 #[test]
-fn the_rotor_turns_in_the_sense_of_the_scene() {
+fn rotor_keeps_the_sense_of_rotation_of_the_scene() {
     let speeds = around(CROSSING, 0.1, 2);
     let request = MapRequest { revolutions: Some(2), transient: Some(1), ..request(BUMP, speeds) };
     let request = MapRequest {
@@ -321,7 +321,7 @@ fn the_rotor_turns_in_the_sense_of_the_scene() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_before_the_work() {
+fn rejects_excessive_requests_before_running() {
     let refused = |request: &MapRequest| Map::prepare(scene(FIRST, 36), request).map(|_| ()).unwrap_err();
     for revolutions in [100_000_000, usize::MAX] {
         let request = MapRequest { revolutions: Some(revolutions), ..request(BUMP, around(CROSSING, 0.1, 5)) };
@@ -348,7 +348,7 @@ fn what_does_not_fit_is_refused_before_the_work() {
 }
 
 #[test]
-fn the_cost_told_is_what_is_done() {
+fn reported_cost_matches_the_work_done() {
     let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 2)) };
     let reported = std::cell::RefCell::new(Vec::new());
     let tell = |done: usize, all: usize, steps: f64| reported.borrow_mut().push((done, all, steps));
@@ -362,7 +362,7 @@ fn the_cost_told_is_what_is_done() {
 }
 
 #[test]
-fn start_values_count_in_orders_and_facts() {
+fn start_values_affect_orders_and_facts() {
     let prepared = |change: fn(&mut Scene), set: &[(&str, &str)]| {
         let mut scene = scene(FIRST, 2);
         scene.settings.surfaces[0].moving = true;
@@ -392,7 +392,7 @@ fn start_values_count_in_orders_and_facts() {
 
 /// Where nothing touches nothing is said about the response.
 #[test]
-fn nothing_that_moves_is_no_verdict() {
+fn gives_no_response_verdict_without_contact() {
     let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(-1e-4, around(CROSSING, 0.1, 2)) };
     let study = run(scene(FIRST, 2), &request, 1);
     let holds = |start: &str| study.statements.iter().find(|one| one.expected.starts_with(start)).unwrap().holds;
@@ -401,7 +401,7 @@ fn nothing_that_moves_is_no_verdict() {
 }
 
 #[test]
-fn stiffening_is_decided_only_where_it_shows() {
+fn stiffening_verdict_requires_a_visible_effect() {
     let crossing = |order, speed| Crossing { order, mode: 0, speed, frequency: 100.0, excited: true };
     let one = |order, response, beyond| Coincidence {
         crossing: crossing(order, 100.0),
@@ -429,7 +429,7 @@ fn stiffening_is_decided_only_where_it_shows() {
 
 /// Two runs beside a border of the window: the parabola's top lies beyond it.
 #[test]
-fn a_maximum_stays_in_its_window() {
+fn interpolated_maximum_stays_in_its_window() {
     let mut scene = scene(FIRST, 4);
     let rom = &mut scene.roms[0];
     rom.stiffness[(1, 1)] = rom.stiffness[(0, 0)] * 1.25_f64.powi(2);

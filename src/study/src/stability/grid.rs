@@ -105,7 +105,7 @@ mod tests {
     use super::with;
 
     #[test]
-    fn the_own_value_is_among_them_once_and_as_it_is() {
+    fn grid_contains_the_value_of_the_scene_exactly_once() {
         let own = 0.3;
         assert_eq!(with(vec![0.1 + 0.2, 0.0], own), [Some(0.0), Some(own)]);
         assert_eq!(with(vec![0.0, 0.0], 0.0), [Some(0.0)]);

@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reasons_are_told_apart_by_their_words() {
+    fn reasons_are_compared_by_their_words() {
         assert!(same_reason("ω_max·h = 2.1 ≥ 2 at 1e-6 s", "ω_max·h = 3.7 ≥ 2 at 2e-6 s"));
         assert!(!same_reason("ω_max·h = 2.1 ≥ 2", "`coulomb` is not prepared"));
     }

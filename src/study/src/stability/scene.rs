@@ -117,7 +117,7 @@ mod tests {
     use super::divided;
 
     #[test]
-    fn the_step_is_the_largest_where_that_divides() {
+    fn step_is_the_largest_divisor_within_the_limit() {
         assert_eq!(divided(1e-5, 1e-6).to_bits(), 1e-6_f64.to_bits());
         assert!((divided(1e-5, 3e-6) - 2.5e-6).abs() < 1e-18 && (divided(1e-6, 3e-6) - 1e-6).abs() < 1e-18);
     }

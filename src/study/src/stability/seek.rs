@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_is_found_to_a_percent_and_where_known_exactly() {
+    fn finds_the_limit_within_one_percent_or_exactly() {
         let Sought::Below(step, why) = seek([1e-6, 1e-2], None, below(3.1e-4)) else { panic!("not found") };
         assert!(step < 3.1e-4 && step > 0.99 * 3.1e-4 && why >= 3.1e-4, "{step} {why}");
         let Sought::Below(step, _) = seek([1e-6, 1e-2], Some(3.1e-4), below(3.1e-4)) else { panic!("not found") };
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn all_or_none_are_told_apart() {
+    fn distinguishes_all_stable_from_none_stable() {
         assert_eq!(seek([1e-6, 1e-2], None, below(1.0)), Sought::All(1e-2));
         assert_eq!(seek([1e-6, 1e-2], None, below(0.0)), Sought::None(1e-6));
     }

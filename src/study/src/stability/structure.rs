@@ -386,7 +386,7 @@ mod tests {
 
     /// The limits of the structure alone are those of which the start of a run warns; with less friction there is no warning.
     #[test]
-    fn a_tip_digs_in_with_the_friction_that_a_run_warns_of() {
+    fn lock_up_friction_matches_the_warning_of_a_run() {
         let options = StageOptions {
             tip: TipContact::Patches(3),
             kind: ReductionKind::FreeInterface,

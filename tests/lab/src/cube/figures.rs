@@ -185,7 +185,7 @@ mod tests {
 
     /// 100 N to the last record, which lies within a window: the mean over what is not there would be less.
     #[test]
-    fn the_curve_of_a_force_ends_with_its_windows() {
+    fn force_curve_ends_with_the_last_complete_window() {
         let times: Vec<f64> = (0..=104).map(|index| f64::from(index) * 1e-6).collect();
         let points = means(&times, &vec![100.0; times.len()]);
         assert_eq!(points.len(), 10, "{points:?}");
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_that_end_early_hold_no_numbers_after() {
+    fn short_columns_are_padded_with_nan() {
         let column = |name: &str, count: u32| {
             (name.to_owned(), (0..count).map(|index| (f64::from(index), 2.0)).collect::<Vec<_>>())
         };
@@ -207,7 +207,7 @@ mod tests {
 
     /// Some of the eight corners are behind the cube itself or a ring.
     #[test]
-    fn the_picture_of_the_scene_hides_what_is_behind() {
+    fn scene_picture_hides_occluded_parts() {
         let svg = scene().picture.svg;
         let circles: Vec<&str> = svg.split("<circle ").skip(1).collect();
         let hidden = circles.iter().filter(|circle| circle.contains(r#"fill="none""#)).count();

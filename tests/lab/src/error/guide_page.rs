@@ -101,7 +101,7 @@ mod tests {
                         <!-- written: lab error second; 2026-01-01, version 0 -->\n<!-- end -->\n";
 
     #[test]
-    fn a_block_is_replaced_and_all_else_stays() {
+    fn replaces_a_block_and_keeps_the_rest() {
         let found = replaced(PAGE, "first", "| new |", "2026-11-25").unwrap();
         let expected = PAGE
             .replacen("2026-01-01, version 0", &format!("2026-11-25, version {}", env!("CARGO_PKG_VERSION")), 1)

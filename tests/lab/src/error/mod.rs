@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn what_flies_beside_a_rotor_hides_none_of_its_error() {
+    fn free_body_does_not_mask_the_error_of_a_rotor() {
         let alone = error(&rotor());
         assert!((1e-7..0.1).contains(&alone), "{alone:e}");
         assert_eq!(error(&beside(rotor(), 0.0)).to_bits(), alone.to_bits(), "untouched");
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn flight_is_no_displacement_and_what_an_impact_changes_is() {
+    fn free_body_displacement_excludes_undisturbed_flight() {
         let last = |approach: f64| {
             let found = run(&beside(rotor(), approach), 8);
             found.displacements[59][found.parts[0]..].to_vec()

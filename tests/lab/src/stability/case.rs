@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn refusal_counts_only_where_expected_with_its_names() {
+    fn rejection_counts_only_if_expected_and_named() {
         let refused = || Expected::refused(["µ", "h ="]);
         assert_eq!(verdict(refused(), CaseEnd::refused("µ = 2 with h = 1 s")), CaseVerdict::Refused);
         assert_eq!(verdict(refused(), CaseEnd::refused("µ = 2")), CaseVerdict::Wrong);
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn what_happened_crosses_the_process_boundary_bit_by_bit() {
+    fn case_result_round_trips_between_processes() {
         let happened = CaseEnd {
             refusal: Some("no".into()),
             checks: vec![Check::at_most("a", f64::NAN, 0.1), Check::at_most("b", 1.0 / 3.0, f64::INFINITY)],

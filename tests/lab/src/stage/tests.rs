@@ -14,7 +14,7 @@ fn names() -> Vec<String> {
 
 /// One node that stays away, or touches once, is not what figure 11 shows.
 #[test]
-fn every_node_has_to_touch_again_and_again() {
+fn every_node_must_touch_repeatedly() {
     let holds = |touches| statements::all_nodes_touch(&run(touches), &names(), 1.0).holds;
     assert_eq!(holds([3, 2, 9]), Some(true));
     assert_eq!([holds([0, 12, 12]), holds([1, 12, 12])], [Some(false); 2]);
@@ -24,7 +24,7 @@ fn every_node_has_to_touch_again_and_again() {
 
 /// The ratios that an average of the slowest and fastest third let pass.
 #[test]
-fn a_share_that_rises_again_or_stays_is_not_negligible() {
+fn fraction_that_persists_or_rises_is_not_negligible() {
     let holds = |ratios: &[f64]| {
         let shares: Vec<(f64, f64)> =
             ratios.iter().zip(1_u32..).map(|(share, speed)| (f64::from(speed), *share)).collect();
@@ -39,7 +39,7 @@ fn a_share_that_rises_again_or_stays_is_not_negligible() {
 
 /// Nothing is said of speeds at which there was no run.
 #[test]
-fn every_run_above_the_critical_speed_decides() {
+fn verdict_uses_every_run_above_the_critical_speed() {
     let holds = |shares: &[(f64, f64)]| statements::prevails(shares, 2.0).holds;
     assert_eq!(holds(&[(1.0, 5.0), (2.0, 0.9), (3.0, 0.8)]), Some(true));
     assert_eq!(holds(&[(1.0, 0.5), (2.0, 0.9), (3.0, 1.2)]), Some(false));

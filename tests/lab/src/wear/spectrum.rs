@@ -74,7 +74,7 @@ mod tests {
 
     /// Two vibrations of any phases on a drift and the casing's lobes.
     #[test]
-    fn swings_are_found_beside_drift_and_lobes() {
+    fn detects_vibrations_despite_drift_and_lobes() {
         for (first, second) in [(5.78, 11.56), (8.72, 17.41), (6.59, 12.0)] {
             let samples = series(400, |turn| {
                 3.0 * turn + 5.0 * (2.0 * turn).cos() + (first * turn + 1.0).cos() + 0.7 * (second * turn - 2.0).sin()
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn lobes_are_counted_and_a_small_second_is_not_told() {
+    fn counts_lobes_and_ignores_a_small_second_order() {
         let map = |second: f64| {
             series(100, |turn| 2.0 + 3.0 * turn.cos() + (7.0 * turn - 0.4).sin() + second * (9.0 * turn).cos())
         };

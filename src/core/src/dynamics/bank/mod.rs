@@ -519,7 +519,7 @@ mod tests {
     /// Free motion keeps ½q̇² + ½ω²q² exactly, far beyond where the scheme's own energy is half of it; rest under load has none
     /// of the first, with the load as with a contact force that lasts.
     #[test]
-    fn the_energy_of_the_instant_is_that_of_the_motion() {
+    fn instantaneous_energy_matches_the_motion() {
         let frequencies = vec![0.0, 1e3, 4e4, 1.2e5];
         let model = ModalModel {
             damping_ratios: vec![0.0; 4],
@@ -590,7 +590,7 @@ mod tests {
     }
 
     #[test]
-    fn at_rest_nothing_of_the_run_before_acts() {
+    fn reset_to_rest_clears_previous_loads() {
         let model = small(0.01);
         let spin = ModalSpin {
             reference_speed: 0.0,
@@ -632,7 +632,7 @@ mod tests {
     }
 
     #[test]
-    fn quasi_static_modes_have_no_motion_to_start_with() {
+    fn quasi_static_modes_start_without_motion() {
         let model = small(0.0);
         let mut bank = ModalBank::new(&model, 3);
         bank.set_step(Scheme::MasslessBoundary, 2e-5);

@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_circle_is_exact_where_it_can_be() {
+    fn sine_and_cosine_are_exact_at_symmetry_angles() {
         for count in 1..60 {
             for index in 0..3 * count {
                 let (sine, cosine) = sine_cosine(index, count);

@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn phases_do_not_depend_on_how_the_eigenvectors_came_out() {
+    fn phases_are_independent_of_eigenvector_choice() {
         let mut seed = 9;
         let mut shapes = DMatrix::from_fn(7, 5, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
         let mut turned = shapes.clone();

@@ -26,7 +26,7 @@ pub(super) fn model(sectors: usize, nodes: usize) -> CyclicModel {
 
 /// Free motion keeps ½q̇² + ½ω²q² of every nodal diameter, which the energy that is conserved does not tell.
 #[test]
-fn the_energy_of_the_instant_is_that_of_the_motion() {
+fn instantaneous_energy_matches_the_motion() {
     let mut undamped = model(11, 2);
     undamped.set_damping_ratio(0.0, &[]);
     let mut bank = CyclicBank::new(&undamped, false);
@@ -51,7 +51,7 @@ fn the_energy_of_the_instant_is_that_of_the_motion() {
 }
 
 #[test]
-fn at_rest_nothing_of_the_run_before_acts() {
+fn reset_to_rest_clears_previous_loads() {
     for scheme in [Scheme::ModalExact, Scheme::CentralDifference, Scheme::MasslessBoundary] {
         let mut bank = CyclicBank::new(&model(11, 2), true);
         bank.set_step(scheme, 1e-6);
@@ -76,7 +76,7 @@ fn at_rest_nothing_of_the_run_before_acts() {
 }
 
 #[test]
-fn quasi_static_modes_have_no_motion_to_start_with() {
+fn quasi_static_modes_start_without_motion() {
     let mut undamped = model(8, 1);
     undamped.set_damping_ratio(0.0, &[]);
     let mut bank = CyclicBank::new(&undamped, false);

@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_contact_that_opens_or_closes_has_a_kink_wherever_it_does() {
+    fn opening_or_closing_contact_is_detected_as_a_kink() {
         for degree in 1..=3 {
             let basis = TimeBasis::new(degree);
             let of = |value: &dyn Fn(f64) -> f64| kink(&basis, |point| value(basis.points[point]));

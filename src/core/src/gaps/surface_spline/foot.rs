@@ -177,7 +177,7 @@ mod tests {
 
     /// All signs of the second derivatives, zeros included: where any direction leads down, half a patch along one that does.
     #[test]
-    fn an_escape_leads_down_from_hills_and_saddles_alone() {
+    fn escape_descends_from_maxima_and_saddles_only() {
         let metric = [2.0, 0.3, 0.7];
         let values = [-3.0, -0.4, 0.0, 0.4, 3.0];
         let all = values.iter().flat_map(|a| values.iter().flat_map(move |b| values.map(|c| [*a, *b, c])));

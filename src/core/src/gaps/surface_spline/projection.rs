@@ -254,7 +254,7 @@ mod tests {
 
     /// Nodes of a run start from where they were a step ago: the short way ends there, and where the long one does.
     #[test]
-    fn nodes_that_have_hardly_moved_take_the_short_way() {
+    fn nearly_stationary_nodes_use_the_fast_projection() {
         let ring = |ring: u32| {
             (0..24).map(move |i| {
                 let (sine, cosine) = libm::sincos(std::f64::consts::TAU * f64::from(i) / 24.0);

@@ -72,7 +72,7 @@ fn coincident_nodes_share_one_constraint() {
 }
 
 #[test]
-fn of_coincident_nodes_the_deepest_decides() {
+fn deepest_of_coincident_nodes_determines_the_force() {
     for (first, second) in [(-1.0, -2.0), (-2.0, -1.0), (-1.0, -1.0 - 1e-6)] {
         for warm in [[false; 2], [true; 2], [true, false], [false, true]] {
             let mut solver = ContactSolver::new(2);
@@ -99,7 +99,7 @@ fn stiff_nodes_beside_soft_ones_are_not_redundant() {
 }
 
 #[test]
-fn film_leaves_what_it_does_not_look_at() {
+fn film_ignores_penetration_caused_by_other_contacts() {
     // Pushing node 1 out pulls node 2 in: FILM does not notice, complementarity does.
     let mut solver = ContactSolver::new(2);
     solver.delassus.copy_from_slice(&[1.0, -0.9, -0.9, 1.0]);
@@ -147,7 +147,7 @@ fn large_problems_fulfil_complementarity() {
 }
 
 #[test]
-fn a_smaller_problem_in_a_larger_solver_has_the_same_bits() {
+fn unused_solver_capacity_does_not_change_the_result() {
     let entries: Vec<f64> = (0..49).map(|k| libm::sin(1.3 * f64::from(k * k))).collect();
     let w = p_matrix(&entries, 7);
     let g: Vec<f64> = (0..7).map(|k| libm::sin(f64::from(3 * k)) - 0.4).collect();
@@ -183,7 +183,7 @@ fn effort_is_bounded_for_every_size() {
 }
 
 #[test]
-fn driving_contacts_one_by_one_finds_the_same_solution() {
+fn single_contact_pivoting_finds_the_same_solution() {
     for case in 0..200 {
         let n = 1 + case % 7;
         let entries: Vec<f64> = (0..49).map(|k| libm::sin(1.3 * f64::from(k * k) + case as f64)).collect();

@@ -101,7 +101,7 @@ fn load_unload_reload_follows_the_law() {
 }
 
 #[test]
-fn work_over_a_closed_cycle_is_plastic_and_hardening_energy() {
+fn closed_cycle_work_is_plastic_plus_hardening_energy() {
     let (e, y, k) = (5.0, 0.4, 1.5);
     let mut coating = coating(&material(e, y, k, 8, 1), 1);
     let volume = std::f64::consts::TAU / 8.0 * 0.4 * THICKNESS;
@@ -142,7 +142,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn wear_only_grows(
+    fn wear_never_decreases(
         settings in materials(),
         path in prop::collection::vec((-1.0..0.3_f64, -1.0..0.3_f64, -20.0..20.0_f64), 1..40),
     ) {
@@ -231,7 +231,7 @@ fn cells_follow_the_angle_of_the_blade() {
 
 /// Shares of cells by the overlap of intervals, whatever the angle and the width.
 #[test]
-fn shares_of_covered_cells_add_up_to_the_width_of_the_tip() {
+fn covered_cell_fractions_sum_to_the_tip_width() {
     let mut random = tiprub_test_models::SeededRandom(3);
     for _ in 0..3000 {
         let (around, angle) = (40, 30.0 * (random.unit() - 0.5));
@@ -300,7 +300,7 @@ fn patch_width_is_thickness_over_cosine_of_stagger() {
 }
 
 #[test]
-fn hard_contact_takes_the_rest_beyond_the_thickness() {
+fn hard_contact_carries_load_beyond_the_coating_thickness() {
     let settings = material(2.0, 0.3, 0.4, 4, 3);
     let coating = coating(&settings, 1);
     let areas: Vec<f64> = coating.rows.iter().map(|row| row.area).collect();
@@ -316,7 +316,7 @@ fn hard_contact_takes_the_rest_beyond_the_thickness() {
 }
 
 #[test]
-fn the_wear_map_survives_saving_bit_for_bit() {
+fn wear_map_round_trips_bit_for_bit() {
     let settings = material(3.0, 0.1, 0.7, 16, 3);
     let mut worn = coating(&settings, 2);
     for step in 0..50 {
@@ -343,7 +343,7 @@ fn the_wear_map_survives_saving_bit_for_bit() {
 }
 
 #[test]
-fn blades_of_one_group_are_coupled_and_find_their_own_cells() {
+fn coupled_blades_contact_their_own_cells() {
     let settings = material(3.0, 0.1, 0.7, 16, 4);
     let axial = [0.0, 1.0];
     let coating = Coating::new(&settings, &BladeTip::new(&axial, &[1.0; 2], 0.5 * TAU / 16.0), 4).unwrap();
@@ -391,7 +391,7 @@ fn blades_of_one_group_are_coupled_and_find_their_own_cells() {
 }
 
 #[test]
-fn what_cannot_be_a_coating_is_refused() {
+fn rejects_invalid_coatings() {
     let settings = material(1.0, 0.1, 0.1, 8, 2);
     let refused = |result: Result<Coating>, part: &str| {
         let message = result.unwrap_err().to_string();

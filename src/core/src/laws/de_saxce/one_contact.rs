@@ -194,7 +194,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
         #[test]
-        fn solution_is_one_of_brute_force(
+        fn solution_matches_one_from_brute_force(
             entries in prop::array::uniform32(-1.0..1.0_f64),
             b in prop::array::uniform3(-1.0..1.0_f64),
             friction in 0.01..2.0_f64,
@@ -225,7 +225,7 @@ mod tests {
 
     /// Nothing yields sideways: the force is µ times the normal one against the slip, however far that goes beside the penetration.
     #[test]
-    fn a_slide_is_solved_however_little_it_is_pressed() {
+    fn solves_sliding_at_vanishing_contact_pressure() {
         let (a, friction) = ([[1.0, 0.5, 0.0], [0.5, 0.25, 0.0], [0.0, 0.0, 0.0]], 0.6);
         for exponent in [0, -9, -30, -50, -70, -90] {
             let pressed = 10.0_f64.powi(exponent);
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_between_the_cases() {
+    fn solves_limits_between_open_stick_and_slip() {
         let a = [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         assert_eq!(solve(&a, [0.0, 1.0, 1.0], 0.5).map(f64::to_bits), [0.0_f64.to_bits(); 3]);
         // On the edge of the stick cone.

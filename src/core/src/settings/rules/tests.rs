@@ -342,7 +342,7 @@ fn check(scene: &Scene, solver: Solver) -> crate::Result<()> {
 }
 
 #[test]
-fn every_row_refuses_what_breaks_it_and_tells_it() {
+fn every_rule_rejects_its_violation_with_a_message() {
     let mut reported = Vec::new();
     for (whole, changes) in [(rotor(), OF_ROTORS), (flight(), OF_FREE_MASTERS)] {
         check(&whole, Solver::Lcp).unwrap();

@@ -76,7 +76,7 @@ mod tests {
     use crate::settings::Shape;
 
     #[test]
-    fn arcs_are_those_of_the_shape() {
+    fn contact_arc_widths_match_the_shape() {
         let lobes = |amplitude| CompiledShape::new(&Shape::Lobes { amplitude, order: 2, phase: 0.3 }, 1e-3).unwrap();
         // −A cos 2θ reaches A/√2 over half a right angle, one spacing more at most.
         let found = widest(&lobes(1e-3), 1e-3 / 2.0_f64.sqrt());

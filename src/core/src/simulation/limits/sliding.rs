@@ -405,7 +405,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flutter_is_a_note_where_contact_opens_before_it_matters() {
+    fn flutter_is_only_a_note_if_contact_opens_before_growth() {
         let flutter =
             Warning::new(Topic::Flutter, "grows", "Use less friction").with_text("It grows. Use less friction");
         let lock_up = Warning::new(Topic::LockUp, "locks up", "Use less friction");

@@ -131,7 +131,7 @@ fn solved(kind: HardMatrix, n: usize, seed: u64) -> TestCaseResult {
 }
 
 #[test]
-fn without_friction_what_can_be_solved_is() {
+fn solves_every_solvable_frictionless_problem() {
     for kind in KINDS {
         for seed in 0..1200 {
             let n = 1 + usize::try_from(seed % 40).unwrap();
@@ -142,7 +142,7 @@ fn without_friction_what_can_be_solved_is() {
 
 /// One mode that opens either contact closes the other; and three contacts of which forces 1, 1, 1 move nothing.
 #[test]
-fn contacts_that_nothing_opens_at_once_are_not_solved() {
+fn contacts_that_cannot_open_together_are_reported_unsolved() {
     let second = [[2.0, -1.0, -1.0], [-1.0, 2.0, -1.0], [-1.0, -1.0, 2.0]].concat();
     for (matrix, gaps) in [
         (vec![1.0, -1.0, -1.0, 1.0], vec![-1.0, -1.0]),

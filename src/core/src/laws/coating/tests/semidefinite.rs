@@ -62,7 +62,7 @@ fn check(n: usize, modes: usize, modulus: f64, seed: u64) -> Result<(), String> 
 }
 
 #[test]
-fn without_friction_what_can_be_solved_on_a_coating_is() {
+fn solves_every_solvable_frictionless_coating_problem() {
     let mut failures = Vec::new();
     for (kind, modulus) in [1e-3, 1.0, 1e3, 1e6].into_iter().enumerate() {
         for seed in 0..400_u64 {

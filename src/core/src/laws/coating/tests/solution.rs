@@ -50,7 +50,7 @@ proptest! {
     }
 
     #[test]
-    fn several_nodes_agree_with_every_combination_tried(
+    fn several_nodes_agree_with_exhaustive_search(
         settings in materials(),
         n in 2_usize..4,
         entries in prop::collection::vec(-1.0..1.0_f64, 9),
@@ -224,7 +224,7 @@ fn violation(
 
 /// Rods that all reach the ends of their branches together, first unworn, then where wear has just stopped.
 #[test]
-fn equal_rods_do_not_hold_up_the_path() {
+fn path_handles_simultaneous_transitions_of_equal_rods() {
     let settings = material(50.0, 3.0, 5.0, 8, 20);
     let mut coating = Coating::new(&settings, &tip(&settings, &[0.0, 0.5, 1.0]), 1).unwrap();
     for gap in [-0.2, -0.6, -0.6, -0.6, -5.0, -5.0, -0.1] {
@@ -246,7 +246,7 @@ fn equal_rods_do_not_hold_up_the_path() {
 }
 
 #[test]
-fn limits_of_the_modulus_are_hard_contact_and_none() {
+fn stiff_and_soft_limits_are_hard_contact_and_no_contact() {
     let w = DMatrix::from_row_slice(3, 3, &[1.0, 0.3, -0.2, 0.25, 1.5, 0.4, -0.1, 0.3, 0.8]);
     let gaps = DVector::from_column_slice(&[-0.3, 0.1, -0.25]);
     let solve = |modulus: f64, extent: [f64; 2]| {
@@ -304,7 +304,7 @@ fn redundant_nodes_share_the_hard_contact() {
 
 /// Lengths across the coating a power of two as long: the same way, to the last bit.
 #[test]
-fn the_path_does_not_know_the_unit_of_length() {
+fn path_is_independent_of_the_unit_of_length() {
     let mut random = SeededRandom(12);
     for _ in 0..100 {
         let plastic: Vec<f64> = (0..9).map(|_| 0.2 * random.unit()).collect();
@@ -329,7 +329,7 @@ fn the_path_does_not_know_the_unit_of_length() {
 
 /// Nodes in a ring, alike and pressed alike, that push one neighbour out and draw the other in: many rods end together, again and again.
 #[test]
-fn rods_that_move_alike_do_not_lead_the_path_in_circles() {
+fn path_does_not_cycle_when_rods_move_identically() {
     for (n, modulus, yields, pushes, draws) in [(3, 8.0, 0.25, 1.25, -0.75), (4, 64.0, 0.5, 1.75, -2.25)] {
         for (worn, depth) in [0.0, 0.25, 0.5].into_iter().flat_map(|worn| [0.25, 0.5, 1.0, 4.0, 8.0].map(|d| (worn, d)))
         {
@@ -355,7 +355,7 @@ fn rods_that_move_alike_do_not_lead_the_path_in_circles() {
 
 /// Rods that load and unload again: more exchanges than they have branches.
 #[test]
-fn a_path_back_and_forth_is_followed_to_its_end() {
+fn path_is_followed_through_repeated_unloading() {
     let mut random = SeededRandom(77);
     let mut most = 0.0_f64;
     for _ in 0..4 {
