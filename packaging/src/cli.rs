@@ -398,7 +398,7 @@ mod tests {
             ("reduce blade", "<FILE>"),
             ("reduce blade blade.inp --units inch", "possible values: mm-t-s, m"),
             ("reduce blade blade.inp --poisson 0.5", "below 0.5"),
-            ("study stability a.toml --friction -0.1:1:3", "from 0 on"),
+            ("study stability a.toml --friction -0.1:1:3", "(0 or more)"),
             ("study stability a.toml --steps 0:1:3", "positive steps"),
             ("study stability a.toml --speeds 5:1:3", "FROM:TO:COUNT"),
             ("reduce casing --contour 0.1", "z:r"),
