@@ -29,7 +29,7 @@ fn inspect_shows_contact_nodes_and_settings() {
     let rom = project.succeed(&["inspect", "small.rom.safetensors"]);
     assert!(rom.contains("r 0.250000 m, θ 0.000000 rad, z 0.000000 m, slope 0.0000"), "{rom}");
     let scene = project.succeed(&["inspect", "scene.toml"]);
-    for shown in ["100 rad/s (954.9 rpm)", "damping ratio of the ROM", "\"watched_sectors\":[1]"] {
+    for shown in ["100 rad/s (954.9 rpm)", "damping ratio from the ROM", "\"watched_sectors\":[1]"] {
         assert!(scene.contains(shown), "{shown}: {scene}");
     }
     let named = SCENE.replace("gap = 1e-3", "gap = 1e-3\nnodes = \"ti\"");

@@ -135,7 +135,7 @@ fn time_varying_inputs_are_followed_without_delay() {
     for (inputs, more, reported) in [
         ("time,sped\n0,1\n", &[][..], "inputs.csv, `sped`: no such variable. Did you mean `speed`?"),
         ("time,torque\n0,1\n", &[], "inputs.csv, `torque`: it cannot change during a run"),
-        ("time,speed\n0,100\n0.01,1e9\n", &[], "variable `speed`: its derivative"),
+        ("time,speed\n0,100\n0.01,1e9\n", &[], "variable `speed`: with the derivative"),
         (
             "time,speed\n0,100\n",
             &["--set", "speed=50"],

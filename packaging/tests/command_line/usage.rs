@@ -60,7 +60,7 @@ fn every_error_is_available_as_one_json_object() {
         ("inspect none.fmu --json", 1, "none.fmu", "cannot be read"),
         ("package scene.toml --library none.so --json", 1, "none.so", "cannot be read"),
         ("study stability none.toml --json", 1, "none.toml", "cannot be read"),
-        ("study error scene.toml --set scheme=1 --json", 2, "--set scheme", "compares"),
+        ("study error scene.toml --set scheme=1 --json", 2, "--set scheme", "varies this setting itself"),
         ("demo --out scene.toml --json", 1, "scene.toml", "directory"),
     ] {
         let output = project.run(&line.split(' ').collect::<Vec<_>>());
