@@ -82,7 +82,7 @@ fn inspect_lists_the_features_of_a_built_in_scene() {
     let project = tempfile::tempdir().unwrap();
     let text = succeed(&project, &["inspect", "builtin:flexible-casing", "--quiet"]);
     for part in [
-        "ring from builtin:casing37, stands still",
+        "ring from builtin:casing37, stationary",
         "surface `casing` is flexible: carried by `ring` with ",
         "`ring` heats up: temperatures of 12 patches are inputs",
         "friction heat is shared: 0.5 into `casing`",

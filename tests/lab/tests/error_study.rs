@@ -61,7 +61,7 @@ fn bars_converge_with_elements_and_steps() {
     assert_eq!(orders[2], "exact", "{line}");
     assert!((3.7..4.3).contains(&orders[3].parse::<f64>().unwrap()), "{line}");
     let csv = fs::read_to_string(root.path().join("out/carpenter.csv")).unwrap();
-    assert!(csv.lines().any(|line| line.contains("refused")), "refusals are rows");
+    assert!(csv.lines().any(|line| line.contains("ω_max·h")), "rejected runs are rows");
 }
 
 #[test]

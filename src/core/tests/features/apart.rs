@@ -190,7 +190,7 @@ fn only_coupled_contacts_count_towards_the_limit() {
     let both = several::in_one_casing(rub(350), Solver::Lcp, 0.0);
     let reported = Simulation::new(&both).unwrap_err().to_string();
     assert!(
-        reported.starts_with("surface[2].structure: 2100 contact nodes") && reported.contains("`rear`"),
+        reported.starts_with("surface[2].structure: 2100 coupled contact nodes") && reported.contains("`rear`"),
         "{reported}"
     );
     let mut apart = both;

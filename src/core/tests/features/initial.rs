@@ -166,7 +166,7 @@ fn starts_and_ratios_are_checked_parameters() {
             "structure[1].initial[1].mode: mode 9",
             (|scene| scene.settings.structures[0].initial[0].mode = 9) as fn(&mut Scene),
         ),
-        ("structure[1].initial[1].sector: sector 5 of 4", |scene| {
+        ("structure[1].initial[1].sector: sector 5, but the ROM has only 4 sectors", |scene| {
             scene.settings.structures[0].initial[0].sector = Some(5);
         }),
         ("structure[1].initial[1].nodal_diameter: 3", |scene| {

@@ -308,7 +308,7 @@ fn rejected_steps_suggest_adaptive_steps_first() {
         let Err(Error::Unstable { remedy, .. }) = try_started(&scene).map(drop) else { panic!("accepted") };
         remedy
     };
-    let adaptive = "Use adaptive steps (`time.scheme = \"galerkin\"`), or set `time.step` (in the FMU";
+    let adaptive = "Use adaptive steps (set `time.scheme = \"galerkin\"`), or set `time.step` (in the FMU";
     for scheme in Scheme::RECURRENCES {
         let found = remedy(&|scene| {
             (scene.settings.time.scheme, scene.settings.contacts[0].solver) = (scheme, Solver::Lcp);

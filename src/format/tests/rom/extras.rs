@@ -235,7 +235,7 @@ fn open_grid_is_marked_in_the_metadata() {
         ("4,3,shut", "is not of the form `around,along` or `around,along,open` with two whole numbers"),
         ("4,3,open,open", "or `around,along,open`"),
         ("5,3,open", "5 around x 3 along"),
-        ("12,1,open", "at least 2 x 2"),
+        ("12,1,open", "less than 2 x 2"),
     ] {
         file.entries.insert("contact_grid".into(), text.into());
         let message = read_rom(&file.bytes(), "panel.rom").unwrap_err().to_string();

@@ -398,7 +398,7 @@ fn rejects_invalid_coatings() {
         assert!(message.contains(part), "{part:?} is not in {message:?}");
     };
     let made = |axial: &[f64], blades: usize| Coating::new(&settings, &tip(&settings, axial), blades);
-    refused(made(&[0.1], 1), "1 contact nodes per blade over 0 m");
+    refused(made(&[0.1], 1), "1 contact nodes per blade over an axial length of 0 m");
     refused(made(&[], 1), "0 contact nodes");
     refused(made(&[0.1, 0.0, 0.1], 1), "nodes 1 and 3 are at the same axial");
     refused(made(&[0.0, 1.0], 5), "8 x 2 cells for 5 blades");
