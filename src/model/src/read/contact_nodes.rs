@@ -114,8 +114,8 @@ mod tests {
             let names = names.iter().map(ToString::to_string).collect();
             choose_contact_nodes(&nodes, &[0, 1, 2], &ContactChoice { count, names }).unwrap_err().to_string()
         };
-        assert!(refused(Some(4), &[]).contains("4 of a set of 3"));
-        assert!(refused(Some(0), &[]).contains("0 of a set of 3"));
+        assert!(refused(Some(4), &[]).contains("4 requested from a set of 3"));
+        assert!(refused(Some(0), &[]).contains("0 requested from a set of 3"));
         assert!(refused(Some(2), &["a"]).contains("1 names for 2"));
     }
 }

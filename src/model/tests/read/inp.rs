@@ -86,7 +86,7 @@ fn shell_elements_are_skipped_but_define_node_sets() {
     let text = format!("{}*ELEMENT, TYPE=S4, ELSET=SKIN\n900, 110, 120, 130, 140\n", deck());
     let imported = imported(&text);
     assert_eq!(imported.model.set("skin").unwrap(), [8, 9, 10, 11]);
-    assert!(imported.notes.iter().any(|note| note.contains("1 elements S4")), "{:?}", imported.notes);
+    assert!(imported.notes.iter().any(|note| note.contains("1 S4 elements")), "{:?}", imported.notes);
 }
 
 #[test]
