@@ -13,7 +13,7 @@ use tiprub_core::{
 use tiprub_shell::{Failure, Result};
 use tiprub_study::{
     estimate,
-    stability::structure::{Digging, KnownContact, SingleStructure, StepLimit},
+    stability::structure::{LockUp, KnownContact, SingleStructure, StepLimit},
 };
 
 /// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
@@ -54,7 +54,7 @@ pub struct RomFacts {
     pub solvable_friction: Option<f64>,
     /// Least friction with which closed contact locks up that slides towards +θ and −θ (positive and negative `speed`); `None` if no
     /// friction does, and for the sense in which a known scene does not turn.
-    pub lock_up: [Option<Digging>; 2],
+    pub lock_up: [Option<LockUp>; 2],
     /// Internal step of every scheme below which all are accepted, with the contact given.
     pub step_limits: Vec<StepLimit>,
     /// The contact they hold for, where it was given.
@@ -96,7 +96,7 @@ impl RomFacts {
         let limits = structure.models.iter().map(stability::central_difference_limit);
         let speed = sliding.map_or(0.0, |sliding| sliding.speed);
         let turns = |sense: f64| sense * speed >= 0.0;
-        let lock_up = [1.0, -1.0].map(|sense| turns(sense).then(|| structure.digs_in(sense)).flatten());
+        let lock_up = [1.0, -1.0].map(|sense| turns(sense).then(|| structure.lock_up(sense)).flatten());
         Ok(Self {
             rom: rom.clone(),
             frequencies,
@@ -209,8 +209,8 @@ impl RomFacts {
         if rom.frame == DisplacementFrame::Cylindrical {
             let friction = self.solvable_friction.map_or("none".into(), |value| format!("{value}"));
             let _ = writeln!(text, "  contact solvable up to µ  {friction} (all nodes closed, tried up to 2)");
-            let digging = self.digging_text();
-            let _ = writeln!(text, "  locks up above µ*         {digging}");
+            let lock_up = self.lock_up_text();
+            let _ = writeln!(text, "  locks up above µ*         {lock_up}");
         }
         self.write_frequencies(&mut text);
         self.write_checks(&mut text);
@@ -237,7 +237,7 @@ impl RomFacts {
     }
 
     /// The lower of both senses.
-    fn least_lock_up(&self) -> Option<&Digging> {
+    fn least_lock_up(&self) -> Option<&LockUp> {
         self.lock_up.iter().flatten().min_by(|a, b| a.friction.total_cmp(&b.friction))
     }
 
@@ -270,8 +270,8 @@ impl RomFacts {
     }
 
     /// "0.080 (closed at tip_2, nodal diameter 0, sliding in +θ); 0.310 (closed at tip_1, nodal diameter 0, sliding in −θ)".
-    pub(crate) fn digging_text(&self) -> String {
-        let reported = |Digging { friction, closed, sense }: &Digging| {
+    pub(crate) fn lock_up_text(&self) -> String {
+        let reported = |LockUp { friction, closed, sense }: &LockUp| {
             format!("{friction:.3} (closed at {closed}, sliding in {})", ["+θ", "−θ"][*sense])
         };
         let senses: Vec<String> = self.lock_up.iter().flatten().map(reported).collect();
@@ -390,8 +390,8 @@ impl RomFacts {
                 "modal-exact_resolves_all_modes_up_to": self.central_difference_limit,
             },
             "solvable_up_to_friction": self.solvable_friction,
-            "digs_in_above": self.least_lock_up().map(lock_up_json),
-            "digs_in_by_sense": self.lock_up.iter().flatten().map(lock_up_json).collect::<Vec<_>>(),
+            "locks_up_above": self.least_lock_up().map(lock_up_json),
+            "locks_up_by_sense": self.lock_up.iter().flatten().map(lock_up_json).collect::<Vec<_>>(),
             "checks": self.checks().iter().map(|row| json!({
                 "full_hz": row.full,
                 "reduced_hz": row.reduced,
@@ -433,7 +433,7 @@ impl OmittedRows {
     }
 }
 
-fn lock_up_json(found: &Digging) -> Value {
+fn lock_up_json(found: &LockUp) -> Value {
     json!({
         "friction": found.friction, "closed": found.closed, "sense": if found.sense == 0 { 1 } else { -1 },
     })

@@ -109,7 +109,7 @@ fn rom_section(facts: &[RomFacts]) -> String {
                 format!("{} s (2/ω<sub>max</sub>)", scientific(fact.central_difference_limit)),
             ),
             ("contact problem solvable up to µ", format!("{friction} (all nodes closed; tried up to 2)")),
-            ("locks up above µ*", escape(&fact.digging_text())),
+            ("locks up above µ*", escape(&fact.lock_up_text())),
         ]));
         html.push_str(&checks_table(&fact.checks()));
     }

@@ -9,7 +9,7 @@
 //!   constrained differential equation.
 
 pub mod cutting;
-pub mod digging;
+pub mod lock_up;
 mod growing;
 mod held;
 pub mod judged;

@@ -51,7 +51,7 @@ pub struct Refined {
     /// A run per level, or why it is refused.
     pub runs: Vec<std::result::Result<RunSummary, String>>,
     /// Per level: friction coefficient beyond which the closed tip digs in; `None` where there is none, and without friction.
-    pub digging: Vec<Option<f64>>,
+    pub lock_up: Vec<Option<f64>>,
 }
 
 /// Everything that was found of a scene.
@@ -243,7 +243,7 @@ impl<'a> Runner<'a> {
             task.at(done as u64);
             task.line(&format!("{done} of {count} runs"));
         };
-        Ok(Refined { runs: self.runs(&direction, &progress)?, digging: vec![None; count], direction })
+        Ok(Refined { runs: self.runs(&direction, &progress)?, lock_up: vec![None; count], direction })
     }
 
     /// Run a direction. A ROM with more modes or nodes may ask for a shorter step than the scene's: then all of its levels take one.
@@ -265,20 +265,20 @@ impl<'a> Runner<'a> {
             let runs = counted(&finer)?;
             if runs.iter().all(std::result::Result::is_ok) {
                 direction = finer;
-                return Ok(Refined { digging: self.digging(&direction)?, direction, runs });
+                return Ok(Refined { lock_up: self.lock_up(&direction)?, direction, runs });
             }
         }
-        Ok(Refined { digging: self.digging(&direction)?, direction, runs })
+        Ok(Refined { lock_up: self.lock_up(&direction)?, direction, runs })
     }
 
     /// Returns the lock-up friction of the master's tip, level by level; it depends on the model, not on the steps.
-    fn digging(&self, direction: &RefinementDirection) -> Result<Vec<Option<f64>>> {
+    fn lock_up(&self, direction: &RefinementDirection) -> Result<Vec<Option<f64>>> {
         let of = |level: &RefinementLevel| {
             let (index, scene) = (master(&level.scene), &level.scene);
             let (rom, settings) = (&scene.roms[index], &scene.settings.structures[index]);
             let rubs = scene.settings.contacts.iter().any(|contact| contact.friction > 0.0);
             let found = SingleStructure::new(rom, rom.damping_ratio, 0.0).ok().filter(|_| rubs);
-            Ok(found.and_then(|structure| Some(structure.digs_in(settings.speed)?.friction)))
+            Ok(found.and_then(|structure| Some(structure.lock_up(settings.speed)?.friction)))
         };
         match direction.name == refine::STEP {
             true => Ok(vec![None; direction.levels.len()]),

@@ -100,7 +100,7 @@ pub fn statements(found: &ConvergenceResult) -> Vec<Statement> {
     let mut all: Vec<Statement> = found.refined.iter().filter_map(error).collect();
     all.extend(found.refined.iter().filter_map(small));
     all.extend(worst(found));
-    all.extend(found.refined.iter().filter_map(digging));
+    all.extend(found.refined.iter().filter_map(lock_up));
     all.extend(scope(found));
     for refined in found.refined.iter().filter(|refined| !refined.direction.missing.is_empty()) {
         let title = &refined.direction.title;
@@ -118,14 +118,14 @@ pub fn statements(found: &ConvergenceResult) -> Vec<Statement> {
 }
 
 /// Level by level the friction beyond which the closed tip digs in, where there is one.
-fn digging(refined: &Refined) -> Option<Statement> {
-    let levels = refined.direction.levels.iter().zip(&refined.digging);
+fn lock_up(refined: &Refined) -> Option<Statement> {
+    let levels = refined.direction.levels.iter().zip(&refined.lock_up);
     let known = levels.map(|(level, least)| {
         let reported = least.map_or("none".to_owned(), |least| format!("{least:.3}"));
         format!("{} with {}", reported, value(refined, level.value))
     });
     let found = known.collect::<Vec<_>>().join(", ");
-    let some = refined.digging.iter().any(Option::is_some);
+    let some = refined.lock_up.iter().any(Option::is_some);
     some.then(|| {
         Statement::remark(format!("Friction coefficient µ* of lock-up of the closed tip, by {}", title(refined)), found)
     })
@@ -362,11 +362,11 @@ fn figure(refined: &Refined) -> Result<StudyFigure> {
 pub fn results(found: &ConvergenceResult) -> Value {
     let level = |refined: &Refined| {
         let mut changes = refined.changes().into_iter();
-        let levels = refined.direction.levels.iter().zip(&refined.runs).zip(&refined.digging);
+        let levels = refined.direction.levels.iter().zip(&refined.runs).zip(&refined.lock_up);
         type ReachedErrors = std::result::Result<RunSummary, String>;
-        let each = |((level, run), digging): ((&super::RefinementLevel, &ReachedErrors), &Option<f64>)| match run {
+        let each = |((level, run), lock_up): ((&super::RefinementLevel, &ReachedErrors), &Option<f64>)| match run {
             Ok(run) => json!({
-                "value": level.value, "own": level.own, "digs_in_above": digging, "impulse": run.impulse, "friction_work": run.friction_work,
+                "value": level.value, "own": level.own, "locks_up_above": lock_up, "impulse": run.impulse, "friction_work": run.friction_work,
                 "peak_force": run.peak_force, "strain_energy": run.strain_energy,
                 "changes_to_next": changes.next().map(|changes| json!({
                     "displacements": changes[0], "impulse": changes[1], "friction_work": changes[2], "peak_force": changes[3],

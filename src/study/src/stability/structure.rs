@@ -8,7 +8,7 @@ use tiprub_core::{
     rom::DisplacementFrame,
     settings::Scheme,
     shown,
-    stability::{self, ContactDirections, Fastest, GrowthRates, digging, judged::SetGrowth, massless::MasslessCheck},
+    stability::{self, ContactDirections, Fastest, GrowthRates, lock_up, judged::SetGrowth, massless::MasslessCheck},
 };
 
 use super::seek::{Sought, TRIED, seek};
@@ -100,7 +100,7 @@ impl Rates {
 
 /// Where a tip digs in.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Digging {
+pub struct LockUp {
     /// Friction coefficient µ* beyond which no force holds closed contact that slides.
     pub friction: f64,
     /// Names of the closed nodes, of coupled sectors with the nodal diameter.
@@ -188,18 +188,18 @@ impl<'a> SingleStructure<'a> {
 
     /// The least friction with which closed contact that slides digs in, of all sets of closed nodes and of the senses of a speed (rad/s), both
     /// where it is 0. `None` where no friction does, of what flies freely, and of a ROM that does not say where the other body is.
-    pub fn digs_in(&self, speed: f64) -> Option<Digging> {
+    pub fn lock_up(&self, speed: f64) -> Option<LockUp> {
         if self.rom.frame == DisplacementFrame::Cartesian {
             return None;
         }
-        let mut least: Option<Digging> = None;
+        let mut least: Option<LockUp> = None;
         for sense in (KnownContact { friction: 1.0, speed }).senses() {
             for nodes in self.combinations() {
                 for model in 0..self.models.len() {
                     let (seen, directions) = self.seen(model, &nodes, sense);
-                    let own = digging::least_friction(&seen, &directions).unwrap_or(f64::INFINITY);
+                    let own = lock_up::least_friction(&seen, &directions).unwrap_or(f64::INFINITY);
                     if own < least.as_ref().map_or(f64::INFINITY, |least| least.friction) {
-                        least = Some(Digging { friction: own, closed: self.named(&nodes, model), sense });
+                        least = Some(LockUp { friction: own, closed: self.named(&nodes, model), sense });
                     }
                 }
             }
@@ -394,7 +394,7 @@ mod tests {
             ..StageOptions::coarse()
         };
         let rom = reduce_stage(&options, &|_| {}).unwrap().rom;
-        let found = SingleStructure::new(&rom, rom.damping_ratio, 0.0).unwrap().digs_in(1000.0).unwrap();
+        let found = SingleStructure::new(&rom, rom.damping_ratio, 0.0).unwrap().lock_up(1000.0).unwrap();
         let mut scene = scene_source::rotor37_scene_with(rom).unwrap();
         let mut warned = |share: f64| {
             scene.settings.contacts[0].friction = share * found.friction;

@@ -7,7 +7,7 @@ use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
 use crate::simulation::SAME_STEP;
 use crate::stability::judged::{self, SetGrowth};
-use crate::stability::{self, ContactDirections, Fastest, digging};
+use crate::stability::{self, ContactDirections, Fastest, lock_up};
 use crate::warning::{Severity, Topic};
 use crate::{Error, Result, Warning, shown};
 
@@ -122,7 +122,7 @@ struct Flutter {
 struct Physics {
     flutter: Option<Flutter>,
     /// Least friction with which the tip digs in, where it is closed, and the fastest growth without swinging (1/s).
-    digging: Option<(f64, Vec<usize>)>,
+    lock_up: Option<(f64, Vec<usize>)>,
     divergence: f64,
 }
 
@@ -136,9 +136,9 @@ impl Physics {
         }
     }
 
-    fn digs(&mut self, least: f64, nodes: &[usize]) {
-        if self.digging.as_ref().is_none_or(|known| least < known.0) {
-            self.digging = Some((least, nodes.to_vec()));
+    fn note_lock_up(&mut self, least: f64, nodes: &[usize]) {
+        if self.lock_up.as_ref().is_none_or(|known| least < known.0) {
+            self.lock_up = Some((least, nodes.to_vec()));
         }
     }
 }
@@ -202,8 +202,8 @@ impl Checking<'_> {
                     let share = judged::share_of(&seen, &directions, physical.frequency);
                     physics.add(Flutter { found: physical, nodes: nodes.clone(), with_mass, share });
                 }
-                let least = digging::least_friction(&seen, &directions).filter(|least| *least < self.friction);
-                least.into_iter().for_each(|least| physics.digs(least, &nodes));
+                let least = lock_up::least_friction(&seen, &directions).filter(|least| *least < self.friction);
+                least.into_iter().for_each(|least| physics.note_lock_up(least, &nodes));
                 let found = stability::stepped(&seen, scheme, expected, self.friction, &directions, continuous);
                 let Some(growth) = found else { continue };
                 if most.as_ref().is_none_or(|most| growth.stepped > most.judged.growth.stepped) {
@@ -285,7 +285,7 @@ impl Checking<'_> {
 
     /// Returns warnings of growth by the differential equations.
     fn growth(&self, physics: &Physics, sign: f64, expected: f64) -> Sense {
-        let lock_up = physics.digging.as_ref().map(|(least, nodes)| {
+        let lock_up = physics.lock_up.as_ref().map(|(least, nodes)| {
             let rate = match physics.divergence {
                 0.0 => String::new(),
                 rate => format!(", at {rate:.2e} 1/s and 0 Hz"),

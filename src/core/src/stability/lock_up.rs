@@ -43,12 +43,12 @@ mod tests {
         let across = 0.5e-4 - 0.9 * 2.0 * 1e-10;
         let own = |directions: &ContactDirections| least_friction(&model, directions).unwrap();
         let other = vec![([-1.0, 0.0, 0.0], [0.0, -1.0, 0.0])];
-        let (digs, never) = if own(&other).is_finite() { (other, radial()) } else { (radial(), other) };
-        let least = own(&digs);
+        let (locking, never) = if own(&other).is_finite() { (other, radial()) } else { (radial(), other) };
+        let least = own(&locking);
         assert!((least / (along / across) - 1.0).abs() < 1e-12 && own(&never).is_infinite(), "{least}");
         // Below it nothing grows without swinging, above something does.
         let diverges = |friction: f64| {
-            let growth = stability::growth(&model, Scheme::ModalExact, 1e-6, friction, &digs).unwrap();
+            let growth = stability::growth(&model, Scheme::ModalExact, 1e-6, friction, &locking).unwrap();
             growth.is_flutter() && growth.frequency == 0.0
         };
         assert!(!diverges(0.99 * least) && diverges(1.01 * least));
