@@ -1,11 +1,11 @@
-//! A small element tree, written with quick-xml.
+//! Small tree of XML elements, written with quick-xml.
 
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
 use crate::text::clean;
 
-/// An XML element without text content: model descriptions have attributes only.
+/// XML element without text content: model descriptions only have attributes.
 pub(crate) struct XmlElement {
     name: &'static str,
     attributes: Vec<(&'static str, String)>,
@@ -17,13 +17,13 @@ impl XmlElement {
         Self { name, attributes: Vec::new(), children: Vec::new() }
     }
 
-    /// Add an attribute; the value is cleaned here and escaped on writing.
+    /// Adds an attribute; the value is cleaned here and escaped on writing.
     pub(crate) fn with(mut self, key: &'static str, value: impl AsRef<str>) -> Self {
         self.attributes.push((key, clean(value.as_ref())));
         self
     }
 
-    /// Add an attribute where there is a value.
+    /// Adds an attribute if there is a value.
     pub(crate) fn with_some(self, key: &'static str, value: Option<impl AsRef<str>>) -> Self {
         match value {
             Some(value) => self.with(key, value),
@@ -31,7 +31,7 @@ impl XmlElement {
         }
     }
 
-    /// Add an attribute where the text is not empty.
+    /// Adds an attribute if the text is not empty.
     pub(crate) fn with_text(self, key: &'static str, value: &str) -> Self {
         self.with_some(key, (!value.is_empty()).then_some(value))
     }
@@ -46,12 +46,12 @@ impl XmlElement {
         self
     }
 
-    /// The element if it has children: the schemas forbid most empty lists.
+    /// Returns the element if it has children: the schemas forbid most empty lists.
     pub(crate) fn unless_empty(self) -> Option<Self> {
         (!self.children.is_empty()).then_some(self)
     }
 
-    /// The document with this element as its root.
+    /// Returns the document with this element as its root.
     pub(crate) fn document(&self) -> String {
         let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
         let declaration = BytesDecl::new("1.0", Some("UTF-8"), None);

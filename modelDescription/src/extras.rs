@@ -1,13 +1,13 @@
-//! What stands beside `modelDescription.xml`: terminals of FMI 3.0, and the list of related files of FMI-LS-REF.
+//! Files beside `modelDescription.xml`: terminals of FMI 3.0, and the list of related files of FMI-LS-REF.
 
 use crate::Description;
 use crate::element::XmlElement;
 use crate::row::{DescribedVariable, rows};
 
-/// Member of a terminal: its name there, the variable's name without prefix and index, kind (FMI 3.0, section 2.4.9.2.2).
+/// Member of a terminal: its name there, the name of the variable without prefix and index, kind (FMI 3.0, section 2.4.9.2.2).
 type TerminalMember = (&'static str, &'static str, &'static str);
 
-/// Terminal, its text, its members. Forces, torques and heat go out of the unit: they act on what is connected.
+/// Terminal: name, description, members. Forces, torques and heat flow out of the unit, since they act on connected units.
 type Terminal = (&'static str, &'static str, &'static [TerminalMember]);
 
 /// Terminals of each rotor.
@@ -33,8 +33,8 @@ const TERMINALS: [Terminal; 2] = [
     ),
 ];
 
-/// Thermal port of each casing patch, or of all where arrays are whole: of the contact and of the heat that it makes, and of
-/// conduction, which takes that. Of several pairs none: heat is of a pair, temperature of a structure.
+/// Thermal ports of each casing patch, or of all patches if arrays are whole: of the contact, with the generated heat, and of the heat conduction,
+/// which receives it. With several pairs there is none, because heat belongs to a pair and temperature to a structure.
 const PATCHES: [Terminal; 2] = [
     (
         "casing_patch",
@@ -52,7 +52,7 @@ const SIGNAL: &str = "signal";
 const INFLOW: &str = "inflow";
 const OUTFLOW: &str = "outflow";
 
-/// `terminalsAndIcons.xml` of FMI 3.0; none where the scene has nothing to connect.
+/// Returns `terminalsAndIcons.xml` of FMI 3.0; `None` if the scene has nothing to connect.
 pub fn fmi3_terminals(description: &Description) -> Option<String> {
     let rows = rows(description.table, description.fmi3_arrays);
     let mut prefixes: Vec<&str> = Vec::new();
@@ -78,7 +78,7 @@ pub fn fmi3_terminals(description: &Description) -> Option<String> {
     Some(XmlElement::new("fmiTerminalsAndIcons").with("fmiVersion", "3.0").child(terminals).document())
 }
 
-/// A terminal with those members that the scene has; a single one connects nothing.
+/// Returns a terminal with those members that the scene has; a single member does not make a terminal.
 fn terminal_of(
     rows: &[DescribedVariable],
     (name, text, members): &Terminal,
@@ -105,7 +105,7 @@ fn terminal_of(
     })
 }
 
-/// `rotor.speed[3]` as prefix with its point, base name and index.
+/// Splits `rotor.speed[3]` into the prefix with its point, the base name and the index.
 fn parts(name: &str) -> (&str, &str, Option<&str>) {
     let (name, index) = match name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
         Some((name, index)) => (name, Some(index)),
@@ -115,8 +115,8 @@ fn parts(name: &str) -> (&str, &str, Option<&str>) {
     (&name[..at], &name[at..], index)
 }
 
-/// `fmi-ls-manifest.xml` of FMI-LS-REF 1.0.0-alpha.1, in `extra/org.fmi-standard.fmi-ls-ref`: which of the files of the FMU
-/// (`related`: path from its root, MIME type, role, description) is what.
+/// Returns `fmi-ls-manifest.xml` of FMI-LS-REF 1.0.0-alpha.1, in `extra/org.fmi-standard.fmi-ls-ref`, with the roles of files of the FMU (`related`:
+/// path from its root, MIME type, role, description).
 pub fn references_manifest(related: &[(&str, &str, &str, &str)]) -> String {
     let file = |(path, kind, role, text): &(&str, &str, &str, &str)| {
         XmlElement::new("Related")

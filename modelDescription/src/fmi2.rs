@@ -8,8 +8,7 @@ use crate::row::{DescribedVariable, causality, rows_without_time, variability};
 use crate::shared::{default_experiment, enumerations, items, log_categories, root_attributes, unit_definitions};
 use crate::text::number;
 
-/// The model description of FMI 2.0: arrays are flattened to scalars `name[i]`, and time is
-/// not among the variables.
+/// Returns the model description of FMI 2.0: arrays are flattened to scalars `name[i]`, and time is not among the variables.
 pub fn fmi2_xml(description: &Description) -> String {
     let rows = rows_without_time(description.table);
     let root = XmlElement::new("fmiModelDescription")
@@ -83,7 +82,7 @@ fn typed(row: &DescribedVariable) -> XmlElement {
     element.with_some("start", row.start.as_ref())
 }
 
-/// Outputs and initial unknowns by index.
+/// Returns outputs and initial unknowns by index.
 fn model_structure(rows: &[DescribedVariable]) -> XmlElement {
     let unknown = |row: &DescribedVariable| XmlElement::new("Unknown").with("index", row.index.to_string());
     let output = |row: &DescribedVariable| unknown(row).with("dependencies", row.output_dependencies());

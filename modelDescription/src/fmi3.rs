@@ -8,7 +8,7 @@ use crate::row::{DescribedVariable, causality, rows, variability};
 use crate::shared::{default_experiment, enumerations, items, log_categories, root_attributes, unit_definitions};
 use crate::text::number;
 
-/// The model description of FMI 3.0, with arrays as arrays or flattened as the description asks.
+/// Returns the model description of FMI 3.0, with whole or flattened arrays according to the description.
 pub fn fmi3_xml(description: &Description) -> String {
     let rows = rows(description.table, description.fmi3_arrays);
     let root = XmlElement::new("fmiModelDescription")
@@ -84,7 +84,7 @@ fn variable(row: &DescribedVariable) -> XmlElement {
     }
     let dimension = row.dimension.map(|size| XmlElement::new("Dimension").with("start", size.to_string()));
     match (variable.kind, &row.start) {
-        // The start of texts is an element, one per array element.
+        // The start value of a string is an element, one per array element.
         (DataType::String, Some(text)) => {
             let start = |_| XmlElement::new("Start").with("value", text);
             element.children(dimension).children((0..row.dimension.unwrap_or(1)).map(start))
@@ -93,13 +93,13 @@ fn variable(row: &DescribedVariable) -> XmlElement {
     }
 }
 
-/// In intermediate update mode continuous inputs may be set and continuous outputs read.
+/// Returns whether a variable takes part in intermediate updates: continuous inputs may be set and continuous outputs read.
 fn takes_part_in_intermediate_updates(row: &DescribedVariable) -> bool {
     matches!(row.variable.causality, Causality::Input | Causality::Output)
         && row.variable.variability == Variability::Continuous
 }
 
-/// Outputs and initial unknowns by value reference.
+/// Returns outputs and initial unknowns by value reference.
 fn model_structure(rows: &[DescribedVariable]) -> XmlElement {
     let unknown =
         |name, row: &DescribedVariable| XmlElement::new(name).with("valueReference", row.reference.to_string());

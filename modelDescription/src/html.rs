@@ -1,4 +1,4 @@
-//! The page for people that travels inside the FMU: `documentation/index.html`.
+//! Documentation page inside the FMU: `documentation/index.html`.
 
 use std::fmt::Write as _;
 
@@ -20,8 +20,8 @@ code{font-size:.95em;background:#f3f5f8;padding:0 .2em;border-radius:3px}td:firs
 dt{font-weight:600}dd{margin:0 0 .5em 1.5em}.warning{border-left:4px solid #c77700;padding-left:.8em}\
 footer{margin-top:3em;color:#5a6675;font-size:.85em}";
 
-/// The page: what the model is, every variable, how values relate to the step, limits, and the checks of the ROMs.
-/// Self-contained: it opens from a disk without a network.
+/// Returns the page: the model, every variable, the relation of values to the step, limits, and the checks of the ROMs. It is self-contained and
+/// opens without a network.
 pub fn html(description: &Description) -> String {
     let mut page = String::new();
     let title = text(description.model_name);
@@ -120,12 +120,12 @@ fn variable_row(page: &mut String, variable: &Variable) {
     );
 }
 
-/// `name`, or `name[1..n]`.
+/// Returns `name`, or `name[1..n]`.
 pub(crate) fn array_name(variable: &Variable) -> String {
     variable.dimension.map_or_else(|| variable.name.clone(), |size| format!("{}[1..{size}]", variable.name))
 }
 
-/// Unit with the display unit in brackets, or the data type of what is not a number.
+/// Returns the unit with the display unit in brackets, or the data type of variables without unit.
 pub(crate) fn unit(variable: &Variable) -> String {
     match (variable.kind, variable.unit) {
         (DataType::Integer, _) => "whole number".into(),
@@ -140,7 +140,7 @@ pub(crate) fn unit(variable: &Variable) -> String {
     }
 }
 
-/// Legal values in words.
+/// Describes the valid values.
 pub(crate) fn range(variable: &Variable) -> String {
     if let DataType::Enumeration(enumeration) = variable.kind {
         let item = |(index, (name, _)): (usize, &(&str, &str))| format!("{} = {name}", index + 1);
@@ -154,7 +154,7 @@ pub(crate) fn range(variable: &Variable) -> String {
     }
 }
 
-/// Start value; of arrays the common value, or the first and last.
+/// Returns the start value; for arrays the common value, or the first and the last.
 pub(crate) fn start(variable: &Variable) -> String {
     match &variable.start {
         None => String::new(),
@@ -213,7 +213,7 @@ fn structure(page: &mut String, name: &str, rom: &Rom) {
     checks(page, rom);
 }
 
-/// Spin and heat, where the model has them.
+/// Writes spin matrices and thermal loads if the model has them.
 fn extras(page: &mut String, rom: &Rom) {
     if let Some(spin) = &rom.extras.spin {
         let speed = readable(spin.largest_speed);
@@ -238,7 +238,7 @@ fn extras(page: &mut String, rom: &Rom) {
     }
 }
 
-/// Sectors and reduced coordinates in words.
+/// Describes sectors and reduced coordinates.
 fn size(rom: &Rom) -> String {
     if rom.is_cyclic() {
         let (sectors, largest, order) = (rom.sectors, rom.largest_nodal_diameter(), rom.total_order());
@@ -250,7 +250,7 @@ fn size(rom: &Rom) -> String {
     format!("{} sector{plural} with {} reduced coordinates each", rom.sectors, rom.order())
 }
 
-/// Modes listed: coupled sectors may come with hundreds.
+/// Largest number of listed modes; coupled sectors may have hundreds.
 const CHECKS_SHOWN: usize = 40;
 
 fn checks(page: &mut String, rom: &Rom) {
@@ -294,7 +294,7 @@ fn checks(page: &mut String, rom: &Rom) {
     }
 }
 
-/// Six significant digits, for reading.
+/// Formats a value with six significant digits.
 fn significant(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude != 0.0 && !(1e-3..1e6).contains(&magnitude) {

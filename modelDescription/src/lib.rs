@@ -1,7 +1,7 @@
-//! The variable table as `modelDescription.xml` of FMI 2.0 and FMI 3.0, and as a page for people.
+//! Writes the variable table as `modelDescription.xml` of FMI 2.0 and FMI 3.0, and as an HTML page.
 //!
-//! Nothing here decides anything about a variable: names, references, units, causality and start values come from the
-//! [`VariableTable`], which the FMU's get and set functions use as well.
+//! This crate makes no decisions about variables: names, references, units, causality and start values come from the [`VariableTable`], which the
+//! FMU's get and set functions use as well.
 #![warn(unreachable_pub)]
 #![forbid(unsafe_code)]
 
@@ -23,7 +23,7 @@ pub use html::html;
 pub use row::meaning_of_span;
 pub use shared::LOG_CATEGORIES;
 
-/// Everything a model description says. Two equal descriptions give equal text.
+/// Content of a model description. Equal descriptions give equal text.
 #[derive(Debug, Clone)]
 pub struct Description<'a> {
     /// Name of the model.
@@ -32,14 +32,13 @@ pub struct Description<'a> {
     pub identifier: &'a str,
     /// Instantiation token (FMI 2.0: GUID) that the library computes from the resources.
     pub token: &'a str,
-    /// One or a few sentences for an importer's catalogue.
+    /// Description in one or a few sentences, for the catalogue of an importer.
     pub description: &'a str,
     /// Purpose and use of the unit, for the page.
     pub about: &'a str,
     /// Text about communication steps, for the page.
     pub steps: &'a str,
-    /// Generation date as `xs:dateTime`, for example `2026-01-31T12:00:00Z`. The caller decides, so that equal input
-    /// can give equal files.
+    /// Generation date as `xs:dateTime`, for example `2026-01-31T12:00:00Z`. The caller chooses it, so that equal input can give equal files.
     pub generated: &'a str,
     /// Program that generated the FMU, with its version.
     pub generation_tool: &'a str,
@@ -51,15 +50,15 @@ pub struct Description<'a> {
     pub copyright: &'a str,
     /// Licence.
     pub license: &'a str,
-    /// Proposal for the importer.
+    /// Default experiment that is proposed to the importer.
     pub experiment: DefaultExperiment,
-    /// Internal step (s), where it is the same for every communication step that is a multiple of it.
+    /// Internal step (s), if it is the same for every communication step that is a multiple of it.
     pub fixed_internal_step: Option<f64>,
-    /// Friction heat is told by the thermal patches of the ROMs, not by a grid of its own.
+    /// True if friction heat is output by thermal patches of the ROMs instead of a separate grid.
     pub patches_of_roms: bool,
-    /// The variables.
+    /// Table of variables.
     pub table: &'a VariableTable,
-    /// FMI 3.0: arrays as arrays, else flattened to scalars as in FMI 2.0.
+    /// FMI 3.0: true for whole arrays, false for scalars as in FMI 2.0.
     pub fmi3_arrays: bool,
     /// Structures of the scene with their ROMs, for the page.
     pub structures: Vec<(&'a str, &'a Rom)>,

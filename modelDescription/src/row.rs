@@ -1,27 +1,27 @@
-//! Rows of the variable table as a description lists them: arrays as one row or as their elements.
+//! Rows of the variable table in a model description: arrays as one row or as their elements.
 
 use tiprub_core::VariableTable;
 use tiprub_core::variables::{Causality, DataType, Span, StartValue, Variability, Variable};
 
 use crate::text::number;
 
-/// Unit of reals without dimension.
+/// Unit of dimensionless reals.
 pub(crate) const ONE: &str = "1";
 
-/// A variable of the description: a scalar, an element of an array, or a whole array.
+/// Variable of the description: a scalar, an element of an array, or a whole array.
 pub(crate) struct DescribedVariable<'a> {
     pub name: String,
     pub reference: u32,
     /// Number of elements for a whole array.
     pub dimension: Option<usize>,
-    /// Start value as an attribute has it (arrays: separated by spaces); texts are separate, see `start_text`.
+    /// Start value in the form of an attribute (arrays: separated by spaces); strings are separate, see `start_text`.
     pub start: Option<String>,
-    /// Position in the description, from 1, as FMI 2.0 counts.
+    /// Position in the description, from 1, as in FMI 2.0.
     pub index: usize,
     pub variable: &'a Variable,
 }
 
-/// Every variable in order of value references; `arrays` keeps arrays whole.
+/// Returns every variable in order of value references; `arrays` keeps arrays whole.
 pub(crate) fn rows(table: &VariableTable, arrays: bool) -> Vec<DescribedVariable<'_>> {
     let mut rows = Vec::new();
     for variable in table.variables() {
@@ -41,8 +41,7 @@ pub(crate) fn rows(table: &VariableTable, arrays: bool) -> Vec<DescribedVariable
     rows
 }
 
-/// The same without time, as scalars: in FMI 2.0 the independent variable is optional, and old versions of FMI
-/// Library report errors at it.
+/// Returns the scalars without time: in FMI 2.0 the independent variable is optional, and old versions of FMI Library report errors for it.
 pub(crate) fn rows_without_time(table: &VariableTable) -> Vec<DescribedVariable<'_>> {
     let mut rows = rows(table, false);
     rows.retain(|row| row.variable.causality != Causality::Independent);
@@ -63,34 +62,34 @@ fn start(variable: &Variable, elements: std::ops::Range<usize>) -> Option<String
 }
 
 impl DescribedVariable<'_> {
-    /// Whether it belongs to the list of outputs of the model structure.
+    /// Returns whether the variable belongs to the outputs of the model structure.
     pub(crate) fn is_output(&self) -> bool {
         self.variable.causality == Causality::Output
     }
 
-    /// Whether it belongs to the initial unknowns: outputs that are computed during initialisation.
+    /// Returns whether the variable belongs to the initial unknowns: outputs that are computed during initialisation.
     pub(crate) fn is_initial_unknown(&self) -> bool {
         self.is_output() && self.variable.initial_is_exact() == Some(false)
     }
 
-    /// The attribute `dependencies` of an output: none. Outputs are computed by `doStep` and stay as they are until the
-    /// next one, whatever inputs are set in between, so that importers find no algebraic loop through this FMU.
+    /// Returns the attribute `dependencies` of an output: none. Outputs are computed by `doStep` and remain constant until the next one, independent
+    /// of inputs set in between, so that importers find no algebraic loop through this FMU.
     pub(crate) fn output_dependencies(&self) -> &'static str {
         ""
     }
 
-    /// The attribute `dependencies` of an initial unknown: nothing has been averaged or accumulated at the start, so
-    /// that means and totals are zero; everything else may depend on every input and parameter, said by its absence.
+    /// Returns the attribute `dependencies` of an initial unknown: none for means and totals, which are zero at the start; `None` for all others,
+    /// because an absent attribute means that they may depend on every input and parameter.
     pub(crate) fn initial_dependencies(&self) -> Option<&'static str> {
         matches!(self.variable.span, Span::Mean | Span::Total).then_some("")
     }
 
-    /// The attribute `initial`, absent for inputs and time.
+    /// Returns the attribute `initial`, which is absent for inputs and time.
     pub(crate) fn initial(&self) -> Option<&'static str> {
         self.variable.initial_is_exact().map(|exact| if exact { "exact" } else { "calculated" })
     }
 
-    /// The name of the unit: "1" for reals without dimension (as FMI 3.0 proposes), none for other types.
+    /// Returns the name of the unit: "1" for dimensionless reals (as FMI 3.0 proposes), `None` for other types.
     pub(crate) fn unit(&self) -> Option<&'static str> {
         let real = self.variable.kind == DataType::Real;
         real.then(|| self.variable.unit.map_or(ONE, |unit| unit.name))
@@ -101,7 +100,7 @@ impl DescribedVariable<'_> {
         self.variable.unit.map(|unit| unit.quantity)
     }
 
-    /// Legal values as the type writes them.
+    /// Returns the bounds in the format of the type.
     pub(crate) fn bounds(&self) -> [Option<String>; 2] {
         [self.variable.min, self.variable.max].map(|bound| {
             bound.map(
@@ -110,13 +109,13 @@ impl DescribedVariable<'_> {
         })
     }
 
-    /// The name of the display unit, if one is better than SI.
+    /// Returns the name of the display unit, if one is better than SI.
     pub(crate) fn display_unit(&self) -> Option<&'static str> {
         let unit = self.variable.unit?;
         self.variable.display.and_then(|index| unit.display.get(index)).map(|(name, _)| *name)
     }
 
-    /// The enumeration of an enumeration variable.
+    /// Returns the name of the enumeration of an enumeration variable.
     pub(crate) fn type_name(&self) -> Option<&'static str> {
         match self.variable.kind {
             DataType::Enumeration(enumeration) => Some(enumeration.name),
@@ -125,7 +124,7 @@ impl DescribedVariable<'_> {
     }
 }
 
-/// The attribute `causality`.
+/// Returns the attribute `causality`.
 pub(crate) fn causality(causality: Causality) -> &'static str {
     match causality {
         Causality::Independent => "independent",
@@ -136,7 +135,7 @@ pub(crate) fn causality(causality: Causality) -> &'static str {
     }
 }
 
-/// The attribute `variability`.
+/// Returns the attribute `variability`.
 pub(crate) fn variability(variability: Variability) -> &'static str {
     match variability {
         Variability::Constant => "constant",
@@ -147,7 +146,7 @@ pub(crate) fn variability(variability: Variability) -> &'static str {
     }
 }
 
-/// A span in words: (short name, explanation).
+/// Describes a span: (short name, explanation).
 pub fn meaning_of_span(span: Span) -> (&'static str, &'static str) {
     match span {
         Span::Point => ("point", "the value at the communication point"),

@@ -1,4 +1,4 @@
-//! What both versions of the standard describe alike.
+//! Parts that both versions of the standard describe in the same way.
 
 use tiprub_core::variables::{DataType, Enumeration, Variable, VariableUnit};
 
@@ -16,7 +16,7 @@ pub const LOG_CATEGORIES: [(&str, &str); 5] = [
     ("logAll", "All messages"),
 ];
 
-/// Attributes of the root element after those that differ between the versions.
+/// Adds the attributes of the root element after those that differ between the versions.
 pub(crate) fn root_attributes(element: XmlElement, description: &Description) -> XmlElement {
     element
         .with_text("description", description.description)
@@ -29,7 +29,7 @@ pub(crate) fn root_attributes(element: XmlElement, description: &Description) ->
         .with("variableNamingConvention", "structured")
 }
 
-/// Units in order of first use.
+/// Returns the units in order of first use.
 pub(crate) fn unit_definitions(description: &Description) -> Option<XmlElement> {
     let mut units: Vec<&'static VariableUnit> = Vec::new();
     for unit in description.table.variables().iter().filter_map(|variable| variable.unit) {
@@ -54,7 +54,7 @@ fn unit_definition(unit: &VariableUnit) -> XmlElement {
     XmlElement::new("Unit").with("name", unit.name).child(base).children(unit.display.iter().map(display))
 }
 
-/// Enumerations in order of first use.
+/// Returns the enumerations in order of first use.
 pub(crate) fn enumerations(description: &Description) -> Vec<&'static Enumeration> {
     let mut enumerations: Vec<&'static Enumeration> = Vec::new();
     for variable in description.table.variables() {
@@ -67,7 +67,7 @@ pub(crate) fn enumerations(description: &Description) -> Vec<&'static Enumeratio
     enumerations
 }
 
-/// The items of an enumeration; values count from 1.
+/// Returns the items of an enumeration; values start at 1.
 pub(crate) fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = XmlElement> {
     enumeration.items.iter().enumerate().map(|(index, (name, description))| {
         XmlElement::new("Item")
@@ -77,7 +77,7 @@ pub(crate) fn items(enumeration: &'static Enumeration) -> impl Iterator<Item = X
     })
 }
 
-/// The log categories.
+/// Returns the log categories.
 pub(crate) fn log_categories() -> XmlElement {
     let category = |(name, description): (&str, &str)| {
         XmlElement::new("Category").with("name", name).with("description", description)
@@ -85,7 +85,7 @@ pub(crate) fn log_categories() -> XmlElement {
     XmlElement::new("LogCategories").children(LOG_CATEGORIES.map(category))
 }
 
-/// The default experiment.
+/// Returns the default experiment.
 pub(crate) fn default_experiment(description: &Description) -> XmlElement {
     XmlElement::new("DefaultExperiment")
         .with("startTime", number(description.experiment.start))

@@ -1,6 +1,6 @@
-//! Numbers and texts as XML has them.
+//! Numbers and texts in XML.
 
-/// A number as `xs:double`, shortest form that reads back to the same bits.
+/// Formats a number as `xs:double`, in the shortest form that reads back to the same bits.
 pub(crate) fn number(value: f64) -> String {
     if value.is_nan() {
         return "NaN".into();
@@ -12,14 +12,14 @@ pub(crate) fn number(value: f64) -> String {
     if magnitude != 0.0 && !(1e-4..1e7).contains(&magnitude) { format!("{value:e}") } else { format!("{value:?}") }
 }
 
-/// A number for people: as [`number`], whole numbers without decimals.
+/// Formats a number for people: as [`number`], but whole numbers without decimals.
 pub(crate) fn readable(value: f64) -> String {
     let text = number(value);
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
-/// Text for an attribute: line breaks and tabs become spaces, as XML readers make them, and characters that XML 1.0
-/// has no way to write become the replacement character.
+/// Cleans text for an attribute: line breaks and tabs become spaces, as XML readers convert them, and characters that XML 1.0 cannot represent
+/// become the replacement character.
 pub(crate) fn clean(text: &str) -> String {
     let replace = |c: char| match c {
         '\n' | '\r' | '\t' => ' ',

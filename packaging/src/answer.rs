@@ -1,4 +1,4 @@
-//! The answer of a run in five lines: force, heat, torque, clearance, growth.
+//! Main results of a run in five lines: force, heat, torque, clearance, growth.
 
 use serde_json::{Value, json};
 use tiprub_shell::{
@@ -6,18 +6,18 @@ use tiprub_shell::{
     recording::Recording,
 };
 
-/// One line of the answer.
+/// One line of the main results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnswerLine {
     /// Name of the result.
     pub name: &'static str,
     /// Value and unit; `None` if the scene does not have it.
     pub value: Option<(f64, &'static str)>,
-    /// Meaning of the value, or why there is none.
+    /// Meaning of the value, or the reason why there is none.
     pub meaning: String,
 }
 
-/// The five lines of a run whose steps may leave closed contact open or inside by up to `tolerance` (m).
+/// Returns the five lines of a run whose steps may leave closed contact open or penetrating by up to `tolerance` (m).
 pub fn lines(recording: &Recording, tolerance: f64) -> [AnswerLine; 5] {
     let found = extremes(recording);
     let extreme = |name: &str| found.iter().find(|extreme| extreme.name == name);
@@ -30,7 +30,7 @@ pub fn lines(recording: &Recording, tolerance: f64) -> [AnswerLine; 5] {
     ]
 }
 
-/// The lines as text.
+/// Formats the lines as text.
 pub fn text(lines: &[AnswerLine]) -> String {
     let line = |AnswerLine { name, value, meaning }: &AnswerLine| {
         let value = value.map_or("-".to_owned(), |(value, unit)| format!("{} {unit}", six_digits(value)));
@@ -39,7 +39,7 @@ pub fn text(lines: &[AnswerLine]) -> String {
     lines.iter().map(line).collect()
 }
 
-/// The lines for programs: an object of values, `null` where there is none.
+/// Returns the lines as a JSON object of values, `null` if there is none.
 pub fn json(lines: &[AnswerLine]) -> Value {
     let one = |line: &AnswerLine| (line.name.to_owned(), json!(line.value.map(|(value, _)| value)));
     lines.iter().map(one).collect::<serde_json::Map<_, _>>().into()
@@ -71,7 +71,7 @@ fn heat(recording: &Recording) -> AnswerLine {
     AnswerLine { name: "heat", value, meaning: meaning.to_owned() }
 }
 
-/// Integral of a mean over each communication step.
+/// Integrates a mean over each communication step.
 fn integral(recording: &Recording, means: &[f64]) -> f64 {
     recording.times.windows(2).zip(&means[1..]).map(|(ends, mean)| (ends[1] - ends[0]) * mean).sum()
 }
@@ -106,7 +106,7 @@ fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Answer
             let column = recording.column("clearance_minimum").unwrap_or_default();
             let touch = column.iter().zip(&recording.times).find(|(clearance, _)| **clearance < tolerance);
             let first = touch.map_or(extreme.time, |(_, time)| *time);
-            // Contact that is closed has a clearance of rounding.
+            // In closed contact, the clearance is rounding.
             let is_rounding = extreme.value.abs() < ROUNDING;
             let value = if is_rounding { 0.0 } else { extreme.value };
             let within = if is_rounding { "" } else { " within the tolerance of the adaptive steps" };
@@ -118,10 +118,10 @@ fn clearance(recording: &Recording, found: &[Extreme], tolerance: f64) -> Answer
     AnswerLine { name: "clearance", value, meaning }
 }
 
-/// Clearances (m) below this are those of closed contact.
+/// Clearances (m) below this belong to closed contact.
 const ROUNDING: f64 = 1e-12;
 
-/// Largest vibration energy of the last third of the run against that of the third before.
+/// Returns the largest vibration energy of the last third of the run relative to that of the middle third.
 fn growth(recording: &Recording) -> AnswerLine {
     let energies = recording.column("kinetic_energy").zip(recording.column("strain_energy"));
     let ratio = energies.and_then(|(kinetic, strain)| {
@@ -173,7 +173,7 @@ mod tests {
         let lines = lines(&recording(&names, &rows), 0.0);
         let text = text(&lines);
         let values: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().take(2).collect()).collect();
-        // 4 N s in 0.5 s; the mean of −1 to −6 N m; (3 + 3)/(2 + 1) J.
+        // 4 N·s in 0.5 s; the mean of −1 to −6 N m; (3 + 3)/(2 + 1) J.
         let expected = [["force", "8"], ["heat", "1234.57"], ["torque", "-3.5"], ["clearance", "0"], ["growth", "2"]];
         assert_eq!(values, expected, "{text}");
         assert!(text.contains("largest") && text.contains("tips touch, first at t = 1 s"), "{text}");

@@ -1,4 +1,4 @@
-//! Options of `tiprub reduce casing` and `tiprub thermal`: a ring described on the command line.
+//! Options of `tiprub reduce casing` and `tiprub thermal`: a ring that is described on the command line.
 
 use crate::shared_arguments::{MaterialChoice, MeshSize, OutputArguments, axial, pair};
 use clap::{Args, ValueEnum};
@@ -8,7 +8,7 @@ use tiprub_model::{
     element::ElementKind,
 };
 
-/// Share of a casing's length before the first and behind the last contact ring, where no positions are given.
+/// Default distance of the first and the last contact ring from the ends of the casing, as a fraction of its length.
 const MARGIN: f64 = 0.1;
 
 /// Shape of a casing; absent options are those of casing37.
@@ -70,7 +70,7 @@ pub struct CasingArguments {
     pub written: OutputArguments,
 }
 
-/// A flange, or none.
+/// Flange, or none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlangeChoice(Option<Flange>);
 
@@ -97,7 +97,7 @@ pub enum ElementChoice {
 }
 
 impl RingArguments {
-    /// The casing asked for, with the name, support and modes of casing37.
+    /// Returns the requested casing, with the name, support and modes of casing37.
     pub fn options(&self) -> CasingOptions {
         let defaults = CasingOptions::default();
         let mut options = defaults.clone();
@@ -125,7 +125,7 @@ impl RingArguments {
 }
 
 impl CasingArguments {
-    /// The casing asked for.
+    /// Returns the requested casing.
     pub fn options(&self) -> CasingOptions {
         let defaults = CasingOptions::default();
         let mut options = self.ring.options();
@@ -133,7 +133,7 @@ impl CasingArguments {
         options.material.expansion = self.expansion.unwrap_or(options.material.expansion);
         options.fixed_interface_modes = self.fixed_interface_modes.unwrap_or(defaults.fixed_interface_modes);
         options.modes = self.modes.unwrap_or(defaults.modes);
-        // The name stands for the one casing that ships, and not for any other.
+        // The name stands for the built-in casing only.
         if options != defaults {
             options.name = "casing".into();
         }

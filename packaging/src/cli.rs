@@ -1,4 +1,4 @@
-//! The command line itself: what can be asked for, with defaults, units and examples.
+//! Command line: commands and options with defaults, units and examples.
 
 use std::path::PathBuf;
 
@@ -293,7 +293,7 @@ mod tests {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             assert!(help.contains(&name), "{name}: {help}");
             for line in help.lines().filter_map(|line| line.trim().strip_prefix("tiprub ")) {
-                // Remarks stand behind some spaces.
+                // Remarks follow after several spaces.
                 let line = line.split("   ").next().unwrap_or(line).split(" | ").next().unwrap_or(line);
                 let parsed = parse(line);
                 let fine = parsed.as_ref().err().is_none_or(|error| error.exit_code() == 0);
@@ -310,7 +310,7 @@ mod tests {
         explained(&cli, "tiprub");
     }
 
-    /// An option that a command does not list does not exist there.
+    /// A command rejects options that it does not list.
     #[test]
     fn rejects_options_of_another_model() {
         let own = "blade.inp --contact-set TIP --clamp-set ROOT";

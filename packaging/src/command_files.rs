@@ -1,4 +1,4 @@
-//! What each command reads and writes, looked at before any work.
+//! Inputs and outputs of each command, checked before any work.
 
 use std::path::{Path, PathBuf};
 
@@ -16,13 +16,13 @@ use crate::{
     shared_arguments::OutputArguments,
 };
 
-/// Extensions of what a study writes.
+/// Extensions of the files that a study writes.
 const STUDY_FILES: [&str; 5] = ["csv", "html", "json", "md", "svg"];
 
-/// Look at everything that a command line names, before any work.
+/// Checks all files that a command line names, before any work.
 ///
 /// # Errors
-/// Two names for one file of which one is written, or a file that cannot be written.
+/// Two names stand for one file, at least one of them an output, or a file cannot be written.
 pub fn check(command: &Command) -> Result<()> {
     match command {
         Command::Run(arguments) => {
@@ -60,9 +60,9 @@ pub fn check(command: &Command) -> Result<()> {
     }
 }
 
-/// The files of an FMU are named after the scene.
+/// Checks `package`, whose output files are named after the scene.
 fn package(arguments: &PackageArguments) -> Result<()> {
-    // What is wrong with the command line alone comes first.
+    // Problems of the command line alone come first.
     targets(arguments.fmi, &arguments.output, "model")?;
     let read = libraries(&arguments.libraries)?;
     let name = scene_source::settings(&arguments.scene)?.name;
@@ -74,12 +74,12 @@ fn fmus(targets: &[(FmiVersion, PathBuf)]) -> Vec<NamedFile> {
     targets.iter().map(|(_, path)| NamedFile::new("--output", path)).collect()
 }
 
-/// The libraries that are named on the command line.
+/// Returns the libraries that are named on the command line.
 fn libraries(arguments: &LibraryArguments) -> Result<Vec<NamedFile>> {
     Ok(library::given_libraries(arguments)?.into_iter().map(|path| NamedFile::new("--library", path)).collect())
 }
 
-/// The files of a scene.
+/// Returns the files of a scene.
 fn scene(argument: &str) -> Vec<NamedFile> {
     let files = scene_source::files(argument).into_iter();
     files
@@ -88,19 +88,19 @@ fn scene(argument: &str) -> Vec<NamedFile> {
         .collect()
 }
 
-/// The files that `reduce` was told to write.
+/// Returns the output files that `reduce` was given.
 fn written(arguments: &OutputArguments) -> Vec<NamedFile> {
     let options = [("--output", &arguments.output), ("--inp", &arguments.inp), ("--vtk", &arguments.vtk)];
     options.into_iter().filter_map(|(role, path)| NamedFile::option(role, path)).collect()
 }
 
-/// A study names its files itself, in one directory: what is read must not be there under a name of that kind.
+/// Checks a study, which names its files itself in one directory: no input may be there with one of the extensions of these files.
 fn study(argument: &str, out: &Path, more: Vec<NamedFile>) -> Result<()> {
     let replaced = |path: &PathBuf| {
         let kind = path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_ascii_lowercase();
         STUDY_FILES.contains(&kind.as_str())
     };
-    // No directory, no files.
+    // If the directory does not exist, there are no files.
     let files = out.read_dir().into_iter().flatten().flatten().map(|entry| entry.path()).filter(replaced);
     let files: Vec<Identity> = files.filter_map(|path| identity(&path)).collect();
     for input in scene(argument).into_iter().chain(more) {

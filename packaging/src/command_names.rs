@@ -1,4 +1,4 @@
-//! Command lines that the parser would reject without a useful remedy, and errors of the parser for programs.
+//! Adds useful remedies to command lines that the parser rejects, and returns errors of the parser as JSON.
 
 use std::{ffi::OsString, fmt::Write as _};
 
@@ -10,13 +10,13 @@ use tiprub_shell::{Failure, console::Console};
 
 use crate::cli::Cli;
 
-/// Whether `--json` is among the arguments: a file may be called so behind `--`.
+/// Returns whether `--json` is among the arguments; after `--` it may be the name of a file.
 pub fn asks_for_json(arguments: &[OsString]) -> bool {
     arguments.iter().take_while(|argument| *argument != "--").any(|argument| argument == "--json")
 }
 
-/// The error of a command line in which the kind of model or the name of a study is missing or wrong; `None` if they are right. The arguments
-/// are without the name of the program.
+/// Returns the error of a command line in which the kind of model or the name of a study is missing or wrong; `None` if they are right. The
+/// arguments do not include the name of the program.
 pub fn check_names(arguments: &[OsString]) -> Option<Failure> {
     let words: Vec<String> = arguments.iter().map(|word| word.to_string_lossy().into_owned()).collect();
     let global = |word: &&String| ["--json", "--quiet", "-q"].contains(&word.as_str());
@@ -38,14 +38,14 @@ fn study(name: &str) -> Option<Failure> {
     Some(Failure::usage(format!("study {name}"), "no such study", remedy))
 }
 
-/// Names of the subcommands of a command.
+/// Returns the names of the subcommands of a command.
 fn subcommands(of: &str) -> Vec<String> {
     let cli = Cli::command();
     let command = cli.find_subcommand(of).into_iter().flat_map(clap::Command::get_subcommands);
     command.map(|command| command.get_name().to_owned()).collect()
 }
 
-/// "`a`, `b` or `c`".
+/// Formats names as "`a`, `b` or `c`".
 fn listed(names: &[String]) -> String {
     let mut text = String::new();
     for (index, name) in names.iter().enumerate() {
@@ -61,7 +61,7 @@ fn listed(names: &[String]) -> String {
     text
 }
 
-/// The kind of model comes before options and files.
+/// Checks that the kind of model comes before options and files.
 fn reduce(words: &[String]) -> Option<Failure> {
     let (own, global): (Vec<&String>, Vec<&String>) =
         words.iter().partition(|word| !["--json", "--quiet", "-q"].contains(&word.as_str()));
@@ -101,7 +101,7 @@ fn is_mesh(word: &str) -> bool {
     !word.starts_with('-') && [".inp", ".msh"].iter().any(|end| lower.ends_with(end))
 }
 
-/// Models are names, and those of one's own are files.
+/// Returns the error of an unknown kind of model, with the similar name and the command for user meshes.
 fn no_model(name: &str, models: &[String]) -> Failure {
     let near = models.iter().map(|model| (strsim::jaro_winkler(name, model), model));
     let near = near.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -111,7 +111,7 @@ fn no_model(name: &str, models: &[String]) -> Failure {
     Failure::usage(format!("reduce {name}"), "no such kind of model", remedy)
 }
 
-/// As a shell would take it.
+/// Quotes a word for a shell.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+\\".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -121,7 +121,7 @@ fn quoted(word: &str) -> String {
     }
 }
 
-/// The command line of a program. Help, and what is not understood, end it here, as JSON too where that is asked for.
+/// Parses the command line of a program. Help and errors end the program here, errors as JSON if requested.
 pub fn parsed<C: Parser>(asked: &Console) -> C {
     C::try_parse().unwrap_or_else(|error| {
         if let Some(failure) = failure(&error, C::command().get_name()) {
@@ -131,7 +131,7 @@ pub fn parsed<C: Parser>(asked: &Console) -> C {
     })
 }
 
-/// A command line that clap does not understand, as what, problem and remedy; `None` of help, which is no failure.
+/// Splits an error of clap into place, problem and remedy; `None` for help, which is no failure.
 fn failure(error: &clap::Error, program: &str) -> Option<Failure> {
     if error.exit_code() == 0 {
         return None;
@@ -152,7 +152,7 @@ fn failure(error: &clap::Error, program: &str) -> Option<Failure> {
     }
     let reported = error.render().to_string();
     let problem = reported.split("\n\nUsage:").next().unwrap_or(&reported).trim().trim_start_matches("error: ");
-    // Hints of clap stand behind an empty line.
+    // Hints of clap follow after an empty line.
     let (problem, hints) = problem.split_once("\n\n").unwrap_or((problem, ""));
     let hints = hints.lines().map(|line| line.trim().trim_start_matches("tip: ").trim_end_matches('.'));
     let hints = hints.filter(|line| !line.is_empty() && !line.starts_with("For more information"));

@@ -1,4 +1,4 @@
-//! The bodies of the cube between two rings, as `tiprub reduce` makes them.
+//! Bodies of the scene with a cube between two rings, for `tiprub reduce`.
 
 use tiprub_gallery::reduction;
 use tiprub_model::cube::{CubeOptions, MassMatrix, RingOptions, RingSide};
@@ -10,13 +10,13 @@ use crate::{
     shared_arguments::KindChoice,
 };
 
-/// Set of the clamped nodes of a ring, for exported files.
+/// Name of the set of clamped nodes of a ring in exported files.
 const CLAMPED: &str = "CLAMPED";
 
-/// The cube.
+/// Reduces the cube.
 ///
 /// # Errors
-/// Whatever the reduction refuses.
+/// The reduction fails.
 pub fn cube(arguments: &CubeArguments, console: &Console) -> Result<ReducedModel> {
     let options = CubeOptions {
         patches: arguments.contact_patches,
@@ -28,10 +28,10 @@ pub fn cube(arguments: &CubeArguments, console: &Console) -> Result<ReducedModel
     Ok(ReducedModel::general(reduction::cube(&options, console)?, None))
 }
 
-/// A ring.
+/// Reduces a ring.
 ///
 /// # Errors
-/// Whatever the reduction refuses.
+/// The reduction fails.
 pub fn ring(arguments: &CubeRingArguments, side: RingSide, console: &Console) -> Result<ReducedModel> {
     let defaults = RingOptions::new(side);
     let options = RingOptions {

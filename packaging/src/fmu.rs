@@ -1,4 +1,4 @@
-//! What goes into an .fmu, for both FMI versions: nothing is compiled, everything is data around the libraries.
+//! Content of an .fmu for both FMI versions: nothing is compiled, all parts except the libraries are data.
 
 use std::{env, path::Path};
 
@@ -23,21 +23,21 @@ use crate::{library::Library, scene_features};
 /// File name of the library inside the FMU, without extension, and `modelIdentifier` of both versions.
 pub const MODEL_IDENTIFIER: &str = "tiprub";
 
-/// Communication steps of the reference result that is packed with the documentation, and most values in it.
+/// Number of communication steps of the reference result in the documentation, and largest number of values in it.
 const REFERENCE_STEPS: usize = 100;
 const REFERENCE_VALUES: usize = 20_000_000;
 
-/// Most variables of an FMI 3.0 unit that are scalars by default. Several importers read no arrays, or take their first
-/// element for the whole; no person reads a list of more.
+/// Largest number of variables of an FMI 3.0 unit that are scalars by default. Several importers do not read arrays, or use only their first
+/// element; longer lists are not readable for people.
 pub const MOST_SCALARS: usize = 300;
 
-/// Most variables of an FMU without arrays: each takes half a kilobyte of its description, and importers hold all of it in memory.
+/// Largest number of variables of an FMU without arrays: each needs half a kilobyte in the model description, which importers hold in memory.
 pub const MOST_VARIABLES: usize = 100_000;
 
 /// Entry of FMI-LS-REF for a file of an FMU: path, MIME type, role, description.
 pub type Related<'a> = (&'a str, &'a str, &'a str, &'a str);
 
-/// The scene inside the FMU.
+/// Scene inside the FMU.
 const SCENE: Related =
     ("resources/scene.toml", "application/toml", "model", "The scene that this FMU was generated from");
 
@@ -78,11 +78,11 @@ impl FmiVersion {
     }
 }
 
-/// A scene made ready for packaging.
+/// Scene that is ready for packaging.
 #[derive(Debug)]
 pub struct FmuPackage<'a> {
     scene: &'a Scene,
-    /// ROMs as the FMU holds them.
+    /// ROMs in the form that the FMU contains.
     roms: Vec<Rom>,
     simulation: Simulation,
     libraries: &'a [Library],
@@ -93,10 +93,10 @@ pub struct FmuPackage<'a> {
 }
 
 impl<'a> FmuPackage<'a> {
-    /// Compile and initialise the scene (which refuses what an FMU instance would refuse), and run the reference.
+    /// Compiles and initialises the scene (with the same checks as an FMU instance), and runs the reference.
     ///
     /// # Errors
-    /// The scene is refused, or SOURCE_DATE_EPOCH is set to nonsense.
+    /// The scene is rejected, or SOURCE_DATE_EPOCH is invalid.
     pub fn new(scene: &'a Scene, libraries: &'a [Library]) -> Result<Self> {
         let in_scene = |error| Failure::from_core(format!("scene `{}`", scene.settings.name), error);
         let mut schedule = Schedule::new(&scene.settings.experiment, None, None)?;
@@ -123,16 +123,16 @@ impl<'a> FmuPackage<'a> {
         })
     }
 
-    /// Warnings of the initialisation (what an FMU instance would log) and of the experiment proposed.
+    /// Returns the warnings of the initialisation (which an FMU instance would log) and of the default experiment.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
-    /// Write the .fmu, whole or not at all. `arrays` is for FMI 3.0 only: whether they stay whole, by default where there would
-    /// be more than [`MOST_SCALARS`] variables. FMI 2.0 has scalars.
+    /// Writes the .fmu, completely or not at all. `arrays` applies to FMI 3.0 only: it keeps arrays whole, by default if there would be more than
+    /// [`MOST_SCALARS`] variables. FMI 2.0 always has scalars.
     ///
     /// # Errors
-    /// More than [`MOST_VARIABLES`] without arrays; the file cannot be written.
+    /// There are more than [`MOST_VARIABLES`] variables without arrays, or the file cannot be written.
     pub fn write(&self, target: &Path, version: FmiVersion, arrays: Option<bool>) -> Result<()> {
         let values = self.simulation.table().references();
         let arrays = arrays.unwrap_or(values > MOST_SCALARS);
@@ -156,7 +156,7 @@ impl<'a> FmuPackage<'a> {
         )
     }
 
-    /// Files of the .fmu in their order.
+    /// Returns the files of the .fmu in their order.
     fn entries(&self, version: FmiVersion, arrays: bool) -> Vec<ArchiveEntry> {
         let resources = tiprub_format::resource_files(self.scene, arrays);
         let token = tiprub_format::instantiation_token(&resources);
@@ -165,8 +165,8 @@ impl<'a> FmuPackage<'a> {
         contents(version, &description, self.libraries, resources, reference, SCENE)
     }
 
-    /// The internal step (s) where every communication step that is a multiple of it is divided by it: the largest step
-    /// allowed, if the default communication step is a multiple of that. Steps of a tolerance are of any length.
+    /// Returns the internal step (s) that applies to every communication step that is a multiple of it: the largest permitted step, if the default
+    /// communication step is a multiple of that. Adaptive steps have no fixed length.
     fn fixed_internal_step(&self) -> Option<f64> {
         let variable = self.simulation.table().with_quantity(Quantity::StepMax)?;
         let most = self.simulation.real(variable.reference).ok()?;
@@ -209,8 +209,8 @@ impl<'a> FmuPackage<'a> {
     }
 }
 
-/// Files of an .fmu in their order: what its description says, the libraries, and the model that it reads; a reference result comes with
-/// the number of communication steps that it has at most.
+/// Returns the files of an .fmu in their order: the model description, the libraries, and the resources; a reference result is given with its
+/// largest number of communication steps.
 pub fn contents(
     version: FmiVersion,
     description: &Description,
@@ -256,10 +256,10 @@ pub fn contents(
     entries
 }
 
-/// The optional generation date: left out (equal inputs, equal bytes) unless SOURCE_DATE_EPOCH gives one.
+/// Returns the optional generation date: empty (equal inputs, equal bytes) unless SOURCE_DATE_EPOCH defines one.
 pub(crate) fn generation_date(source_date_epoch: Option<&str>) -> Result<String> {
     let Some(text) = source_date_epoch else { return Ok(String::new()) };
-    // Four-digit years only: xs:dateTime allows more, importers do not.
+    // Only years with four digits: xs:dateTime permits more, importers do not.
     match text.trim().parse::<i64>() {
         Ok(seconds) if (0..253_402_300_800).contains(&seconds) => Ok(date_time(seconds)),
         _ => Err(Failure::usage(
@@ -270,7 +270,7 @@ pub(crate) fn generation_date(source_date_epoch: Option<&str>) -> Result<String>
     }
 }
 
-/// xs:dateTime of a count of seconds since 1970 (UTC), after H. Hinnant's `civil_from_days`.
+/// Formats seconds since 1970 (UTC) as xs:dateTime, after H. Hinnant's `civil_from_days`.
 fn date_time(seconds: i64) -> String {
     let (days, rest) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
     let shifted = days + 719_468;

@@ -1,14 +1,15 @@
 //! The `tiprub` command line as a library: reduce, package, run, demo, inspect.
 //!
-//! It wires the lower floors together. [`commands`] holds one module per command; the rest are the parts they share.
+//! It connects the lower layers. [`commands`] has one module per command; the other modules are shared by them.
 //!
-//! - [`cli`], [`reduce_arguments`], [`casing_arguments`], [`thermal_arguments`], [`mesh_arguments`], [`shared_arguments`]: what can be requested; [`command_names`]: errors of the command line;
-//! - [`command_files`]: what each command reads and writes, looked at before any work;
-//! - [`left_out`]: what a scene leaves out, in one table;
-//! - [`answer`]: the five lines that a run is about;
-//! - [`scene_features`], [`rom_facts`]: what is to be known of a scene or a ROM before it is trusted;
-//! - [`user_mesh`], [`cube_models`], [`mod@reduced`]: models read, judged, reduced, and what is told of them;
-//! - [`fmu`], [`thermal_fmu`], [`library`]: what is in an FMU, and where its shared library comes from;
+//! - [`cli`], [`reduce_arguments`], [`casing_arguments`], [`thermal_arguments`], [`mesh_arguments`], [`shared_arguments`]: arguments;
+//!   [`command_names`]: errors of the command line;
+//! - [`command_files`]: inputs and outputs of each command, checked before any work;
+//! - [`left_out`]: table of the effects that a scene leaves out;
+//! - [`answer`]: main results of a run in five lines;
+//! - [`scene_features`], [`rom_facts`]: properties and limits of a scene or a ROM;
+//! - [`user_mesh`], [`cube_models`], [`mod@reduced`]: models that are read, checked, reduced and described;
+//! - [`fmu`], [`thermal_fmu`], [`library`]: content of an FMU, and the source of its shared library;
 //! - [`report`]: the HTML report of the demo.
 
 pub mod answer;

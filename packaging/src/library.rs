@@ -1,10 +1,9 @@
-//! Where the shared libraries that go into every FMU come from.
+//! Finds the shared libraries for the FMUs.
 //!
-//! In this order: the files and directories given with `--library`; for a tiprub that runs from a cargo target directory
-//! of the workspace, a fresh build of the fmi crate alone (profile `fmu`, so that no other crate's features leak in);
-//! else the libraries beside the executable, where an installation puts them, one for each platform; else, for a tiprub
-//! that cargo installed, one built from the same sources, which is kept in the user's cache. What a file is made
-//! for, of which unit and of which sources it is, is read from its content.
+//! In this order: the files and directories given with `--library`; for a tiprub that runs from a cargo target directory of the workspace, a fresh
+//! build of the fmi crate alone (profile `fmu`, so that features of other crates do not affect it); else the libraries beside the executable, where
+//! an installation puts them, one for each platform; else, for a tiprub that cargo installed, a library built from the same sources, which is cached
+//! in the user's cache directory. Platform, unit and sources of a library are read from its content.
 
 mod build;
 
@@ -22,15 +21,15 @@ use tiprub_shell::{Failure, Result, console::Console};
 
 use crate::cli::LibraryArguments;
 
-/// The workspace this program was compiled from; it need not exist where it runs. A program that is built to be handed on
-/// (`wheels.sh`) knows none, so that its bytes do not tell where it was built.
+/// Workspace from which this program was compiled; it need not exist at run time. A program that is built for distribution (`wheels.sh`) does not
+/// know it, so that its bytes do not contain the build location.
 const WORKSPACE: Option<&str> = match option_env!("TIPRUB_HANDED_ON") {
     Some(_) => None,
     None => Some(concat!(env!("CARGO_MANIFEST_DIR"), "/..")),
 };
 
-/// Directories in which an installation may hold the libraries, relative to that of the executable. Each is called as
-/// its platform. The last is where `pip install --user` puts them on Windows, seen from `Python311/Scripts` and its like.
+/// Directories in which an installation may have the libraries, relative to that of the executable. Each library is named after its platform. The
+/// last one is where `pip install --user` puts them on Windows, relative to `Python311/Scripts` and similar directories.
 #[cfg(not(windows))]
 const INSTALLED: [&str; 2] = [".", "../lib/tiprub"];
 #[cfg(windows)]
@@ -39,20 +38,20 @@ const INSTALLED: [&str; 3] = [".", "../lib/tiprub", "../../lib/tiprub"];
 /// Largest library (bytes).
 const LARGEST: u64 = 1 << 30;
 
-/// Extensions of libraries; a directory may hold other files too.
+/// Extensions of libraries; a directory may also contain other files.
 const EXTENSIONS: [&str; 3] = ["so", "dll", "dylib"];
 
-/// Kind of FMU that a library makes.
+/// Kind of FMU that a library is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LibraryUnit {
-    /// Contact of a scene.
+    /// Simulation of the contact of a scene.
     Scene,
     /// Heat conduction of a casing.
     Thermal,
 }
 
 impl LibraryUnit {
-    /// Crate that the library is built of, and its file without prefix and extension.
+    /// Returns the crate of the library, and its file name without prefix and extension.
     fn names(self) -> (&'static str, &'static str) {
         match self {
             Self::Scene => ("tiprub-fmi", "tiprub_fmi"),
@@ -68,7 +67,7 @@ impl LibraryUnit {
         }
     }
 
-    /// The unit of a library: that of heat conduction knows the name of the file it reads.
+    /// Returns the unit of a library: that of heat conduction contains the name of the file it reads.
     fn of_library(bytes: &[u8]) -> Self {
         if holds(bytes, tiprub_format::THERMAL_FILE.as_bytes()) { Self::Thermal } else { Self::Scene }
     }
@@ -82,27 +81,27 @@ fn place_of(bytes: &[u8], name: &[u8]) -> Option<usize> {
     bytes.windows(name.len()).position(|part| part == name)
 }
 
-/// The release that a library says it is of, as long as that of this program.
+/// Returns the release that a library states, cut to the length of that of this program.
 fn release(bytes: &[u8]) -> Option<String> {
     let start = place_of(bytes, LIBRARY_MARK.as_bytes())?;
     let text = &bytes[start..bytes.len().min(start + LIBRARY_RELEASE.len())];
     Some(text.iter().take_while(|byte| matches!(byte, 0x20..0x7f)).map(|byte| char::from(*byte)).collect())
 }
 
-/// The FMU's code for one platform.
+/// Code of the FMU for one platform.
 #[derive(Debug, Clone)]
 pub struct Library {
     /// Platform of the library.
     pub platform: Platform,
-    /// The file.
+    /// Content of the file.
     pub bytes: Vec<u8>,
 }
 
-/// The libraries for an FMU, one for each platform, in the order of [`Platform::ALL`].
+/// Returns the libraries for an FMU, one for each platform, in the order of [`Platform::ALL`].
 ///
 /// # Errors
-/// No library found, the build failed, a file that is no shared library for a known platform, two for one platform, or
-/// none for a platform asked for.
+/// There is no library, the build failed, a file is not a shared library for a known platform, two are for one platform, or none is for a requested
+/// platform.
 pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> Result<Vec<Library>> {
     let mut found: BTreeMap<Platform, (PathBuf, Vec<u8>)> = BTreeMap::new();
     let (files, _build) = find(unit, arguments, console)?;
@@ -111,7 +110,7 @@ pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) 
             tiprub_format::read_file(&path, LARGEST).map_err(|error| Failure::file(&path, "cannot be read", &error))?;
         let platform = recognised(&path, &bytes)?;
         if LibraryUnit::of_library(&bytes) != unit {
-            // A directory holds those of all units.
+            // A directory contains the libraries of all units.
             if !arguments.library.contains(&path) {
                 continue;
             }
@@ -145,7 +144,7 @@ pub fn load(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) 
         .collect())
 }
 
-/// Each platform asked for is there.
+/// Checks that there is a library for each requested platform.
 fn check_platforms(asked: &[PlatformChoice], found: Vec<Platform>) -> Result<()> {
     let Some(missing) = asked.iter().find(|choice| !found.contains(&choice.0)) else { return Ok(()) };
     let names: Vec<&str> = found.into_iter().map(Platform::tuple).collect();
@@ -157,7 +156,7 @@ fn check_platforms(asked: &[PlatformChoice], found: Vec<Platform>) -> Result<()>
     ))
 }
 
-/// A platform as the command line takes it.
+/// Platform as an argument of the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlatformChoice(pub Platform);
 
@@ -180,32 +179,32 @@ impl clap::ValueEnum for PlatformChoice {
     }
 }
 
-/// The files that `--library` names, those of directories among them.
+/// Returns the files that `--library` names, including those in directories.
 ///
 /// # Errors
-/// A directory that cannot be read, or is empty.
+/// A directory cannot be read, or is empty.
 pub fn given_libraries(arguments: &LibraryArguments) -> Result<Vec<PathBuf>> {
     Ok(arguments.library.iter().map(|path| files(path)).collect::<Result<Vec<_>>>()?.concat())
 }
 
-/// Where libraries come from that the command line does not name.
+/// Origin of libraries that the command line does not name.
 #[derive(Debug, PartialEq)]
 enum Origin<'a> {
-    /// Built in the target directory of cargo that the program runs from.
+    /// Built in the cargo target directory from which the program runs.
     Target {
         sources: &'a Path,
         target: &'a Path,
     },
     /// Beside the program.
     Installed(Vec<PathBuf>),
-    /// Built before from the sources of the program.
+    /// Built earlier from the sources of the program.
     Kept(PathBuf),
     /// To be built from the sources of the program.
     Sources(&'a Path),
     Nowhere,
 }
 
-/// `sources` is the workspace that the program was compiled from, where it still is; `cache` keeps what was built.
+/// Returns the origin; `sources` is the workspace from which the program was compiled, if it still exists; `cache` contains built libraries.
 fn origin<'a>(unit: LibraryUnit, executable: &'a Path, sources: Option<&'a Path>, cache: Option<&Path>) -> Origin<'a> {
     if let (Some(sources), Some(target)) = (sources, build::cargo_target(executable)) {
         return Origin::Target { sources, target };
@@ -218,7 +217,7 @@ fn origin<'a>(unit: LibraryUnit, executable: &'a Path, sources: Option<&'a Path>
     kept.map(Origin::Kept).or(sources.map(Origin::Sources)).unwrap_or(Origin::Nowhere)
 }
 
-/// Files, and the directory that they are in where it goes when they are read.
+/// Finds the files; also returns their directory if it is temporary, so that it lives until they are read.
 fn find(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> Result<(Vec<PathBuf>, Option<TempDir>)> {
     if !arguments.library.is_empty() {
         return Ok((given_libraries(arguments)?, None));
@@ -244,7 +243,7 @@ fn find(unit: LibraryUnit, arguments: &LibraryArguments, console: &Console) -> R
     }
 }
 
-/// A file, or the libraries of a directory by their extensions.
+/// Returns a file, or the libraries in a directory by their extensions.
 fn files(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(vec![path.to_path_buf()]);
@@ -261,7 +260,7 @@ fn files(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// By its name.
+/// Returns whether a file is a library by its extension.
 fn is_library(path: &Path) -> bool {
     path.extension().is_some_and(|extension| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
@@ -275,8 +274,7 @@ fn installed(unit: LibraryUnit, executable: &Path) -> Vec<PathBuf> {
     Platform::ALL.into_iter().filter_map(place).collect()
 }
 
-/// The platform of a library whose names are those of both versions of FMI. A file that is called as a platform must be
-/// for it.
+/// Returns the platform of a library that exports the functions of both FMI versions. A file that is named after a platform must be for it.
 fn recognised(path: &Path, bytes: &[u8]) -> Result<Platform> {
     let refused = |problem: &str| {
         Failure::new(path.display(), problem, "Give a library built from the fmi crate with --library FILE")

@@ -24,7 +24,7 @@ fn main() -> ExitCode {
     console.finish(commands::run(&cli.command, &console))
 }
 
-/// Before `main`, Rust opens /dev/null in the place of a closed stdout, which then takes all results in silence.
+/// Detects a closed stdout before `main`: Rust opens /dev/null in its place, which would silently discard all results.
 #[cfg(target_os = "linux")]
 mod stdout_at_start {
     use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,12 +32,12 @@ mod stdout_at_start {
     static CLOSED: AtomicBool = AtomicBool::new(false);
 
     extern "C" fn look() {
-        // SAFETY: asks for the flags of a descriptor, which need not be open, and touches no memory.
+        // SAFETY: reads the flags of a descriptor, which need not be open, and accesses no memory.
         let flags = unsafe { libc::fcntl(libc::STDOUT_FILENO, libc::F_GETFD) };
         CLOSED.store(flags == -1, Ordering::Relaxed);
     }
 
-    /// The C library calls what stands in this section before Rust starts.
+    /// The C library calls the functions in this section before Rust starts.
     #[used]
     #[unsafe(link_section = ".init_array")]
     static LOOK: extern "C" fn() = look;

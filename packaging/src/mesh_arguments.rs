@@ -1,4 +1,4 @@
-//! Options of `tiprub reduce blade`, `sector` and `casing-mesh`: finite-element models of one's own.
+//! Options of `tiprub reduce blade`, `sector` and `casing-mesh`: finite-element models of the user.
 
 mod included;
 
@@ -103,10 +103,10 @@ pub struct FromMesh {
 const MESH: &str = "Source of the ROM, as for `tiprub reduce blade`";
 
 impl FromMesh {
-    /// Whether a mesh or matrices are given.
+    /// Returns whether a mesh or matrices are given.
     ///
     /// # Errors
-    /// Options of a mesh without one.
+    /// There are options of a mesh without a mesh.
     pub fn is_given(&self) -> Result<bool> {
         let given = self.file.is_some() || self.blade.matrices.stiffness.is_some();
         if given || self.blade == BladeOptions::default() {
@@ -116,7 +116,7 @@ impl FromMesh {
         Err(Failure::usage("--mesh", problem, "Give --mesh FILE, or omit the options of `tiprub reduce blade`"))
     }
 
-    /// All files that are read.
+    /// Returns all files that are read.
     pub fn files(&self) -> Vec<NamedFile> {
         let own = self.blade.source(self.file.as_deref(), KeptOptions::default()).files();
         own.into_iter().chain(self.others.iter().map(|path| NamedFile::new("--other-mesh", path))).collect()
@@ -283,14 +283,14 @@ pub struct MatrixOptions {
     pub dofs: Option<PathBuf>,
 }
 
-/// Input of a user mesh, of any kind.
+/// Input for a user mesh of any kind.
 #[derive(Debug, Clone)]
 pub struct MeshSource<'a> {
     /// Mesh file.
     pub file: Option<&'a Path>,
     /// Options.
     pub model: &'a ModelOptions,
-    /// Matrices, where they can be given.
+    /// Matrices, if the command accepts them.
     pub matrices: Option<&'a MatrixOptions>,
     /// Reduction options.
     pub kept: KeptOptions,
@@ -326,14 +326,14 @@ impl CasingMeshArguments {
 }
 
 impl<'a> MeshSource<'a> {
-    /// A mesh alone.
+    /// Creates the input for a mesh alone.
     pub fn mesh(file: &'a Path, model: &'a ModelOptions) -> Self {
         Self { file: Some(file), model, matrices: None, kept: KeptOptions::default() }
     }
 }
 
 impl MeshSource<'_> {
-    /// Name of the model.
+    /// Returns the name of the model.
     pub fn name(&self) -> String {
         if let Some(name) = &self.kept.name {
             return name.clone();
@@ -343,14 +343,14 @@ impl MeshSource<'_> {
         stem.map_or_else(|| "model".to_owned(), |stem| stem.to_string_lossy().into_owned())
     }
 
-    /// All files that are read.
+    /// Returns all files that are read.
     pub fn files(&self) -> Vec<NamedFile> {
         let mesh = self.file.map(|path| NamedFile::new("FILE", path));
         let mut parts = Vec::new();
         self.file.iter().for_each(|path| included::collect(path, &mut parts));
         let parts = parts.into_iter().map(|path| NamedFile::new("a file that FILE includes,", path));
         let matrices = self.matrices.into_iter().flat_map(|own| {
-            // Without --dofs the list beside CalculiX's stiffness file is read.
+            // Without --dofs, the list beside CalculiX's stiffness file is read.
             let storage = own.stiffness.as_ref().filter(|path| path.extension().is_some_and(|kind| kind == "sti"));
             let dofs = own.dofs.clone().or(storage.map(|path| path.with_extension("dof")));
             let all = [
@@ -364,7 +364,7 @@ impl MeshSource<'_> {
         mesh.into_iter().chain(parts).chain(matrices).collect()
     }
 
-    /// The material that the command line gives, if any.
+    /// Returns the material of the command line, if any.
     pub fn material(&self) -> Option<Material> {
         let own = self.model;
         let of_numbers = |((young_modulus, poisson_ratio), density)| Material {
@@ -402,7 +402,7 @@ pub enum AxisChoice {
 }
 
 impl ModelOptions {
-    /// Engine axis in the file.
+    /// Returns the engine axis in the file.
     pub fn axis(&self) -> EngineAxis {
         match self.axis {
             Some(AxisChoice::X) => EngineAxis::X,
@@ -411,7 +411,7 @@ impl ModelOptions {
         }
     }
 
-    /// Units of the file.
+    /// Returns the units of the file.
     pub fn units(&self) -> Units {
         match self.units {
             Some(UnitChoice::MillimetreTonneSecond) => Units::MillimetreTonneSecond,
@@ -434,7 +434,7 @@ fn poisson(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Part of variable names.
+/// Checks a part of variable names.
 fn identifier(text: &str) -> Result<String, String> {
     let starts_well = text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
     if starts_well && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
@@ -443,7 +443,7 @@ fn identifier(text: &str) -> Result<String, String> {
     Err("use letters, digits and underscores, not starting with a digit; the name is part of variable names".into())
 }
 
-/// Part of a file name.
+/// Checks a part of a file name.
 fn model_name(text: &str) -> Result<String, String> {
     if text.is_empty() || text.contains(['/', '\\']) || text.starts_with('.') {
         return Err("give a plain name without a path; set the path of the ROM file with -o".into());

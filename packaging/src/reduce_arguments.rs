@@ -1,4 +1,4 @@
-//! What `tiprub reduce` is asked for: a subcommand per kind of model, each with its own options.
+//! Arguments of `tiprub reduce`: a subcommand per kind of model, with separate options.
 
 use clap::{Args, Subcommand, ValueEnum};
 use tiprub_gallery::builtin;
@@ -106,7 +106,7 @@ pub struct Rotor37Arguments {
 }
 
 impl Rotor37Arguments {
-    /// The blade asked for.
+    /// Returns the requested blade.
     pub fn options(&self) -> Rotor37Options {
         let of_the_paper = self.contact_nodes.is_some();
         let defaults = if of_the_paper { Rotor37Options::paper() } else { Rotor37Options::default() };
@@ -130,7 +130,8 @@ impl Rotor37Arguments {
 }
 
 impl StageArguments {
-    /// Name and options of the disk. A coarse disk has contact nodes unless patches are given: its elements are wider than nine patches.
+    /// Returns name and options of the disk. A coarse disk has contact nodes unless patches are requested, because its elements are wider than nine
+    /// patches.
     pub fn options(&self) -> (&'static str, StageOptions) {
         let [patches, rows] = builtin::stage().1.tip.counts();
         let has_patches = self.contact_patches.or(self.contact_rows).is_some();
@@ -279,7 +280,7 @@ impl ModelToReduce {
         }
     }
 
-    /// The name that the model will have.
+    /// Returns the name that the model will have.
     pub fn name(&self) -> String {
         let [left, right] = builtin::RINGS;
         match self {
@@ -296,7 +297,7 @@ impl ModelToReduce {
         }
     }
 
-    /// The files that describe it.
+    /// Returns the files that describe the model.
     pub fn files(&self) -> Vec<NamedFile> {
         match self {
             Self::Blade(own) => own.source().files(),

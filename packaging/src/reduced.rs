@@ -1,4 +1,4 @@
-//! A reduced model with everything that is written and told about it, whatever it was made of.
+//! Reduced model of any kind, with all data for its files and its description.
 
 use serde_json::Value;
 use tiprub_core::{Rom, plausibility::Slip};
@@ -11,46 +11,46 @@ use tiprub_model::{
 };
 use tiprub_shell::{Failure, Result};
 
-/// Frequencies asked for in the exported finite-element model.
+/// Number of frequencies that the exported finite-element model requests.
 const EXPORTED_FREQUENCIES: usize = 10;
-/// Nodal diameters asked for in the exported model of a sector: the first few.
+/// Largest number of nodal diameters that the exported model of a sector requests.
 const EXPORTED_DIAMETERS: usize = 3;
-/// Modes per nodal diameter drawn in the exported picture of a sector.
+/// Number of modes per nodal diameter in the exported picture of a sector.
 const DRAWN_MODES: usize = 3;
 
-/// A reduced model.
+/// Reduced model with its full model and description.
 #[derive(Debug)]
 pub struct ReducedModel {
-    /// The reduced-order model, checks included.
+    /// Reduced-order model, including the checks.
     pub rom: Rom,
-    /// Mesh and material, where there is one mesh of one material.
+    /// Mesh and material, if there is one mesh with one material.
     pub mesh: Option<(Mesh, Material)>,
     /// Number of nodes of the full model (of one sector).
     pub nodes: usize,
-    /// Degrees of freedom that are not clamped.
+    /// Number of degrees of freedom that are not clamped.
     pub free_dofs: usize,
-    /// Largest relative residual of the full modes, where it is known.
+    /// Largest relative residual of the full modes, if it is known.
     pub largest_residual: Option<f64>,
     /// Quality of the spin arrays; empty if they were not requested.
     pub spin_checks: Vec<SpinCheck>,
     /// Wall time (s).
     pub seconds: f64,
-    /// Set of clamped nodes, for exported files.
+    /// Name of the set of clamped nodes, for exported files.
     pub clamped: Option<String>,
-    /// Sets of the two faces of a sector, for exported files.
+    /// Names of the sets of the two faces of a sector, for exported files.
     pub faces: Option<[String; 2]>,
     /// Mode shapes for pictures.
     pub fields: Vec<NodalField>,
-    /// Description of the file that was read: for people, and for programs.
+    /// Description of the file that was read, as text and as JSON.
     pub read: (String, Value),
     /// Warnings.
     pub warnings: Vec<String>,
-    /// Values that are rarely meant.
+    /// Implausible values.
     pub slips: Vec<Slip>,
 }
 
 impl ReducedModel {
-    /// From a general reduction; `clamped` is a set of its mesh.
+    /// Creates the model from a general reduction; `clamped` is a set of its mesh.
     pub fn general(reduction: Reduction, clamped: Option<&str>) -> Self {
         let field = |(mode, number): (&tiprub_model::reduce::Mode, usize)| {
             NodalField::vectors(format!("mode_{number}_{:.1}_Hz", mode.frequency), mode.shape.clone())
@@ -72,7 +72,7 @@ impl ReducedModel {
         }
     }
 
-    /// From the reduction of a sector with this mesh.
+    /// Creates the model from the reduction of a sector with this mesh.
     pub fn cyclic(
         reduction: CyclicReduction,
         mesh: Option<(Mesh, Material)>,
@@ -109,10 +109,10 @@ impl ReducedModel {
         })
     }
 
-    /// The full model as a CalculiX input file: with cyclic symmetry, where it is a sector.
+    /// Returns the full model as a CalculiX input file, with cyclic symmetry for a sector.
     ///
     /// # Errors
-    /// A model without a mesh.
+    /// The model has no mesh.
     pub fn calculix(&self) -> Result<Vec<u8>> {
         let (mesh, material) = self.mesh_for("--inp")?;
         let clamped = self.clamped.as_deref();
@@ -128,10 +128,10 @@ impl ReducedModel {
         text.map(String::into_bytes).map_err(|error| Failure::from_below("--inp", error))
     }
 
-    /// Mesh, sets and mode shapes for ParaView.
+    /// Returns mesh, sets and mode shapes for ParaView.
     ///
     /// # Errors
-    /// A model without a mesh.
+    /// The model has no mesh.
     pub fn vtk(&self) -> Result<Vec<u8>> {
         let (mesh, _) = self.mesh_for("--vtk")?;
         vtk::write(mesh, &self.fields).map_err(|error| Failure::from_below("--vtk", error))

@@ -1,4 +1,4 @@
-//! What a user wants to know of a ROM before trusting it: size, frequencies, checks, limits.
+//! Facts about a ROM for its assessment: size, frequencies, checks, limits.
 
 use std::fmt::Write as _;
 
@@ -13,27 +13,27 @@ use tiprub_core::{
 use tiprub_shell::{Failure, Result};
 use tiprub_study::{
     estimate,
-    stability::structure::{LockUp, KnownContact, SingleStructure, StepLimit},
+    stability::structure::{KnownContact, LockUp, SingleStructure, StepLimit},
 };
 
-/// Modes that a warning of the checks is about: those that blade-tip contact excites most. Of coupled sectors the first
-/// family: as many modes of the disk as there are sectors.
+/// Number of modes whose checks cause warnings: those that blade-tip contact excites most. For coupled sectors, these are the modes of the first
+/// family, as many as there are sectors.
 const FIRST_MODES: usize = 6;
-/// Contact nodes that are listed.
+/// Largest number of listed contact nodes.
 const LISTED_NODES: usize = 24;
-/// Rows of a table of checks for people; coupled sectors may come with hundreds.
+/// Largest number of printed rows of a table of checks; coupled sectors may have hundreds.
 pub(crate) const ROWS_SHOWN: usize = 40;
-/// Frequencies listed of each nodal diameter.
+/// Number of listed frequencies of each nodal diameter.
 const FREQUENCIES_SHOWN: usize = 6;
-/// Modes below this share of the highest frequency that was checked are those of a rigid body.
+/// Modes below this fraction of the highest checked frequency are rigid-body modes.
 const RIGID: f64 = 1e-4;
-/// Largest frequency deviation (eq. 13) without a warning (%): what the paper calls satisfactory.
+/// Largest frequency deviation (eq. 13) without a warning (%), which the paper calls satisfactory.
 pub const DEVIATION_LIMIT: f64 = 0.3;
-/// The same for the residual convergence criterion (eq. 12, %).
+/// Largest value of the residual convergence criterion (eq. 12) without a warning (%).
 pub const RESIDUAL_LIMIT: f64 = 1.0;
-/// Friction coefficient that tips do not exceed: lock-up beyond it matters to no rub.
+/// Largest friction coefficient of tips; lock-up friction above it is irrelevant.
 const USUAL_FRICTION: f64 = 1.0;
-/// Factor between the lock-up frictions of both senses of rotation from which the lower one is asked about.
+/// Ratio of the lock-up frictions of both senses of rotation from which the lower one causes a question.
 const OTHER_SENSE: f64 = 2.0;
 
 /// Facts of one ROM.
@@ -41,9 +41,9 @@ const OTHER_SENSE: f64 = 2.0;
 pub struct RomFacts {
     /// The ROM.
     pub rom: Rom,
-    /// Natural frequencies of the reduced model (Hz), ascending, all of them; of coupled sectors double ones once.
+    /// All natural frequencies of the reduced model (Hz), ascending; double frequencies of coupled sectors appear once.
     pub frequencies: Vec<f64>,
-    /// The same for every nodal diameter of coupled sectors, from 0; else empty.
+    /// Natural frequencies of every nodal diameter of coupled sectors, from 0; otherwise empty.
     pub by_nodal_diameter: Vec<Vec<f64>>,
     /// Largest angular frequency ω_max (rad/s).
     pub largest_angular_frequency: f64,
@@ -52,40 +52,40 @@ pub struct RomFacts {
     /// Largest friction coefficient (in steps of 0.05, up to 2) for which the contact problem with all nodes of one
     /// sector closed has a unique solution at h = 1/ω_max, for slip in both directions; `None` if not even for 0.
     pub solvable_friction: Option<f64>,
-    /// Least friction with which closed contact locks up that slides towards +θ and −θ (positive and negative `speed`); `None` if no
-    /// friction does, and for the sense in which a known scene does not turn.
+    /// Lock-up friction for sliding towards +θ and −θ (positive and negative `speed`); `None` if no friction causes lock-up, and for the sense in
+    /// which a known scene does not rotate.
     pub lock_up: [Option<LockUp>; 2],
-    /// Internal step of every scheme below which all are accepted, with the contact given.
+    /// Internal step of every scheme below which all steps are accepted, for the given contact.
     pub step_limits: Vec<StepLimit>,
-    /// The contact they hold for, where it was given.
+    /// Contact for which the limits hold, if it was given.
     pub sliding: Option<KnownContact>,
 }
 
 /// One row of the table of checks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CheckRow {
-    /// Full model (Hz).
+    /// Frequency of the full model (Hz).
     pub full: f64,
-    /// Reduced model (Hz).
+    /// Frequency of the reduced model (Hz).
     pub reduced: f64,
     /// Frequency deviation, eq. 13 (%).
     pub deviation: f64,
     /// Residual convergence criterion, eq. 12 (%).
     pub residual: f64,
-    /// Nodal diameter, of coupled sectors.
+    /// Nodal diameter, for coupled sectors.
     pub nodal_diameter: Option<u32>,
 }
 
-/// A value of five decimals that does not read -0.00000.
+/// Returns 0 for values that would be printed as -0.00000 with five decimals.
 pub fn not_negative_zero(value: f64) -> f64 {
     if value.abs() < 5e-6 { 0.0 } else { value }
 }
 
 impl RomFacts {
-    /// Work out the facts of a ROM; `sliding` is its contact, where a scene gives it.
+    /// Determines the facts of a ROM; `sliding` is its contact, if a scene defines it.
     ///
     /// # Errors
-    /// A ROM whose eigenproblem cannot be solved.
+    /// The eigenproblem of the ROM cannot be solved.
     pub fn of(rom: &Rom, sliding: Option<KnownContact>) -> Result<Self> {
         let in_rom = |error| Failure::from_core(format!("ROM `{}`", rom.name), error);
         let structure = SingleStructure::new(rom, rom.damping_ratio, 0.0).map_err(in_rom)?;
@@ -113,7 +113,7 @@ impl RomFacts {
     /// Returns the warnings of the checks of a ROM: one line per mode beyond the limits, first modes only.
     pub fn warnings(&self) -> Vec<Warning> {
         let checks = self.checks();
-        // A deviation of rigid-body modes compares one rounding with another.
+        // For rigid-body modes, the deviation would compare two rounding errors.
         let rigid = RIGID * checks.iter().map(|row| row.full.abs()).fold(0.0, f64::max);
         let poor = |row: &CheckRow| row.deviation.abs() > DEVIATION_LIMIT || row.residual > RESIDUAL_LIMIT;
         let poor = |row: &CheckRow| poor(row) && !(row.full.abs() < rigid && row.reduced.abs() < rigid);
@@ -129,7 +129,7 @@ impl RomFacts {
         poor.collect()
     }
 
-    /// Returns values of the ROM that are rarely meant.
+    /// Returns implausible values of the ROM.
     pub fn slips(&self) -> Vec<Slip> {
         plausibility::of_rom(&self.rom, self.frequencies.iter().map(|hertz| hertz * std::f64::consts::TAU))
     }
@@ -148,7 +148,7 @@ impl RomFacts {
         before.take_while(|sum| *sum <= sectors).count()
     }
 
-    /// The checks that came with the ROM, mode by mode; empty where it came without.
+    /// Returns the checks of the ROM, mode by mode; empty if it has none.
     pub fn checks(&self) -> Vec<CheckRow> {
         let checks = &self.rom.checks;
         let columns = checks.full_frequencies.iter().zip(&checks.reduced_frequencies);
@@ -165,7 +165,7 @@ impl RomFacts {
             .collect()
     }
 
-    /// For people.
+    /// Formats the facts for the terminal.
     pub fn to_text(&self) -> String {
         let rom = &self.rom;
         let mut text = String::new();
@@ -173,7 +173,7 @@ impl RomFacts {
         let _ = writeln!(text, "ROM {}: {}", rom.name, rom.origin);
         let _ = writeln!(text, "  sectors                   {}", sectors_text(rom));
         let _ = writeln!(text, "  reduced coordinates       {}", order_text(rom));
-        // Of a grid, the first node of every ring stands for the others; of many nodes, some.
+        // For a grid, the first node of every ring represents the others; for many nodes, only some are shown.
         let shown = match rom.extras.grid {
             Some(grid) => {
                 let edges = if grid.closed { "" } else { ", four free edges" };
@@ -236,13 +236,13 @@ impl RomFacts {
         }
     }
 
-    /// The lower of both senses.
+    /// Returns the lower lock-up friction of both senses.
     fn least_lock_up(&self) -> Option<&LockUp> {
         self.lock_up.iter().flatten().min_by(|a, b| a.friction.total_cmp(&b.friction))
     }
 
-    /// A blade that locks up with little friction in the sense of a positive speed, and with much more or never in the other sense: it may
-    /// be staggered for a rotor that turns the other way.
+    /// Returns a warning if the blade locks up with little friction in the sense of a positive speed, and with much more or none in the other sense:
+    /// it may be staggered for the opposite rotation.
     pub fn sense_warning(&self) -> Option<String> {
         let [forward, backward] =
             self.lock_up.each_ref().map(|found| found.as_ref().map_or(f64::INFINITY, |own| own.friction));
@@ -261,7 +261,7 @@ impl RomFacts {
         ))
     }
 
-    /// Contact node at the end of the chord that is ahead when the rotor turns towards +θ.
+    /// Returns the contact node at the end of the chord that leads when the rotor turns towards +θ.
     fn leading_edge(&self) -> Option<&ContactNode> {
         let nodes = &self.rom.contact_nodes;
         let along = |a: &&ContactNode, b: &&ContactNode| a.position[2].total_cmp(&b.position[2]);
@@ -269,7 +269,8 @@ impl RomFacts {
         ends.into_iter().max_by(|a, b| a.position[1].total_cmp(&b.position[1]))
     }
 
-    /// "0.080 (closed at tip_2, nodal diameter 0, sliding in +θ); 0.310 (closed at tip_1, nodal diameter 0, sliding in −θ)".
+    /// Formats lock-up frictions: "0.080 (closed at tip_2, nodal diameter 0, sliding in +θ); 0.310 (closed at tip_1, nodal diameter 0, sliding in
+    /// −θ)".
     pub(crate) fn lock_up_text(&self) -> String {
         let reported = |LockUp { friction, closed, sense }: &LockUp| {
             format!("{friction:.3} (closed at {closed}, sliding in {})", ["+θ", "−θ"][*sense])
@@ -304,7 +305,7 @@ impl RomFacts {
         text
     }
 
-    /// First frequencies, of coupled sectors by nodal diameter; not repeated where checks list them.
+    /// Writes the first frequencies, for coupled sectors by nodal diameter; omitted if the checks list them.
     fn write_frequencies(&self, text: &mut String) {
         let list = |frequencies: &[f64], separator: &str| {
             let first = frequencies.iter().take(FREQUENCIES_SHOWN).map(|value| format!("{value:.2}"));
@@ -353,7 +354,7 @@ impl RomFacts {
         self.step_limits.iter().find(|limit| limit.scheme == scheme).and_then(StepLimit::below)
     }
 
-    /// For programs.
+    /// Returns the facts as JSON.
     pub fn to_json(&self) -> Value {
         let rom = &self.rom;
         json!({
@@ -410,7 +411,7 @@ impl RomFacts {
     }
 }
 
-/// Summary of the rows of a long table of checks that are not shown.
+/// Summary of the omitted rows of a long table of checks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct OmittedRows {
     pub count: usize,
@@ -420,7 +421,7 @@ pub(crate) struct OmittedRows {
 }
 
 impl OmittedRows {
-    /// The rows from `shown` on; `None` where there are none.
+    /// Summarises the rows from `shown` on; `None` if there are none.
     pub fn of(checks: &[CheckRow], shown: usize) -> Option<Self> {
         let rest = checks.get(shown..).filter(|rest| !rest.is_empty())?;
         let most = |value: &dyn Fn(&CheckRow) -> f64| rest.iter().map(value).fold(0.0, f64::max);
@@ -439,7 +440,7 @@ fn lock_up_json(found: &LockUp) -> Value {
     })
 }
 
-/// Number of sectors, and how they are coupled.
+/// Describes the number of sectors and their coupling.
 pub(crate) fn sectors_text(rom: &Rom) -> String {
     match (rom.is_cyclic(), rom.sectors) {
         (true, sectors) => format!("{sectors}, coupled: nodal diameters 0 to {}", rom.largest_nodal_diameter()),
@@ -447,7 +448,7 @@ pub(crate) fn sectors_text(rom: &Rom) -> String {
     }
 }
 
-/// Number of reduced coordinates: they may differ from one nodal diameter to the next.
+/// Describes the number of reduced coordinates, which may differ between nodal diameters.
 pub(crate) fn order_text(rom: &Rom) -> String {
     if !rom.is_cyclic() {
         return format!("{} per sector", rom.order());
@@ -458,7 +459,7 @@ pub(crate) fn order_text(rom: &Rom) -> String {
     format!("{each} per nodal diameter, {} for the whole disk", rom.total_order())
 }
 
-/// Rows of patches around an axis, for people; nothing for contact nodes.
+/// Describes rows of patches; empty for contact nodes.
 fn rows_text(rom: &Rom) -> String {
     if rom.frame == DisplacementFrame::Cartesian || rom.contact_nodes.iter().any(|node| node.area <= 0.0) {
         return String::new();
@@ -470,7 +471,7 @@ fn rows_text(rom: &Rom) -> String {
     format!("  rows across the thickness {}{alone}\n", rom.rows())
 }
 
-/// Spin and heat, for people; nothing for a ROM without.
+/// Describes spin matrices and thermal loads; empty for a ROM without them.
 fn extras_text(rom: &Rom) -> String {
     let mut text = String::new();
     if let Some(spin) = &rom.extras.spin {

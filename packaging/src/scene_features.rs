@@ -1,4 +1,4 @@
-//! What a scene asks for beyond sliding contact of a rotor in a rigid casing, and what the model leaves out, in words.
+//! Describes the features of a scene beyond sliding contact of a rotor in a rigid casing, and the limits of the model.
 
 use tiprub_core::{
     Rom, Scene,
@@ -8,7 +8,7 @@ use tiprub_core::{
     },
 };
 
-/// Everything that is on although it is off unless asked for; one phrase each, empty for a plain scene.
+/// Returns one phrase for every feature that is off by default but on in the scene; empty for a plain scene.
 pub fn features(scene: &Scene) -> Vec<String> {
     let settings = &scene.settings;
     let mut found = Vec::new();
@@ -37,7 +37,7 @@ pub fn features(scene: &Scene) -> Vec<String> {
     found
 }
 
-/// Returns the scheme with why it is this one.
+/// Returns the scheme with the reason for its choice.
 pub fn scheme(settings: &SceneSettings) -> String {
     let name = settings.time.scheme.name();
     match (&settings.time.scheme_reason, settings.preset) {
@@ -146,7 +146,7 @@ fn of_contact(contact: &ContactSettings, found: &mut Vec<String>) {
     }
 }
 
-/// Limits of validity that every importer's user should read; one sentence each.
+/// Returns limits of validity that the user of an importer should know; one sentence each.
 pub fn limits(scene: &Scene) -> Vec<String> {
     let settings = &scene.settings;
     if settings.free_master().is_some() {
@@ -194,7 +194,7 @@ pub fn limits(scene: &Scene) -> Vec<String> {
     limits.into_iter().map(String::from).collect()
 }
 
-/// Limits of a scene whose master flies freely.
+/// Returns the limits of a scene whose master is a free body.
 fn limits_of_flight(settings: &SceneSettings) -> [&'static str; 5] {
     let sticks = settings.contacts.iter().any(|contact| contact.solver == Solver::Coulomb);
     [

@@ -1,4 +1,4 @@
-//! Options that several kinds of `tiprub reduce` have.
+//! Options that several kinds of `tiprub reduce` share.
 
 use std::path::PathBuf;
 
@@ -37,7 +37,7 @@ pub enum KindChoice {
 }
 
 impl KindChoice {
-    /// The kind asked for; contact patches ask for free-interface modes.
+    /// Returns the requested kind; by default, contact patches use free-interface modes.
     pub fn kind(choice: Option<Self>, patches: bool) -> ReductionKind {
         match choice {
             Some(Self::CraigBampton) => ReductionKind::FixedInterface,
@@ -60,7 +60,7 @@ pub enum MaterialChoice {
 }
 
 impl MaterialChoice {
-    /// The material of this name.
+    /// Returns the material of this name.
     pub fn material(self) -> Material {
         match self {
             Self::Steel => Material::steel(),
@@ -70,7 +70,7 @@ impl MaterialChoice {
     }
 }
 
-/// Three element counts: chord, thickness and span of a blade; around, through and along of a casing.
+/// Three element counts: chord, thickness and span of a blade; circumference, thickness and length of a casing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MeshSize(pub [usize; 3]);
 
@@ -90,10 +90,10 @@ impl std::str::FromStr for MeshSize {
     }
 }
 
-/// Two counts.
+/// Parses two counts.
 ///
 /// # Errors
-/// The problem with the text.
+/// The text does not have this form.
 pub fn pair(text: &str) -> Result<[usize; 2], String> {
     let counts: Result<Vec<usize>, _> = text.split(['x', 'X']).map(str::parse).collect();
     match counts.as_deref() {
@@ -102,10 +102,10 @@ pub fn pair(text: &str) -> Result<[usize; 2], String> {
     }
 }
 
-/// Two axial positions (m).
+/// Parses two axial positions (m).
 ///
 /// # Errors
-/// The problem with the text.
+/// The text does not have this form.
 pub fn axial(text: &str) -> Result<[f64; 2], String> {
     let ends = text.split_once(':').map(|(from, to)| [from, to].map(|end| end.trim().parse::<f64>().ok()));
     match ends {

@@ -69,7 +69,7 @@ pub struct ThermalArguments {
 }
 
 impl ThermalArguments {
-    /// Name of the model.
+    /// Returns the name of the model.
     pub fn name(&self) -> String {
         self.name.clone().unwrap_or_else(|| {
             let stem = self.file.as_deref().and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned());
@@ -89,7 +89,7 @@ impl ThermalArguments {
         }
     }
 
-    /// All files that are read.
+    /// Returns all files that are read.
     pub fn files(&self) -> Vec<NamedFile> {
         let model = self.model();
         self.file.as_deref().map_or_else(Vec::new, |file| MeshSource::mesh(file, &model).files())

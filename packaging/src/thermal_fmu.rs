@@ -1,4 +1,4 @@
-//! What goes into the .fmu of a thermal model: data around its own library.
+//! Content of the .fmu of a thermal model: data, and a separate library.
 
 use std::{env, path::Path};
 
@@ -30,7 +30,7 @@ const ABOUT: &str = "This FMU computes heat conduction through a casing with a r
 const STEPS: &str = "Heat inputs are constant over a step, so that the transferred heat is the value times the \
     length of the step. Heat flows from gas and air are averages over the last communication step.";
 
-/// A model made ready for packaging.
+/// Thermal model that is ready for packaging.
 #[derive(Debug)]
 pub struct ThermalPackage<'a> {
     simulation: ThermalSimulation,
@@ -39,17 +39,17 @@ pub struct ThermalPackage<'a> {
 }
 
 impl<'a> ThermalPackage<'a> {
-    /// Make an instance of the model, as an FMU would.
+    /// Creates an instance of the model, as an FMU would.
     ///
     /// # Errors
-    /// The model is refused, or SOURCE_DATE_EPOCH is set to nonsense.
+    /// The model is rejected, or SOURCE_DATE_EPOCH is invalid.
     pub fn new(model: &ConductionModel, libraries: &'a [Library]) -> Result<Self> {
         let simulation = ThermalSimulation::new(model.clone());
         let simulation = simulation.map_err(|error| Failure::from_core(format!("model `{}`", model.name), error))?;
         Ok(Self { simulation, libraries, generated: generation_date(env::var("SOURCE_DATE_EPOCH").ok().as_deref())? })
     }
 
-    /// Write the .fmu, whole or not at all; `arrays` is for FMI 3.0 only.
+    /// Writes the .fmu, completely or not at all; `arrays` applies to FMI 3.0 only.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -1,5 +1,5 @@
-//! Figures of the user guide: every table of figures says where it comes from, and what a command of the program says is what
-//! the guide shows. Blocks from tests are held by these tests ([`guide::hold`]).
+//! Figures of the user guide: every table of figures states its source, and the guide shows the current output of the program. Blocks from tests are
+//! checked by these tests ([`guide::hold`]).
 
 #[path = "guide/book.rs"]
 mod book;
@@ -10,7 +10,7 @@ use std::{collections::BTreeSet, fs, path::Path, process::Command};
 
 use guide::{blocks, holds, missing, numbers, pages, print_row};
 
-/// Output of `tiprub ...`, line by line.
+/// Returns the output of `tiprub ...`, line by line.
 fn run(command: &str) -> Vec<String> {
     run_in(tempfile::tempdir().unwrap().path(), command)
 }
@@ -43,7 +43,7 @@ fn command_outputs_match_the_guide() {
     }
 }
 
-/// A block whose test does not look at it would hold nothing.
+/// Every block that names a test is checked by that test.
 #[test]
 fn every_quoted_test_output_is_checked_by_its_test() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -62,7 +62,7 @@ fn every_quoted_test_output_is_checked_by_its_test() {
     }
 }
 
-/// One name means one thing: the first scene of the reference is the built-in scene with its model and its scheme.
+/// The first scene of the reference is the built-in scene with its model and its scheme, because it has the same name.
 #[test]
 fn the_first_scene_of_the_reference_is_the_built_in_scene() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/scene-file.md");
@@ -79,7 +79,7 @@ fn the_first_scene_of_the_reference_is_the_built_in_scene() {
     assert_eq!(method(&shown), method(&built_in));
 }
 
-/// The rub of the first run at one, half and a quarter of its internal step: what a newcomer sees of the step.
+/// Rub of the first run with the full, half and quarter internal step: the influence of the step that a newcomer sees.
 #[test]
 fn first_run_results_at_halved_steps() {
     for step in [0.5, 0.25, 0.125] {
@@ -98,7 +98,7 @@ fn first_run_results_at_halved_steps() {
     guide::hold("cargo test -p tiprub --test guide halved");
 }
 
-/// The rub of the first run after two revolutions, without mass at the contact: points along the tip, and patches.
+/// Rub of the first run after two revolutions, with massless contact nodes: points along the tip, and patches.
 #[test]
 fn first_run_results_with_points_and_patches() {
     let root = tempfile::tempdir().unwrap();
@@ -125,8 +125,7 @@ fn first_run_results_with_points_and_patches() {
     guide::hold("cargo test -p tiprub --test guide patches");
 }
 
-/// Tables with decimals stand in a block, in a part that is generated, or behind a mark that says who wrote them and when, or
-/// that they are given.
+/// Tables with decimals stand in a block, in a generated part, or after a mark that states their source and date, or that they are given values.
 #[test]
 fn every_numeric_table_states_its_source() {
     let marks = ["<!-- from: ", "<!-- generated: ", "<!-- written: ", "<!-- given -->"];
@@ -148,7 +147,7 @@ fn every_numeric_table_states_its_source() {
     }
 }
 
-/// Whether a cell shows a number with decimals or an exponent.
+/// Returns whether a cell shows a number with decimals or an exponent.
 fn decimal(cell: &str) -> bool {
     let digit = |c: Option<&char>| c.is_some_and(char::is_ascii_digit);
     let all: Vec<char> = cell.chars().collect();
@@ -159,7 +158,7 @@ fn decimal(cell: &str) -> bool {
     })
 }
 
-/// The comparison sees a last digit that differs, a sign, an order and a number that is missing.
+/// The comparison detects a different last digit, sign or order, and a missing number.
 #[test]
 fn comparison_detects_any_difference_in_figures() {
     let found = "| ModalExact | Lcp | 200 | 133452.84 | 49.42 | -1.0e-3, 2.0e-13 |".to_owned();
@@ -174,7 +173,7 @@ fn comparison_detects_any_difference_in_figures() {
     assert_eq!(missing("| 7 |\n|---|\n| a | 200 |\n| b | 7 |\nwords", &[found]), ["| b | 7 |"]);
 }
 
-/// What the README's sample prints: torque and largest force of the demo's scene at 1700 rad/s with µ = 0.1.
+/// The sample in the README prints torque and largest force of the demo's scene at 1700 rad/s with µ = 0.1.
 #[test]
 fn readme_sample_prints_the_documented_values() {
     let readme = pages().into_iter().find(|page| page.0 == "README.md").unwrap().1;

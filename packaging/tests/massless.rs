@@ -12,7 +12,7 @@ use tiprub_core::{
 };
 use tiprub_model::{Rotor37Options, reduce_rotor37};
 
-/// Displacements (m) of all contact rows at common times, the total normal impulse (N.s), and the impact loss (J).
+/// Returns the displacements (m) of all contact rows at common times, the total normal impulse (N·s), and the impact loss (J).
 fn run(scene: &Scene, scheme: Scheme, step: f64) -> (Vec<f64>, f64, f64) {
     let mut scene = scene.clone();
     scene.settings.time.scheme = scheme;
@@ -21,7 +21,7 @@ fn run(scene: &Scene, scheme: Scheme, step: f64) -> (Vec<f64>, f64, f64) {
     simulation.initialise(0.0).unwrap();
     let (mut displacements, mut impulse) = (Vec::new(), 0.0);
     let reference = simulation.table().find("normal_impulse").unwrap().reference;
-    // The first impacts of a light rub: later, single impacts fall into different steps.
+    // Only the first impacts of a light rub; later, single impacts fall into different steps.
     for _ in 0..50 {
         let time = simulation.time();
         simulation.do_step(time, 3e-5).unwrap();

@@ -1,5 +1,5 @@
-//! Rotor 37 at speed through the whole simulation, against CalculiX 2.20 (nonlinear static step with centrifugal load,
-//! same mesh; the numbers and how they were made are with the tests of the reduction).
+//! Compares rotor 37 at speed in the whole simulation with CalculiX 2.20 (nonlinear static step with centrifugal load, same mesh; the tests of the
+//! reduction document the reference values and their origin).
 
 use tiprub_core::{Scene, Simulation, settings::Shape};
 use tiprub_gallery::scene_source::rotor37_scene_with;
@@ -15,7 +15,7 @@ fn scene() -> Scene {
     scene.settings.structures[0].spin.stiffening = true;
     scene.settings.structures[0].spin.growth = true;
     scene.settings.structures[0].damping_ratio = Some(0.05);
-    // A round casing far enough away not to touch.
+    // A round casing with a clearance that excludes contact.
     scene.settings.surfaces[0].shape = Shape::Circular {};
     scene.settings.contacts[0].gap = 2e-3;
     scene
@@ -37,14 +37,14 @@ fn blade_stretch_follows_the_rotor_speed() {
     let start = leading_edge(&simulation);
     println!("start at 1800 rad/s: {:.3?} um, off by {:.1e}", start.map(|u| 1e6 * u), off(start));
     assert!(off(start) < 1e-3);
-    // It stays there: the static shape is an equilibrium of the step.
+    // It stays there: the static shape is an equilibrium of the steps.
     for _ in 0..100 {
         let time = simulation.time();
         simulation.do_step(time, 1e-5).unwrap();
     }
     assert!(off(leading_edge(&simulation)) < 1e-3);
 
-    // From 1300 rad/s, whose modes are then those of the step, up to 1800 rad/s: the same shape.
+    // Starting from 1300 rad/s, whose modes are then those of the steps, up to 1800 rad/s: the shape is the same.
     let mut simulation = Simulation::new(&scene).unwrap();
     let speed = simulation.table().find("speed").unwrap().reference;
     simulation.set_real(speed, 1300.0).unwrap();
@@ -61,7 +61,7 @@ fn blade_stretch_follows_the_rotor_speed() {
     let residual = simulation.system().ledger().residual(kinetic + strain) / simulation.system().ledger().scale();
     println!("ledger {residual:.1e}");
     assert!(residual.abs() < 1e-9);
-    // Beyond what the matrices were fitted for: refused, nothing lost.
+    // Speeds beyond the fitted range of the matrices are rejected without a change of the state.
     simulation.set_real(speed, 2500.0).unwrap();
     let time = simulation.time();
     let refusal = simulation.do_step(time, 1e-5).unwrap_err().to_string();

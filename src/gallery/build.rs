@@ -1,9 +1,9 @@
-//! A digest of the sources that decide what a built-in model is, so that a cached one is never that of other sources.
+//! Computes a digest of the sources that determine the built-in models, so that a cached model of other sources is never used.
 
 #[path = "../format/digest.rs"]
 mod digest;
 
-/// Sources of built-in models: the reduction, the types it fills, the file that holds them, the numerical libraries.
+/// Sources of built-in models: the reduction, its data types, the file format, and the numerical libraries.
 const SOURCES: [&str; 5] =
     ["../model/src", "../core/src/rom.rs", "../core/src/rom", "../format/src/rom_file", "../../Cargo.lock"];
 

@@ -1,4 +1,4 @@
-//! A synthetic table with every kind of variable, and a description around it.
+//! Synthetic table with every kind of variable, and a description with it.
 
 use nalgebra::DMatrix;
 use tiprub_core::rom::{DisplacementFrame, RomChecks};
@@ -25,7 +25,7 @@ pub static SCHEME: Enumeration = Enumeration {
     items: &[("central_difference", "Explicit <central> differences"), ("modal_exact", "Exact in free flight")],
 };
 
-/// A scalar output without a start value; the tests change what they need.
+/// Returns a scalar output without a start value; the tests change it as needed.
 fn variable(name: &str, kind: DataType, causality: Causality, variability: Variability) -> Variable {
     Variable {
         name: name.into(),

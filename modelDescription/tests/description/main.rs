@@ -1,4 +1,4 @@
-//! Model descriptions: of a synthetic table and of a real scene.
+//! Tests of model descriptions of a synthetic table and of a real scene.
 
 mod common;
 mod real_scene;

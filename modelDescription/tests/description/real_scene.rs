@@ -1,5 +1,5 @@
-//! Descriptions of a real scene: what they claim about outputs holds for the simulation, and the chapter on variables
-//! of the user guide lists what the table holds.
+//! Descriptions of a real scene: their statements about outputs agree with the simulation, and the chapter on variables in the user guide lists the
+//! variables of the table.
 
 use std::fs;
 use std::path::Path;
@@ -135,7 +135,7 @@ fn page_describes_grid_heat_and_spin() {
 fn default_has_at_most_fifty_scalars_and_the_time() {
     let count = |outputs: OutputSettings| {
         let mut scene = scene::rigid();
-        // Of a ROM without watched points, which add four outputs each.
+        // The ROM has no watched points, which would add four outputs each.
         scene.roms[0].extras.watched = None;
         scene.settings.surfaces[0].moving = false;
         scene.settings.outputs = outputs;
@@ -153,7 +153,7 @@ fn default_has_at_most_fifty_scalars_and_the_time() {
     assert_eq!(more(|outputs| outputs.nodal_diameters = Some(18)), 19);
 }
 
-/// Options without which the variable is not in the table.
+/// Returns the options without which the variable is not in the table.
 fn needs(name: &str) -> String {
     let has = |switch_off: fn(&mut Scene)| {
         let mut scene = scene::complete();
@@ -173,7 +173,7 @@ fn needs(name: &str) -> String {
     options.join(", ")
 }
 
-/// What a rigid casing alone has: the shape turns with an input.
+/// Returns the options for variables of rigid casings only: the shape turns with an input.
 fn rigid_needs(name: &str) -> String {
     let has = |change: fn(&mut Scene)| {
         let mut scene = scene::rigid();
@@ -187,7 +187,7 @@ fn rigid_needs(name: &str) -> String {
     options.collect::<Vec<_>>().join(", ")
 }
 
-/// Legal values, as the page inside an FMU has them.
+/// Returns the valid values in the form of the page inside an FMU.
 fn range(variable: &Variable) -> String {
     // Four digits are enough for limits that depend on the scene.
     let number = |value: f64| match value.abs() {
@@ -227,7 +227,7 @@ fn is_set(causality: Causality) -> bool {
     matches!(causality, Causality::Input | Causality::Parameter)
 }
 
-/// The variables of the complete scene, with what only a rigid casing has in its place.
+/// Returns the variables of the complete scene, and those of a rigid casing only.
 fn all_variables() -> Vec<Variable> {
     let rows = |scene: &Scene| Simulation::new(scene).unwrap().table().variables().to_vec();
     let mut all = rows(&scene::complete());

@@ -1,4 +1,4 @@
-//! A scene with every option on, small blades in a small flexible casing, and what each option is.
+//! Scene with every option on, small blades in a small flexible casing, and the list of options.
 
 use nalgebra::DMatrix;
 use tiprub_core::rom::{SUPPORT_ROWS, SupportRows, Thermal, ThermalPatch, WatchedPoints};
@@ -7,7 +7,7 @@ use tiprub_core::{Rom, Scene, VariableTable};
 use tiprub_model_description::{DefaultExperiment, Description};
 use tiprub_test_models as models;
 
-/// Every option on.
+/// Returns a scene with every option on.
 pub fn complete() -> Scene {
     let mut scene = rigid();
     scene.settings.time.tolerance = Some(1e-3);
@@ -47,7 +47,7 @@ pub fn complete() -> Scene {
     scene
 }
 
-/// A rigid casing, and every option on that this leaves.
+/// Returns a scene with a rigid casing and every option that it permits.
 pub fn rigid() -> Scene {
     let mut rom = models::blade(36);
     rom.extras.spin = Some(models::spin(rom.order()));
@@ -81,10 +81,10 @@ pub fn rigid() -> Scene {
     scene
 }
 
-/// An option as the user guide writes it, and a function that switches it off.
+/// Option in the words of the user guide, and a function that switches it off.
 pub type Switch = (&'static str, fn(&mut Scene));
 
-/// Every option that adds variables, in a scene with a flexible casing.
+/// All options that add variables, in a scene with a flexible casing.
 pub const OPTIONS: [Switch; 32] = [
     ("`tolerance`, or the scheme `galerkin`", |scene| scene.settings.time.tolerance = None),
     ("`motion = \"rotating\"`", |scene| {
@@ -114,7 +114,7 @@ pub const OPTIONS: [Switch; 32] = [
     ("`moving = true`", |scene| scene.settings.surfaces[0].moving = false),
     ("a shape other than `circular`", |scene| scene.settings.surfaces[0].shape = Shape::Circular {}),
     ("`friction` > 0", |scene| {
-        // Without friction there is no heat to share.
+        // Without friction there is no heat to distribute.
         (scene.settings.contacts[0].friction, scene.settings.contacts[0].slave_heat_fraction) = (0.0, None);
     }),
     ("`slave_heat_fraction`", |scene| scene.settings.contacts[0].slave_heat_fraction = None),
@@ -146,7 +146,7 @@ pub const OPTIONS: [Switch; 32] = [
     ("`slave_displacement = true`", |scene| scene.settings.outputs.slave_displacement = false),
 ];
 
-/// Options of which any one will do: the last word on variables that no single option switches off.
+/// Groups of options, each of which is sufficient, for variables that no single option switches off.
 pub const ALTERNATIVES: [Switch; 3] = [
     ("`patches` of the surface or `thermal = true`", |scene| {
         scene.settings.surfaces[0].patches = None;
@@ -164,7 +164,7 @@ pub const ALTERNATIVES: [Switch; 3] = [
     }),
 ];
 
-/// A description of the scene; what says nothing about variables is short.
+/// Returns a description of the scene; parts without influence on variables are short.
 pub fn description<'a>(table: &'a VariableTable, roms: &'a [Rom], fmi3_arrays: bool) -> Description<'a> {
     Description {
         model_name: "rotor_rub",

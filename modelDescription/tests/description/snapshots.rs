@@ -1,5 +1,5 @@
-//! The texts for a synthetic table against files in the repository: any change of the output shows as a change of
-//! these files. `UPDATE_SNAPSHOTS=1 cargo test` rewrites them.
+//! Compares the texts for a synthetic table with files in the repository: any change of the output appears as a change of these files.
+//! `UPDATE_SNAPSHOTS=1 cargo test` regenerates them.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What the standards demand of a model description, read back with an XML reader.
+//! Requirements of the standards on a model description, checked with an XML reader.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use tiprub_model_description::{LOG_CATEGORIES, fmi2_xml, fmi3_xml, html};
 
 use crate::common;
 
-/// An element as read: path of element names, attributes.
+/// Element as read: path of element names, attributes.
 type Read = (String, BTreeMap<String, String>);
 
 fn attributes(start: &BytesStart) -> BTreeMap<String, String> {
@@ -50,7 +50,7 @@ fn at<'a>(elements: &'a [Read], path: &str) -> Vec<&'a BTreeMap<String, String>>
     elements.iter().filter(|(found, _)| *found == path).map(|(_, attributes)| attributes).collect()
 }
 
-/// One description of each version and kind.
+/// Returns one description of each version and kind.
 fn all() -> [(&'static str, Vec<Read>); 3] {
     let (table, rom) = (common::table(), common::rom());
     [
@@ -160,7 +160,7 @@ fn the_model_structure_is_complete() {
     let numbers = |elements: &[Read], path: &str, key: &str| -> Vec<u32> {
         at(elements, path).iter().map(|unknown| unknown[key].parse().unwrap()).collect()
     };
-    // Indices of FMI 2.0 count from 1; references of this table from 0 without gaps, and time, at 0, is not listed.
+    // Indices of FMI 2.0 start at 1; references of this table start at 0 without gaps, and time, at 0, is not listed.
     for path in ["/ModelStructure/Outputs/Unknown", "/ModelStructure/InitialUnknowns/Unknown"] {
         assert_eq!(numbers(&two, path, "index"), elements);
     }

@@ -1,4 +1,4 @@
-//! Terminals: every member is a variable of the description, ports are whole, and a scene without any has no file.
+//! Terminals: every member is a variable of the description, ports are complete, and a scene without terminals has no file.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use tiprub_model_description::{fmi3_terminals, fmi3_xml};
 
 use crate::scene;
 
-/// Values of one attribute, in order.
+/// Returns the values of one attribute, in order.
 fn values<'a>(xml: &'a str, attribute: &str) -> Vec<&'a str> {
     let key = format!(" {attribute}=\"");
     xml.split(&key).skip(1).map(|rest| rest.split('"').next().unwrap()).collect()
@@ -41,7 +41,7 @@ fn terminal_members_exist_and_terminals_are_complete() {
     }
 }
 
-/// Patches of a surface are other places than those of the ROM, even where they are as many.
+/// Patches of a surface are at other places than those of the ROM, even if their numbers are equal.
 #[test]
 fn no_heat_terminal_for_surface_patches() {
     let complete = scene::complete();

@@ -1,7 +1,7 @@
 """Blade-tip/casing contact (rub) in a compressor or turbine stage, as an FMU.
 
-Every function runs a command of the program `tiprub`, which is installed with this module. SI units everywhere. Scenes are files,
-those that ship (`"builtin:rotor37"`), TOML text, or dicts of the same form. What goes wrong is an `Error`.
+Every function runs a command of the program `tiprub`, which is installed with this module. All values are in SI units. A scene is
+a file, a built-in scene (`"builtin:rotor37"`), TOML text, or a dict of the same form. Failures raise an `Error`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Result(pandas.DataFrame):
     """Outputs of a run over time: a pandas.DataFrame.
 
     The index is the time (s) of each communication point, the columns are the FMI 2.0 names of the outputs in the units of the
-    model description. `attrs` holds what `tiprub run --json` says: `model`, `extremes`, `warnings`, `seconds`,
+    model description. `attrs` contains the results of `tiprub run --json`: `model`, `extremes`, `warnings`, `seconds`,
     `internal_steps`, ... Parts of a result are plain DataFrames.
     """
 
@@ -63,7 +63,7 @@ def run(
     quiet: bool = False,
     **more: Any,
 ) -> Result:
-    """Run a scene, without FMI.
+    """Run a scene without FMI.
 
     Parameters
     ----------
@@ -77,24 +77,24 @@ def run(
         Start values of inputs and parameters by name, such as `{"speed": 1700.0}`. An array takes a number for all of its
         elements, or an array_like of shape (elements,).
     inputs : pandas.DataFrame, dict or path
-        Inputs and tunable parameters over time: columns by name, with `time` (s) as a column or as the index; or a CSV file. Linear between
-        the rows, and followed without delay.
+        Inputs and tunable parameters over time: columns by name, with `time` (s) as a column or as the index; or a CSV file. Values are
+        linear between the rows and are applied without delay.
     directory : path
-        Where ROM files are that a dict or text names without a place.
+        Directory of ROM files that a dict or text names with a relative path.
     quiet : bool
-        No progress on stderr; warnings are in the result.
+        Suppress progress on stderr; warnings are in the result.
     **more
         Other options of `tiprub run`: `estimate=True`, `no_cache=True`.
 
     Returns
     -------
     Result
-        A pandas.DataFrame with a row per communication point. Numbers are those of the program, to the last bit.
+        A pandas.DataFrame with a row per communication point. The numbers equal those of the program to the last bit.
 
     Raises
     ------
     Error
-        The scene, a start value or a keyword is refused, or the run fails.
+        The scene, a start value or a keyword is rejected, or the run fails.
     """
     with scene_file(scene, directory) as file, tempfile.TemporaryDirectory(prefix="tiprub-") as own:
         csv = Path(own) / "result.csv"
@@ -110,7 +110,7 @@ def run(
 
 
 def _history(inputs: Union[None, Place, pandas.DataFrame, Mapping[str, Any]], file: Path) -> Optional[Place]:
-    """The CSV file of inputs over time, written where they are a table."""
+    """Return the CSV file of inputs over time; a table is written to `file` first."""
     if inputs is None or isinstance(inputs, (str, os.PathLike)):
         return inputs
     table = pandas.DataFrame(inputs)
@@ -142,21 +142,21 @@ def package(
     fmi : {"both", 2, 3}
         FMI version.
     arrays, scalars : bool
-        FMI 3.0: arrays whole, or scalars however many there are. Without both, arrays where there would be more than 300 scalars.
+        FMI 3.0: keep whole arrays, or always use scalars. By default, arrays are used if there would be more than 300 scalars.
     platforms : str or iterable of str
-        Leave out all platforms but these, such as `["x86_64-windows"]`.
+        Include only these platforms, such as `["x86_64-windows"]`.
     **more
         Other options of `tiprub package`: `library=FILE_OR_DIRECTORY`, `no_cache=True`.
 
     Returns
     -------
     list of pathlib.Path
-        The files.
+        Paths of the FMUs.
 
     Raises
     ------
     Error
-        The scene is refused, there is no library, or files cannot be written.
+        The scene is rejected, there is no library, or files cannot be written.
     """
     asked = {"output": output, "fmi": fmi, "arrays": arrays, "scalars": scalars, "platform": platforms}
     with scene_file(scene, directory) as file:
@@ -165,30 +165,30 @@ def package(
 
 
 def reduce(kind: str, file: Optional[Place] = None, output: Optional[Place] = None, *, quiet: bool = False, **more: Any) -> Report:
-    """Make a reduced-order model (ROM) from a mesh, from matrices, or of what ships.
+    """Make a reduced-order model (ROM) from a mesh, from matrices, or of a built-in structure.
 
     Parameters
     ----------
     kind : str
         `"blade"`, `"sector"`, `"casing-mesh"`, `"casing"`, `"rotor37"`, ...: see `tiprub reduce --help`.
     file : path
-        The mesh, where the kind takes one.
+        Mesh file, if the kind accepts one.
     output : path
-        The ROM file, by default NAME.rom.safetensors.
+        ROM file, by default NAME.rom.safetensors.
     quiet : bool
-        No progress on stderr.
+        Suppress progress on stderr.
     **more
         Options of `tiprub reduce KIND`: `contact_set="TIP"`, `clamp_set=["A", "B"]`, `contact_patches=9`, `force=True`, ...
 
     Returns
     -------
     Report
-        What was made, with the checks of the ROM; its `path` is the file, and a dict scene takes it as `rom`.
+        Description of the ROM with its checks; its `path` is the file, and a dict scene accepts the report as `rom`.
 
     Raises
     ------
     Error
-        Wrong files or options, or a file that already exists (`force=True` replaces it).
+        Files or options are wrong, or the file already exists (`force=True` replaces it).
     """
     words = ["reduce", kind_of(kind), *options({"output": output}, more)]
     answer = call(words, [place("file", file)] if file is not None else [], quiet)
@@ -201,7 +201,7 @@ def inspect(path: Scene, *, directory: Place = ".", quiet: bool = True, **more: 
     Parameters
     ----------
     path : path, str or dict
-        An FMU, a ROM, or a scene as for `run`.
+        FMU, ROM, or scene as for `run`.
     directory, quiet
         As for `run`.
     **more
@@ -210,12 +210,12 @@ def inspect(path: Scene, *, directory: Place = ".", quiet: bool = True, **more: 
     Returns
     -------
     Report
-        A dict with `kind` and what `tiprub inspect --json` says; a table in notebooks.
+        A dict with `kind` and the results of `tiprub inspect --json`; a table in notebooks.
 
     Raises
     ------
     Error
-        The file is missing, of no known kind, damaged or refused.
+        The file is missing, of an unknown kind, damaged or rejected.
     """
     with scene_file(path, directory) as file:
         answer = call(["inspect", *options({}, more)], [file], quiet)
@@ -238,7 +238,7 @@ def study(
     Parameters
     ----------
     kind : {"stability", "convergence", "error", "map"}
-        The question.
+        Kind of study.
     scene, set, directory, quiet
         As for `run`.
     out : path
@@ -249,12 +249,12 @@ def study(
     Returns
     -------
     Report
-        What results.json holds; its `path` is the directory.
+        Content of results.json; its `path` is the directory.
 
     Raises
     ------
     Error
-        The scene is refused, a run fails, or files cannot be written.
+        The scene is rejected, a run fails, or files cannot be written.
     """
     kept = Path(place("keyword `out`", out) if out is not None else f"study-{kind_of(kind)}")
     with scene_file(scene, directory) as file:
@@ -268,11 +268,11 @@ def demo(out: Place = "demo", *, revolutions: Optional[float] = None, quiet: boo
     Parameters
     ----------
     out : path
-        Directory for everything; made if missing.
+        Directory for all files; created if missing.
     revolutions : float
         Revolutions to simulate, by default those of the scene.
     quiet : bool
-        No progress on stderr.
+        Suppress progress on stderr.
     **more
         Other options of `tiprub demo`: `library=FILE_OR_DIRECTORY`, `platform=[...]`.
 

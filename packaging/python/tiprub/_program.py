@@ -1,4 +1,4 @@
-"""Running the program `tiprub`, and what it answers."""
+"""Run the program `tiprub` and read its results."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ import numpy
 
 
 class Error(Exception):
-    """What tiprub refused or could not do, in the words of the command line.
+    """Failure of a command, with the message of the command line.
 
     Attributes
     ----------
     what : str
-        What the trouble is about: a file, an option, a scene field.
+        Subject of the problem: a file, an option, a scene field.
     problem : str
-        What is wrong with it.
+        The problem.
     remedy : str
-        What to do about it; empty where the problem already says so.
+        The remedy; empty if the problem already contains it.
     exit_code : int
-        1: the work failed; 2: what was asked for is wrong.
+        1: the work failed; 2: the request is wrong.
     """
 
     def __init__(self, what: str, problem: str, remedy: str = "", exit_code: int = 1) -> None:
@@ -45,14 +45,14 @@ class Error(Exception):
 
 
 class Report(dict):
-    """What a command answers: a dict, with the keys of `tiprub COMMAND --json`.
+    """Result of a command: a dict with the keys of `tiprub COMMAND --json`.
 
-    It stands for the file or directory that was written or looked at wherever Python takes a path, and in a scene's `rom`.
+    It can be used as the path of the file or directory that was written or read, wherever Python accepts a path, and as `rom` of a scene.
 
     Attributes
     ----------
     path : pathlib.Path or None
-        That file or directory; None for what ships.
+        That file or directory; None for built-in models and scenes.
     """
 
     def __init__(self, values: Mapping[str, Any], path: Optional[Path] = None) -> None:
@@ -74,12 +74,12 @@ class Report(dict):
         return title + as_html(self)
 
 
-#: Longer lists are cut in notebooks.
+#: Largest number of list items that notebooks show.
 MOST_SHOWN = 12
 
 
 def as_html(value: Any) -> str:
-    """Nested tables of what JSON holds."""
+    """Return JSON values as nested HTML tables."""
     if isinstance(value, dict):
         rows = (f"<tr><th style='text-align:left'>{html.escape(str(key))}</th>"
                 f"<td style='text-align:left'>{as_html(item)}</td></tr>" for key, item in value.items())
@@ -92,13 +92,13 @@ def as_html(value: Any) -> str:
 
 
 def program() -> str:
-    """The program: what TIPRUB names, else the one installed with this module, else the one on PATH."""
+    """Return the program: the one that TIPRUB names, else the one installed with this module, else the one on PATH."""
     named = os.environ.get("TIPRUB")
     if named:
         return named
     name = "tiprub.exe" if os.name == "nt" else "tiprub"
     user = sysconfig.get_path("scripts", f"{os.name}_user")
-    # The last is where `pip install --target` puts it.
+    # The last directory is that of `pip install --target`.
     for directory in [sysconfig.get_path("scripts"), user, Path(__file__).resolve().parents[1] / "bin"]:
         if (Path(directory) / name).is_file():
             return str(Path(directory) / name)
@@ -108,7 +108,7 @@ def program() -> str:
     return found
 
 
-#: Options that are no keywords: what to do instead.
+#: Options that are not available as keywords, with the alternatives.
 INSTEAD = {
     "csv": "The result is a pandas.DataFrame: write it with its `to_csv`",
     "help": "Call Python's help, such as help(tiprub.run), or `tiprub COMMAND --help`",
@@ -121,12 +121,12 @@ INSTEAD = {
 
 
 def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({})) -> list[str]:
-    """Keywords as options: `contact_nodes=3` is `--contact-nodes=3`, True an option alone, several values the option repeated.
+    """Convert keywords to options: `contact_nodes=3` is `--contact-nodes=3`, True gives an option without value, several values repeat it.
 
     Raises
     ------
     Error
-        A keyword of `more` that is also among the function's `own` options or is in `INSTEAD`, or a value of a wrong type.
+        A keyword of `more` is also among the function's `own` options or in `INSTEAD`, or a value has a wrong type.
     """
     for key in more:
         if key in own or key in INSTEAD:
@@ -146,26 +146,26 @@ def options(own: Mapping[str, Any], more: Mapping[str, Any] = MappingProxyType({
 
 
 def kind_of(kind: Any) -> str:
-    """The kind of a reduction or study, which is no option."""
+    """Check the kind of a reduction or study, which must not be an option."""
     if not isinstance(kind, str) or not kind or kind.startswith("-"):
         raise Error("kind", f"{kind!r} is none", "See `tiprub reduce --help` or `tiprub study --help`", 2)
     return kind
 
 
 def assignments(values: Optional[Mapping[str, Any]]) -> list[str]:
-    """Start values as options; an array as a list in brackets, whose length the program checks."""
+    """Convert start values to options; an array becomes a list in brackets, whose length the program checks."""
     if not isinstance(values, (Mapping, type(None))):
         raise Error("keyword `set`", f"is of type {type(values).__name__}", 'Give a dict of names and values, such as {"speed": 1700.0}', 2)
     return [f"--set={name}={start_value(f'keyword `set`, `{name}`', value)}" for name, value in (values or {}).items()]
 
 
 def start_value(what: str, value: Any) -> str:
-    """A number or word, or the numbers of an array of one dimension."""
+    """Convert a number, a word or a one-dimensional array to text."""
     try:
-        # Not asarray, which forgets masks.
+        # asarray would drop masks.
         array = numpy.asanyarray(value)
     except ValueError:
-        # Rows of several lengths.
+        # Rows of different lengths.
         array = numpy.empty((0, 0))
     if array.ndim == 0:
         return text(what, array.item())
@@ -175,7 +175,7 @@ def start_value(what: str, value: Any) -> str:
 
 
 def text(what: str, value: Any) -> str:
-    """A value as the command line and TOML take it; numbers keep their bits. `what` is named where it is none."""
+    """Convert a value to text for the command line and TOML; numbers keep their bits. Errors name `what`."""
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, (str, os.PathLike)):
         return place(what, value)
@@ -187,9 +187,9 @@ def text(what: str, value: Any) -> str:
 
 
 def place(what: str, value: Any) -> str:
-    """A path as text. `what` is named where it is none."""
+    """Convert a path to text. Errors name `what`."""
     if isinstance(value, (str, os.PathLike)):
-        # A report may stand for no file.
+        # A report may have no file.
         with contextlib.suppress(TypeError):
             return os.fsdecode(value)
     raise Error(what, f"is no path (type {type(value).__name__})", "Give the path of a file or directory", 2)
@@ -197,7 +197,7 @@ def place(what: str, value: Any) -> str:
 
 @contextlib.contextmanager
 def called(name: str, file: "os.PathLike[str]") -> Iterator[None]:
-    """Errors call the temporary file by the name that the user knows."""
+    """Replace the temporary file in errors by the name that the user knows."""
     try:
         yield
     except Error as error:
@@ -207,9 +207,9 @@ def called(name: str, file: "os.PathLike[str]") -> Iterator[None]:
 
 @contextlib.contextmanager
 def _interrupts_wait() -> Iterator[None]:
-    """Within it an interrupt (Ctrl-C) waits; it is raised on leaving.
+    """Delay an interrupt (Ctrl-C) until the end of the context.
 
-    `subprocess.Popen` loses the process that it has started when it is interrupted itself.
+    An interrupt within `subprocess.Popen` would lose the process that it has just started.
     """
     previous = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(previous):
@@ -226,17 +226,17 @@ def _interrupts_wait() -> Iterator[None]:
 
 
 def call(words: Iterable[str], files: Iterable[str] = (), quiet: bool = False) -> dict[str, Any]:
-    """Run a command; its JSON object.
+    """Run a command and return its JSON object.
 
-    Progress and warnings go to stderr, that of a notebook too; with `quiet` they go nowhere.
+    Progress and warnings are printed on stderr, also in a notebook; `quiet` suppresses them.
 
     Raises
     ------
     Error
-        What the command says it could not do.
+        The command failed.
     """
     command = [program(), "--json", *(["--quiet"] if quiet else []), *words, *(["--", *files] if files else [])]
-    # A terminal gets progress bars; a stream of Python's own, as in a notebook, gets lines.
+    # A terminal shows progress bars; a Python stream, as in a notebook, shows lines.
     inherited = sys.stderr is sys.__stderr__ and sys.stderr is not None
     stderr = subprocess.DEVNULL if quiet else None if inherited else subprocess.PIPE
     with tempfile.TemporaryFile() as answer:

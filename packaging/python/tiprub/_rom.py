@@ -1,4 +1,4 @@
-"""ROM files from NumPy arrays, without another package."""
+"""Write ROM files from NumPy arrays, without other packages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy
 
 from ._program import Error, call, called, place, text
 
-#: Entries of the file that are text; all else is an array.
+#: Entries of the file that are text; all others are arrays.
 ENTRIES = {"origin", "contact_names", "largest_speed", "contact_grid", "watched_names", "stress_names", "basis", "contact_rows",
            "rub_errors", "rub_errors_found_on", "units"}
 
@@ -33,14 +33,14 @@ def rom(
     check: bool = True,
     **more: Any,
 ) -> Path:
-    """Write the reduced-order model of a structure, from whatever program its matrices come.
+    """Write the reduced-order model of a structure from matrices of any program.
 
     With `n` reduced coordinates q of one sector: M q'' + D q' + K q = Cᵀ f and u = C q.
 
     Parameters
     ----------
     path : path
-        The file, by custom NAME.rom.safetensors. One that is there is replaced, unless the new one is refused.
+        ROM file, by convention NAME.rom.safetensors. An existing file is replaced, unless the new one is rejected.
     mass : array_like, shape (n, n), kg
         M: symmetric, positive definite.
     stiffness : array_like, shape (n, n), N/m
@@ -58,21 +58,21 @@ def rom(
     damping_ratio : float
         Modal damping ratio, from 0 to below 1.
     check : bool
-        Have the program read the file, so that what is wrong with it is said here, before anything is replaced.
+        Let the program check the file, so that errors are raised here, before an existing file is replaced.
     **more
-        Any other array or entry of the format, by its name: `contact_names=["le", "te"]`, `contact_grid=(24, 3)`,
-        `stiffness_speed2=K1`, ... Of coupled sectors, `mass_3`, `stiffness_3`, `contact_map_3` and so on are complex
+        Other arrays or entries of the format by name: `contact_names=["le", "te"]`, `contact_grid=(24, 3)`,
+        `stiffness_speed2=K1`, ... For coupled sectors, `mass_3`, `stiffness_3`, `contact_map_3` and so on are complex
         arrays of shapes (m, m), (m, m) and (nodes, 3, m).
 
     Returns
     -------
     pathlib.Path
-        The file.
+        Path of the ROM file.
 
     Raises
     ------
     Error
-        What the program refuses in it, what is no number or text, or a file that cannot be written.
+        The program rejects the file, a value is neither a number nor text, or the file cannot be written.
     """
     arrays = {"mass": mass, "stiffness": stiffness, "contact_map": contact_map, "contact_positions": contact_positions}
     arrays.update((key, item) for key, item in more.items() if key not in ENTRIES)
@@ -93,7 +93,7 @@ def rom(
         data.append(content.tobytes())
     head = json.dumps(header).encode()
     head += b" " * (-len(head) % 8)
-    # Beside it, under the same name: what is there stays as it is until the new one is right. Through a link to its file.
+    # Written beside the target under the same name, so that an existing file is unchanged until the new one is valid. Links are followed.
     try:
         file = Path(os.path.realpath(path))
         with tempfile.TemporaryDirectory(prefix=".tiprub-", dir=file.parent) as own:
@@ -110,19 +110,19 @@ def rom(
 
 
 def array(key: str, item: Any) -> numpy.ndarray:
-    """An array as the file holds it; complex ones have real and imaginary parts last."""
+    """Convert an array to the form of the file; the last axis of complex arrays holds real and imaginary parts."""
     found = numpy.asarray(item)
     if found.dtype.kind not in "biufc":
         raise TypeError(f"dtype {found.dtype}")
     coupled = re.fullmatch(r"(mass|stiffness|contact_map)_[0-9]+", key)
     if numpy.iscomplexobj(found) or (coupled and found.ndim == (3 if coupled[1] == "contact_map" else 2)):
         found = numpy.stack([found.real, found.imag], axis=-1)
-    # Not ascontiguousarray, which makes a vector of a number.
+    # ascontiguousarray would turn a number into a vector.
     return numpy.array(found, dtype="<f8", order="C")
 
 
 def entry(what: str, item: Any) -> str:
-    """Text of an entry; several words or numbers have commas between them."""
+    """Convert an entry to text; several words or numbers are separated by commas."""
     item = item.tolist() if hasattr(item, "tolist") else item
     found = ",".join(text(what, one) for one in item) if isinstance(item, (list, tuple)) else text(what, item)
     if not found:

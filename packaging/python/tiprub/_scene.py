@@ -1,4 +1,4 @@
-"""Scenes: files, those that ship, TOML text and dicts."""
+"""Scenes: files, built-in scenes, TOML text and dicts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BUILTIN = "builtin:"
 
 
 def rom_place(rom: Any, directory: Path) -> Any:
-    """A model as a scene in another directory names it; what is no name as it is."""
+    """Return the path of a model for a scene in another directory; values that are not paths stay unchanged."""
     if not isinstance(rom, (str, os.PathLike)):
         return rom
     name = place("scene: rom", rom)
@@ -31,7 +31,7 @@ def rom_place(rom: Any, directory: Path) -> Any:
 
 
 def value(where: str, item: Any) -> str:
-    """A value of a scene in one line of TOML; `where` is named if it can be none."""
+    """Convert a value of a scene to one line of TOML; errors name `where`."""
     if isinstance(item, Mapping):
         return "{ " + ", ".join(f"{quoted(str(key))} = {value(f'{where}.{key}', one)}" for key, one in item.items()) + " }"
     if isinstance(item, (str, os.PathLike)):
@@ -44,12 +44,12 @@ def value(where: str, item: Any) -> str:
 
 
 def quoted(string: str) -> str:
-    """A string of TOML: as in JSON, but for a character that JSON lets stand."""
+    """Quote a string for TOML: as in JSON, except for one character that JSON does not escape."""
     return json.dumps(string, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def toml(scene: Mapping[str, Any]) -> str:
-    """A scene as TOML: what has no table first, then a table or an array of tables for each other key."""
+    """Convert a scene to TOML: plain values first, then a table or an array of tables for each other key."""
     tables = {key: item for key, item in scene.items() if isinstance(item, Mapping)}
     arrays = {key: item for key, item in scene.items()
               if isinstance(item, (list, tuple)) and item and all(isinstance(one, Mapping) for one in item)}
@@ -62,19 +62,19 @@ def toml(scene: Mapping[str, Any]) -> str:
     return "".join(parts)
 
 
-#: Comments and strings of TOML, which alone can hold the signs of others. Before a string, `rom =` in a table or inline.
+#: Comments and strings of TOML, the only tokens that can contain the delimiters of others; a string may follow `rom =` in a table or inline.
 TOKEN = re.compile(r"""\#[^\n]*|(?P<key>(?<![\w.-])(?:"rom"|'rom'|rom)[ \t]*=[ \t]*)?"""
                    r"""(?P<string>\"{3}(?:\\.|[^\\])*?\"{3,5}|'{3}.*?'{3,5}|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')""", re.DOTALL)
 
 
 def placed(token: "re.Match[str]", directory: Path) -> str:
-    """A token of TOML as a scene in another directory has it, with as many lines."""
+    """Adapt a TOML token to a scene in another directory, with the same number of lines."""
     if token["key"] is None:
         return token[0]
     try:
         name = tomllib.loads(f"rom = {token['string']}")["rom"]
     except tomllib.TOMLDecodeError:
-        # The program says so, with the place.
+        # The program reports this error with its place.
         return token[0]
     found = quoted(rom_place(name, directory))
     lines = token["string"].count("\n")
@@ -82,7 +82,7 @@ def placed(token: "re.Match[str]", directory: Path) -> str:
 
 
 def as_text(scene: Union[str, Mapping[str, Any]], directory: Path) -> str:
-    """TOML of a scene that is no file; ROMs it names without a place are in `directory`."""
+    """Convert a scene that is not a file to TOML; relative paths of its ROMs refer to `directory`."""
     if isinstance(scene, str):
         return TOKEN.sub(lambda token: placed(token, directory), scene)
     def structure(one: Any) -> Any:
@@ -93,12 +93,12 @@ def as_text(scene: Union[str, Mapping[str, Any]], directory: Path) -> str:
 
 @contextlib.contextmanager
 def scene_file(scene: Scene, directory: Union[str, "os.PathLike[str]"] = ".") -> Iterator[str]:
-    """The scene as the command line takes it. What is no file is one for as long as it is needed, and is called `scene` in errors.
+    """Return the scene as a command-line argument. Other forms than files are written to a temporary file, which errors call `scene`.
 
     Raises
     ------
     Error
-        What is no scene of any form, or a value that no scene holds.
+        The scene has none of these forms, or contains an invalid value.
     """
     if isinstance(scene, os.PathLike) or (isinstance(scene, str) and "\n" not in scene):
         yield place("scene", scene)

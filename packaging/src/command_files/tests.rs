@@ -1,4 +1,4 @@
-//! Every file that a command reads is protected from every file that it writes. The arguments are those of clap's definition: a new one
+//! Tests that every file that a command reads is protected from every file that it writes. The arguments come from clap's definition: a new one
 //! fails here until it is listed, and a listed one until it is protected.
 
 use std::{any::TypeId, collections::BTreeSet, fs, path::PathBuf};
@@ -9,7 +9,7 @@ use tiprub_gallery::scene_source::ROTOR37_SCENE;
 use super::{STUDY_FILES, check};
 use crate::{cli::Cli, commands::demo};
 
-/// Command, argument that names what is read, and a command line in which `{}` is that file.
+/// Returns command, argument for an input file, and a command line in which `{}` is that file.
 fn read() -> Vec<(&'static str, &'static str, String)> {
     let sets = "--contact-set TIP --clamp-set ROOT";
     let sector = format!("{sets} --sectors 36 --cyclic-low LOW --cyclic-high HIGH");
@@ -52,8 +52,8 @@ fn matrices() -> [(&'static str, &'static str); 4] {
     ]
 }
 
-/// Command, argument that names what is written, words in which `{}` is the file or its directory, and a name that a file has there;
-/// none where the argument names the file itself.
+/// Returns command, argument for an output file, words in which `{}` is the file or its directory, and the name of the file in that directory;
+/// `None` if the argument names the file itself.
 fn written() -> Vec<(String, &'static str, &'static str, Option<String>)> {
     let fmu = Some("written_fmi2.fmu".to_owned());
     let mut all =
@@ -72,7 +72,7 @@ fn written() -> Vec<(String, &'static str, &'static str, Option<String>)> {
     all
 }
 
-/// Every argument of every command that names a file or a directory.
+/// Collects every argument of every command that names a file or a directory.
 fn defined(command: &clap::Command, path: &str, found: &mut BTreeSet<(String, String)>) {
     for below in command.get_subcommands().filter(|below| below.get_name() != "help") {
         let path = format!("{path} {}", below.get_name()).trim().to_owned();
@@ -104,13 +104,13 @@ fn answer(line: &str) -> Result<(), tiprub_shell::Failure> {
     check(&Cli::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}")).command)
 }
 
-/// A scene whose FMUs have the names that [`written`] says.
+/// Returns a scene whose FMUs have the names in [`written`].
 fn named_written() -> String {
     let name = tiprub_format::parse_scene(ROTOR37_SCENE, "built-in").unwrap().name;
     ROTOR37_SCENE.replacen(&format!("{name:?}"), "\"written\"", 1)
 }
 
-/// The file that is written is there, and what is read is a link to it.
+/// The output file exists, and the input is a link to it.
 #[test]
 #[cfg(unix)]
 fn no_command_overwrites_its_inputs() {

@@ -1,4 +1,4 @@
-//! `tiprub demo`: the whole road on a real blade, and a report of it.
+//! `tiprub demo`: all steps from the mesh to the results on a real blade, with a report.
 
 use std::{
     path::{Path, PathBuf},
@@ -34,23 +34,23 @@ use crate::{
     rom_facts::RomFacts,
 };
 
-/// Files the demo writes into its directory.
+/// Names of the files that the demo writes into its directory.
 const ROM_FILE: &str = "rotor37.rom.safetensors";
 const SCENE_FILE: &str = "rotor37.toml";
 const REPORT_FILE: &str = "report.html";
 const CSV_FILE: &str = "results.csv";
 
-/// All of them, and the FMUs.
+/// All files, including the FMUs.
 pub const FILES: [&str; 6] = [ROM_FILE, SCENE_FILE, REPORT_FILE, CSV_FILE, "rotor37_fmi2.fmu", "rotor37_fmi3.fmu"];
 
-/// Beyond it (bytes), a scene is none that a demo wrote.
+/// Largest size (bytes) of a scene file that a demo may have written.
 const LARGEST_SCENE: u64 = 1 << 20;
 
-/// Where the error study is that the demo does not run.
+/// Note about the error study, which the demo does not run.
 const STUDY: &str = "The report shows the error against run time of every method. To measure it on this machine (takes \
                      minutes), run\n  tiprub study error builtin:rotor37 --quick\n";
 
-/// Remedy for a scene in the directory that somebody changed.
+/// Remedy if the directory contains a scene that was changed.
 const KEEP: &str = "Choose another directory with --out, or move your file elsewhere";
 
 /// Wall times of the parts of the demo.
@@ -66,10 +66,10 @@ impl Stopwatch {
     }
 }
 
-/// Reduce, package, import, compare, report.
+/// Reduces, packages, imports and runs, compares, and writes the report.
 ///
 /// # Errors
-/// Any of the steps failed, or the runs do not agree bit for bit.
+/// A step failed, or the runs do not agree bit for bit.
 pub fn run(arguments: &DemoArguments, console: &Console) -> Result<CommandOutcome> {
     let directory = arguments.out.as_path();
     let scene_text = scene_text(arguments.revolutions)?;
@@ -112,19 +112,18 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<CommandOutcom
     demo.outcome()
 }
 
-/// The scene as text, over so many revolutions (the stop time of the scene that ships where `None`).
+/// Returns the scene as text over this number of revolutions (`None`: with the stop time of the built-in scene).
 fn scene_text(revolutions: Option<f64>) -> Result<String> {
     let settings = tiprub_format::parse_scene(ROTOR37_SCENE, SCENE_FILE)?;
     let speed = settings.structures.first().map_or(0.0, |structure| structure.speed.abs());
     let turn = std::f64::consts::TAU / speed;
     let step = settings.experiment.communication_step;
-    // Whole communication steps, so that every importer's last point is a regular one.
+    // Whole communication steps, so that the last point of every importer is a regular one.
     let stop = revolutions.map_or(settings.experiment.stop, |count| (count * turn / step).ceil() * step);
     Ok(rotor37_text(ROM_FILE, stop))
 }
 
-/// Refuse to lose a scene that the user changed. One that an earlier demo wrote, for whatever number of revolutions, is
-/// nobody's work.
+/// Rejects the replacement of a scene that the user changed. A scene that an earlier demo wrote, for any number of revolutions, may be replaced.
 fn keep_changed_scene(path: &Path, text: &str) -> Result<()> {
     let present = tiprub_format::read_file(path, LARGEST_SCENE).ok().and_then(|bytes| String::from_utf8(bytes).ok());
     let present = present.unwrap_or_default();
@@ -135,7 +134,7 @@ fn keep_changed_scene(path: &Path, text: &str) -> Result<()> {
     output_file::refuse_to_replace(path, text, KEEP)
 }
 
-/// The ROM and the scene, as files a user can go on with; returns the scene as read back from them.
+/// Writes the ROM and the scene as files for further use; returns the scene as read back from them.
 fn write_inputs(directory: &Path, reduction: &Reduction, scene_text: &str) -> Result<Scene> {
     let rom = tiprub_format::write_rom(&reduction.rom);
     output_file::write(&directory.join(ROM_FILE), rom)?;
@@ -155,7 +154,7 @@ fn import(path: &Path, label: &str, schedule: &Schedule, console: &Console) -> R
     fmu.simulate(schedule, &|done| task.at(done as u64)).map_err(in_file)
 }
 
-/// Everything the demo found out.
+/// All results of the demo.
 struct Demo<'a> {
     directory: &'a Path,
     scene: Scene,
@@ -169,7 +168,7 @@ struct Demo<'a> {
     durations: Vec<(String, f64)>,
 }
 
-/// The scene that ships with the paper's model and method, run as the demo runs its own.
+/// Built-in scene with the paper's model and method, run in the same way as the scene of the demo.
 struct Paper {
     scene: Scene,
     run: NativeRun,
@@ -221,7 +220,7 @@ impl Demo<'_> {
         .to_vec()
     }
 
-    /// The result, or a failure if an FMU and the native run differ in any bit (the report is written either way).
+    /// Returns the result, or a failure if an FMU and the native run differ in any bit (the report is written in both cases).
     fn outcome(&self) -> Result<CommandOutcome> {
         if let Some(run) = self.imported.iter().find(|run| !run.agreement.is_exact()) {
             let (name, time) = run.agreement.first.clone().unwrap_or_default();

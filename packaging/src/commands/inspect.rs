@@ -1,4 +1,4 @@
-//! `tiprub inspect`: what is in a file, and whether it is sound.
+//! `tiprub inspect`: content of a file, and its validity.
 
 use std::{
     fmt::Write as _,
@@ -24,7 +24,7 @@ use tiprub_study::stability::structure::KnownContact;
 
 use crate::{cli::InspectArguments, left_out, rom_facts::RomFacts, scene_features};
 
-/// Kinds of files, told apart by name and, where that does not help, by their first bytes.
+/// Kinds of files, distinguished by name, or else by their first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FileKind {
     Fmu,
@@ -32,10 +32,10 @@ enum FileKind {
     Scene,
 }
 
-/// Inspect the file.
+/// Inspects the file.
 ///
 /// # Errors
-/// The file is missing, of no known kind, or damaged.
+/// The file is missing, of an unknown kind, or damaged.
 pub fn run(arguments: &InspectArguments, console: &Console) -> Result<CommandOutcome> {
     let path = arguments.file.as_path();
     match kind(path)? {
@@ -73,7 +73,7 @@ fn kind(path: &Path) -> Result<FileKind> {
         Some("safetensors") => Ok(FileKind::Rom),
         Some("toml") => Ok(FileKind::Scene),
         _ if start.starts_with(b"PK") => Ok(FileKind::Fmu),
-        // safetensors: length of the header (8 bytes), then its JSON.
+        // safetensors: the length of the header (8 bytes), then its JSON.
         _ if start.len() == 9 && start[8] == b'{' => Ok(FileKind::Rom),
         _ => Err(Failure::usage(
             path.display(),
@@ -138,7 +138,7 @@ fn inspect_fmu(path: &Path, measure: bool, console: &Console) -> Result<CommandO
     Ok(CommandOutcome { text, warnings, json, ..CommandOutcome::default() })
 }
 
-/// The scene inside a tiprub FMU, checked against the token; `None` for FMUs of other tools.
+/// Reads the scene inside a tiprub FMU and checks it against the token; `None` for FMUs of other tools.
 fn inspect_resources(fmu: &UnpackedFmu, measure: bool, console: &Console) -> Result<Option<Described>> {
     let directory: PathBuf = fmu.resources();
     if !directory.join(tiprub_format::SCENE_FILE).is_file() {
@@ -165,7 +165,7 @@ struct Described {
 fn describe_scene(scene: &Scene, measure: bool, console: &Console) -> Result<Described> {
     let settings = &scene.settings;
     let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
-    // Of many coupled sectors it takes long.
+    // This takes long for many coupled sectors.
     let task = console.task(&format!("Checking limits of {}", settings.name), None);
     let mut simulation = Simulation::new(scene).map_err(in_scene)?;
     simulation.initialise(settings.experiment.start).map_err(in_scene)?;
@@ -234,7 +234,7 @@ fn scene_text(settings: &SceneSettings) -> String {
     let colon = if settings.description.is_empty() { "" } else { ": " };
     let mut text = format!("scene {}{colon}{}\n", settings.name, settings.description);
     settings.structures.iter().for_each(|structure| text.push_str(&structure_text(structure)));
-    // Gaps and surfaces of what flies freely are in the ROMs.
+    // The ROMs of free bodies contain gaps and surfaces.
     let flies = |contact: &ContactSettings| {
         settings.master_of(contact).is_some_and(|structure| structure.motion == BodyMotion::Free)
     };

@@ -1,4 +1,4 @@
-//! One module per command; each turns its arguments into an [`CommandOutcome`] or a [`Failure`].
+//! One module per command; each converts its arguments to a [`CommandOutcome`] or a [`Failure`].
 
 pub mod demo;
 pub mod inspect;
@@ -17,11 +17,10 @@ use tiprub_shell::{
 
 use crate::{cli::Command, command_files};
 
-/// Run the command. Nothing is written, and no long work begins, where the command line alone shows that an output would replace
-/// an input or another output.
+/// Runs the command. Before any output or long work, it checks that no output would replace an input or another output.
 ///
 /// # Errors
-/// What the command could not do. A defect of this program is one of them.
+/// The failure of the command. A panic of the program is also returned as a failure.
 pub fn run(command: &Command, console: &Console) -> Result<CommandOutcome> {
     walled(|| {
         command_files::check(command)?;
@@ -37,7 +36,7 @@ pub fn run(command: &Command, console: &Console) -> Result<CommandOutcome> {
     })
 }
 
-/// A panic ends in a failure like any other; where it began has been said on stderr.
+/// Converts a panic to a failure; its location was already printed on stderr.
 fn walled(work: impl FnOnce() -> Result<CommandOutcome>) -> Result<CommandOutcome> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());

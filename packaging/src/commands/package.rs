@@ -1,4 +1,4 @@
-//! `tiprub package`: from a scene to .fmu files.
+//! `tiprub package`: writes .fmu files for a scene.
 
 use std::path::{Path, PathBuf};
 
@@ -15,12 +15,12 @@ use crate::{
     library::{self, LibraryUnit},
 };
 
-/// Load the scene, find the library, zip.
+/// Loads the scene, finds the library, and writes the archives.
 ///
 /// # Errors
-/// A wrong scene, no library, or files that cannot be written.
+/// The scene is wrong, there is no library, or files cannot be written.
 pub fn run(arguments: &PackageArguments, console: &Console) -> Result<CommandOutcome> {
-    // What is wrong with the command line is said before any work; a library that has to be built waits for a scene that is right.
+    // Problems of the command line are reported before any work; a library is built only after the scene was accepted.
     targets(arguments.fmi, &arguments.output, "model")?;
     let given = !arguments.libraries.library.is_empty();
     let libraries = given.then(|| library::load(LibraryUnit::Scene, &arguments.libraries, console)).transpose()?;
@@ -60,7 +60,7 @@ pub(crate) fn size(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |metadata| metadata.len())
 }
 
-/// Which files to write: NAME_fmi2.fmu and NAME_fmi3.fmu in a directory, or one file as named.
+/// Returns the files to write: NAME_fmi2.fmu and NAME_fmi3.fmu in a directory, or one named file.
 pub(crate) fn targets(fmi: FmiChoice, output: &Path, name: &str) -> Result<Vec<(FmiVersion, PathBuf)>> {
     let versions = match fmi {
         FmiChoice::Two => vec![FmiVersion::Two],

@@ -1,4 +1,4 @@
-//! `tiprub reduce`: from a blade or a casing to a ROM file, with its checks.
+//! `tiprub reduce`: writes a ROM file for a blade or a casing, with its checks.
 
 use std::{fmt::Write as _, path::Path, time::Instant};
 
@@ -31,12 +31,12 @@ use crate::{
     user_mesh,
 };
 
-/// Reduce, check, write.
+/// Reduces, checks and writes.
 ///
 /// # Errors
-/// Counts that do not fit the mesh, wrong files, or files that cannot be written.
+/// Counts do not fit the mesh, input files are wrong, or files cannot be written.
 pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<CommandOutcome> {
-    // What would fail after the work is said before it.
+    // Problems that would appear after the work are reported before it.
     let written = arguments.model.written();
     let output =
         &written.output.clone().unwrap_or_else(|| format!("{}.rom.safetensors", arguments.model.name()).into());
@@ -72,7 +72,7 @@ pub fn run(arguments: &ReduceArguments, console: &Console) -> Result<CommandOutc
     Ok(CommandOutcome { text, json, ..CommandOutcome::default() })
 }
 
-/// Refuse a model that is rarely meant, unless it `is_meant`: its slips are warnings then.
+/// Rejects a model with implausible values, unless it `is_meant`: its slips are warnings then.
 fn check_slips(reduced: &ReducedModel, facts: &RomFacts, is_meant: bool) -> Result<Vec<Warning>> {
     let slips = [reduced.slips.clone(), facts.slips()].concat();
     match slips.first().filter(|_| !is_meant) {
@@ -84,10 +84,10 @@ fn check_slips(reduced: &ReducedModel, facts: &RomFacts, is_meant: bool) -> Resu
     }
 }
 
-/// Whether a file can be written there, and replaces none without being told to. Devices and pipes take whatever comes.
+/// Checks that a file can be written, and that it replaces another one only if requested. Devices and pipes are always accepted.
 ///
 /// # Errors
-/// It is there already, or cannot be written.
+/// The file already exists, or cannot be written.
 pub fn check_target(path: &Path, force: bool) -> Result<()> {
     if path.is_file() && !force {
         let remedy = "Choose another file, or replace it with --force";
@@ -100,7 +100,7 @@ pub fn check_target(path: &Path, force: bool) -> Result<()> {
     output_file::try_directory(directory.unwrap_or(Path::new(".")))
 }
 
-/// For people.
+/// Formats the result for the terminal.
 fn text(reduced: &ReducedModel, facts: &RomFacts, paths: &[&Path]) -> String {
     let elements = reduced.mesh.as_ref().map(|(mesh, _)| format!(" {} elements,", mesh.elements.len()));
     let read = &reduced.read.0;
@@ -130,7 +130,7 @@ fn text(reduced: &ReducedModel, facts: &RomFacts, paths: &[&Path]) -> String {
     text
 }
 
-/// For programs.
+/// Returns the result as JSON.
 fn json(
     reduced: &ReducedModel,
     facts: &RomFacts,
@@ -187,7 +187,7 @@ fn casing(arguments: &CasingArguments, console: &Console) -> Result<ReducedModel
     Ok(ReducedModel::general(reduction::casing(&options, console)?, clamped))
 }
 
-/// The bladed disk that ships.
+/// Reduces the built-in bladed disk.
 fn stage(arguments: &StageArguments, console: &Console) -> Result<ReducedModel> {
     let (name, options) = arguments.options();
     let sector = sector_mesh(&options.sector).map_err(|error| reduction::failure("stage", error))?;
@@ -197,7 +197,7 @@ fn stage(arguments: &StageArguments, console: &Console) -> Result<ReducedModel> 
     Ok(ReducedModel::cyclic(reduced, mesh, nodes, Some("CLAMPED"), ["CYCLIC_LOW", "CYCLIC_HIGH"]))
 }
 
-/// The casing around it.
+/// Reduces the casing around it.
 fn stage_casing(arguments: &StageCasingArguments, console: &Console) -> Result<ReducedModel> {
     let mut options = builtin::stage_casing(arguments.coarse);
     options.contact = arguments.contact_grid.unwrap_or(options.contact);
@@ -217,10 +217,10 @@ fn rotor37(options: &Rotor37Options, console: &Console) -> Result<ReducedModel> 
     Ok(ReducedModel { warnings: narrow.into_iter().chain(narrow_rows).collect(), ..reduced })
 }
 
-/// Share (%) by which frequencies or growth at speed may be off without a warning.
+/// Largest deviation (%) of frequencies or growth at speed without a warning.
 const SPIN_DEVIATION: f64 = 1.0;
 
-/// A fit that does not follow the full model over its range of speed.
+/// Returns a warning about a fit that does not follow the full model over its range of speed.
 fn spin_warning(checks: &[tiprub_model::spin::SpinCheck]) -> Option<String> {
     let worst = |check: &tiprub_model::spin::SpinCheck| {
         let frequencies = check.frequency_deviation().into_iter().fold(0.0, |worst: f64, value| worst.max(value.abs()));

@@ -1,4 +1,4 @@
-//! `tiprub run`: a scene without FMI, one row per communication point.
+//! `tiprub run`: runs a scene without FMI, with one row of results per communication point.
 
 use std::{path::Path, time::Instant};
 
@@ -22,7 +22,7 @@ use tiprub_study::estimate::{self, Estimate};
 
 use crate::{answer, cli::RunArguments, scene_features};
 
-/// Largest gap or depth of a closed contact with adaptive steps (m); 0 with fixed steps.
+/// Returns the largest gap or penetration of a closed contact with adaptive steps (m); 0 with fixed steps.
 fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
     if settings.time.scheme != Scheme::Galerkin {
         return 0.0;
@@ -33,10 +33,10 @@ fn allowed_error(settings: &SceneSettings, set: &[(String, String)]) -> f64 {
     if smallest.is_finite() { given.or(settings.time.tolerance).unwrap_or(TOLERANCE) * smallest } else { 0.0 }
 }
 
-/// Load, run, write the CSV, sum up.
+/// Loads and runs the scene, writes the CSV, and summarises.
 ///
 /// # Errors
-/// A wrong scene or option, a refused or diverged simulation, a file that cannot be written.
+/// The scene or an option is wrong, the simulation is rejected or diverges, or a file cannot be written.
 pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome> {
     let to_stdout = arguments.csv.as_deref() == Some(Path::new("-"));
     if to_stdout && console.is_json() {
@@ -51,7 +51,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         let task = console.task(&format!("Running {}", scene.settings.name), Some(schedule.count as u64));
         let given = RunInputs { settings: &arguments.set, history: history.as_ref() };
         let run = native::run(&scene, &schedule, given, &|done| task.at(done as u64));
-        // The step of the file, unless the command line has another.
+        // The message refers to the step in the file, unless the command line sets another one.
         let is_set = arguments.step.is_some() || arguments.set.iter().any(|(name, _)| name == "internal_step_max");
         run.map_err(|failure| if is_set { failure } else { scene_source::located(&arguments.scene, failure) })?
     };
@@ -70,7 +70,7 @@ pub fn run(arguments: &RunArguments, console: &Console) -> Result<CommandOutcome
         .map(|(name, value)| (name.clone(), json!(value)))
         .collect();
     let extremes = extremes(&run.recording);
-    // A parameter of the command line replaces what the scene has.
+    // A parameter on the command line replaces that of the scene.
     let is_set = arguments.set.iter().any(|(name, _)| name == "scheme");
     let scheme = if is_set { "set on the command line".to_owned() } else { scene_features::scheme(&scene.settings) };
     let answer = answer::lines(&run.recording, allowed_error(&scene.settings, &arguments.set));
@@ -157,7 +157,7 @@ fn lines(estimates: &[Estimate]) -> String {
     format!("\n{}{}", estimate::errors_text(estimates), why.collect::<String>())
 }
 
-/// Longer arrays are told by their range.
+/// Longest array that is listed; longer ones are shown by their range.
 const MOST_LISTED: usize = 12;
 
 /// Returns the most useful results, which come last, near the prompt: extremes, warnings, files.
@@ -201,7 +201,7 @@ fn summary(json: &Value, extremes: &[Extreme], warnings: &[Warning]) -> String {
     text
 }
 
-/// All outputs at the end of the run.
+/// Formats all outputs at the end of the run.
 fn outputs(names: &[String], last: &[f64]) -> String {
     let mut text = "values at the end:\n".to_owned();
     let width = names.iter().map(String::len).max().unwrap_or(0);

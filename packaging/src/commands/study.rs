@@ -1,4 +1,4 @@
-//! `tiprub study`: a question about a scene, answered with pictures and numbers.
+//! `tiprub study`: answers a question about a scene with pictures and numbers.
 
 use std::path::PathBuf;
 
@@ -21,10 +21,10 @@ use crate::{
     user_mesh::BladeSource,
 };
 
-/// Study, write, sum up.
+/// Runs the study, writes its files, and summarises.
 ///
 /// # Errors
-/// A run that fails, or files that cannot be written.
+/// A run fails, or files cannot be written.
 pub fn run(arguments: &StudyArguments, console: &Console) -> Result<CommandOutcome> {
     type Work<'a> = Box<dyn Fn(&Console) -> Result<Study> + 'a>;
     let (name, common, work): (_, _, Work) = match &arguments.study {
@@ -45,7 +45,7 @@ pub fn run(arguments: &StudyArguments, console: &Console) -> Result<CommandOutco
     output::write(&work(console)?, &directory)
 }
 
-/// The study that may also write a ROM.
+/// Runs the convergence study, which may also write a ROM.
 fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOutcome> {
     let given = own.from.is_given()?;
     let directory = directory("convergence", &own.study.common);
@@ -76,7 +76,7 @@ fn convergence(own: &ConvergenceCommand, console: &Console) -> Result<CommandOut
     Ok(outcome)
 }
 
-/// Where everything goes.
+/// Returns the directory for all files.
 pub fn directory(name: &str, common: &StudyCommon) -> PathBuf {
     common.out.clone().unwrap_or_else(|| PathBuf::from(format!("study-{name}")))
 }

@@ -1,4 +1,4 @@
-//! `tiprub thermal`: from a casing to the .fmu of its heat conduction.
+//! `tiprub thermal`: writes the .fmu of the heat conduction of a casing.
 
 use std::fmt::Write as _;
 
@@ -22,10 +22,10 @@ use crate::{
     user_mesh,
 };
 
-/// Reduce, check, find the library, zip.
+/// Reduces, checks, finds the library, and writes the archives.
 ///
 /// # Errors
-/// A casing or a mesh that cannot be, no library, or files that cannot be written.
+/// The casing or the mesh is invalid, there is no library, or files cannot be written.
 pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<CommandOutcome> {
     let casing = arguments.ring.options();
     let name = arguments.name();
@@ -86,7 +86,7 @@ pub fn run(arguments: &ThermalArguments, console: &Console) -> Result<CommandOut
     Ok(CommandOutcome { text, json, ..CommandOutcome::default() })
 }
 
-/// For people.
+/// Formats the facts for the terminal.
 fn facts(reduced: &ConductionReduction) -> String {
     let ConductionReduction { model, counts: [nodes, elements], areas: [gas, air, heated], time_constants, checks } =
         reduced;
@@ -113,7 +113,7 @@ fn facts(reduced: &ConductionReduction) -> String {
     text
 }
 
-/// For programs.
+/// Returns the facts as JSON.
 fn facts_json(reduced: &ConductionReduction) -> serde_json::Value {
     let model = &reduced.model;
     json!({

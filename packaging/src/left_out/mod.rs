@@ -1,4 +1,4 @@
-//! What a scene leaves out, what it would take, and what that would cost here.
+//! Effects that a scene leaves out, their requirements, and their cost in this scene.
 
 mod table;
 
@@ -13,36 +13,36 @@ use tiprub_shell::{
 
 pub use table::{EFFECTS, Effect, RowGroup};
 
-/// Communication steps whose time is measured.
+/// Number of communication steps whose time is measured.
 const MEASURED_STEPS: usize = 100;
 
 /// Cost that an effect adds to a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
-    /// Variables, as scalars.
+    /// Number of variables, as scalars.
     pub variables: i64,
-    /// Bytes of scene and models in the FMU.
+    /// Bytes of the scene and models in the FMU.
     pub bytes: i64,
     /// Bytes of a saved state.
     pub state: i64,
-    /// Time of a communication step relative to the scene without it, where it was measured.
+    /// Time of a communication step relative to the scene without the effect, if it was measured.
     pub time: Option<f64>,
 }
 
-/// One effect that a scene leaves out.
+/// Effect that a scene leaves out.
 pub struct LeftOut {
-    /// Which one.
+    /// The effect.
     pub effect: &'static Effect,
-    /// Cost, or why this scene cannot have the effect as it stands; `None` if keys alone are not enough.
+    /// Cost, or the reason why this scene cannot have the effect; `None` if keys alone are not enough.
     pub cost: Option<Result<Cost, FeatureRefusal>>,
 }
 
-/// Why a scene cannot have an effect.
+/// Reason why a scene cannot have an effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FeatureRefusal {
-    /// The rule that excludes it; with adaptive steps also what excludes it with fixed ones.
+    /// Rule that excludes it; for a scene with adaptive steps, also the rule that excludes it with fixed steps.
     pub reason: String,
-    /// Whether the rules allow it in the same scene with fixed steps, whose length is not judged.
+    /// True if the rules permit it in the same scene with fixed steps, whose length is not checked.
     pub allowed_with_fixed_steps: bool,
 }
 
@@ -54,10 +54,10 @@ struct SceneSizes {
     seconds: Option<f64>,
 }
 
-/// Everything that a scene leaves out; `measure` also runs it with each effect for the time that takes.
+/// Returns all effects that a scene leaves out; with `measure`, the scene also runs with each effect to measure the time.
 ///
 /// # Errors
-/// The scene is refused.
+/// The scene is rejected.
 pub fn left_out(scene: &Scene, measure: bool) -> tiprub_core::Result<Vec<LeftOut>> {
     let own = sizes(scene, measure)?;
     let absent = EFFECTS.iter().filter(|effect| (effect.concerns)(scene) && !(effect.has)(scene));
@@ -78,7 +78,7 @@ fn cost(scene: &Scene, with: fn(&mut Scene), own: &SceneSizes, measure: bool) ->
     })
 }
 
-/// Why a scene is rejected. The rules are also asked about one with adaptive steps if it had fixed ones.
+/// Returns the reason why a scene is rejected. For a scene with adaptive steps, the rules are also checked with fixed steps.
 fn refusal(mut scene: Scene, error: Error) -> FeatureRefusal {
     let mut reason = reason_of(error);
     let time = &mut scene.settings.time;
@@ -113,7 +113,7 @@ fn sizes(scene: &Scene, measure: bool) -> tiprub_core::Result<SceneSizes> {
     })
 }
 
-/// Time of the first communication steps (s), the shorter of two runs.
+/// Returns the time of the first communication steps (s), the shorter of two runs.
 fn seconds(scene: &Scene) -> Option<f64> {
     let mut schedule = Schedule::new(&scene.settings.experiment, None, None).ok()?;
     schedule.count = schedule.count.min(MEASURED_STEPS);
@@ -121,7 +121,7 @@ fn seconds(scene: &Scene) -> Option<f64> {
     Some(run()?.min(run()?))
 }
 
-/// The list as text.
+/// Formats the list as text.
 pub fn text(all: &[LeftOut]) -> String {
     let mut text = String::new();
     let groups = [(RowGroup::Physics, "effects left out here"), (RowGroup::Machinery, "features that are off")];
@@ -152,7 +152,7 @@ fn cost_text(cost: Option<&Result<Cost, FeatureRefusal>>) -> String {
     }
 }
 
-/// The list for programs.
+/// Returns the list as JSON.
 pub fn json(all: &[LeftOut]) -> Value {
     let one = |LeftOut { effect, cost }: &LeftOut| {
         let group = if effect.group == RowGroup::Physics { "physics" } else { "machinery" };
@@ -170,7 +170,7 @@ pub fn json(all: &[LeftOut]) -> Value {
     all.iter().map(one).collect()
 }
 
-/// The table of the guide.
+/// Returns the table of the guide.
 pub fn markdown() -> String {
     let mut text = String::new();
     for (group, title) in [(RowGroup::Physics, "effect"), (RowGroup::Machinery, "feature")] {
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
     use tiprub_test_models::{blade, round, rub};
 
-    /// The guide prints this table; `UPDATE_SNAPSHOTS=1` writes it anew.
+    /// The guide contains this table; `UPDATE_SNAPSHOTS=1` regenerates it.
     #[test]
     fn guide_contains_the_generated_table() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/left-out.md");
@@ -223,7 +223,7 @@ mod tests {
         let scene = round(blade(4));
         let all = left_out(&scene, false).unwrap();
         let of = |name: &str| all.iter().find(|one| one.effect.name == name);
-        // Two inputs for the displacement of the centre, two moments, and its work.
+        // Two inputs for the displacement of the centre, two moments, and the work of the whirl.
         let whirl = of("whirl of the shaft").unwrap().cost.as_ref().unwrap().as_ref().unwrap();
         assert!(whirl.variables >= 4 && whirl.bytes > 0 && whirl.state > 0, "{whirl:?}");
         let spin = of("centrifugal stiffening").unwrap().cost.as_ref().unwrap().as_ref().unwrap_err();

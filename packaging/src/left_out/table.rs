@@ -1,4 +1,4 @@
-//! Every physical effect and every part of the machinery, in one table: for `tiprub inspect`, and for the guide.
+//! Table of all physical effects and features of the machinery, for `tiprub inspect` and for the guide.
 
 use tiprub_core::{
     Rom, Scene,
@@ -11,13 +11,13 @@ use tiprub_core::{
 /// Topic of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowGroup {
-    /// A physical effect.
+    /// Physical effect.
     Physics,
-    /// A part of the machinery.
+    /// Feature of the machinery.
     Machinery,
 }
 
-/// Something that a scene has or leaves out.
+/// Effect or feature that a scene has or leaves out.
 pub struct Effect {
     /// Name of the effect.
     pub name: &'static str,
@@ -25,11 +25,11 @@ pub struct Effect {
     pub group: RowGroup,
     /// Keys or models that the effect needs.
     pub takes: &'static str,
-    /// Whether it means anything for a scene.
+    /// Function that returns whether the effect is meaningful for a scene.
     pub concerns: fn(&Scene) -> bool,
-    /// Whether the scene has it; no scene has what is not supported.
+    /// Function that returns whether the scene has it; always false if it is not supported.
     pub has: fn(&Scene) -> bool,
-    /// The scene with it, where keys alone do it.
+    /// Function that adds the effect to a scene, if keys alone can do so.
     pub with: Option<fn(&mut Scene)>,
 }
 
@@ -103,7 +103,7 @@ impl Effect {
     }
 }
 
-/// All of them.
+/// All effects.
 pub static EFFECTS: &[Effect] = &[
     physics("friction", "`contact.friction`", always, |scene| contact(scene, |one| one.friction > 0.0)),
     physics("sticking friction", "`contact.solver = \"coulomb\"`", always, |scene| {

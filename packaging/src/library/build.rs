@@ -1,4 +1,4 @@
-//! Libraries built from the sources of this program.
+//! Builds libraries from the sources of this program.
 
 use std::{
     collections::VecDeque,
@@ -16,17 +16,17 @@ use tiprub_shell::{Failure, Result, console::Console, output_file};
 
 use super::{LARGEST, LibraryUnit, holds, is_library};
 
-/// Lines of cargo's stderr kept for the error message.
+/// Number of lines of cargo's stderr for the error message.
 const LINES_KEPT: usize = 30;
 
-/// Where a library of these sources for this platform is kept between two commands.
+/// Returns the path at which a library of these sources for this platform is cached.
 pub(super) fn kept(unit: LibraryUnit, directory: &Path) -> Option<PathBuf> {
     let name = format!("{}{}", unit.prefix(), Platform::here()?.file_name());
     let sources = LIBRARY_RELEASE.strip_prefix(LIBRARY_MARK)?.replace(", ", "-").replace(' ', "-");
     Some(directory.join("libraries").join(sources).join(name))
 }
 
-/// Build the library of a program that cargo installed, in a directory that goes afterwards, and keep it for the next command.
+/// Builds the library for a program that cargo installed, in a temporary directory, and caches it for the next command.
 pub(super) fn build_once(
     unit: LibraryUnit,
     workspace: &Path,
@@ -62,12 +62,12 @@ pub(super) fn build_once(
     }
 }
 
-/// The cargo target directory that `executable` lies in, recognised by the file cargo keeps there.
+/// Returns the cargo target directory that contains `executable`, recognised by a file that cargo keeps there.
 pub(super) fn cargo_target(executable: &Path) -> Option<&Path> {
     executable.ancestors().skip(1).find(|directory| directory.join(".rustc_info.json").is_file())
 }
 
-/// Build the crate of the unit alone and return the library cargo reports.
+/// Builds only the crate of the unit, and returns the library that cargo reports.
 pub(super) fn build(unit: LibraryUnit, workspace: &Path, target: &Path, console: &Console) -> Result<PathBuf> {
     let task = console.task("Building the FMU library", None);
     let failed = |problem: String, remedy: &str| Failure::new("building the FMU library", problem, remedy);
@@ -86,7 +86,7 @@ pub(super) fn build(unit: LibraryUnit, workspace: &Path, target: &Path, console:
     let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
     let messages = thread::spawn(move || {
         let mut text = String::new();
-        // A broken pipe shows up as a missing artifact below.
+        // After a broken pipe, the library is missing below.
         let _ = stdout.map(|mut pipe| pipe.read_to_string(&mut text));
         text
     });
@@ -108,9 +108,9 @@ pub(super) fn build(unit: LibraryUnit, workspace: &Path, target: &Path, console:
         .ok_or_else(|| failed("cargo reported no shared library".into(), "Use --library FILE"))
 }
 
-/// Cargo options that keep the places of cargo's home, its registry and the workspace, and with them the builder's name
-/// and the registry's host, out of the library: the same sources then give the same bytes for everybody. Flags of the
-/// user's own environment take precedence, as cargo has it. `remap.sh` does the same for the scripts.
+/// Returns cargo options that keep the paths of cargo's home, its registry and the workspace, and with them the user name and the host of the
+/// registry, out of the library: the same sources then give the same bytes everywhere. Flags in the user's environment take precedence, as in cargo.
+/// `remap.sh` does the same for the scripts.
 fn without_builder_paths(workspace: &Path) -> Vec<String> {
     let home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| env::var_os("HOME").map(|home| Path::new(&home).join(".cargo")));
@@ -121,7 +121,7 @@ fn without_builder_paths(workspace: &Path) -> Vec<String> {
     vec!["--config".into(), format!("target.\"cfg(all())\".rustflags=[{}]", flags.join(","))]
 }
 
-/// Directories and the neutral names that stand for them; of two that match, rustc takes the later.
+/// Returns directories and the neutral names that replace them; if two match, rustc uses the later one.
 fn remaps(home: Option<&Path>, workspace: &Path) -> Vec<(PathBuf, &'static str)> {
     let mut remaps = Vec::new();
     if let Ok(workspace) = workspace.canonicalize() {
@@ -137,7 +137,7 @@ fn remaps(home: Option<&Path>, workspace: &Path) -> Vec<(PathBuf, &'static str)>
     remaps
 }
 
-/// The shared library in cargo's JSON messages, one per line.
+/// Finds the shared library in cargo's JSON messages, one per line.
 fn artifact(messages: &str, name: &str) -> Option<PathBuf> {
     messages
         .lines()

@@ -3,12 +3,12 @@ use super::*;
 /// Text that every library of an FMU contains.
 const FUNCTIONS: &[u8] = b"fmi2DoStep\0fmi3DoStep\0";
 
-/// Both functions and this release.
+/// Returns bytes with the functions of both FMI versions and this release.
 fn content() -> Vec<u8> {
     [FUNCTIONS, LIBRARY_RELEASE.as_bytes()].concat()
 }
 
-/// Headers of an empty shared library for Linux (ELF, machine 62 is x86-64 and 183 AArch64).
+/// Returns the headers of an empty shared library for Linux (ELF, machine 62 is x86-64 and 183 AArch64).
 fn elf(machine: u8) -> Vec<u8> {
     let mut bytes = vec![0_u8; 64];
     bytes.extend(content());
@@ -17,7 +17,7 @@ fn elf(machine: u8) -> Vec<u8> {
     bytes
 }
 
-/// Headers of an empty library for macOS (Mach-O, file type 6; the last byte of the type of processor is 7 or 12).
+/// Returns the headers of an empty library for macOS (Mach-O, file type 6; the last byte of the processor type is 7 or 12).
 fn mach_o(processor: u8) -> Vec<u8> {
     let mut bytes = vec![0_u8; 32];
     bytes.extend(content());
@@ -26,7 +26,7 @@ fn mach_o(processor: u8) -> Vec<u8> {
     bytes
 }
 
-/// Headers of an empty library for Windows: DOS header, COFF header (x86-64, a DLL), optional header of PE32+, one empty section.
+/// Returns the headers of an empty library for Windows: DOS header, COFF header (x86-64, a DLL), optional header of PE32+, one empty section.
 fn pe() -> Vec<u8> {
     let mut bytes = vec![0_u8; 64 + 24 + 112 + 16 * 8 + 40];
     bytes[..2].copy_from_slice(b"MZ");
@@ -92,7 +92,7 @@ fn installed_program_builds_and_caches_a_missing_library() {
     assert!(build::kept(LibraryUnit::Thermal, &cache).is_some_and(|other| other != kept));
     std::fs::create_dir_all(kept.parent().unwrap()).unwrap();
     std::fs::write(&kept, "").unwrap();
-    // Also when the sources are gone.
+    // Also if the sources no longer exist.
     assert_eq!(origin(None, Some(cache.as_path())), Origin::Kept(kept.clone()));
     assert_eq!(origin(Some(sources.as_path()), None), Origin::Sources(&sources));
     let beside = root.path().join("bin").join(Platform::X86_64Linux.file_name());
@@ -145,7 +145,7 @@ fn rejects_file_that_is_not_a_library_by_name() {
     std::fs::write(&path, &elf(62)[..64]).unwrap();
     assert!(refused(path).problem.contains("of an FMU"));
     let mut cut = pe();
-    // The one section begins behind the end.
+    // The only section begins after the end of the file.
     cut[88 + 240 + 8..][..4].copy_from_slice(&[0, 2, 0, 0]);
     cut[88 + 240 + 16..][..8].copy_from_slice(&[0, 2, 0, 0, 0, 2, 0, 0]);
     let path = root.path().join("cut.dll");

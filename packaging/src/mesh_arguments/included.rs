@@ -1,18 +1,18 @@
-//! Files that an input file includes: they are read too, and protected.
+//! Files that an input file includes, which are read and protected as well.
 
 use std::{
     io::{BufRead, BufReader},
     path::{Path, PathBuf},
 };
 
-/// Most files that a mesh includes.
+/// Largest number of files that a mesh includes.
 const MOST_INCLUDED: usize = 1000;
 
-/// Files that an input file names with INPUT=, and those that they name; what cannot be read includes nothing.
+/// Collects the files that an input file names with INPUT=, recursively; unreadable files include nothing.
 pub(super) fn collect(path: &Path, found: &mut Vec<PathBuf>) {
     let is_input = path.extension().is_none_or(|kind| !kind.eq_ignore_ascii_case("msh"));
     let Some(file) = tiprub_format::open_file(path).ok().filter(|_| is_input) else { return };
-    // Comments come in many encodings.
+    // Comments have various encodings.
     for line in BufReader::new(file).split(b'\n').map_while(std::io::Result::ok) {
         let text = String::from_utf8_lossy(&line);
         let upper = text.to_ascii_uppercase();

@@ -1,4 +1,4 @@
-//! What the report is made from.
+//! Data for the report.
 
 use tiprub_core::{Scene, VariableTable};
 use tiprub_model::Reduction;
@@ -10,7 +10,7 @@ use crate::rom_facts::RomFacts;
 /// Results of an imported run for the report.
 #[derive(Debug, Clone)]
 pub struct ImportedSummary {
-    /// For example `FMI 2.0`.
+    /// Label, for example `FMI 2.0`.
     pub label: String,
     /// Time spent in doStep (s).
     pub stepping: f64,
@@ -18,7 +18,7 @@ pub struct ImportedSummary {
     pub agreement: RecordingDifference,
 }
 
-/// A file beside the report.
+/// File beside the report.
 #[derive(Debug, Clone)]
 pub struct ReportFile {
     /// File name, relative to the report.
@@ -29,13 +29,13 @@ pub struct ReportFile {
     pub bytes: u64,
 }
 
-/// Everything the report shows.
+/// All data that the report shows.
 pub struct ReportInput<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Variables of the run.
     pub table: &'a VariableTable,
-    /// Full model and modes, where they are at hand.
+    /// Full model and modes, if they are available.
     pub reduction: Option<&'a Reduction>,
     /// Facts of the ROMs.
     pub facts: &'a [RomFacts],
@@ -43,14 +43,14 @@ pub struct ReportInput<'a> {
     pub schedule: &'a Schedule,
     /// The native run.
     pub native: &'a NativeRun,
-    /// The runs through the C ABIs.
+    /// Runs through the C interfaces of FMI.
     pub imported: &'a [ImportedSummary],
     /// Estimated errors of steps, modes, patches and mesh; empty if not requested.
     pub estimates: &'a [Estimate],
-    /// The same run with the paper's model and method, and its variables.
+    /// Run of the same rub with the paper's model and method, and its variables.
     pub paper: Option<(&'a VariableTable, &'a NativeRun)>,
     /// Files beside the report.
     pub files: &'a [ReportFile],
-    /// Wall times of the parts of the work (what, s).
+    /// Wall times of the parts of the work (name, s).
     pub durations: &'a [(String, f64)],
 }

@@ -1,4 +1,4 @@
-//! The report of a run: one HTML file that opens offline.
+//! Report of a run: one HTML file that opens offline.
 
 pub mod input;
 pub mod page;

@@ -1,4 +1,4 @@
-//! The page around the figures: header, key figures, tables, links.
+//! Page around the figures: header, key figures, tables, links.
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ use super::input::{ReportFile, ReportInput};
 use super::sections::{Results, figures};
 use crate::rom_facts::{CheckRow, OmittedRows, ROWS_SHOWN, RomFacts, not_negative_zero, order_text, sectors_text};
 
-/// The whole page.
+/// Renders the whole page.
 ///
 /// # Errors
 /// A plot cannot be drawn.
@@ -205,7 +205,7 @@ fn step_of(settings: &SceneSettings) -> &'static str {
     if settings.time.scheme == Scheme::Galerkin { "one blade, native" } else { "whole disk, native" }
 }
 
-/// Both models and methods at the end of the same run.
+/// Compares both models and methods at the end of the same run.
 fn paper_part(input: &ReportInput<'_>, own: &Results<'_>) -> String {
     let Some((table, run)) = input.paper else { return String::new() };
     let paper = Results::new(table, &run.recording);
@@ -294,7 +294,7 @@ fn files_section(files: &[ReportFile]) -> String {
     html
 }
 
-/// A table of names and values; values are HTML.
+/// Returns a table of names and values; values are HTML.
 fn table(rows: &[(&str, String)]) -> String {
     let mut html = String::from("<table><tbody>");
     for (name, value) in rows {
@@ -304,7 +304,7 @@ fn table(rows: &[(&str, String)]) -> String {
     html
 }
 
-/// Three significant digits.
+/// Formats a value with three significant digits.
 fn rounded(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
@@ -324,7 +324,7 @@ fn rounded(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// At most four significant digits, powers of ten written out.
+/// Formats a value with at most four significant digits; powers of ten are written out.
 fn scientific(value: f64) -> String {
     let text = format!("{value:.3e}");
     match text.split_once('e') {

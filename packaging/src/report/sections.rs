@@ -1,4 +1,4 @@
-//! The figures of the report: which quantity goes where, in which unit, under which caption.
+//! Figures of the report, with their quantities, units and captions.
 
 use std::fmt::Write as _;
 
@@ -14,46 +14,46 @@ use tiprub_shell::{Failure, Result, recording::Recording};
 
 use super::input::ReportInput;
 
-/// Azimuth and elevation of the blade pictures (rad): suction side, leading edge to the left, a little from above.
+/// Azimuth and elevation of the blade pictures (rad): suction side, leading edge to the left, slightly from above.
 const AZIMUTH: f64 = 1.1;
 const ELEVATION: f64 = 0.22;
-/// Displacements are drawn so that the largest is this share of the blade's height.
+/// Largest drawn displacement as a fraction of the height of the blade.
 const DRAWN_DISPLACEMENT: f64 = 0.12;
-/// Mode shapes shown.
+/// Number of mode shapes shown.
 const MODES_SHOWN: usize = 4;
 
-/// Error against run time as the guide shows it.
+/// Figure of the guide for error against run time.
 const ERROR_PICTURE: &str = include_str!("../../../docs/error/rotor37-light-steps.svg");
 
-/// Results of a run, found by what they stand for rather than by name.
+/// Results of a run, found by quantity instead of by name.
 pub struct Results<'a> {
     table: &'a VariableTable,
     recording: &'a Recording,
 }
 
 impl<'a> Results<'a> {
-    /// Results of a run of the scene with this table.
+    /// Creates the results of a run of the scene with this table.
     pub fn new(table: &'a VariableTable, recording: &'a Recording) -> Self {
         Self { table, recording }
     }
 
-    /// Columns (one per element) of the variable with this quantity; empty where the scene has none.
+    /// Returns the columns (one per element) of the variable with this quantity; empty if the scene has none.
     fn columns(&self, quantity: Quantity) -> Vec<Vec<f64>> {
         let Some(variable) = self.table.with_quantity(quantity) else { return Vec::new() };
         (0..variable.len()).filter_map(|index| self.recording.column(&variable.element_name(index))).collect()
     }
 
-    /// The column of a scalar quantity.
+    /// Returns the column of a scalar quantity.
     pub fn column(&self, quantity: Quantity) -> Option<Vec<f64>> {
         self.columns(quantity).into_iter().next()
     }
 
-    /// Last value of a scalar quantity.
+    /// Returns the last value of a scalar quantity.
     pub fn last(&self, quantity: Quantity) -> Option<f64> {
         self.column(quantity)?.last().copied()
     }
 
-    /// Smallest and largest value of a scalar quantity.
+    /// Returns the smallest and the largest value of a scalar quantity.
     pub fn extremes(&self, quantity: Quantity) -> Option<(f64, f64)> {
         let column = self.column(quantity)?;
         Some(
@@ -63,12 +63,12 @@ impl<'a> Results<'a> {
         )
     }
 
-    /// Time in ms against value times `factor`.
+    /// Returns points of time in ms and value times `factor`.
     fn points(&self, column: &[f64], factor: f64) -> Vec<(f64, f64)> {
         self.recording.times.iter().zip(column).map(|(time, value)| (1e3 * time, factor * value)).collect()
     }
 
-    /// Draws the contact nodes over time: a line for each of a few, a map of more. Empty if the scene has no such output.
+    /// Draws the contact nodes over time: lines for a few nodes, a map for more. Empty if the scene has no such output.
     fn per_node(&self, quantity: Quantity, nodes: &[String], (label, factor, shows): LabelledUnit) -> Result<String> {
         let columns = self.columns(quantity);
         if columns.is_empty() {
@@ -91,20 +91,20 @@ impl<'a> Results<'a> {
     }
 }
 
-/// Label with unit, factor to that unit, and what a map shows.
+/// Label with unit, factor to that unit, and the value that a map shows.
 type LabelledUnit = (&'static str, f64, Shows);
 
-/// More contact nodes than this are a map and no lines.
+/// Largest number of contact nodes that are drawn as lines instead of a map.
 const MOST_LINES: usize = 4;
 
-/// A numbered figure.
+/// Numbered figure.
 #[derive(Clone)]
 struct NumberedFigure {
     body: String,
     caption: String,
 }
 
-/// All figures, numbered in order, as HTML.
+/// Returns all figures, numbered in order, as HTML.
 pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, String)>> {
     let results = Results::new(input.table, &input.native.recording);
     let mut number = 0;
@@ -131,7 +131,7 @@ pub(super) fn figures(input: &ReportInput<'_>) -> Result<Vec<(&'static str, Stri
 
 /// Shows the error study of the laboratory, with the command that measures it on this machine.
 fn error_study() -> NumberedFigure {
-    // The picture has its own paper and its own legend.
+    // The picture has its own background and legend.
     let body = format!("<div class=\"scroll adapts\">{ERROR_PICTURE}</div>");
     let caption =
         "Error against run time of adaptive steps, fixed steps and the paper's method for a light rub of the \
@@ -154,7 +154,7 @@ fn node_names(input: &ReportInput<'_>) -> Vec<String> {
         .map_or_else(Vec::new, |rom| rom.contact_nodes.iter().map(|node| node.name.clone()).collect())
 }
 
-/// `leading_edge` as people write it.
+/// Returns a readable form of a name such as `leading_edge`.
 fn readable(name: &str) -> String {
     match name {
         "mid_chord" => "mid-chord".into(),
@@ -162,7 +162,7 @@ fn readable(name: &str) -> String {
     }
 }
 
-/// Clearance of an undeformed blade around the circumference, for the first contact.
+/// Draws the clearance of an undeformed blade around the circumference, for the first contact.
 fn casing(input: &ReportInput<'_>) -> Result<Vec<NumberedFigure>> {
     let settings = &input.scene.settings;
     let Some(contact) = settings.contacts.first() else { return Ok(Vec::new()) };
@@ -305,7 +305,7 @@ fn energies(results: &Results<'_>) -> Result<Vec<NumberedFigure>> {
     Ok(figures)
 }
 
-/// The blade at rest with its contact nodes, and its first mode shapes.
+/// Draws the blade at rest with its contact nodes, and its first mode shapes.
 fn mode_shapes(reduction: &Reduction) -> NumberedFigure {
     let surface = reduction.mesh.as_ref().map_or_else(MeshSurface::default, surface_of);
     let view = ViewPoint::of_blade(&surface, AZIMUTH, ELEVATION);

@@ -1,4 +1,4 @@
-//! Contact nodes, held nodes and faces, out of the sets of a model that was read.
+//! Chooses contact nodes, clamped nodes and faces from the sets of an imported model.
 
 use tiprub_model::{
     FeModel, Mesh,
@@ -14,14 +14,14 @@ use tiprub_shell::{Failure, Result};
 use super::failure;
 use crate::mesh_arguments::{BladeOptions, CasingMeshArguments, ModelOptions, SectorArguments, TipOptions};
 
-/// Share of the largest radius by which nodes of the two faces of a sector may miss each other.
+/// Largest distance between corresponding nodes of the two faces of a sector, as a fraction of the largest radius.
 const FACE_TOLERANCE: f64 = 1e-5;
 
 /// Nodes and options of the reduction, chosen from the input.
 pub struct Chosen {
-    /// Places whose stress the ROM recovers.
+    /// Points at which the ROM recovers stress.
     pub stress: StressPlaces,
-    /// Nodes that are held, ascending.
+    /// Clamped nodes, ascending.
     pub clamped: Vec<usize>,
     /// Contact nodes.
     pub contact: Vec<ContactPoint>,
@@ -29,25 +29,25 @@ pub struct Chosen {
     pub faces: Option<(CyclicBoundary, PairingReport)>,
     /// Contact nodes of a casing.
     pub grid: Option<GridNodes>,
-    /// The tip of blades as the mesh shows it, and whether contact was taken from it because no set was named.
+    /// Blade tip found in the mesh, and true if contact uses it because no set was named.
     pub tip: Option<(FoundTip, bool)>,
-    /// Nodes of the contact set that can move, if it names the whole tip and not single contact nodes; else empty.
+    /// Nodes of the contact set that can move, if it names the whole tip instead of single contact nodes; else empty.
     pub tip_set: Vec<usize>,
-    /// Nodes of the root of blades as the mesh shows it, ascending; empty where there is no mesh.
+    /// Nodes of the blade root found in the mesh, ascending; empty without a mesh.
     pub root: Vec<usize>,
 }
 
-/// Patches along the chord by default: more change little, fewer a lot.
+/// Default number of patches along the chord: more change little, fewer a lot.
 pub const PATCHES: usize = 9;
-/// Rows of patches across the thickness by default: they stand at the sides of the tip.
+/// Default number of rows of patches across the thickness, which lie at the sides of the tip.
 const ROWS: usize = 2;
-/// Sets with at most so many nodes name contact nodes. Larger ones name a tip.
+/// Largest set whose nodes are single contact nodes. Larger sets name a tip.
 const SMALL_SET: usize = 12;
 
-/// For blades, or for a sector between its faces.
+/// Chooses the nodes for blades, or for a sector between its faces.
 ///
 /// # Errors
-/// Sets that are missing or do not fit each other.
+/// Sets are missing or inconsistent.
 pub fn tips(
     imported: &Imported,
     options: &ModelOptions,
@@ -79,11 +79,11 @@ pub fn tips(
         let in_rows = |rows: usize| patches(imported, &free, [count, rows], &tips.contact_names);
         match tips.contact_rows {
             Some(rows) => in_rows(rows)?,
-            // A coarse tip may not tell two rows apart.
+            // A coarse tip may not resolve two rows.
             None => in_rows(ROWS).or_else(|_| in_rows(1))?,
         }
     } else {
-        // Nodes given one by one are all meant.
+        // Nodes given by number are all used.
         let count = tips.contact_nodes.or(by_number.then_some(free.len()));
         let choice = ContactChoice { count, names: tips.contact_names.clone() };
         choose_contact_nodes(&imported.model.nodes, &free, &choice).map_err(failure)?
@@ -94,7 +94,7 @@ pub fn tips(
     Ok(Chosen { stress: StressPlaces::default(), clamped, contact, faces, grid: None, tip, tip_set, root })
 }
 
-/// Nodes that may touch, whether they were given by number, and the tip with whether they are its.
+/// Candidates for contact nodes, true if they were given by number, and the tip with true if the candidates are its nodes.
 type Candidates = (Vec<usize>, bool, Option<(FoundTip, bool)>);
 
 /// Returns the nodes of the contact set, or of the tip if there is no set.
@@ -109,7 +109,7 @@ fn candidates(imported: &Imported, options: &ModelOptions, fixed: &[usize]) -> R
     Ok((tip.nodes.clone(), false, Some((tip, true))))
 }
 
-/// As many as there are names; else nine, or as many as a coarse tip or contact set can have.
+/// Returns the default number of patches: the number of names, else nine, or as many as a coarse tip or contact set permits.
 fn default_patches(tips: &TipOptions, tip: &Option<(FoundTip, bool)>, mesh: &Mesh, set: &[usize]) -> usize {
     match tips.contact_names.len() {
         0 => tip.as_ref().map_or(PATCHES, |(tip, _)| tip.at_most(PATCHES)).min(places_along_chord(mesh, set)),
@@ -117,7 +117,7 @@ fn default_patches(tips: &TipOptions, tip: &Option<(FoundTip, bool)>, mesh: &Mes
     }
 }
 
-/// Patches of the faces whose nodes are all in the contact set.
+/// Returns the patches of the faces whose nodes are all in the contact set.
 fn patches(
     imported: &Imported,
     set: &[usize],
@@ -137,10 +137,10 @@ fn patches(
     tip_patches(mesh, set, [count, rows], name).map_err(failure)
 }
 
-/// Edges and middle of a tip of patches, whose displacements the ROM is to tell; none of contact nodes, which tell theirs.
+/// Returns the edges and the middle of a tip with patches as watched points; empty for contact nodes, whose displacements are outputs anyway.
 ///
 /// # Errors
-/// Never for patches that were made.
+/// Does not fail for patches from [`tips`].
 pub fn watched(model: &FeModel, contact: &[ContactPoint]) -> Result<Vec<ContactPoint>> {
     let mut set: Vec<usize> = contact.iter().flat_map(|point| point.patch.iter().map(|(node, _)| *node)).collect();
     set.sort_unstable();
@@ -153,13 +153,13 @@ pub fn watched(model: &FeModel, contact: &[ContactPoint]) -> Result<Vec<ContactP
     choose_contact_nodes(&model.nodes, &set, &choice).map_err(failure)
 }
 
-/// Most places of a set: each has seven outputs per watched sector.
+/// Largest number of points of a set: each has seven outputs per watched sector.
 const MOST_PLACES: usize = 1000;
 
-/// Places whose stress the ROM of blades recovers.
+/// Returns the points at which the ROM of blades recovers stress.
 ///
 /// # Errors
-/// Sets that are missing or large.
+/// Sets are missing or too large.
 pub fn stress(imported: &Imported, options: &BladeOptions) -> Result<StressPlaces> {
     let mut places = StressPlaces { nodes: Vec::new(), modes: options.stress_modes.unwrap_or(0) };
     if let Some(name) = &options.stress_set {
@@ -174,10 +174,10 @@ pub fn stress(imported: &Imported, options: &BladeOptions) -> Result<StressPlace
     Ok(places)
 }
 
-/// For a casing.
+/// Chooses the nodes for a casing.
 ///
 /// # Errors
-/// Sets that are missing, and a grid that they do not hold.
+/// Sets are missing, or do not contain the grid.
 pub fn grid(imported: &Imported, options: &CasingMeshArguments) -> Result<Chosen> {
     let name = named_set(imported, options.model.contact_set.as_deref(), "--contact-set")?;
     let clamped = clamped_nodes(imported, &options.model.clamp_set)?;
@@ -198,7 +198,7 @@ pub fn grid(imported: &Imported, options: &CasingMeshArguments) -> Result<Chosen
     })
 }
 
-/// Contact nodes that are not among the `fixed` ones, and whether they were given by number.
+/// Returns the contact nodes that are not among the `fixed` ones, and whether they were given by number.
 fn free_contact_nodes(imported: &Imported, options: &ModelOptions, fixed: &[usize]) -> Result<(Vec<usize>, bool)> {
     let name = named_set(imported, options.contact_set.as_deref(), "--contact-set")?;
     let (nodes, by_number) = nodes_of(imported, name, "--contact-set")?;
@@ -237,7 +237,7 @@ fn set<'a>(imported: &'a Imported, name: &str) -> Result<&'a [usize]> {
     imported.model.set(name).map_err(failure)
 }
 
-/// Nodes of a set, or those whose numbers in the file are listed (then true), ascending.
+/// Returns the nodes of a set, or those whose numbers in the file are listed (then true), ascending.
 pub fn nodes_of(imported: &Imported, text: &str, option: &str) -> Result<(Vec<usize>, bool)> {
     let numbers: Result<Vec<u64>, _> = text.split(',').map(|part| part.trim().parse::<u64>()).collect();
     let (Ok(numbers), false) = (numbers, imported.model.sets.contains_key(text)) else {
@@ -257,7 +257,7 @@ pub fn nodes_of(imported: &Imported, text: &str, option: &str) -> Result<(Vec<us
     Ok((nodes, true))
 }
 
-/// All nodes that are held, ascending.
+/// Returns all clamped nodes, ascending.
 fn clamped_nodes(imported: &Imported, names: &[String]) -> Result<Vec<usize>> {
     let mut clamped = imported.absent.clone();
     let free = matches!(names, [only] if only.eq_ignore_ascii_case("none"));
@@ -273,7 +273,7 @@ fn clamped_nodes(imported: &Imported, names: &[String]) -> Result<Vec<usize>> {
         return Err(Failure::usage("--clamp-set", "no set is given", remedy));
     }
     for name in names.iter().filter(|_| !free) {
-        // Of matrices the set was left out when they were read.
+        // With matrices, the set was already left out when they were read.
         clamped.extend(nodes_of(imported, name, "--clamp-set")?.0);
     }
     clamped.sort_unstable();

@@ -1,4 +1,4 @@
-//! What was read and chosen, told.
+//! Describes the imported model and the choices.
 
 use std::fmt::Write as _;
 
@@ -13,7 +13,7 @@ use tiprub_model::{
 use super::choose::Chosen;
 use crate::mesh_arguments::ModelOptions;
 
-/// Describes the input and the choices, for people and for programs.
+/// Describes the input and the choices, as text and as JSON.
 pub fn describe(imported: &Imported, options: &ModelOptions, chosen: &Chosen) -> (String, Value) {
     let model = &imported.model;
     let [low, high] = bounding_box(&model.nodes);
@@ -78,7 +78,7 @@ pub fn describe(imported: &Imported, options: &ModelOptions, chosen: &Chosen) ->
     (text, json)
 }
 
-/// Contact nodes or patches, each with its node in the file; of a grid its size; the tip, where it was found.
+/// Describes contact nodes or patches, each with its node in the file, the size of a grid, and the tip if it was found.
 fn contact(imported: &Imported, options: &ModelOptions, chosen: &Chosen) -> String {
     let mut text = String::new();
     let contact_set = options.contact_set.as_deref().unwrap_or("the detected tip");

@@ -1,4 +1,4 @@
-//! What of a model that was read cannot be meant, and what is asked about.
+//! Rejects impossible values of an imported model, and asks about unusual ones.
 
 use tiprub_core::{Rom, plausibility::Slip};
 use tiprub_model::{
@@ -10,10 +10,10 @@ use tiprub_shell::{Failure, Result};
 use super::choose::{Chosen, PATCHES};
 use crate::mesh_arguments::{ModelOptions, UnitChoice};
 
-/// First natural frequencies (Hz) of things that are built lie in here.
+/// Usual range of the first natural frequency of machine parts (Hz).
 const USUAL_FREQUENCIES: [f64; 2] = [1.0, 1e6];
 
-/// Rejects values that cannot be meant, unless the units are said to be SI; asks about unusual values.
+/// Rejects impossible values, unless the units are explicitly SI; asks about unusual values.
 pub fn judge(imported: &Imported, options: &ModelOptions) -> Result<Vec<String>> {
     let found = plausibility(&imported.model, &imported.materials);
     let question = |list: &[String]| format!("{}: is this intended?", list.join("; "));
@@ -41,10 +41,10 @@ pub fn judge(imported: &Imported, options: &ModelOptions) -> Result<Vec<String>>
     Ok(warnings)
 }
 
-/// Share of the largest radius of the model below which contact nodes are not its tips: shrouds and flared tips stay above.
+/// Smallest radius of contact nodes at a tip, as a fraction of the largest radius of the model; shrouds and flared tips stay above it.
 const TIPS: f64 = 0.9;
 
-/// Blades whose contact nodes lie inside: tip and root exchanged, or another axis.
+/// Returns a slip if the contact nodes of blades lie inside: tip and root may be exchanged, or the axis may be wrong.
 pub fn radius_slip(imported: &Imported, chosen: &Chosen) -> Option<Slip> {
     let radius = |[x, y, _]: [f64; 3]| x.hypot(y);
     let nodes = &imported.model.nodes;
@@ -57,10 +57,10 @@ pub fn radius_slip(imported: &Imported, chosen: &Chosen) -> Option<Slip> {
     })
 }
 
-/// Edges of the tip's faces between two contact nodes, beyond which a force at a node says little of one on the tip.
+/// Largest number of element edges between two contact nodes; with more, forces at nodes represent the force on the tip poorly.
 const REFINED: f64 = 2.0;
 
-/// Contact at points where the mesh could do better, and a tip that may not be all that touches.
+/// Returns warnings about contact at nodes if the mesh permits patches, and about a tip that may be incomplete.
 pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
     let Some((tip, automatic)) = &chosen.tip else { return single(chosen).into_iter().collect() };
     let mut warnings = Vec::new();
@@ -95,7 +95,7 @@ pub fn contact_warnings(chosen: &Chosen) -> Vec<String> {
     warnings
 }
 
-/// Sets that hold a part of what the mesh shows to be the tip and the root.
+/// Returns warnings about sets that contain only a part of the tip or root found in the mesh.
 pub fn set_warnings(options: &ModelOptions, chosen: &Chosen) -> Vec<String> {
     let within = |set: &[usize], whole: &[usize]| whole.iter().filter(|node| set.binary_search(node).is_ok()).count();
     let mut warnings = Vec::new();
@@ -124,7 +124,7 @@ pub fn set_warnings(options: &ModelOptions, chosen: &Chosen) -> Vec<String> {
     warnings
 }
 
-/// More patches than the elements of a tip tell apart.
+/// Returns the warning that there are more patches than the elements of a tip resolve.
 pub fn narrow(patches: usize, edges: f64, most: usize) -> String {
     format!(
         "{patches} contact patches along about {edges:.0} element edges: patches narrower than elements are not \
@@ -133,7 +133,7 @@ pub fn narrow(patches: usize, edges: f64, most: usize) -> String {
     )
 }
 
-/// More rows than the elements of a tip tell apart across its thickness.
+/// Returns the warning that there are more rows than the elements resolve across the thickness of a tip.
 pub fn narrow_rows(rows: usize, elements: usize) -> String {
     let (plural, most) = (if elements == 1 { "" } else { "s" }, elements + 1);
     format!(
@@ -156,7 +156,7 @@ fn single(chosen: &Chosen) -> Option<String> {
     ))
 }
 
-/// A first frequency that no machine has; of a `free` structure the seventh.
+/// Returns a warning about a first frequency outside the usual range; for a `free` structure, the seventh frequency.
 pub fn frequency_warning(rom: &Rom, free: bool) -> Option<String> {
     let first = *rom.checks.full_frequencies.get(if free { 6 } else { 0 })?;
     let [low, high] = USUAL_FREQUENCIES;

@@ -1,4 +1,4 @@
-//! A finite-element model of one's own: read, judged, reduced, told about.
+//! Finite-element models of the user: read, checked, reduced, described.
 
 mod choose;
 mod describe;
@@ -37,10 +37,10 @@ use crate::{
     reduced::ReducedModel,
 };
 
-/// Modes, of patches as many as fine meshes bear, modes compared with the full model, and damping ratio where none are given.
+/// Defaults: number of modes, with patches up to the number that fine meshes permit, number of modes compared with the full model, damping ratio.
 pub const MODES: usize = 25;
 const MOST_MODES: usize = 80;
-/// Degrees of freedom of the full model per mode of patches: the highest modes of a coarse mesh say nothing.
+/// Degrees of freedom of the full model per mode with patches, because the highest modes of a coarse mesh are meaningless.
 const PER_MODE: usize = 40;
 const CHECKED_MODES: usize = 10;
 const DAMPING: f64 = 0.005;
@@ -49,10 +49,10 @@ const DAMPING: f64 = 0.005;
 const CLAMPED: &str = casing::CLAMPED;
 const FACES: [&str; 2] = ["CYCLIC_LOW", "CYCLIC_HIGH"];
 
-/// Blades on a rigid hub.
+/// Reduces blades on a rigid hub.
 ///
 /// # Errors
-/// Files and sets, naming file, line and remedy; and whatever the reduction refuses.
+/// Files or sets are wrong (the error names file, line and remedy), or the reduction fails.
 pub fn blade(
     file: Option<&Path>,
     options: &BladeOptions,
@@ -69,7 +69,7 @@ pub fn blade(
     })
 }
 
-/// Where a ROM of blades came from: a mesh or matrices with the options that it was reduced with.
+/// Source of a ROM of blades: a mesh or matrices with the options of its reduction.
 pub struct BladeSource<'a> {
     /// Mesh file.
     pub file: Option<&'a Path>,
@@ -80,7 +80,7 @@ pub struct BladeSource<'a> {
 }
 
 impl<'a> BladeSource<'a> {
-    /// As the command line has it.
+    /// Creates the source from the command line.
     pub fn of(from: &'a FromMesh) -> Self {
         Self { file: from.file.as_deref(), others: &from.others, options: &from.blade }
     }
@@ -106,10 +106,10 @@ impl refine::RomSource for BladeSource<'_> {
     }
 }
 
-/// A disk of coupled sectors.
+/// Reduces a disk of coupled sectors.
 ///
 /// # Errors
-/// As [`blade`].
+/// The errors of [`blade`].
 pub fn sector(options: &SectorArguments, console: &Console) -> Result<ReducedModel> {
     let source = options.source();
     let imported = import(&source, console)?;
@@ -119,10 +119,10 @@ pub fn sector(options: &SectorArguments, console: &Console) -> Result<ReducedMod
     })
 }
 
-/// A casing whose contact nodes form a grid.
+/// Reduces a casing whose contact nodes form a grid.
 ///
 /// # Errors
-/// As [`blade`]; a mesh of several materials.
+/// The errors of [`blade`], or a mesh with several materials.
 pub fn casing(options: &CasingMeshArguments, console: &Console) -> Result<ReducedModel> {
     let source = options.source();
     let imported = import(&source, console)?;
@@ -136,10 +136,10 @@ pub fn casing(options: &CasingMeshArguments, console: &Console) -> Result<Reduce
     })
 }
 
-/// A casing of one material for its heat conduction: mesh, material, the nodes of its contact set where one is named, warnings.
+/// Reads a casing of one material for its heat conduction: mesh, material, the nodes of its contact set if one is named, warnings.
 ///
 /// # Errors
-/// As [`blade`]; a mesh of several materials.
+/// The errors of [`blade`], or a mesh with several materials.
 pub fn conducting(file: &Path, options: &ModelOptions, console: &Console) -> Result<ConductingMesh> {
     let imported = import(&MeshSource::mesh(file, options), console)?;
     let mut warnings = imported.warnings.clone();
@@ -156,7 +156,7 @@ pub struct ConductingMesh {
     pub mesh: Mesh,
     /// Material of all its elements.
     pub material: Material,
-    /// Nodes of the inner surface, where a set is named.
+    /// Nodes of the inner surface, if a set is named.
     pub set: Option<Vec<usize>>,
     /// Unusual properties.
     pub warnings: Vec<String>,
@@ -167,7 +167,7 @@ fn no_mesh() -> Failure {
     Failure::usage("FILE", problem, "Give a mesh file whose elements share one material")
 }
 
-/// Judge and choose, reduce with the set of clamped nodes, and tell of all.
+/// Checks the model, chooses the nodes, reduces with the set of clamped nodes, and describes the result.
 fn reduce_clamped(
     source: &MeshSource,
     imported: Imported,
@@ -218,7 +218,7 @@ fn general(
     };
     let model = RefCell::new(Some(model));
     with_progress(&title, console, &|listener| {
-        // The matrices are handed over, not copied.
+        // The matrices are moved, not copied.
         let model = model.take().ok_or_else(|| tiprub_model::Error::invalid("model", "it is already reduced", ""))?;
         reduce_model(model, &chosen.clamped, &chosen.contact, &reduction, options.spin, listener)
     })

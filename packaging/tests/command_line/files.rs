@@ -1,4 +1,4 @@
-//! Outputs and inputs as files: pipes, names, permissions, nothing replaced.
+//! Outputs and inputs as files: pipes, names, permissions, and no replacement by accident.
 
 use std::{fs, path::PathBuf, process::Command};
 
@@ -76,7 +76,7 @@ fn rejects_pipes_as_inputs_and_stdout_twice() {
         let message = project.fail(words, 1);
         assert!(message.contains("pipe or a device"), "{message}");
     }
-    // Stdout is a pipe here, and takes the summary.
+    // Stdout is a pipe here, and receives the summary.
     for words in [&["run", "scene.toml", "--csv", "/dev/stdout"][..], &["reduce", "rotor37", "-o", "/proc/self/fd/1"]] {
         let message = project.fail(words, 2);
         assert!(message.contains("is the same file as stdout"), "{message}");
@@ -154,7 +154,7 @@ fn new_files_follow_the_umask() {
     }
 }
 
-/// The same files give the same archive, whatever the umask of who makes it.
+/// The same files give the same archive, independent of the umask.
 #[test]
 #[cfg(target_os = "linux")]
 fn archives_of_a_release_do_not_depend_on_the_umask() {

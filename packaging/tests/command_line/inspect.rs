@@ -39,7 +39,7 @@ fn inspect_shows_contact_nodes_and_settings() {
     assert!(scene.contains("\nstructure rotor, ROM small: One mass"), "{scene}");
 }
 
-/// One that is chosen when the scene is read goes with its reason into the FMU, whose scene names it.
+/// A scheme that is chosen when the scene is read goes with its reason into the FMU, whose scene names it.
 #[test]
 fn run_inspect_and_the_fmu_report_the_scheme_and_its_reason() {
     let project = Project::new();

@@ -1,8 +1,8 @@
-//! The list of libraries inside the FMU, against cargo's own dependency tree.
+//! Compares the list of libraries inside the FMU with cargo's dependency tree.
 
 use std::{collections::BTreeSet, process::Command};
 
-/// (crate, licence) of everything `package` links, itself included, without procedural macros (they run in the compiler).
+/// Returns (crate, licence) of all crates that `package` links, including itself, without procedural macros (they run in the compiler).
 fn linked(package: &str) -> BTreeSet<(String, String)> {
     let output = Command::new(env!("CARGO"))
         .args([
@@ -35,7 +35,7 @@ fn linked(package: &str) -> BTreeSet<(String, String)> {
 fn the_list_of_contained_libraries_is_complete() {
     let listed = include_str!("../../assets/third-party.txt");
     let own = |(name, _): &(String, String)| !name.starts_with("tiprub-");
-    // Both libraries are made of the same.
+    // Both libraries have the same dependencies.
     let contained = |package: &str| linked(package).into_iter().filter(own).collect::<Vec<_>>();
     let linked = contained("tiprub-fmi");
     assert_eq!(contained("tiprub-fmi-thermal"), linked);

@@ -1,4 +1,4 @@
-//! The `tiprub` program as a user meets it: a small scene, real files, models of a user's own, exit codes, and nothing half-written.
+//! Tests of the `tiprub` program: a small scene, real files, user models, exit codes, and no incomplete files.
 
 #[path = "../../../tests/guide.rs"]
 mod guide;

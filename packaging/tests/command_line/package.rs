@@ -152,7 +152,7 @@ fn failed_package_leaves_no_files() {
     assert_eq!(project.files(), before);
 }
 
-/// Names of the local headers of a zip, found by walking its bytes; checks what importers trip over on the way.
+/// Returns the names of the local headers of a zip, found in its bytes; also checks details that importers fail on.
 fn raw_entries(bytes: &[u8]) -> Vec<String> {
     let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
     let u32_at = |at: usize| usize::from(u16_at(at)) + (usize::from(u16_at(at + 2)) << 16);

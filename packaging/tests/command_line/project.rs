@@ -1,4 +1,4 @@
-//! A small scene with its files, and the program run on it.
+//! Small scene with its files, and runs of the program on it.
 
 use std::{
     fs,
@@ -35,7 +35,7 @@ stop = 0.05
 communication_step = 1e-3
 "#;
 
-/// A directory with a scene of four one-node blades.
+/// Directory with a scene of four one-node blades.
 pub struct Project {
     pub root: TempDir,
 }
@@ -63,7 +63,7 @@ impl Project {
         };
         fs::write(root.path().join("small.rom.safetensors"), tiprub_format::write_rom(&rom)).unwrap();
         fs::write(root.path().join("scene.toml"), SCENE).unwrap();
-        // The header of a shared library for Linux on x86-64, which is all that packaging looks at.
+        // The header of a shared library for Linux on x86-64 is all that packaging checks.
         let mut library = vec![0_u8; 4096];
         library[64..86].copy_from_slice(b"fmi2DoStep\0fmi3DoStep\0");
         library[96..][..tiprub_format::LIBRARY_RELEASE.len()]
@@ -91,7 +91,7 @@ impl Project {
         String::from_utf8(output.stdout).unwrap()
     }
 
-    /// The error line of a run that must fail with this code.
+    /// Returns the error line of a run that must fail with this code.
     #[track_caller]
     pub fn fail(&self, arguments: &[&str], code: i32) -> String {
         let output = self.run(arguments);
@@ -115,7 +115,7 @@ pub fn columns(csv: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     (names, lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())
 }
 
-/// Everything on stdout, which must be one JSON object.
+/// Parses stdout, which must be one JSON object.
 pub fn json(output: &Output) -> serde_json::Value {
     let text = String::from_utf8(output.stdout.clone()).unwrap();
     let value: serde_json::Value = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"));

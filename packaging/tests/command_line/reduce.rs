@@ -13,7 +13,7 @@ fn reduction_replaces_a_rom_only_by_force() {
     let poor = [&coarse[..], &["--modes", "0"]].concat();
     let error = project.fail(&poor, 1);
     assert!(error.contains("blade.rom.safetensors") && error.contains("--force"), "{error}");
-    // Said before the work, which would refuse this mesh; of the file written by default and of others as well.
+    // Reported before the work, which would reject this mesh; for the default output file and for other files.
     fs::write(project.path("rotor37.rom.safetensors"), "kept").unwrap();
     for line in [
         "reduce rotor37 --mesh 1x1x1 -o blade.rom.safetensors",

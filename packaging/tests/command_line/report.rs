@@ -1,4 +1,4 @@
-//! The report of a run: complete, offline, small.
+//! Report of a run: complete, offline, small.
 
 use tiprub_core::Simulation;
 use tiprub_gallery::{reduction, scene_source::rotor37_scene_with};

@@ -24,7 +24,7 @@ fn a_native_run_writes_one_row_per_communication_point() {
     assert_eq!(columns(&again).1, rows, "the same run gives the same bits");
 }
 
-/// What the CSV says, without looking for it: the lobes of the scene reach through the gap.
+/// The extremes agree with the CSV; the lobes of the scene extend through the gap.
 #[test]
 fn run_summary_reports_extremes() {
     let project = Project::new();
@@ -36,7 +36,7 @@ fn run_summary_reports_extremes() {
         let index = names.iter().position(|other| other == name).unwrap();
         rows.iter().map(|row| (row[0], row[index])).collect::<Vec<_>>()
     };
-    // Communication steps of 1 ms.
+    // The communication step is 1 ms.
     let total: Vec<_> = column("normal_impulse").into_iter().map(|(time, impulse)| (time, impulse / 1e-3)).collect();
     let largest = |column: Vec<(f64, f64)>| column.into_iter().map(|row| row.1).fold(f64::MIN, f64::max);
     let least = column("clearance_minimum").into_iter().map(|row| row.1).fold(f64::MAX, f64::min);
@@ -59,7 +59,7 @@ fn run_summary_reports_extremes() {
     assert!(reported.contains("largest number of contact nodes touching at a communication point: "), "{text}");
 }
 
-/// Five lines before all else, the same with and without `--all`, and then where the rest is.
+/// The five lines come first, the same with and without `--all`, then the references to other results.
 #[test]
 fn run_output_starts_with_five_summary_lines() {
     let project = Project::new();
@@ -109,7 +109,8 @@ fn settings_and_times_can_be_replaced() {
     assert_eq!(csv(&["--set", "speed=100"]), csv(&[]));
 }
 
-/// Inputs of a file: a speed that grows is integrated exactly, what rests changes nothing, what cannot be followed is told.
+/// Inputs from a file: an increasing speed is integrated exactly, a constant input changes nothing, and an input that cannot be followed is
+/// reported.
 #[test]
 fn time_varying_inputs_are_followed_without_delay() {
     let project = Project::new();

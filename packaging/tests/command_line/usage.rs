@@ -1,4 +1,4 @@
-//! Command lines and files that are wrong: exit codes, what is said, and the same as JSON.
+//! Wrong command lines and files: exit codes, messages, and errors as JSON.
 
 use std::fs;
 
@@ -73,7 +73,7 @@ fn every_error_is_available_as_one_json_object() {
         assert!(!output.stderr.is_empty(), "{line}");
         assert!(!remedy.contains("..") && !remedy.contains("For more information"), "{line}: {error}");
     }
-    // Help is no failure, and a file may be called --json.
+    // Help is no failure, and a file may be named --json.
     assert!(String::from_utf8(project.run(&["--json", "--help"]).stdout).unwrap().contains("Usage"));
     assert!(project.run(&["run", "--nothing", "--", "--json"]).stdout.is_empty());
 }
@@ -87,7 +87,7 @@ fn every_command_has_help() {
     }
 }
 
-/// Whatever is given, an error is a line or two: no number is written out with three hundred digits.
+/// For any input, an error has one or two lines and no number with three hundred digits.
 #[test]
 fn numbers_in_errors_are_short() {
     let project = Project::new();

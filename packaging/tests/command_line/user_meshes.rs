@@ -1,4 +1,4 @@
-//! Models of a user's own, as the user meets them: reduce, package, run, and what is said of wrong ones.
+//! User models through the program: reduce, package, run, and messages about wrong models.
 
 mod sets;
 mod tips;
@@ -18,7 +18,7 @@ fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/models").join(name)
 }
 
-/// A directory with the models of the tests.
+/// Directory with the models of the tests.
 struct ModelProject {
     root: TempDir,
 }
@@ -72,7 +72,7 @@ fn guide() -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/models.md")).unwrap()
 }
 
-/// The scene of the guide.
+/// Returns the scene of the guide.
 fn scene() -> String {
     let guide = guide();
     let text = guide.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
@@ -80,7 +80,7 @@ fn scene() -> String {
     text.to_owned()
 }
 
-/// The command of the guide that reduces the blade, without `tiprub`.
+/// Returns the command of the guide that reduces the blade, without `tiprub`.
 fn command() -> String {
     let guide = guide();
     let lines = guide.split("\n    tiprub reduce blade blade.inp --clamp-set ROOT").nth(2).expect("the second one");
@@ -95,10 +95,10 @@ fn gmsh_mesh_becomes_a_running_scene_as_in_the_guide() {
     assert_eq!(reported["rom"]["sectors"], 36);
     assert_eq!(reported["model"]["sets"]["TIP"], 53);
     assert!((reported["model"]["mass"].as_f64().unwrap() - 0.0771).abs() < 1e-4);
-    // Seven patches are as wide as the six elements along the tip allow, in two rows at its sides.
+    // Seven patches are the most for the six elements along the tip, in two rows at its sides.
     let rom = project.rom("blade.rom.safetensors");
     assert_eq!((rom.contact_nodes.len(), rom.rows()), (14, 2));
-    // The chord of the tip is 32 mm at 40 degrees to the axis: the edges' middles lie 12.26 mm before and behind.
+    // The chord of the tip is 32 mm at 40 degrees to the axis: the middles of the edges lie 12.26 mm before and behind the centre.
     let watched = &rom.extras.watched.as_ref().unwrap().points;
     for (node, z) in watched.iter().zip([-12.256e-3, 0.0, 12.256e-3]) {
         let [radius, _, axial] = node.position;
@@ -143,7 +143,7 @@ fn calculix_matrices_give_the_same_rom_as_the_mesh() {
     for name in ["matrices.rom.safetensors", "held.rom.safetensors"] {
         let found = project.rom(name);
         assert_eq!(found.contact_nodes, expected.contact_nodes);
-        // Shapes have no sign of their own.
+        // The sign of a shape is arbitrary.
         let off = (found.mass.abs() - expected.mass.abs()).amax() / expected.mass.amax();
         let stiffness = (found.stiffness.abs() - expected.stiffness.abs()).amax() / expected.stiffness.amax();
         println!("{name}: mass off by {off:.2e}, stiffness by {stiffness:.2e}");
@@ -189,7 +189,7 @@ fn gmsh_sector_frequencies_match_calculix() {
             .contains("*CYCLIC SYMMETRY MODEL, N=12")
     );
     assert!(fs::metadata(project.root.path().join("sector.vtu")).unwrap().len() > 1000);
-    // The other way round is noticed and put right.
+    // The opposite order is detected and corrected.
     let swapped = line.replace("--cyclic-low LOW --cyclic-high HIGH", "--cyclic-low HIGH --cyclic-high LOW --force");
     assert_eq!(project.succeed(&swapped)["model"]["faces"]["swapped"], true);
     assert!(project.rom("sector.rom.safetensors") == rom);
@@ -205,7 +205,7 @@ fn an_exported_mesh_is_read_back_to_the_same_frequencies() {
     assert!(a.iter().zip(&b).all(|(a, b)| (a / b - 1.0).abs() < 1e-9), "{a:?} {b:?}");
 }
 
-/// Radial flexibility (m/N) in the middle of the tip, on meshes of three kinds: patches do not depend on the elements, nodes do.
+/// Radial flexibility (m/N) in the middle of the tip on meshes of three kinds: with patches it does not depend on the elements, with nodes it does.
 #[test]
 fn patch_flexibility_is_independent_of_element_type() {
     let kinds = ["hex20", "penta15", "tet10"];
@@ -320,13 +320,13 @@ fn user_casing_mesh_reproduces_the_built_in_casing() {
         assert_eq!(own.name, ships.name);
         assert!(own.position.iter().zip(ships.position).all(|(a, b)| (a - b).abs() < 1e-12), "{own:?} {ships:?}");
     }
-    // Two rings tell a straight line; the ring that ships knows its contour.
+    // Two rings define a straight line; the built-in ring has the exact contour.
     let [[low, _, front], [high, _, back]] = [own.contact_nodes[0].position, own.contact_nodes[12].position];
     assert!((own.contact_nodes[0].meridional_slope - (high - low) / (back - front)).abs() < 1e-9);
     let off = (own.stiffness.diagonal() - ships.stiffness.diagonal()).component_div(&ships.stiffness.diagonal()).amax();
     println!("eigenvalues differ by {off:.1e}");
     assert!(own.order() == ships.order() && off < 1e-9, "{off:.1e}");
-    // The expansion of the command line holds beside the file's material, which has the rest.
+    // The expansion from the command line is combined with the material of the file, which defines the other properties.
     let heated = file
         .replace("12x2", "4x2")
         .replace("--modes 20 --fixed-interface-modes 40", "--modes 8 --fixed-interface-modes 8");
@@ -335,7 +335,7 @@ fn user_casing_mesh_reproduces_the_built_in_casing() {
         project.rom("hot.rom.safetensors").extras.thermal.unwrap().loads.amax()
     };
     assert!((loads("2e-5") / loads("1e-5") - 2.0).abs() < 1e-6);
-    // Between nodes the grid lies on the faces, and counts angles from zero.
+    // Between nodes, the grid lies on the faces, and angles start from zero.
     let between = project.run(&format!("{} --force -o between.rom.safetensors", file.replace("12x2", "13x2")));
     let text = String::from_utf8_lossy(&between.stdout);
     assert!(
@@ -357,7 +357,7 @@ fn user_casing_mesh_reproduces_the_built_in_casing() {
 #[test]
 fn conducts_heat_in_a_casing_mesh_of_the_user() {
     let project = ModelProject::new(&[]);
-    // What packaging looks at in a library of heat conduction for Linux on x86-64.
+    // The parts of a library for heat conduction on Linux on x86-64 that packaging checks.
     let mut library = vec![0_u8; 4096];
     library[..20].copy_from_slice(b"\x7fELF\x02\x01\x01\0\0\0\0\0\0\0\0\0\x03\0\x3e\0");
     let parts = ["fmi2DoStep\0fmi3DoStep\0", tiprub_format::LIBRARY_RELEASE, tiprub_format::THERMAL_FILE];
@@ -408,7 +408,7 @@ fn accepts_node_numbers_and_rejects_invalid_tips_and_axes() {
     assert_eq!(places(&by_set), places(&by_number));
     let error = project.fail(&format!("{line} --contact-set 1,999999999"), 1);
     assert!(error.contains("no node 999999999"), "{error}");
-    // Held at the tip, touching with the root.
+    // Clamped at the tip, with contact at the root.
     let line =
         "reduce blade blade_hex8.inp --sectors 36 --units mm-t-s --material steel --modes 4 --contact-nodes 3 --force";
     let swapped = format!("{line} --contact-set ROOT --clamp-set TIP");

@@ -1,4 +1,4 @@
-//! Warnings, and what is printed.
+//! Warnings and their output.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use crate::project::{Project, SCENE, json};
 #[test]
 fn warnings_are_on_stderr_even_when_quiet_and_in_json() {
     let project = Project::new();
-    // Just longer than 2/omega_max = 2 ms of the springs; much longer ones end the run, for energy that was not supplied.
+    // Slightly longer than 2/omega_max = 2 ms of the springs; much longer steps end the run because of energy that was not supplied.
     let coarse = SCENE
         .replace("step = 1e-4", "step = 2.05e-3")
         .replace("communication_step = 1e-3", "communication_step = 4.1e-3");
@@ -22,7 +22,7 @@ fn warnings_are_on_stderr_even_when_quiet_and_in_json() {
     ] {
         let output = project.run(arguments);
         let stderr = String::from_utf8(output.stderr).unwrap();
-        // What is not resolved, and what contact makes of it: two lines each.
+        // Unresolved modes, and the effect of contact on them: two lines each.
         let shown = warnings(&stderr);
         assert!(output.status.success() && shown.len() == 2, "{arguments:?}: {stderr}");
         assert_eq!(stderr.lines().count(), 4, "{stderr}");
@@ -41,14 +41,14 @@ fn warnings_are_on_stderr_even_when_quiet_and_in_json() {
     }
 }
 
-/// Every warning with its remedy, as they stand on stderr.
+/// Returns every warning with its remedy from stderr.
 fn warnings(stderr: &str) -> Vec<String> {
     let lines: Vec<&str> = stderr.lines().collect();
     let first = |line: &&[&str]| line[0].starts_with("warning [") || line[0].starts_with("note [");
     lines.windows(2).filter(first).map(|two| two.join("\n")).collect()
 }
 
-/// A warning is found by its identifier, and silenced by it: on the command line, in a scene, and in what is packed.
+/// A warning has an identifier that silences it: on the command line, in a scene, and in an FMU.
 #[test]
 fn a_warning_is_silenced_by_its_identifier() {
     let project = Project::new();
@@ -74,7 +74,7 @@ fn a_warning_is_silenced_by_its_identifier() {
     assert!(unknown.contains("no warning has the identifier \"fluter\"") && unknown.contains("flutter"), "{unknown}");
 }
 
-/// Slips end with an error, unless the scene or the command line says that they are meant; an FMU then says so too.
+/// Slips end with an error, unless the scene or the command line accepts them; an FMU then contains that setting, too.
 #[test]
 fn every_command_rejects_suspect_input_unless_accepted() {
     let project = Project::new();
@@ -98,14 +98,14 @@ fn every_command_rejects_suspect_input_unless_accepted() {
             assert!(refused.contains("rpm") && refused.contains("4297 m/s"), "{line}: {refused}");
             assert!(refused.contains("--accept-implausible"), "{line}: {refused}");
         }
-        // What is packed holds the key.
+        // The scene inside the FMU contains the key.
         let meant = if line.contains("fmu") { words } else { [&words[..], &["--accept-implausible"]].concat() };
         let output = project.run(&meant);
         let stderr = String::from_utf8(output.stderr).unwrap();
         let reported: Vec<_> = stderr.lines().filter(|text| text.contains("[implausible]")).collect();
         assert!(output.status.success() && reported.len() == 1 && reported[0].contains("4297 m/s"), "{line}: {stderr}");
     }
-    // A ROM by hand in millimetres.
+    // A manually written ROM in millimetres.
     let path = project.path("small.rom.safetensors");
     let mut rom = tiprub_format::read_rom(&fs::read(&path).unwrap(), "small").unwrap();
     rom.contact_nodes[0].position[0] = 250.0;
@@ -144,13 +144,13 @@ fn control_characters_are_never_printed() {
     }
 }
 
-/// What comes up in a run is told beside the warnings of its start, and not among them once more.
+/// A warning of the run is reported beside the warnings of its start, and only once.
 #[test]
 fn run_time_warnings_appear_once() {
     let project = Project::new();
     let path = project.path("small.rom.safetensors");
     let mut rom = tiprub_format::read_rom(&fs::read(&path).unwrap(), "small").unwrap();
-    // A light contact node on the mass: galerkin leaves out the mass of contact nodes.
+    // A light contact node on the mass: galerkin neglects the mass of contact nodes.
     let stiff = |i: usize, j: usize| match (i == j, i / 3 + j / 3) {
         (true, 0) => 2.4e8,
         (true, _) => 2e8,

@@ -1,4 +1,4 @@
-//! The guide as a book: no link, anchor, image or path is dead, no page is missing, and every command shown is one.
+//! Tests the guide as a book: no dead link, anchor, image or path, no missing page, and no unknown command.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -22,7 +22,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
 }
 
-/// Pages in `folder` of the sources, by their paths in the sources.
+/// Returns the pages in `folder` of the sources, with their paths in the sources.
 fn pages_in(folder: &str) -> Vec<(PathBuf, String)> {
     let entries = fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
     let mut paths: Vec<_> = entries.filter(|path| path.extension().is_some_and(|kind| kind == "md")).collect();
@@ -31,7 +31,7 @@ fn pages_in(folder: &str) -> Vec<(PathBuf, String)> {
     paths.iter().map(|path| (name(path), fs::read_to_string(path).unwrap())).collect()
 }
 
-/// The pages beside the sources' root and all chapters; not the changelog, which tells of what was.
+/// Returns the pages in the root of the sources and all chapters, without the changelog, which describes earlier versions.
 fn pages() -> Vec<(PathBuf, String)> {
     let mut all = pages_in("");
     all.retain(|(path, _)| path.as_path() != Path::new("CHANGELOG.md"));
@@ -40,7 +40,7 @@ fn pages() -> Vec<(PathBuf, String)> {
     all
 }
 
-/// A page without what is in fences, and its lines of code: those in fences and those indented.
+/// Splits a page into its text and its lines of code, fenced or indented.
 fn split(text: &str) -> (String, Vec<String>) {
     let (mut prose, mut code, mut fenced) = (String::new(), Vec::new(), false);
     for line in text.lines() {
@@ -57,13 +57,13 @@ fn split(text: &str) -> (String, Vec<String>) {
     (prose, code)
 }
 
-/// What stands between backticks.
+/// Returns the text between backticks.
 fn spans(prose: &str) -> Vec<String> {
     let paragraphs = prose.split("\n\n").flat_map(|text| text.split('`').skip(1).step_by(2));
     paragraphs.map(|span| span.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
 }
 
-/// Targets of links and images.
+/// Returns the targets of links and images.
 fn targets(prose: &str) -> Vec<String> {
     let paragraph = |text: &str| text.split('`').step_by(2).collect::<Vec<_>>().join("`");
     let without_code: Vec<_> = prose.split("\n\n").map(paragraph).collect();
@@ -72,7 +72,7 @@ fn targets(prose: &str) -> Vec<String> {
     after.map(|(target, _)| target.trim().to_owned()).collect()
 }
 
-/// The anchors of a page, one per heading, as GitHub and mdBook make them.
+/// Returns the anchors of a page, one per heading, as GitHub and mdBook create them.
 fn anchors(prose: &str) -> BTreeSet<String> {
     let mut counts = BTreeMap::<String, usize>::new();
     let headings = prose.lines().filter(|line| line.starts_with('#'));
@@ -87,7 +87,7 @@ fn anchors(prose: &str) -> BTreeSet<String> {
     headings.map(anchor).collect()
 }
 
-/// A path without `..`.
+/// Returns a path without `..`.
 fn plain(path: &Path) -> PathBuf {
     path.components().fold(PathBuf::new(), |mut plain, part| {
         if part == Component::ParentDir {
@@ -99,7 +99,7 @@ fn plain(path: &Path) -> PathBuf {
     })
 }
 
-/// What is wrong with a link on the page `page`; a book holds what is in its own folder alone.
+/// Returns the problem of a link on the page `page`; a book contains only files of its own folder.
 fn dead(page: &Path, target: &str, pages: &BTreeMap<PathBuf, BTreeSet<String>>) -> Option<String> {
     if target.starts_with("https://") {
         return None;
@@ -134,7 +134,7 @@ fn guide_has_no_dead_links() {
     }
     assert!(count > 200, "{count}");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    // A link that is dead is seen.
+    // A dead link is detected.
     let page = Path::new("docs/README.md");
     for (target, problem) in [
         ("theory-14.md", "no such file"),
@@ -147,7 +147,7 @@ fn guide_has_no_dead_links() {
     }
 }
 
-/// Paths of the sources that the pages name, such as `src/core/src/laws/film.rs`.
+/// Paths of the sources that the pages name exist, such as `src/core/src/laws/film.rs`.
 #[test]
 fn guide_has_no_dead_paths() {
     let roots = ["src/", "tests/", "fmi/", "packaging/", "modelDescription/", "docs/", ".ci/"];
@@ -188,7 +188,7 @@ fn every_page_is_listed_once_and_every_picture_is_used() {
     }
 }
 
-/// Names under "Commands:" in the help of a command.
+/// Returns the names under "Commands:" in the help of a command.
 fn commands_of(words: &[&str]) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO_BIN_EXE_tiprub")).args(words).arg("--help").output().unwrap();
     assert!(output.status.success(), "{words:?} --help: {}", String::from_utf8_lossy(&output.stderr));
@@ -198,7 +198,7 @@ fn commands_of(words: &[&str]) -> BTreeSet<String> {
     names.filter_map(|line| line.split_whitespace().next()).map(String::from).collect()
 }
 
-/// The word of a command line that is no command, where the program has commands.
+/// Returns the word of a command line that is not a command although the program expects one.
 fn unknown<'a>(line: &'a str, known: &mut BTreeMap<Vec<&'a str>, BTreeSet<String>>) -> Option<&'a str> {
     let mut before = Vec::new();
     for word in line.split_whitespace().skip(1) {
@@ -232,14 +232,14 @@ fn every_documented_command_is_valid() {
     });
     let wrong: Vec<_> = unknown_words.collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    // The commands are found, and a slip is seen.
+    // The commands are found, and an error is detected.
     assert!(known[&vec![]].contains("package") && known[&vec!["study"]].contains("map"));
     for (line, word) in [("tiprub packge scene.toml", "packge"), ("tiprub study errors SCENE", "errors")] {
         assert_eq!(unknown(line, &mut known), Some(word));
     }
 }
 
-/// The sources of a test or an example of this name: its file, or all files of its folder.
+/// Returns the sources of a test or an example of this name: its file, or all files of its folder.
 pub fn sources(folder: &Path, name: &str) -> String {
     if let Ok(text) = fs::read_to_string(folder.join(format!("{name}.rs"))) {
         return text;
@@ -248,7 +248,7 @@ pub fn sources(folder: &Path, name: &str) -> String {
     entries.filter_map(|entry| fs::read_to_string(entry.unwrap().path()).ok()).collect()
 }
 
-/// `cargo test -p PACKAGE --test NAME` and `--example NAME` name what is there.
+/// `cargo test -p PACKAGE --test NAME` and `--example NAME` name existing targets.
 #[test]
 fn every_named_test_and_example_exists() {
     let mut count = 0;
@@ -263,7 +263,7 @@ fn every_named_test_and_example_exists() {
                 continue;
             };
             for at in 0..words.len() {
-                // The package of whole-product tests has them beside its library.
+                // The package of the whole-product tests has them beside its library.
                 let tests = if package == Some("tiprub-tests") { folder.clone() } else { folder.join("tests") };
                 let test = after("--test", at).map(|name| (tests, name));
                 let example = after("--example", at).map(|name| (folder.join("examples"), name));

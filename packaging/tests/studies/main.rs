@@ -1,4 +1,4 @@
-//! Scenes that ship and scenes of users, run and studied by the `tiprub` program.
+//! Built-in scenes and user scenes, run and studied with the `tiprub` program.
 
 mod shipped_scenes;
 mod studies;

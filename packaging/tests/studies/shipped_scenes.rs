@@ -1,4 +1,4 @@
-//! The scenes that ship, natively and as a user asks for them: each runs in seconds and does what it is there to show.
+//! Built-in scenes, run natively through the program: each runs in seconds and shows the effect that it demonstrates.
 
 use std::{fs, process::Command};
 
@@ -22,12 +22,12 @@ fn columns(csv: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     (names, lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())
 }
 
-/// The JSON object of a run of a scene that ships, which must end well and meet blades on the way.
+/// Returns the JSON object of a run of a built-in scene, which must succeed with contact.
 #[track_caller]
 fn run_builtin(project: &TempDir, name: &str) -> (serde_json::Value, Vec<String>, Vec<Vec<f64>>) {
     let json = succeed(project, &["run", name, "--csv", "out.csv", "--json", "--quiet"]);
     let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
-    // Contact that stays closed flutters, and that is told once; nothing else is doubtful.
+    // Closed contact flutters, which is reported once; there are no other warnings.
     let warnings = summary["warnings"].as_array().unwrap();
     assert!(warnings.len() <= 1, "{name}: {warnings:#?}");
     assert!(warnings.iter().all(|warning| warning.as_str().unwrap().contains("(flutter)")), "{name}: {warnings:#?}");
@@ -53,7 +53,7 @@ fn built_in_flexible_casing_runs_and_heats_its_patches() {
         assert!((casing + row[blades] - row[total]).abs() <= 1e-9 * row[total]);
     }
     assert!(last["load_work"].as_f64().unwrap() == 0.0, "nothing is warm");
-    // A casing warmed by 20 K all around opens, and less is rubbed off.
+    // A casing that is uniformly 20 K warmer is wider, and less coating is worn.
     let warm =
         succeed(&project, &["run", "builtin:flexible-casing", "--set", "casing_temperature=20", "--json", "--quiet"]);
     let warm: serde_json::Value = serde_json::from_str(&warm).unwrap();
@@ -73,7 +73,7 @@ fn built_in_abradable_casing_wears_irreversibly() {
     }
     let deepest = cells.iter().map(|cell| rows.last().unwrap()[*cell]).fold(0.0, f64::max);
     assert_eq!(last["wear_depth_maximum"].as_f64().unwrap().to_bits(), deepest.to_bits());
-    // The bumps reach 0.2 of the gap beyond the blade tips; vibration of the blades cuts little deeper.
+    // The bumps extend 0.2 of the gap beyond the blade tips; the vibration of the blades cuts only slightly deeper.
     assert!((2e-5..1.5e-4).contains(&deepest), "{deepest} m");
 }
 

@@ -12,7 +12,7 @@ fn tiprub(directory: &Path, cache: &str, arguments: &[&str]) -> (String, String)
     (stdout, stderr)
 }
 
-/// These statements are answered with no, and no other is.
+/// Checks that exactly these statements are answered with no.
 #[track_caller]
 fn only_no(json: &Value, no: &[&str]) {
     let statements = json["statements"].as_array().unwrap();
@@ -31,8 +31,8 @@ fn columns(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
     (names, lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())
 }
 
-/// The branch of engine order 4 leans far above its crossing with the first mode. Linear theory does not place it, the motion
-/// is not all multiples of the casing's two lobes and not all steady: these three statements are answered with no.
+/// The branch of engine order 4 extends far above its crossing with the first mode. Linear theory does not predict it, and the motion contains other
+/// orders than the multiples of the two lobes of the casing and is not completely steady: three statements are answered with no.
 #[test]
 fn quick_interaction_map_shows_the_leaning_branch() {
     let root = tempfile::tempdir().unwrap();
@@ -48,14 +48,14 @@ fn quick_interaction_map_shows_the_leaning_branch() {
     let speeds: Vec<f64> = results["speeds"].as_array().unwrap().iter().map(|speed| speed.as_f64().unwrap()).collect();
     let coincidences = results["coincidences"].as_array().unwrap();
     let first = coincidences.iter().find(|one| one["engine_order"] == 4 && one["mode"] == 1).unwrap();
-    // f = 865.22 Hz of the blade (`reduce rotor37 --contact-nodes 3`), turned four times per revolution.
+    // f = 865.22 Hz of the blade (`reduce rotor37 --contact-nodes 3`), excited four times per revolution.
     let predicted = number(first, "predicted_speed");
     assert!((4.0 * predicted / std::f64::consts::TAU - 865.22).abs() < 0.01, "{first:#}");
     assert!(speeds[0] < 0.81 * predicted && *speeds.last().unwrap() > 1.4 * predicted, "{speeds:?}");
     assert!(number(first, "relative_shift") > 0.05 && number(first, "relative_shift") < 0.25, "{first:#}");
     let amplitude = number(first, "response_amplitude");
     assert!((1e-3..5e-3).contains(&amplitude), "{first:#}");
-    // Neighbours of the same order share the range: nothing is sought twice.
+    // Neighbouring crossings of the same order divide the range: no speed belongs to two of them.
     for pair in coincidences.iter().flat_map(|a| coincidences.iter().map(move |b| (a, b))) {
         let (a, b) = pair;
         if a["engine_order"] == b["engine_order"] && number(a, "predicted_speed") < number(b, "predicted_speed") {
@@ -66,7 +66,7 @@ fn quick_interaction_map_shows_the_leaning_branch() {
     let largest = peaks.iter().max_by(|a, b| number(a, "amplitude").total_cmp(&number(b, "amplitude"))).unwrap();
     assert!((number(largest, "engine_order") - 4.0).abs() < 1.0 / 16.0, "{largest:#}");
     assert!(number(largest, "speed") > 1.05 * predicted, "{largest:#}");
-    // Up to the top of the branch engine order 4 grows, and behind it falls off.
+    // Engine order 4 grows up to the top of the branch, and decreases behind it.
     let (names, rows) = columns(&root.path().join("out/amplitudes.csv"));
     assert!(names[3].starts_with("engine order 4"), "{names:?}");
     let top = rows.iter().position(|row| row[0].to_bits() == number(largest, "speed").to_bits()).unwrap();
@@ -77,12 +77,12 @@ fn quick_interaction_map_shows_the_leaning_branch() {
     }
 }
 
-/// The cheapest of a scene, and two schemes that meet.
+/// Reports the cheapest setting for a scene, and two schemes that agree.
 #[test]
 fn quick_error_study_accepts_any_scene() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("scene.toml"), around("builtin:rotor37-paper")).unwrap();
-    // Contact nodes do not know how wide the tip is.
+    // Contact nodes do not define the width of the tip.
     let coated = with_rom("abradable", "builtin:rotor37-paper");
     let coated = coated.replace("\n[time]", "contact_width = 3e-3\n\n[time]");
     fs::write(root.path().join("coated.toml"), coated).unwrap();
@@ -95,10 +95,10 @@ fn quick_error_study_accepts_any_scene() {
         let found = &json["results"]["scenes"][0];
         let rows = found["rows"].as_array().unwrap();
         assert_eq!(rows.len(), 9 * 4 + 4, "every scheme and solver at every step, and four tolerances");
-        // The scene's own step is among them, whatever rounding says of 10 µs over 1 µs.
+        // The scene's own step is among them, in spite of the rounding of 10 µs / 1 µs.
         let own = |row: &&Value| row["internal_step"].as_f64().is_some_and(|step| (step / 1e-6 - 1.0).abs() < 1e-9);
         assert_eq!(rows.iter().filter(own).count(), 9, "{found:#}");
-        // Half the step, and about half the error or less.
+        // Half the step gives about half the error or less.
         let errors: Vec<f64> = rows
             .iter()
             .filter(|row| row["competitor"] == "modal-exact + lcp")
@@ -111,7 +111,7 @@ fn quick_error_study_accepts_any_scene() {
     }
 }
 
-/// Its tolerance is what is refined, beside the steps of other schemes; each is held against the limit of its own equations.
+/// The study refines its tolerance, beside the steps of other schemes; each is compared with the limit of its own equations.
 #[test]
 fn error_study_supports_adaptive_scenes() {
     let root = tempfile::tempdir().unwrap();
@@ -130,7 +130,7 @@ fn error_study_supports_adaptive_scenes() {
     let errors = |name: &str, which: &str| -> Vec<f64> {
         rows.iter().filter(|row| row["competitor"] == name).filter_map(|row| row[which].as_f64()).collect()
     };
-    // Limits with mass and without are far apart, and neither scheme is blamed for that.
+    // The limits with and without mass are far apart, and neither scheme is blamed for this.
     let away = found["massless_boundary_away"][0].as_f64().unwrap();
     let (own, plain) = (errors("galerkin", "error_of_own_limit"), errors("galerkin", "error_of_steps"));
     assert!(own.len() == 4 && own[0] < 2e-2 && own[3] < 1e-4 && own[3] < 0.1 * own[0], "{own:?}");
@@ -143,7 +143,7 @@ fn error_study_supports_adaptive_scenes() {
     }
     let total = &json["results"]["total"]["rows"];
     assert_eq!(total.as_array().unwrap().iter().filter(|row| row["own"] == true).count(), 1, "{total:#}");
-    // Refined, and estimated for a run, by its tolerance.
+    // The convergence study and the estimate of a run refine the tolerance.
     let json = run(&["study", "convergence", "scene.toml", "--quick", "--window", "1.5e-3", "--out", "out"]);
     let levels = json["results"]["directions"][0]["levels"].as_array().unwrap();
     let values: Vec<f64> = levels.iter().map(|level| level["value"].as_f64().unwrap()).collect();
@@ -158,7 +158,7 @@ fn error_study_supports_adaptive_scenes() {
     assert!(json["internal_trials"].as_u64() >= json["internal_steps"].as_u64(), "{json:#}");
 }
 
-/// Total errors of the model of the scene and of one with half of its modes, against one with twice as many and more nodes.
+/// Checks total errors of the model of the scene and of one with half of its modes, against one with twice as many and more nodes.
 fn totals(total: &Value, cheapest: &str) {
     let number = |row: &Value, name: &str| row[name].as_f64().unwrap();
     assert!(total["truth"].as_str().unwrap().starts_with("5 nodes and 40 modes"), "{total:#}");
@@ -167,7 +167,7 @@ fn totals(total: &Value, cheapest: &str) {
         [&json!(["steps", "modes", "nodes"]), &json!(["mesh"])],
         "{total:#}"
     );
-    // The model that ships tells what was found of it.
+    // The built-in model carries its known errors.
     let known = &total["estimates_of_rom"];
     assert!(known["patches"]["displacements"] == 0.34 && known["mesh"]["unknown"].is_string(), "{known:#}");
     assert!(known["modes"]["found_on"].as_str().unwrap().contains("light rub of rotor 37"), "{known:#}");
@@ -181,7 +181,7 @@ fn totals(total: &Value, cheapest: &str) {
     assert!(of(20) < of(10) && of(20) > 1e-2, "fewer modes are worse, and so are three nodes: {total:#}");
     assert!(ran.iter().all(|row| number(row, "seconds") > 0.0), "{total:#}");
     assert_eq!(ran.iter().filter(|row| row["own"] == true).count(), 1);
-    // The cheapest is the cheapest of those that are good enough.
+    // The cheapest setting is the fastest of those that are accurate enough.
     let own = &total["cheapest"][0];
     let good = ran.iter().filter(|row| number(row, "total_error") <= number(own, "error"));
     let best = good.map(|row| number(row, "seconds")).fold(f64::INFINITY, f64::min);
@@ -194,7 +194,7 @@ fn totals(total: &Value, cheapest: &str) {
     );
 }
 
-/// Of a ROM from a file no finer model is known: no error of it is a total one, and what the ROM says of itself stands beside.
+/// Checks that without a finer model of a ROM from a file, no error is called total, and that the errors in the ROM are reported beside.
 fn errors_of_a_file(root: &Path, reported: &str) {
     let json: Value = serde_json::from_str(reported).unwrap();
     let of = &json["results"]["own_model"];
@@ -221,14 +221,14 @@ fn errors_of_a_file(root: &Path, reported: &str) {
     );
 }
 
-/// A scene of one's own around a coarse blade.
+/// Writes a user scene around a coarse blade.
 fn own_scene(root: &Path) {
     let reduce = ["reduce", "rotor37", "--mesh", "6x1x8", "--modes", "4", "--contact-nodes", "2", "--quiet"];
     tiprub(root, "", &[&reduce[..], &["-o", "coarse.rom.safetensors", "--inp", "blade.inp"]].concat());
     fs::write(root.join("own.toml"), around("coarse.rom.safetensors")).unwrap();
 }
 
-/// The scene that ships around another blade, of few contact nodes, which longer steps do.
+/// Returns the built-in scene around another blade with few contact nodes, for which longer steps are sufficient.
 fn around(rom: &str) -> String {
     with_rom("rotor37-one-row", rom)
 }
@@ -239,14 +239,14 @@ fn with_rom(scene: &str, rom: &str) -> String {
     shipped.replace("builtin:rotor37-one-row", rom).replace("step = 5.0e-7 ", "step = 1.0e-6 ")
 }
 
-/// What the study of stability finds on a scene at two frictions, speeds and steps.
+/// Returns the result of the stability study of a scene at two frictions, speeds and steps.
 fn stability(root: &Path, scene: &str) -> Value {
     let arguments = ["study", "stability", scene, "--friction", "0.15:0.9:2", "--speeds=-1800:1800:2"];
     let more = ["--steps", "1e-6:1.6e-5:2", "--json", "--quiet", "--out", "out"];
     serde_json::from_str(&tiprub(root, "", &[&arguments[..], &more].concat()).0).unwrap()
 }
 
-/// A run of three steps of the scene with a friction coefficient, a speed, a step and `scheme + solver`.
+/// Runs three steps of the scene with a friction coefficient, a speed, a step and `scheme + solver`.
 fn three_steps(root: &Path, [friction, speed, step]: [f64; 3], method: &str) -> Value {
     let (scheme, solver) = method.split_once(" + ").unwrap();
     let values = [
@@ -263,8 +263,8 @@ fn three_steps(root: &Path, [friction, speed, step]: [f64; 3], method: &str) -> 
     serde_json::from_slice(&output.unwrap().stdout).unwrap()
 }
 
-/// Every answer of the study is that of a run with the same start values and step, and the largest accepted steps part what is accepted
-/// from what is refused.
+/// Every answer of the study agrees with a run with the same start values and step, and the largest accepted steps separate accepted from rejected
+/// ones.
 #[test]
 fn stability_study_agrees_with_runs() {
     let root = tempfile::tempdir().unwrap();
@@ -278,7 +278,7 @@ fn stability_study_agrees_with_runs() {
         let [friction, speed, step] = ["friction", "speed", "internal_step"].map(|name| number(point, name));
         let reported = three_steps(root.path(), [friction, speed, step], "modal-exact + lcp");
         match point["refusal"].as_str() {
-            // What and where stand apart in JSON.
+            // Place and problem are separate in JSON.
             Some(text) => {
                 let reported = reported["error"]["problem"].as_str().unwrap();
                 assert!(text.starts_with(reported), "{text} {reported}");
@@ -345,7 +345,7 @@ fn stability_study_shows_usable_steps_below_a_long_one() {
     assert!(accepted[0] + accepted[1] > 0, "{}", long["results"]["counts"]);
 }
 
-/// Where the ROM of `own.toml` comes from.
+/// Arguments for the mesh from which the ROM of `own.toml` was reduced.
 const MESH: [&str; 6] = ["--mesh", "blade.inp", "--contact-set", "TIP", "--clamp-set", "HUB"];
 
 fn convergence(root: &Path, more: &[&str]) -> Value {
@@ -353,7 +353,7 @@ fn convergence(root: &Path, more: &[&str]) -> Value {
     serde_json::from_str(&tiprub(root, "", &[&own[..], more].concat()).0).unwrap()
 }
 
-/// Steps of any scene, fewer modes of any ROM; more modes and other contact nodes where the mesh is named, and it is the ROM's.
+/// Refines steps of any scene and reduces modes of any ROM; more modes and other contact nodes need the mesh from which the ROM was reduced.
 #[test]
 fn convergence_study_reports_what_it_cannot_refine() {
     let root = tempfile::tempdir().unwrap();
@@ -375,7 +375,7 @@ fn convergence_study_reports_what_it_cannot_refine() {
     let page = fs::read_to_string(root.path().join("out/index.html")).unwrap();
     let reported = "finer levels: internal step; coarser levels only: modes of rotor; not refined: contact nodes of rotor, mesh of rotor";
     assert!(page.contains(reported) && !page.to_lowercase().contains("total"), "{reported}");
-    // Nothing to write is told, where nothing was found; directories of files are made, as those of all outputs are.
+    // If no error was found, the output reports that there is nothing to write; directories of files are created as for all outputs.
     let (text, _) = tiprub(
         root.path(),
         "",
@@ -393,7 +393,7 @@ fn convergence_study_reports_what_it_cannot_refine() {
     let all = found.as_array().unwrap();
     assert!(all[..3].iter().all(|direction| direction["not_refined"].is_null()), "{found:#}");
     assert!(all[3]["not_refined"].as_str().unwrap().contains("--other-mesh FILE"), "{found:#}");
-    // The scene as it stands is the same run in every direction, and that of the scene without a mesh.
+    // The unchanged scene gives the same run in every direction, and without a mesh.
     let standing = |directions: &Value| -> Vec<Value> {
         let levels = directions.as_array().unwrap().iter().flat_map(|one| one["levels"].as_array().unwrap());
         let own = levels.filter(|level| level["own"] == true);
@@ -404,7 +404,7 @@ fn convergence_study_reports_what_it_cannot_refine() {
     };
     let all = standing(found);
     assert!(all.len() == 3 && all.iter().all(|one| *one == all[0]) && all[0] == standing(alone)[0], "{all:?}");
-    // A change is to the next run; the step changes least of all.
+    // A change is that to the next run; the step changes least of all.
     let change = |direction: &Value, level: usize, name: &str| {
         direction["levels"][level]["changes_to_next"][name].as_f64().unwrap()
     };
@@ -417,7 +417,7 @@ fn convergence_study_reports_what_it_cannot_refine() {
     assert!(fs::read_to_string(root.path().join("out/levels.csv")).unwrap().lines().count() == 1 + 3 + 3 + 2);
 }
 
-/// Just below the limit of central differences, models with more modes or nodes are refused.
+/// Just below the limit of central differences, models with more modes or nodes are rejected.
 #[test]
 fn rejected_refinements_are_repeated_with_half_the_step() {
     let root = tempfile::tempdir().unwrap();
@@ -439,7 +439,7 @@ fn rejected_refinements_are_repeated_with_half_the_step() {
     assert_eq!(found.iter().map(refused).collect::<Vec<_>>(), [1, 0, 0, 0], "{limited:#}");
 }
 
-/// Two other meshes of the blade tell where the sequence goes; the ROM that is written with it tells whoever runs it.
+/// Two other meshes of the blade show the limit of the sequence; the ROM that is written with the result reports it in later runs.
 #[test]
 fn mesh_error_is_estimated_and_stored_in_the_rom() {
     let root = tempfile::tempdir().unwrap();
@@ -462,7 +462,7 @@ fn mesh_error_is_estimated_and_stored_in_the_rom() {
     let limits = fs::read_to_string(root.path().join("out/limits.csv")).unwrap();
     assert!(limits.lines().filter(|line| line.starts_with("mesh of rotor,")).count() == 5, "{limits}");
     let found = mesh["error"]["displacements"].as_f64();
-    // What falls from level to level has a limit, and the scene is farther from it than from the finest mesh.
+    // A sequence with decreasing changes has a limit, and the scene is farther from it than from the finest mesh.
     assert_eq!(found.is_some(), changes[0] > 1.2 * changes[1], "{mesh:#}");
     assert!(found.is_none_or(|found| found > changes[1]), "{mesh:#}");
     let reported = |command: &[&str]| tiprub(root.path(), "", command).0;
@@ -475,7 +475,7 @@ fn mesh_error_is_estimated_and_stored_in_the_rom() {
     let last = run.lines().rfind(|line| line.starts_with("estimated error")).unwrap();
     let mesh = found.map_or("mesh unknown".to_owned(), |found| format!("mesh {:.2} %", 100.0 * found));
     assert!(last.contains("steps unknown") && last.contains(&mesh), "{run}");
-    // A ROM that nobody asked about tells nothing, and is the file that it was.
+    // A ROM without a study carries no errors, and its file is unchanged.
     assert!(!reported(&["run", "own.toml", "--stop", "1e-4", "--quiet"]).contains("estimated error"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_tiprub"));
     errors_of_a_file(
@@ -506,7 +506,7 @@ fn convergence_study_rejects_a_different_mesh() {
     assert!(refuse(&[&MESH[..], &["--modes", "9"]].concat(), 2).contains("unexpected argument '--modes'"));
 }
 
-/// Told at once: nothing is reduced for it, and no directory stays.
+/// Reported immediately: no model is reduced, and no directory is created.
 #[test]
 fn rejects_unsupported_studies_before_running() {
     let root = tempfile::tempdir().unwrap();

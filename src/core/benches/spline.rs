@@ -1,5 +1,5 @@
-//! Time of the surface spline per contact node and step: closest point from the last one, weights, and the control
-//! points of a moved casing. `cargo bench -p tiprub-core --bench spline` prints one table of medians.
+//! Time of the surface spline per contact node and step: closest point from the last one, weights, and the control points of a moving
+//! casing. `cargo bench -p tiprub-core --bench spline` prints one table of medians.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -29,7 +29,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Nanoseconds per projection of nodes that turn by Ω h per step and vibrate; `advanced` moves the start along.
+/// Measures nanoseconds per projection of nodes that turn by Ω h per step and vibrate; with `advanced` the start moves along.
 fn projections(surface: &SurfaceSpline, h: f64, advanced: bool) -> f64 {
     let node = |index: usize, step: usize| {
         let phase = index as f64;

@@ -1,9 +1,8 @@
-//! Time of one internal step of a whole disk, beside the same system stepped with dense matrices in the same run.
+//! Time of one internal step of a whole disk, compared with the same system stepped with dense matrices in the same run.
 //!
-//! `cargo bench -p tiprub-core` prints two tables. Each row is the fastest tenth of repeated batches; ratios are what counts,
-//! absolute times depend on the machine. The baseline "two dense products" is the paper's prediction (eq. 9) with
-//! its two matrices multiplied out beforehand, in the reduced coordinates of all blades. An argument after `--` selects
-//! rows by a part of their name.
+//! `cargo bench -p tiprub-core` prints two tables. Each row is the fastest tenth of repeated batches; only ratios matter, since absolute
+//! times depend on the machine. The baseline "two dense products" is the paper's prediction (eq. 9) with its two matrices multiplied out
+//! beforehand, in the reduced coordinates of all blades. An argument after `--` selects rows by a part of their name.
 
 use std::time::Instant;
 
@@ -61,7 +60,7 @@ fn flexible(scene: &mut Scene) {
     models::on_ring(scene, models::ring_of(36, 3, 34), 0.03);
 }
 
-/// Time per call (s) of the fastest tenth of `batches` batches of `calls` calls: other work on the machine only adds time.
+/// Time per call (s) of the fastest tenth of `batches` batches of `calls` calls, since other work on the machine only adds time.
 fn fastest(batches: usize, calls: u32, mut work: impl FnMut()) -> f64 {
     let mut times: Vec<f64> = (0..batches)
         .map(|_| {
@@ -74,7 +73,7 @@ fn fastest(batches: usize, calls: u32, mut work: impl FnMut()) -> f64 {
     times[times.len() / 10]
 }
 
-/// Time of an internal step (s) and the mean number of active contacts.
+/// Measures the time of an internal step (s) and the mean number of active contacts.
 fn stepping(scene: &Scene) -> (f64, f64) {
     let mut simulation = Simulation::new(scene).expect("a valid scene");
     simulation.initialise(0.0).expect("a stable scene");
@@ -90,8 +89,8 @@ fn stepping(scene: &Scene) -> (f64, f64) {
     (time / 100.0, contacts as f64 / f64::from(samples))
 }
 
-/// A disk of coupled sectors of the reference size: 56 sectors, 34 modes per nodal diameter, 3 contact nodes. Frequencies of
-/// the disk's own modes rise with the nodal diameter, shapes turn with it.
+/// A disk of coupled sectors of the reference size: 56 sectors, 34 modes per nodal diameter, 3 contact nodes. Frequencies of the disk modes
+/// rise with the nodal diameter, and their shapes turn with it.
 fn disk(depth: f64) -> Scene {
     let mut scene = scene(Shape::TwoLobe { depth, width: 0.15, phase: 0.0 }, true);
     let rom = &mut scene.roms[0];
@@ -140,7 +139,7 @@ fn table(title: &str, order: usize, rows: Vec<(&str, Scene)>) {
     println!("{title}; times per internal step");
     println!("{:<40} {:>12} {:>10} {:>16}", "", "time (µs)", "contacts", "dense / this");
     println!("{:<40} {:>12.2} {:>10} {:>16.1}", "two dense products (eq. 9), no contact", dense * 1e6, "-", 1.0);
-    // `cargo bench --bench step -- heavy` takes the rows with this word.
+    // `cargo bench --bench step -- heavy` selects the rows with this word.
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     for (name, scene) in rows.into_iter().filter(|(name, _)| words.iter().all(|word| name.contains(word.as_str()))) {
         let (time, contacts) = stepping(&scene);
@@ -171,7 +170,7 @@ fn main() {
         ("light rub, coating", with(coated)),
         ("light rub, casing of 135 modes, 36 x 3 grid", with(flexible)),
     ];
-    // Part of a row's name as argument: only such rows.
+    // An argument selects rows whose names contain it.
     let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
     let chosen = |rows: Vec<(&'static str, Scene)>| -> Vec<(&str, Scene)> {
         rows.into_iter().filter(|(name, _)| name.contains(&wanted)).collect()

@@ -1,11 +1,11 @@
-//! Cubic polynomials on 0 ≤ θ ≤ 1 by their coefficients, lowest first.
+//! Cubic polynomials on 0 ≤ θ ≤ 1, given by their coefficients (lowest degree first).
 
-/// Value of a polynomial at θ by its coefficients, lowest first.
+/// Value at θ of the polynomial with these coefficients, lowest degree first.
 pub fn evaluate(coefficients: &[f64; 4], theta: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * theta + coefficient)
 }
 
-/// Where in 0 < θ < 1 a polynomial with these coefficients has a minimum: at most one place up to degree 3.
+/// Returns the θ in 0 < θ < 1 at which the polynomial has a minimum; up to degree 3 there is at most one.
 pub fn interior_minimum(coefficients: &[f64; 4]) -> Option<f64> {
     let [_, slope, bend, twist] = *coefficients;
     // p′ = slope + 2 bend θ + 3 twist θ²; at the minimum p″ = 2√(bend² − 3 slope twist) > 0.
@@ -26,7 +26,7 @@ mod tests {
     fn interior_minimum_matches_sampled_polynomial() {
         let mut found = 0;
         for case in 0..400_u32 {
-            // Straight lines and parabolas among them.
+            // Straight lines and parabolas are included.
             let number = |salt: u32| f64::from((case * 7919 + salt * 104_729) % 1009) / 504.0 - 1.0;
             let part = |degree: u32| if case % 4 < degree { 0.0 } else { number(degree) };
             let cubic = [number(9), number(1), part(2), part(3)];

@@ -1,21 +1,21 @@
-//! One error type for the floor: every variant names what, where and the remedy.
+//! The error type of this crate: every variant gives place, problem and remedy.
 
 use thiserror::Error;
 
 /// Error of compiling or stepping a scene.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Error {
-    /// A value in the scene or the ROM is outside what the method allows.
+    /// A value in the scene or the ROM is outside the range of the method.
     #[error("{what}: {problem}. {remedy}")]
     Invalid {
-        /// The field, array or variable, as the user wrote it.
+        /// The field, array or variable, as written by the user.
         what: String,
         /// The problem, with the value.
         problem: String,
         /// The remedy.
         remedy: String,
     },
-    /// A value reference that the table does not hold.
+    /// A value reference that is not in the table.
     #[error(
         "value reference {reference} does not exist in this FMU. Use a value reference of its modelDescription.xml"
     )]
@@ -26,9 +26,9 @@ pub enum Error {
     /// The scheme would be unstable, or the contact problem not solvable, with these settings.
     #[error("{problem}. {remedy}")]
     Unstable {
-        /// Which limit is exceeded, with numbers.
+        /// The exceeded limit, with numbers.
         problem: String,
-        /// Which setting to change, and to what.
+        /// The setting to change, and its new value.
         remedy: String,
     },
     /// The state became non-finite during a step.
@@ -36,15 +36,15 @@ pub enum Error {
     NonFinite {
         /// The last communication point with a finite state (s).
         last_good_time: f64,
-        /// Internal time at which it was found (s).
+        /// Internal time at which the error was detected (s).
         time: f64,
         /// The remedy.
         remedy: String,
     },
-    /// A communication step takes more internal steps than are allowed; nothing is lost.
+    /// A communication step takes more internal steps than allowed; the state is preserved.
     #[error("{problem}. {remedy}")]
     Exhausted {
-        /// The number of internal steps, and from when on.
+        /// The number of internal steps, and the time from which they were counted.
         problem: String,
         /// The remedy.
         remedy: String,
@@ -58,7 +58,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Shorthand for [`Error::Invalid`].
+    /// Creates an [`Error::Invalid`].
     pub fn invalid(what: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Invalid { what: what.into(), problem: problem.into(), remedy: remedy.into() }
     }
@@ -89,19 +89,19 @@ impl Error {
     }
 }
 
-/// A number for people: plain, or with an exponent where that would be long.
+/// Formats a number for messages: plain, or with an exponent if that is shorter.
 pub fn shown(value: f64) -> String {
     let size = value.abs();
     let plain = size == 0.0 || (1e-4..1e6).contains(&size) || !value.is_finite();
     if plain { format!("{value}") } else { format!("{value:e}") }
 }
 
-/// A time (s) for people: as [`shown`], without the digits beyond the 14th, which sums of steps leave.
+/// Formats a time (s) for messages: as [`shown`], without the digits beyond the 14th, which are rounding errors of summed steps.
 pub fn shown_time(time: f64) -> String {
     shown(format!("{time:.13e}").parse().unwrap_or(time))
 }
 
-/// Result of this floor.
+/// Result type of this crate.
 pub type Result<T, E = Error> = core::result::Result<T, E>;
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
-//! What one structure's contact nodes remember: values now, one step before, and the oldest that a step still needs.
+//! Values of one structure's contact nodes: current, one step before, and the oldest that a step still needs.
 
 use crate::gaps::Geometry;
 use crate::persist::{Persist, StateReader, StateWriter, persist_fields};
 
-/// A value of the step just done, and of the step before. Only the former is part of a saved state.
+/// A value of the last step and of the step before. Only the former is part of a saved state.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Two<T> {
     /// Value of the last step.
@@ -13,7 +13,7 @@ pub struct Two<T> {
 }
 
 impl<T: Clone> Two<T> {
-    /// The same value twice.
+    /// Both entries with the same value.
     pub fn new(value: T) -> Self {
         Self { before: value.clone(), now: value }
     }
@@ -24,7 +24,7 @@ impl<T: Clone> Two<T> {
     }
 }
 
-/// Three instants of an array. Those now and before are part of a saved state.
+/// An array at three times. The current values and those one step before are part of a saved state.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Three {
     /// At the current step.
@@ -36,12 +36,12 @@ pub struct Three {
 }
 
 impl Three {
-    /// The same value everywhere and always.
+    /// All entries with the same value.
     pub fn new(len: usize, value: f64) -> Self {
         Self { now: vec![value; len], before: vec![value; len], oldest: vec![value; len] }
     }
 
-    /// Each becomes one step older; what is now is then to be written.
+    /// Makes all values one step older; the current values must be written next.
     pub fn shift(&mut self) {
         std::mem::swap(&mut self.oldest, &mut self.before);
         std::mem::swap(&mut self.before, &mut self.now);
@@ -75,8 +75,8 @@ impl Persist for Three {
     }
 }
 
-/// The past of the contact nodes of one structure, arrays `[node · lanes + lane]` and `[row · lanes + lane]` with three rows per
-/// node. Displacements now and before are those of the modes.
+/// Recent values at the contact nodes of one structure, in arrays `[node · lanes + lane]` and `[row · lanes + lane]` with three
+/// rows per node. Current and previous displacements are those of the modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactHistory {
     /// Gaps (m); infinite in padding lanes and where there is nothing to touch.
@@ -87,26 +87,26 @@ pub struct ContactHistory {
     pub multiplier: Vec<f64>,
     /// Part of λ that a coating carries (N).
     pub coating_force: Vec<f64>,
-    /// Contact force on each row (N). That of the step before is kept for laws that start from it.
+    /// Contact force on each row (N). The previous values serve laws that start from them.
     pub force: Two<Vec<f64>>,
-    /// Contact points as [`crate::gaps::GapLaw::contact_point`] tells them.
+    /// Contact points, see [`crate::gaps::GapLaw::contact_point`].
     pub points: Vec<f64>,
-    /// Displacement of the contact rows as predicted (m), of schemes whose contact forces act one step later.
+    /// Predicted displacements of the contact rows (m), for schemes whose contact forces act one step later.
     pub predicted: Two<Vec<f64>>,
-    /// Data that is not part of a state.
+    /// Data that is not part of the saved state.
     pub passing: Passing,
 }
 
-/// Data of the past that a step needs and the next one does not.
+/// Previous values that only the current step needs.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Passing {
-    /// Displacements of all rows of the structure, two steps before the step under way ends (m).
+    /// Displacements of all rows of the structure (m), two steps before the end of the current step.
     pub oldest: Vec<f64>,
-    /// Contact forces that last (N), on all rows: without those of impacts.
+    /// Contact forces on all rows (N) without those of impacts.
     pub lasting: Vec<f64>,
 }
 
-/// Written at every step before it is read.
+/// Nothing is saved: every step writes the values before it reads them.
 impl Persist for Passing {
     fn save(&self, _: &mut StateWriter) {}
     fn restore(&mut self, _: &mut StateReader) {}
@@ -116,7 +116,7 @@ impl Persist for Passing {
 persist_fields!(ContactHistory { gap, geometry, multiplier, coating_force, force, points, predicted, passing });
 
 impl ContactHistory {
-    /// Nothing has touched yet: `contacts` nodes in all lanes, `rows` values of displacements.
+    /// State without any contact so far: `contacts` nodes in all lanes, `rows` displacements.
     pub fn new(geometry: Geometry, contacts: usize, rows: usize) -> Self {
         Self {
             // Padding lanes keep an infinite gap.
@@ -131,19 +131,19 @@ impl ContactHistory {
         }
     }
 
-    /// A step begins, from displacements `before` (m) one step earlier.
+    /// Starts a step; `before` are the displacements one step earlier (m).
     pub fn shift(&mut self, before: &[f64]) {
         self.gap.shift();
         self.geometry.shift();
         self.passing.oldest.copy_from_slice(before);
     }
 
-    /// Forces of the last step become those of the step before, for laws that start from them.
+    /// Stores the forces of the last step as previous forces, for laws that start from them.
     pub fn keep_forces(&mut self) {
         self.force.before.copy_from_slice(&self.force.now);
     }
 
-    /// Nothing has touched yet.
+    /// Resets all contact forces and points to zero.
     pub fn clear(&mut self) {
         self.multiplier.fill(0.0);
         self.coating_force.fill(0.0);

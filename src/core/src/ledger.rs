@@ -1,12 +1,12 @@
 //! Energy ledger: kinetic + strain = initial + external work + curvature work + load work + excitation work + step changes − damping −
 //! friction − impact losses − wear work.
 //!
-//! All terms are those of the discrete equations (see [`crate::schemes`]), so the closure residual measures
-//! rounding and programming errors, not the scheme's truncation error.
+//! All terms belong to the discrete equations (see [`crate::schemes`]), so the residual of the balance measures rounding and
+//! programming errors, not the truncation error of the scheme.
 
 use crate::persist::persist_fields;
 
-/// Sum with Neumaier's compensation: long runs add millions of tiny losses.
+/// Sum with Neumaier's compensation, because long runs add millions of tiny losses.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sum {
     total: f64,
@@ -16,7 +16,7 @@ pub struct Sum {
 persist_fields!(Sum { total, compensation });
 
 impl Sum {
-    /// Add a term.
+    /// Adds a term.
     pub fn add(&mut self, term: f64) {
         let sum = self.total + term;
         self.compensation +=
@@ -24,7 +24,7 @@ impl Sum {
         self.total = sum;
     }
 
-    /// The compensated value.
+    /// Returns the compensated value.
     pub fn value(&self) -> f64 {
         self.total + self.compensation
     }
@@ -35,45 +35,45 @@ impl Sum {
 pub struct Ledger {
     /// Kinetic plus strain energy at the start.
     pub initial: f64,
-    /// Modal damping.
+    /// Loss by modal damping.
     pub damping_loss: Sum,
-    /// Friction heat: µλ times the slip, rigid motion included.
+    /// Friction heat: µλ times the slip, which includes the rigid motion.
     pub friction_loss: Sum,
-    /// Energy the contact nodes lose when a gap closes within a step.
+    /// Energy that the contact nodes lose when a gap closes within a step.
     pub impact_loss: Sum,
     /// Work of the coating's normal force on the approaching blades.
     pub wear_work: Sum,
-    /// Work along the way against what is cut off the coating: specific cutting energy times volume.
+    /// Work of cutting the coating: specific cutting energy times volume.
     pub cutting_work: Sum,
-    /// Energy that wearing cells takes: ∫(Y + Kε_p) dε_p of those pressed in, not part of the balance; of those cut the same as
-    /// `cutting_work`, cell by cell.
+    /// Energy consumed by the wear of the cells, not part of the balance: ∫(Y + Kε_p) dε_p of compressed cells, and
+    /// `cutting_work`, cell by cell, of cut cells.
     pub wear_energy: Sum,
     /// Work of centrifugal, thermal and nodal-diameter loads.
     pub load_work: Sum,
     /// Work of the excitation of blades.
     pub excitation_work: Sum,
-    /// Work of the shaft through the contacts, −∫ torque dθ_r; of what slides along fixed obstacles.
+    /// Work of the shaft through the contacts, −∫ torque dθ_r; for obstacles at rest, the work of sliding along them.
     pub shaft_work: Sum,
-    /// Work of the shaft on rotors whose modes depend on the speed: strain energy by stiffening.
+    /// Work of the shaft on rotors whose modes depend on the speed: change of strain energy by stiffening.
     pub stiffening_work: Sum,
     /// Work of whirl, −∫ F·de.
     pub whirl_work: Sum,
     /// Work of axial shift.
     pub shift_work: Sum,
-    /// Work of prescribed motion of the casing, along the normals of the contacts.
+    /// Work of the prescribed motion of the casing along the contact normals.
     pub casing_work: Sum,
-    /// Difference between the work of contact forces in the scheme and all other rows: normals turn and surfaces curve within a step. It vanishes
-    /// with the step.
+    /// Difference between the work of contact forces in the scheme and all other terms: normals turn and surfaces curve within a
+    /// step. It vanishes with the step length.
     pub curvature_work: Sum,
-    /// Energy added (or removed) by carrying the state to another step size.
+    /// Energy added or removed when the state is converted to another step size.
     pub step_change: Sum,
-    /// Sum of the magnitudes of all external work: the scale of the residual.
+    /// Sum of the magnitudes of all external work, the scale of the residual.
     pub turnover: Sum,
-    /// Sum of the magnitudes of the work that contact forces do on the structures: what a vibration takes from contact and gives back.
+    /// Sum of the magnitudes of the work that contact forces do on the structures, in both directions.
     pub contact_work: Sum,
 }
 
-/// Every sum by its name, once: a field that is missing here does not compile.
+/// Lists every sum of the ledger once; a missing field is a compile error.
 macro_rules! sums_of_ledger {
     ($count:literal: $($sum:ident),* $(,)?) => {
         persist_fields!(Ledger { initial, $($sum),* });
@@ -108,7 +108,7 @@ sums_of_ledger! { 17:
 }
 
 impl Ledger {
-    /// Work of all inputs but loads (J): shaft, whirl, axial shift, moving casing.
+    /// Work of all inputs except loads (J): shaft, whirl, axial shift, moving casing.
     pub fn external_work(&self) -> f64 {
         let mut sum = Sum::default();
         self.inputs().into_iter().for_each(|work| sum.add(work.value()));
@@ -119,7 +119,7 @@ impl Ledger {
         [self.shaft_work, self.stiffening_work, self.whirl_work, self.shift_work, self.casing_work]
     }
 
-    /// Entries of two sets of structures together.
+    /// Returns the sum of the entries of two sets of structures.
     pub fn with(mut self, other: &Self) -> Self {
         self.initial += other.initial;
         let mut other = *other;
@@ -127,7 +127,7 @@ impl Ledger {
         self
     }
 
-    /// Energy that should be there minus what is (J), given kinetic + strain energy now.
+    /// Residual of the energy balance (J): expected minus actual energy, where `mechanical` is the current kinetic and strain energy.
     pub fn residual(&self, mechanical: f64) -> f64 {
         let mut balance = Sum::default();
         balance.add(self.initial);
@@ -145,14 +145,14 @@ impl Ledger {
         balance.value()
     }
 
-    /// All energy that came in or was lost (J).
+    /// Returns the sum of all supplied and lost energy (J).
     pub fn exchanged(&self) -> f64 {
         let losses = [self.damping_loss, self.friction_loss, self.impact_loss, self.wear_work, self.cutting_work];
         self.scale() + losses.iter().map(|loss| loss.value().abs()).sum::<f64>()
     }
 
-    /// Energy put into vibration since the start by forces times speeds (J): work of inputs and loads and changes of step, less
-    /// heat of friction and damping and work on the coating. Impacts, which only take, are left out.
+    /// Energy supplied to vibration since the start by forces times velocities (J): work of inputs and loads and step changes,
+    /// less friction heat, damping loss and work on the coating. Impacts only dissipate energy and are left out.
     pub fn supplied(&self) -> f64 {
         let put_in = self.external_work() + self.load_work.value() + self.step_change.value();
         let put_in = put_in + self.excitation_work.value();
@@ -160,7 +160,7 @@ impl Ledger {
         left - self.wear_work.value() - self.cutting_work.value()
     }
 
-    /// Returns the energy that the residual is compared with (J): initial energy plus all work exchanged.
+    /// Returns the scale of the residual (J): initial energy plus all exchanged external work.
     pub fn scale(&self) -> f64 {
         self.initial.abs() + self.turnover.value()
     }

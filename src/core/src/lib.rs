@@ -1,11 +1,10 @@
 //! Contact stepping of reduced-order models: everything that runs inside `doStep`.
 //!
-//! Floor 0. Plain data in, plain data out: no files, no threads, no clock, no printing, and no allocation
-//! between [`Simulation::initialise`] and the end of the run. SI units everywhere (m, kg, s, N, rad).
+//! Floor 0. The crate takes and returns plain data: no files, no threads, no clock, no printing, and no allocation between
+//! [`Simulation::initialise`] and the end of the run. SI units everywhere (m, kg, s, N, rad).
 //!
-//! The road through the crate is short: a [`Scene`] (settings and a [`Rom`]) is compiled once into a
-//! [`Simulation`]; the simulation owns the [`VariableTable`] that every importer-facing text and call is
-//! derived from, and marches the contact problem from one communication point to the next.
+//! A [`Scene`] (settings and a [`Rom`]) is compiled once into a [`Simulation`]. The simulation owns the [`VariableTable`], from which all
+//! texts and calls for importers are derived, and steps the contact problem from one communication point to the next.
 #![forbid(unsafe_op_in_unsafe_fn)]
 
 mod cubic;

@@ -1,6 +1,6 @@
-//! Saving and restoring state as bytes: one list of fields per struct serves size, save and restore.
+//! Saves and restores state as bytes. One list of fields per struct defines its size, its saving and its restoring.
 
-/// Appends little-endian values to a buffer of sufficient size.
+/// Writes little-endian values to a buffer.
 #[derive(Debug)]
 pub struct StateWriter<'a> {
     buffer: &'a mut [u8],
@@ -8,12 +8,12 @@ pub struct StateWriter<'a> {
 }
 
 impl<'a> StateWriter<'a> {
-    /// Start at the beginning of `buffer`.
+    /// Starts at the beginning of `buffer`.
     pub fn new(buffer: &'a mut [u8]) -> Self {
         Self { buffer, at: 0 }
     }
 
-    /// Bytes written so far, counted even where the buffer is too short (so an empty buffer measures the size).
+    /// Number of bytes written so far, also counted beyond the end of the buffer, so that an empty buffer measures the size.
     pub fn written(&self) -> usize {
         self.at
     }
@@ -26,7 +26,7 @@ impl<'a> StateWriter<'a> {
     }
 }
 
-/// Takes little-endian values from a buffer; past its end it yields zeros (the length is checked beforehand).
+/// Reads little-endian values from a buffer; past its end it returns zeros (the caller checks the length beforehand).
 #[derive(Debug, Clone)]
 pub struct StateReader<'a> {
     buffer: &'a [u8],
@@ -37,28 +37,27 @@ pub struct StateReader<'a> {
 }
 
 impl<'a> StateReader<'a> {
-    /// Start at the beginning of `buffer`.
+    /// Starts at the beginning of `buffer`.
     pub fn new(buffer: &'a [u8]) -> Self {
         Self { buffer, at: 0, fault: None, largest: f64::MAX, infinite: 0 }
     }
 
-    /// From here on, [`Persist::check`] refuses real numbers beyond ±`largest`; with infinity none, not even one that is
-    /// not a number.
+    /// From here on, [`Persist::check`] rejects real numbers beyond ±`largest` and NaN; if `largest` is infinite, it accepts both.
     pub fn up_to(&mut self, largest: f64) {
         self.largest = largest;
     }
 
-    /// Note what is wrong with the bytes; the first fault counts.
+    /// Records an error in the bytes; only the first one is kept.
     pub fn refuse(&mut self, fault: &'static str) {
         self.fault.get_or_insert(fault);
     }
 
-    /// Returns the fault of the bytes read so far.
+    /// Returns the first error in the bytes read so far.
     pub fn fault(&self) -> Option<&'static str> {
         self.fault
     }
 
-    /// Infinite numbers looked at so far, which are for the caller to judge: gaps of padding lanes are infinite.
+    /// Number of infinite values read so far. The caller decides whether they are valid: gaps of padding lanes are infinite.
     pub fn infinite(&self) -> usize {
         self.infinite
     }
@@ -73,18 +72,18 @@ impl<'a> StateReader<'a> {
     }
 }
 
-/// A value that belongs to the state.
+/// A value that belongs to the saved state.
 pub trait Persist {
-    /// Append it.
+    /// Appends the value.
     fn save(&self, writer: &mut StateWriter);
-    /// Read it back, in the same order.
+    /// Reads the value, in the order in which [`Persist::save`] wrote it.
     fn restore(&mut self, reader: &mut StateReader);
-    /// Pass over its bytes and [`StateReader::refuse`] what [`Persist::save`] never writes, so that nothing is changed before
-    /// all of a state is known to be one.
+    /// Reads over the bytes of the value and calls [`StateReader::refuse`] if [`Persist::save`] cannot have written them. A whole
+    /// state is checked in this way before anything is changed.
     fn check(&self, reader: &mut StateReader);
 }
 
-/// Counts of steps are far below; what is above is no count.
+/// Largest valid step counter; no run comes near it.
 const MOST_COUNTED: u64 = 1 << 53;
 
 impl Persist for f64 {
@@ -188,7 +187,7 @@ impl<T: Persist, const N: usize> Persist for [T; N] {
     }
 }
 
-/// Implements [`Persist`] for a struct from the list of its fields; a field left out does not compile.
+/// Implements [`Persist`] for a struct from the list of its fields; a missing field is a compile error.
 #[macro_export]
 macro_rules! persist_fields {
     ($name:ident { $($field:ident),+ $(,)? }) => {
@@ -210,7 +209,7 @@ macro_rules! persist_fields {
 }
 pub use persist_fields;
 
-/// FNV-1a over bytes, for fingerprints and checksums of saved states (not for security).
+/// FNV-1a hash of bytes, for fingerprints and checksums of saved states (not for security).
 pub fn fingerprint(bytes: &[u8], seed: u64) -> u64 {
     bytes
         .iter()

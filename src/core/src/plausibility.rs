@@ -1,22 +1,22 @@
-//! Values within their range that are rarely meant: slips of units, axes and sets. They are errors unless the scene says that they
-//! are meant (`accept_implausible`), and warnings then.
+//! Implausible values: values within their range that are probably mistakes of units, axes or sets. They are errors unless the scene
+//! accepts them (`accept_implausible`); then they are warnings.
 
 use crate::rom::DisplacementFrame;
 use crate::warning::{Topic, Warning};
 use crate::{Error, Rom, shown};
 
-/// Remedy for a rejected value that is meant.
+/// Remedy for a rejected value that is intended.
 pub const IF_MEANT: &str =
     "If the value is correct, set `accept_implausible = true` in the scene (--accept-implausible)";
 
-/// A value that is rarely meant.
+/// An implausible value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Slip {
-    /// Where it stands: a variable, a field or a ROM.
+    /// Place of the value: a variable, a field or a ROM.
     pub what: String,
     /// The problem, with the value.
     pub problem: String,
-    /// The value that was probably meant.
+    /// The value that was probably intended.
     pub question: String,
 }
 
@@ -25,37 +25,37 @@ impl Slip {
         Self { what: what.into(), problem: problem.into(), question: question.into() }
     }
 
-    /// The error that it is.
+    /// Returns the value as an error.
     pub fn error(&self) -> Error {
         Error::invalid(self.what.clone(), self.problem.clone(), format!("{} {IF_MEANT}", self.question))
     }
 
-    /// The warning that it is where the scene accepts it.
+    /// Returns the value as a warning, if the scene accepts it.
     pub fn warning(&self) -> Warning {
         let problem = format!("{}: {}", self.what, self.problem);
         Warning::new(Topic::Implausible, problem, self.question.clone())
     }
 }
 
-/// Fastest tips that are not asked about (m/s): fans and compressors reach 500, the last blades of steam turbines 800, and
-/// what turns faster than 1500 bursts, whatever it is made of. A speed in rpm taken for rad/s is 9.5 times too fast.
+/// Largest plausible tip speed (m/s): fans and compressors reach 500, the last blades of steam turbines 800, and rotors of any material
+/// burst above 1500. A speed in rpm used as rad/s is 9.5 times too fast.
 pub const TIP_SPEED: f64 = 1500.0;
-/// Fastest flight of a free body that is not asked about (m/s): ten times a bird strike, the speed of space debris.
+/// Largest plausible velocity of a free body (m/s): ten times a bird strike, the speed of space debris.
 pub const FLIGHT: f64 = 3000.0;
-/// Radii of contact nodes that are not asked about (m): from the smallest turbines on a chip to four times the largest steam
-/// turbines. A radius of 20 mm to 20 m in millimetres is 20 to 20 000.
+/// Plausible radii of contact nodes (m): from the smallest turbines on a chip to four times the largest steam turbines. A radius of 20 mm
+/// to 20 m in millimetres is 20 to 20 000.
 const RADII: [f64; 2] = [1e-3, 20.0];
-/// Lowest natural frequencies that are not asked about (Hz): slower than a wind turbine's, faster than a blade on a chip.
+/// Plausible lowest natural frequencies (Hz): slower than a wind turbine's, faster than a blade on a chip.
 const FREQUENCIES: [f64; 2] = [0.05, 1e6];
-/// Tips may overlap seen along the axis: of staggered blades by half a pitch, of inducers by one or two. Sectors whose
-/// contact nodes span more pitches than this are not sectors of this axis.
+/// Tips may overlap seen along the axis: staggered blades by half a pitch, inducers by one or two. Sectors whose contact nodes span more
+/// pitches than this do not belong to this axis.
 const PITCHES: f64 = 3.0;
-/// Frequencies below this share of the highest are rounding of rigid modes.
+/// Frequencies below this fraction of the highest are rounding of rigid-body modes.
 const RIGID: f64 = 1e-6;
-/// Contact nodes up to this number are looked at for blades that cross.
+/// Up to this number contact nodes are checked for crossing blades.
 const CROSSING_UP_TO: usize = 200;
 
-/// Tips that are too fast at `speed` (rad/s), the value of the input `name`. Allocates only to say so.
+/// Checks for tips that are too fast at `speed` (rad/s), the value of the input `name`. Allocates only in this case.
 pub fn of_speed(rom: &Rom, speed: f64, name: impl FnOnce() -> String) -> Option<Slip> {
     let fastest = speed.abs() * radii(rom)[1];
     (rom.frame == DisplacementFrame::Cylindrical && fastest > TIP_SPEED).then(|| {
@@ -68,12 +68,12 @@ pub fn of_speed(rom: &Rom, speed: f64, name: impl FnOnce() -> String) -> Option<
     })
 }
 
-/// Speed up to which tips are not asked about (rad/s).
+/// Largest plausible speed (rad/s).
 pub fn fastest(rom: &Rom) -> f64 {
     if rom.frame == DisplacementFrame::Cylindrical { TIP_SPEED / radii(rom)[1] } else { f64::INFINITY }
 }
 
-/// A free body that is too fast at `velocity` (m/s).
+/// Checks for a free body that is too fast at `velocity` (m/s).
 pub fn of_velocity(name: &str, velocity: [f64; 3]) -> Option<Slip> {
     let size = velocity.iter().map(|component| component * component).sum::<f64>().sqrt();
     (size > FLIGHT).then(|| {
@@ -82,13 +82,13 @@ pub fn of_velocity(name: &str, velocity: [f64; 3]) -> Option<Slip> {
     })
 }
 
-/// Slips of a ROM; `frequencies` are its angular frequencies (rad/s).
+/// Checks a ROM; `frequencies` are its angular frequencies (rad/s).
 pub fn of_rom(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> Vec<Slip> {
     let sectors = if rom.sectors > 1 && rom.extras.grid.is_none() { of_sectors(rom) } else { None };
     [of_size(rom), sectors, of_frequencies(rom, frequencies)].into_iter().flatten().collect()
 }
 
-/// Smallest and largest radius of the contact nodes (m); of a Cartesian ROM the extents of its box.
+/// Smallest and largest radius of the contact nodes (m); for a Cartesian ROM the extents of its bounding box.
 fn radii(rom: &Rom) -> [f64; 2] {
     let along = |axis: usize| {
         let values = rom.contact_nodes.iter().map(|node| node.position[axis]);
@@ -128,7 +128,7 @@ fn of_frequencies(rom: &Rom, frequencies: impl Iterator<Item = f64> + Clone) -> 
     })
 }
 
-/// Neighbouring sectors that lie within each other.
+/// Checks for neighbouring sectors that overlap.
 fn of_sectors(rom: &Rom) -> Option<Slip> {
     if rom.frame != DisplacementFrame::Cylindrical {
         return None;
@@ -150,7 +150,7 @@ fn of_sectors(rom: &Rom) -> Option<Slip> {
     Some(Slip::new(named(rom), problem, question))
 }
 
-/// Angle from the first contact node (rad), the short way, and axial position (m) of every node.
+/// Angle from the first contact node (rad, shortest way), and axial position (m) of every node.
 fn developed(rom: &Rom) -> Vec<[f64; 2]> {
     let first = rom.contact_nodes.first().map_or(0.0, |node| node.position[1]);
     let turn = std::f64::consts::TAU;
@@ -158,7 +158,7 @@ fn developed(rom: &Rom) -> Vec<[f64; 2]> {
     rom.contact_nodes.iter().map(|node| [short(node.position[1] - first), node.position[2]]).collect()
 }
 
-/// Whether the line from node to node properly crosses itself, a pitch further.
+/// Returns whether the line from node to node properly crosses itself one pitch further.
 fn crosses_neighbour(line: &[[f64; 2]], pitch: f64) -> bool {
     if line.len() > CROSSING_UP_TO {
         return false;

@@ -1,9 +1,9 @@
 //! The reduced-order model of one structure, as plain data.
 //!
-//! A ROM is what Craig-Bampton (or any other linear reduction) leaves of a finite-element model: small dense
-//! mass and stiffness matrices and the map from reduced coordinates to the displacement of the contact nodes.
-//! `sectors` identical copies of it stand around the axis: uncoupled (blades on a rigid hub), or coupled, with a small pencil
-//! per nodal diameter ([`Harmonic`]). `sectors = 1` is a single general structure.
+//! A ROM is the result of a Craig-Bampton (or any other linear) reduction of a finite-element model: small dense mass and stiffness
+//! matrices and the map from reduced coordinates to the displacement of the contact nodes. `sectors` identical copies of it are arranged
+//! around the axis: uncoupled (blades on a rigid hub), or coupled, with a small pencil per nodal diameter ([`Harmonic`]). `sectors = 1` is
+//! a single general structure.
 
 mod cyclic;
 mod grid;
@@ -18,14 +18,14 @@ pub(crate) use cyclic::cholesky;
 pub use support::{SUPPORT_ROWS, SupportRows};
 pub use watched::{STRESSES, WatchedPoints, von_mises};
 
-/// Most sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or hostile file must not ask for all memory,
-/// which ends the process of the importer.
+/// Largest number of sectors of a ROM. Bladed disks have tens to a few hundred; a damaged or malicious file must not exhaust the memory,
+/// which would end the process of the importer.
 pub const MAX_SECTORS: usize = 10_000;
 
-/// Which directions the three displacement components of a contact node have.
+/// Directions of the three displacement components of a contact node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DisplacementFrame {
-    /// (radial, tangential, axial) of the node's own position, turning with the structure.
+    /// (radial, tangential, axial) at the position of the node, turning with the structure.
     Cylindrical,
     /// (x, y, z), fixed to the structure.
     Cartesian,
@@ -36,43 +36,43 @@ pub enum DisplacementFrame {
 pub struct ContactNode {
     /// Name used in variable names and plots, for example `leading_edge`.
     pub name: String,
-    /// Undeformed position: (r, θ, z) in m, rad, m for [`DisplacementFrame::Cylindrical`], else (x, y, z) in m.
+    /// Undeformed position: (r, θ, z) in m, rad, m for [`DisplacementFrame::Cylindrical`], otherwise (x, y, z) in m.
     pub position: [f64; 3],
     /// Slope dr/dz of the tip contour in the meridional plane at this node (the casing runs parallel to it).
     pub meridional_slope: f64,
-    /// Area that a patch stands for, the integral of its weight over the tip (m²); 0 for a node.
+    /// Area that a patch represents, the integral of its weight over the tip (m²); 0 for a node.
     pub area: f64,
-    /// Length along the chord that it stands for, the integral of its weight along it (m); 0 for a node.
+    /// Length along the chord that a patch represents, the integral of its weight along the chord (m); 0 for a node.
     pub length: f64,
 }
 
 /// Meaning of the coordinates of a ROM besides static responses to contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ReductionBasis {
-    /// Modes with the contact nodes held (Craig-Bampton), or not known.
+    /// Modes with the contact nodes held (Craig-Bampton), or unknown.
     #[default]
     FixedInterface,
-    /// Modes of the structure as it is supported (MacNeal, Rubin).
+    /// Modes of the structure with its supports only (MacNeal, Rubin).
     FreeInterface,
 }
 
-/// Errors that a reduction causes in a rub: errors of the displacements of the tip (relative L2) against the limit of refinements.
+/// Errors that a reduction causes in a rub: errors of the displacements of the tip (relative L2) compared with the limit of refinement.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RubErrors {
-    /// The scene that they were found on, in words.
+    /// Description of the scene on which they were measured.
     pub found_on: String,
-    /// By the number of modes; `None` where it is not known.
+    /// Error by the number of modes; `None` if unknown.
     pub modes: Option<f64>,
-    /// By the number of contact patches or nodes along the chord.
+    /// Error by the number of contact patches or nodes along the chord.
     pub patches: Option<f64>,
-    /// By the number of rows of patches across the thickness.
+    /// Error by the number of rows of patches across the thickness.
     pub rows: Option<f64>,
-    /// By the mesh.
+    /// Error by the mesh.
     pub mesh: Option<f64>,
 }
 
 impl RubErrors {
-    /// Whether none is known.
+    /// Returns whether all errors are unknown.
     pub fn is_empty(&self) -> bool {
         [self.modes, self.patches, self.rows, self.mesh].iter().all(Option::is_none)
     }
@@ -89,15 +89,15 @@ pub struct RomChecks {
     pub frequency_deviation: Vec<f64>,
     /// Residual convergence criterion per mode (%), eq. 12 of the paper.
     pub residual_criterion: Vec<f64>,
-    /// Nodal diameter of each mode of a structure with coupled sectors, else empty. A mode with 0 < 2n < sectors stands
-    /// for two of the whole disk.
+    /// Nodal diameter of each mode of a structure with coupled sectors, otherwise empty. A mode with 0 < 2n < sectors represents two modes
+    /// of the whole disk.
     pub nodal_diameters: Vec<u32>,
     /// Deviation of the static flexibility at each contact node or patch from the full model (%).
     pub flexibility_deviation: Vec<f64>,
     /// Frequencies (Hz) of the forced responses that were compared, ascending.
     pub response_frequencies: Vec<f64>,
-    /// Deviation of the forced response at the contact nodes from that of the full model at each of them (%), all contact nodes and
-    /// directions together.
+    /// Deviation of the forced response at the contact nodes from that of the full model at each of these frequencies (%), all contact
+    /// nodes and directions together.
     pub response_deviation: Vec<f64>,
     /// Errors in a rub, if they are known.
     pub rub_errors: Option<RubErrors>,
@@ -105,8 +105,8 @@ pub struct RomChecks {
 
 /// Effects of a steady speed Ω about the z axis on one structure, in its reduced coordinates.
 ///
-/// M q̈ + (D + 2ΩG) q̇ + (K + Ω²K₁ + Ω⁴K₂) q = f + Ω²c + Ω⁴c₂ in the rotating frame; K₁ holds spin softening and centrifugal
-/// stiffening together.
+/// M q̈ + (D + 2ΩG) q̇ + (K + Ω²K₁ + Ω⁴K₂) q = f + Ω²c + Ω⁴c₂ in the rotating frame; K₁ contains both spin softening and centrifugal
+/// stiffening.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spin {
     /// K₁, n × n, symmetric (kg for physical coordinates).
@@ -117,19 +117,19 @@ pub struct Spin {
     pub coriolis: DMatrix<f64>,
     /// c, n values: centrifugal force per Ω² (kg·m).
     pub centrifugal_load: Vec<f64>,
-    /// c₂, n values (kg·m·s²). K(Ω) is the stiffness of small motions about the stretched shape, so that the load which
-    /// holds this shape against it is not Ω²c alone. With the resting stiffness K in place of K(Ω), Ω²c alone is right.
+    /// c₂, n values (kg·m·s²). K(Ω) is the stiffness of small motions about the stretched shape, so that the load in equilibrium with this
+    /// shape is not Ω²c alone. With the stiffness K at rest instead of K(Ω), Ω²c alone is correct.
     pub centrifugal_load_speed4: Vec<f64>,
-    /// Largest |Ω| that K₁ and K₂ were fitted for (rad/s).
+    /// Largest |Ω| for which K₁ and K₂ were fitted (rad/s).
     pub largest_speed: f64,
 }
 
-/// Part of a structure whose temperature is one number.
+/// Part of a structure with one uniform temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThermalPatch {
-    /// Angles from and to (rad), from < to ≤ from + 2π.
+    /// Start and end angle (rad), start < end ≤ start + 2π.
     pub angle: [f64; 2],
-    /// Axial positions from and to (m).
+    /// Start and end axial position (m).
     pub axial: [f64; 2],
 }
 
@@ -138,23 +138,23 @@ pub struct ThermalPatch {
 pub struct Thermal {
     /// Force on the reduced coordinates per kelvin of each patch above the reference, n × patches (N/K).
     pub loads: DMatrix<f64>,
-    /// Where the patches are.
+    /// Positions of the patches.
     pub patches: Vec<ThermalPatch>,
 }
 
 /// Contact nodes that form a grid: node `along · around + i` is the i-th of row `along`.
 ///
-/// A closed grid is a ring around the z axis in a cylindrical frame: rows (rings) in order of growing z, nodes of a ring at
-/// growing angles 2π/around apart, at least 4 × 2. An open one is a quadrilateral grid of any shape in a Cartesian frame with
-/// four free edges, at least 2 × 2; with s growing along a row and t from row to row, the surface S(s, t) through its nodes
-/// is met from the side that S_t × S_s points to.
+/// A closed grid is a ring around the z axis in a cylindrical frame: rows (rings) in order of increasing z, nodes of a ring at increasing
+/// angles 2π/around apart, at least 4 × 2. An open grid is a quadrilateral grid of any shape in a Cartesian frame with four free edges, at
+/// least 2 × 2; with s increasing along a row and t from row to row, contact with the surface S(s, t) through its nodes is on the side to
+/// which S_t × S_s points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ContactGrid {
-    /// Nodes of a row: around the circumference where the grid is closed.
+    /// Nodes of a row: around the circumference if the grid is closed.
     pub around: usize,
-    /// Rows: rings along the axis where the grid is closed.
+    /// Rows: rings along the axis if the grid is closed.
     pub along: usize,
-    /// The last node of a row is followed by its first.
+    /// True if the last node of a row is followed by its first.
     pub closed: bool,
 }
 
@@ -165,25 +165,25 @@ pub struct RomExtras {
     pub spin: Option<Spin>,
     /// Thermal loads.
     pub thermal: Option<Thermal>,
-    /// The contact nodes are a grid that a surface spline can be laid through.
+    /// Contact nodes as a grid through which a surface spline can be laid.
     pub grid: Option<ContactGrid>,
-    /// Nodal diameters 1 ..= sectors/2 of coupled sectors, whose diameter 0 are the ROM's own matrices; empty for
-    /// uncoupled sectors and single structures.
+    /// Nodal diameters 1 ..= sectors/2 of coupled sectors; those of diameter 0 are the ROM's own matrices. Empty for uncoupled sectors and
+    /// single structures.
     pub harmonics: Vec<Harmonic>,
-    /// Points beside the contact nodes.
+    /// Watched points.
     pub watched: Option<WatchedPoints>,
-    /// Places whose stress is recovered.
+    /// Places at which stress is recovered.
     pub stress: Option<WatchedPoints>,
-    /// Static stress of the full model at these places per kelvin of each patch, 6·places × patches (Pa/K), held where the structure is
-    /// held and free of contact.
+    /// Static stress of the full model at these places per kelvin of each patch, 6·places × patches (Pa/K), for the supported structure
+    /// without contact.
     pub stress_thermal: Option<DMatrix<f64>>,
-    /// The same per Ω² of the centrifugal load on the structure at rest, 6·places × 1 (Pa s²).
+    /// Static stress at these places per Ω² of the centrifugal load on the structure at rest, 6·places × 1 (Pa s²).
     pub stress_centrifugal: Option<DMatrix<f64>>,
     /// Forces on the held nodes.
     pub support: Option<SupportRows>,
     /// Meaning of the coordinates.
     pub basis: ReductionBasis,
-    /// The contact patches are in so many rows across the thickness of the tip, one row after the other, each as the others along the chord;
+    /// Number of rows of contact patches across the thickness of the tip, one row after the other, with equal patches along the chord;
     /// `None` for one row, or nodes.
     pub rows: Option<usize>,
 }
@@ -193,7 +193,7 @@ pub struct RomExtras {
 pub struct Rom {
     /// Name of the structure.
     pub name: String,
-    /// Where it came from: mesh counts, material, reduction, in one or a few sentences.
+    /// Origin: mesh counts, material, reduction, in one or a few sentences.
     pub origin: String,
     /// Number of identical copies around the axis (1 to [`MAX_SECTORS`]); uncoupled unless there are harmonics.
     pub sectors: usize,
@@ -221,15 +221,15 @@ impl Rom {
         self.mass.nrows()
     }
 
-    /// Whether all its contact nodes are patches with an area and a length along the chord.
+    /// Returns whether all contact nodes are patches with an area and a length along the chord.
     pub fn has_patches(&self) -> bool {
         self.contact_nodes.iter().all(|node| node.area > 0.0 && node.length > 0.0)
     }
 
-    /// Check shapes, finiteness, symmetry and definiteness.
+    /// Checks shapes, finiteness, symmetry and definiteness.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the array and the remedy.
+    /// [`Error::Invalid`] with the array and the remedy.
     pub fn validate(&self) -> Result<()> {
         let remedy = "Write the ROM again with `tiprub reduce`, or see the ROM file chapter of the user guide";
         self.validate_shapes(remedy)?;
@@ -308,7 +308,7 @@ impl Rom {
         Ok(())
     }
 
-    /// Lengths in metres, of a machine.
+    /// Checks that lengths are plausible for a machine in metres.
     fn validate_place(&self, what: &str, node: &ContactNode, remedy: &str) -> Result<()> {
         let finite = node.position.iter().all(|value| value.is_finite());
         let radius_positive = self.frame == DisplacementFrame::Cartesian || node.position[0] > 0.0;
@@ -412,7 +412,7 @@ impl Rom {
     }
 }
 
-/// Entries that are numbers, of a size that squares do not leave the range of double precision.
+/// Checks that entries are finite, and small enough that squares do not overflow.
 fn entries(name: &str, matrix: &DMatrix<f64>, most: f64, remedy: &str) -> Result<()> {
     let Some(index) = matrix.iter().position(|value| value.is_nan() || value.abs() > most) else { return Ok(()) };
     let (row, column, value) = (index % matrix.nrows(), index / matrix.nrows(), matrix[index]);

@@ -34,7 +34,7 @@ pub enum Shape {
     },
     /// Two smooth bumps half a turn apart: clearance c(1 − 2·depth·exp(−((mod(θ − phase, π)/π − ½)/width)²)), c the gap.
     TwoLobe {
-        /// Depth factor (-): 1 makes the bump intrude by as much as the gap.
+        /// Depth factor (-): at 1 the bump overlaps the undeformed tip by as much as the gap.
         #[serde(default = "one")]
         depth: f64,
         /// Width parameter of the bump (-), fraction of half a turn.
@@ -51,17 +51,17 @@ pub enum Shape {
     },
 }
 
-/// A written scene leaves out newer keys at their default, so that it reads as if they did not exist.
+/// Returns whether a value is its default. Newer keys at their default are not written, so that older scenes are unchanged.
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// A negative zero is written, so that it comes back bit by bit.
+/// Returns whether a value is positive zero. A negative zero is written, so that it is read back bit by bit.
 fn is_positive_zero(value: &f64) -> bool {
     value.to_bits() == 0
 }
 
-/// Three numbers: of a longer list none is passed over in silence.
+/// Reads exactly three numbers; a longer list is an error.
 fn three<'de, D: serde::Deserializer<'de>>(source: D) -> std::result::Result<[f64; 3], D::Error> {
     let values = Vec::<f64>::deserialize(source)?;
     let length = values.len();
@@ -80,10 +80,10 @@ fn two_lobe_width() -> f64 {
     0.15
 }
 
-/// Error that a step of `galerkin` may make where nothing else is said, as a share of the smallest clearance.
+/// Default error that a step of `galerkin` may make, as a fraction of the smallest clearance.
 pub const TOLERANCE: f64 = 1e-3;
 
-/// Longest step (s) of `galerkin` if the scene file gives none. The communication step bounds steps too.
+/// Longest step (s) of `galerkin` if the scene file gives none. The communication step also bounds steps.
 pub const ADAPTIVE_STEP: f64 = 8e-5;
 
 /// Rigid motion of a structure.
@@ -93,10 +93,10 @@ pub enum BodyMotion {
     /// Turns about the z axis with the input `speed`.
     #[default]
     Rotating,
-    /// Stands still; `speed` does not exist.
+    /// Stands still; the input `speed` does not exist.
     Still,
-    /// Flies freely, held by nothing but its contacts: a Cartesian ROM whose stiffness leaves the three rigid translations
-    /// free. `velocity` is its velocity at the start.
+    /// Free body, on which only its contacts act: a Cartesian ROM whose stiffness has the three rigid translations in its null space.
+    /// `velocity` is its initial velocity.
     Free,
 }
 
@@ -106,7 +106,7 @@ impl Default for Shape {
     }
 }
 
-/// Effects of spin on a rotating structure, each off unless asked for. They need a ROM with spin matrices.
+/// Effects of spin on a rotating structure, each off unless requested. They need a ROM with spin matrices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SpinSettings {
@@ -149,32 +149,31 @@ pub struct StructureSettings {
     /// Start value of the speed input (rad/s).
     #[serde(default)]
     pub speed: f64,
-    /// Start value of the velocity of the whole body along x, y, z (m/s); of a free structure only.
+    /// Start value of the velocity of the whole body along x, y, z (m/s); for free bodies only.
     #[serde(default, deserialize_with = "three", skip_serializing_if = "is_at_rest")]
     pub velocity: [f64; 3],
-    /// Modal damping ratio ξ (-), 0 ≤ ξ < 1; the ROM's own when absent.
+    /// Modal damping ratio ξ (-), 0 ≤ ξ < 1; that of the ROM if absent.
     #[serde(default)]
     pub damping_ratio: Option<f64>,
-    /// Damping ratios ξ (-) of the first modes, of each nodal diameter where sectors are coupled; `damping_ratio` is that of the
-    /// others.
+    /// Damping ratios ξ (-) of the first modes, of each nodal diameter if sectors are coupled; `damping_ratio` applies to the others.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub damping_ratios: Vec<f64>,
     /// Effects of spin.
     #[serde(default, skip_serializing_if = "is_default")]
     pub spin: SpinSettings,
-    /// Make the displacement of the shaft's centre in x and y inputs.
+    /// Makes the displacement of the shaft centre in x and y inputs.
     #[serde(default, skip_serializing_if = "is_default")]
     pub whirl: bool,
-    /// Make the axial displacement of the rotor an input.
+    /// Makes the axial displacement of the rotor an input.
     #[serde(default, skip_serializing_if = "is_default")]
     pub axial_shift: bool,
     /// Mistuning: factor on the natural frequencies of each sector, one value per sector; empty = all equal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub frequency_factors: Vec<f64>,
-    /// Make the temperatures of the ROM's patches inputs; of a rotor one temperature.
+    /// Makes the temperatures of the ROM's patches inputs; for a rotor one temperature.
     #[serde(default, skip_serializing_if = "is_default")]
     pub thermal: bool,
-    /// Share of its elastic stiffness that a rotor loses per kelvin (1/K).
+    /// Fraction of its elastic stiffness that a rotor loses per kelvin (1/K).
     #[serde(default, skip_serializing_if = "is_positive_zero")]
     pub softening: f64,
     /// Nodal-diameter load with amplitude and phase as inputs.
@@ -183,7 +182,7 @@ pub struct StructureSettings {
     /// Excitation by an engine order, with amplitude and phase as inputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub excitation: Option<ExcitationSettings>,
-    /// Motion of the blades at the start.
+    /// Initial motion of the blades.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub initial: Vec<InitialSettings>,
 }
@@ -206,7 +205,7 @@ pub enum Interpolation {
     /// Bicubic uniform B-spline (default).
     #[default]
     Spline,
-    /// Bilinear facets, whose normals jump from one to the next: only to compare with.
+    /// Bilinear facets, whose normals jump from one to the next: only for comparison.
     Facets,
 }
 
@@ -214,16 +213,16 @@ pub enum Interpolation {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SplineSettings {
-    /// Data points around the circumference; those of the structure's contact grid where the surface has a structure.
+    /// Number of data points around the circumference; that of the structure's contact grid if the surface has a structure.
     #[serde(default = "default_around", skip_serializing_if = "is_default_around")]
     pub around: usize,
-    /// Rings of data points along the axis; those of the structure's contact grid where the surface has a structure.
+    /// Number of rings of data points along the axis; that of the structure's contact grid if the surface has a structure.
     #[serde(default = "default_along", skip_serializing_if = "is_default_along")]
     pub along: usize,
     /// Closure around the circumference.
     #[serde(default, skip_serializing_if = "is_default")]
     pub closure: Closure,
-    /// Between the data points.
+    /// Interpolation between the data points.
     #[serde(default, skip_serializing_if = "is_default")]
     pub interpolation: Interpolation,
 }
@@ -259,9 +258,9 @@ fn is_default_along(along: &usize) -> bool {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PatchSettings {
-    /// Parts around the circumference, the first from θ = 0.
+    /// Number of parts around the circumference, the first from θ = 0.
     pub around: usize,
-    /// Parts along the axis.
+    /// Number of parts along the axis.
     #[serde(default = "one_part", skip_serializing_if = "is_one_part")]
     pub along: usize,
 }
@@ -274,8 +273,8 @@ fn is_one_part(parts: &usize) -> bool {
     *parts == one_part()
 }
 
-/// One surface: around the z axis and parallel to the tip contour of the rotor it faces, or laid through the open contact
-/// grid of a structure where it faces a free one.
+/// One surface: around the z axis and parallel to the tip contour of its rotor, or through the open contact grid of a structure if its
+/// master is a free body.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSettings {
@@ -284,29 +283,27 @@ pub struct SurfaceSettings {
     /// Shape around the circumference.
     #[serde(default)]
     pub shape: Shape,
-    /// Time over which the shape grows smoothly from circular to full (s), 0 = at once.
+    /// Time over which the shape grows smoothly from circular to full (s), 0 = immediately.
     #[serde(default)]
     pub ramp_time: f64,
-    /// Make the shape amplitude factor, its rotation and the uniform radius change inputs.
+    /// Makes the amplitude factor of the shape, its rotation and the uniform radius change inputs.
     #[serde(default)]
     pub moving: bool,
-    /// Structure that carries the surface and deforms it; its ROM needs a contact grid. Rigid where absent.
+    /// Structure that carries the surface and deforms it; its ROM needs a contact grid. The surface is rigid if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub structure: Option<String>,
-    /// The structure gives the place of the surface only: it does not deform. Against free structures only.
+    /// True if the structure only defines the position of the surface and does not deform it. For free bodies only.
     #[serde(default, skip_serializing_if = "is_default")]
     pub rigid: bool,
-    /// Surface spline through data points; the analytical surface of revolution where absent (always a spline on a
-    /// structure).
+    /// Surface spline through data points; the analytical surface of revolution if absent (always a spline on a structure).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spline: Option<SplineSettings>,
-    /// Friction power of each of these patches as an output; the heated patches of the ROM where absent and the
-    /// structure is thermal.
+    /// Patches whose friction power is an output; the heated patches of the ROM if absent and the structure is thermal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patches: Option<PatchSettings>,
 }
 
-/// Whether the contact normal follows the meridional slope of the tip contour.
+/// Direction of the contact normal with respect to the meridional slope of the tip contour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Meridian {
@@ -323,17 +320,16 @@ pub enum Meridian {
 pub struct ContactSettings {
     /// Structure whose contact nodes are the masters.
     pub master: String,
-    /// Surface they meet.
+    /// Surface that they can touch.
     pub slave: String,
-    /// The contact nodes whose names start with this text take part in this pair; all of them when absent. Of several pairs of one
-    /// structure no two may claim the same node.
+    /// Prefix of the names of the contact nodes in this pair; all nodes if absent. No two pairs of one structure may contain the same node.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodes: Option<String>,
     /// Radial tip clearance of the undeformed structure (m), > 0; absent (0) for a free master, whose gaps follow from
     /// the positions in both ROMs.
     #[serde(default, skip_serializing_if = "is_positive_zero")]
     pub gap: f64,
-    /// Clearance of each sector (m) where they differ; replaces `gap`, which may be absent then. One value per sector.
+    /// Clearance of each sector (m) if they differ; replaces `gap`, which may then be absent. One value per sector.
     #[serde(default)]
     pub sector_gaps: Vec<f64>,
     /// Coulomb friction coefficient µ (-), 0 ≤ µ ≤ 2.
@@ -348,13 +344,13 @@ pub struct ContactSettings {
     /// Abradable coating of the slave.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coating: Option<CoatingSettings>,
-    /// Share of the friction heat that goes into the slave (-), 0 to 1; the patch outputs carry this share.
+    /// Fraction of the friction heat that flows into the slave (-), 0 to 1; the patch outputs contain this fraction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slave_heat_fraction: Option<f64>,
 }
 
 impl ContactSettings {
-    /// Clearance that the law of two bumps refers to (m): `gap`, or the mean of `sector_gaps` where these replace it.
+    /// Clearance to which the law of two bumps refers (m): `gap`, or the mean of `sector_gaps` if they replace it.
     pub fn nominal_gap(&self) -> f64 {
         if self.gap != 0.0 || self.sector_gaps.is_empty() {
             return self.gap;
@@ -365,14 +361,14 @@ impl ContactSettings {
     }
 }
 
-/// Interpolation of inputs that move or load something between communication points.
+/// Interpolation between communication points of inputs that move or load a structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InputInterpolation {
-    /// From the value reached to the one set, which is reached at the end of the step (default).
+    /// Ramp from the current value to the new one, which is reached at the end of the step (default).
     #[default]
     Ramp,
-    /// The value set acts at once: a jump within one internal step.
+    /// The new value acts immediately: a jump within one internal step.
     Hold,
 }
 
@@ -380,28 +376,28 @@ pub enum InputInterpolation {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSettings {
-    /// Scheme. A file that names none has the [default](SceneSettings::default_scheme), which is chosen when the file is read.
+    /// Scheme. A file without this key has the [default](SceneSettings::default_scheme), which is chosen when the file is read.
     #[serde(default)]
     pub scheme: Scheme,
-    /// Why the file has this scheme if it named none; for people, without effect.
+    /// Reason for the scheme if the file does not give one; for messages, without effect.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scheme_reason: Option<String>,
-    /// Largest internal step h (s); the step used divides the communication step evenly. With adaptive steps the longest one,
+    /// Largest internal step h (s); the actual step divides the communication step evenly. With adaptive steps the longest one,
     /// [`ADAPTIVE_STEP`] if the file gives none.
     #[serde(default)]
     pub step: f64,
-    /// Error that a step of `galerkin` may make in displacements, as a share of the smallest clearance; 1e-3 where it is absent.
+    /// Error that a step of `galerkin` may make in displacements, as a fraction of the smallest clearance; 1e-3 if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// Most internal steps of one communication step, those tried in vain included; 0, or absent: any number.
+    /// Largest number of internal steps of one communication step, including rejected trials; 0, or absent: any number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_internal_steps: Option<u32>,
-    /// Inputs between communication points.
+    /// Interpolation of inputs between communication points.
     #[serde(default, skip_serializing_if = "is_default")]
     pub input_interpolation: InputInterpolation,
 }
 
-/// Outputs of the FMU besides the totals.
+/// Outputs of the FMU in addition to the totals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct OutputSettings {
@@ -409,16 +405,16 @@ pub struct OutputSettings {
     pub watched_sectors: Vec<usize>,
     /// Smallest clearance and normal force of every sector.
     pub all_sectors: bool,
-    /// Nodal-diameter amplitudes 0..=this of the radial tip displacement; absent = none.
+    /// Nodal-diameter amplitudes from 0 to this number, of the radial tip displacement; absent = none.
     pub nodal_diameters: Option<usize>,
     /// Energy ledger.
     pub energies: bool,
     /// Values at the communication point in addition to averages over the step.
     pub instantaneous_forces: bool,
-    /// Stress at the places that the ROMs recover it at, of watched sectors.
+    /// Stress of watched sectors at the places at which the ROMs recover it.
     #[serde(skip_serializing_if = "is_default")]
     pub stress: bool,
-    /// Amplitudes of so many modes of watched sectors, from the lowest.
+    /// Number of modes of watched sectors, from the lowest, whose amplitudes are outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_amplitudes: Option<usize>,
     /// Displacements of the contact nodes of watched sectors.
@@ -478,29 +474,29 @@ pub struct ExperimentSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
-    /// Every setting by itself (default).
+    /// Individual settings (default).
     #[default]
     None,
     /// The paper's method: central differences and the film of eq. 11.
     Paper,
 }
 
-/// The settings of a scene, without the ROMs it names.
+/// Settings of a scene, without its ROMs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSettings {
     /// Name of the model; letters, digits, underscore.
     pub name: String,
-    /// One or a few sentences for the importer's catalogue.
+    /// Description in one or a few sentences for the importer's catalogue.
     #[serde(default)]
     pub description: String,
     /// Scheme and solver in one word.
     #[serde(default, skip_serializing_if = "is_default")]
     pub preset: Preset,
-    /// Whether values that are rarely meant ([`crate::plausibility`]) are warnings and no errors.
+    /// True if implausible values ([`crate::plausibility`]) are warnings instead of errors.
     #[serde(default, skip_serializing_if = "is_default")]
     pub accept_implausible: bool,
-    /// Identifiers of warnings that are not given ([`crate::warning::Topic::id`]).
+    /// Identifiers of silenced warnings ([`crate::warning::Topic::id`]).
     #[serde(default, skip_serializing_if = "is_default")]
     pub silence: Vec<String>,
     /// Flexible structures.
@@ -523,17 +519,17 @@ pub struct SceneSettings {
 }
 
 impl SceneSettings {
-    /// Whether the importer may bound the number of internal steps: where the scene does, or where a tolerance leaves it open.
+    /// Returns whether the importer may bound the number of internal steps: if the scene does, or if the steps are adaptive.
     pub fn bounds_steps(&self) -> bool {
         self.time.max_internal_steps.is_some() || self.takes_a_tolerance()
     }
 
-    /// Whether warnings about a topic are not given.
+    /// Returns whether warnings about a topic are silenced.
     pub fn is_silenced(&self, topic: Topic) -> bool {
         self.silence.iter().any(|id| id == topic.id())
     }
 
-    /// Whether the importer may give a tolerance in place of a step.
+    /// Returns whether the importer may set a tolerance instead of a step.
     pub fn takes_a_tolerance(&self) -> bool {
         self.time.tolerance.is_some() || self.time.scheme == Scheme::Galerkin
     }

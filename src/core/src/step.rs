@@ -1,4 +1,4 @@
-//! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the ledger kept on the way.
+//! One internal step: prediction, gaps, correction (section 4.3 of the paper), and the terms of the energy ledger.
 
 use crate::gaps::PrescribedMotion;
 use crate::settings::Scheme;
@@ -8,28 +8,28 @@ use crate::system::{Bodies, GroupSolution, StepFailure, System};
 const FLUSH_EVERY: u64 = 512;
 
 impl System {
-    /// One internal step to the instant described by `drives`, one per contact pair.
+    /// Advances the system by one internal step to the time described by `drives`, one per contact pair.
     ///
     /// # Errors
-    /// [`StepFailure`]; the state is then not meaningful any more.
+    /// A [`StepFailure`]; the state is undefined afterwards.
     pub fn step(&mut self, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
         if self.settings.scheme == Scheme::Galerkin {
             return self.march(drives);
         }
         let (acts_later, ledger) = (self.settings.scheme.acts_later(), self.settings.ledger);
-        // Eq. 9: all structures go on without new contact forces.
+        // Eq. 9: predict all structures without new contact forces.
         for structure in &mut self.structures {
             structure.predict(acts_later, ledger);
         }
         self.check_travel()?;
-        // Eqs 3 and 10: gaps at the predicted places.
+        // Eqs 3 and 10: gaps at the predicted positions.
         let step = self.step_size();
         for (pair, drive) in self.pairs.iter_mut().zip(drives) {
             pair.move_to(drive, step);
         }
         self.find_gaps(true);
         self.check_edges()?;
-        // Eq. 11: forces that close what penetrates, and what they do, group by group.
+        // Eq. 11: contact forces that remove the penetration, and their effects, group by group.
         self.retire_events();
         let mut bodies = Bodies { structures: &mut self.structures, pairs: &self.pairs, acts_later, ledger };
         for (group, ledger) in self.groups.iter_mut().zip(&mut self.counted.ledgers) {
@@ -49,7 +49,8 @@ impl System {
         Ok(())
     }
 
-    /// Gap of every node, and the smallest of each lane; `warm`: closest points are sought from those of the step before.
+    /// Finds the gap of every node and the smallest gap of each lane. If `warm`, the search for closest points starts from those
+    /// of the previous step.
     pub(crate) fn find_gaps(&mut self, warm: bool) {
         for index in 0..self.pairs.len() {
             self.pairs[index].find_gaps(&mut self.structures, warm);
@@ -59,7 +60,7 @@ impl System {
         }
     }
 
-    /// The contacts of the last step become those of the step before.
+    /// Makes the contacts of the last step those of the previous step.
     fn retire_events(&mut self) {
         self.events.shift();
         self.events.now.clear();

@@ -1,15 +1,15 @@
-//! The one variable table: XML, HTML, value references, get and set are all derived from it.
+//! The variable table, from which XML, HTML, value references, get and set are derived.
 //!
-//! A variable is a scalar or a one-dimensional array. Value references are consecutive: element `i` (0-based) of
-//! a variable has reference `variable.reference + i`. FMI 2.0 sees every element as a scalar named
-//! `name[i+1]`; FMI 3.0 sees the array under its first reference (or the scalars, when packaged so).
+//! A variable is a scalar or a one-dimensional array. Value references are consecutive: element `i` (0-based) of a variable has reference
+//! `variable.reference + i`. FMI 2.0 sees every element as a scalar named `name[i+1]`; FMI 3.0 sees the array under its first reference (or
+//! the scalars, if packaged in this way).
 
 use std::collections::{BTreeMap, HashSet};
 
 use crate::{Error, Result, ranges};
 
-/// Value of a clearance output if no node has anything to touch (m): finite, as FMI requires, and larger than any distance in an engine. Its time
-/// derivative is 0 then.
+/// Value of a clearance output if there is no surface to touch (m): finite, as FMI requires, and larger than any distance in an engine. Its
+/// time derivative is then 0.
 pub const NO_CLEARANCE: f64 = 1e9;
 
 /// Role of a variable, as in the FMI standards.
@@ -19,11 +19,11 @@ pub enum Causality {
     Independent,
     /// Set by the importer during the simulation.
     Input,
-    /// Set by the importer before the simulation (and during it when tunable).
+    /// Set by the importer before the simulation (and during it if tunable).
     Parameter,
-    /// Computed.
+    /// Computed output.
     Output,
-    /// Computed or constant, not meant for connections.
+    /// Computed or constant, not intended for connections.
     Local,
 }
 
@@ -73,7 +73,7 @@ pub struct Enumeration {
 pub struct VariableUnit {
     /// Unit name.
     pub name: &'static str,
-    /// The quantity, by its name among Modelica's SI units.
+    /// Name of the quantity among Modelica's SI units.
     pub quantity: &'static str,
     /// Exponents of kg, m, s, rad, K.
     pub exponents: [i32; 5],
@@ -81,7 +81,7 @@ pub struct VariableUnit {
     pub display: &'static [(&'static str, f64)],
 }
 
-/// Relation of a value to the communication step just finished.
+/// Relation of a value to the last communication step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Span {
     /// Value at the communication point.
@@ -120,7 +120,7 @@ pub struct Variable {
     pub kind: DataType,
     /// Role.
     pub causality: Causality,
-    /// When it may change.
+    /// Variability.
     pub variability: Variability,
     /// Relation to the communication step.
     pub span: Span,
@@ -136,12 +136,12 @@ pub struct Variable {
     pub nominal: Option<f64>,
     /// Start value; present exactly for inputs, parameters and constants.
     pub start: Option<StartValue>,
-    /// One sentence.
+    /// Description in one sentence.
     pub description: String,
-    /// Quantity inside the simulation that the value is.
+    /// Quantity inside the simulation.
     pub quantity: Quantity,
-    /// Which structure that touches, contact pair or structure that carries surfaces it belongs to, each counted from 0 in the
-    /// order of the scene; 0 for what belongs to none.
+    /// Index of the master, contact pair or surface carrier to which it belongs, each counted from 0 in the order of the scene; 0 if it
+    /// belongs to none.
     pub of: usize,
 }
 
@@ -150,7 +150,7 @@ pub struct Variable {
 pub enum Quantity {
     /// Simulated time.
     Time,
-    /// Ω, input.
+    /// Rotor speed Ω, input.
     Speed,
     /// Factor on the casing shape, input.
     ShapeFactor,
@@ -158,7 +158,7 @@ pub enum Quantity {
     ShapeRotation,
     /// Uniform change of the casing radius, input.
     RadiusChange,
-    /// Displacement of the shaft's centre along x, y (whirl), z (axial shift) by component 0, 1, 2; input.
+    /// Displacement of the shaft centre along x, y (whirl), z (axial shift) by component 0, 1, 2; input.
     ShaftDisplacement(usize),
     /// Temperature of each casing patch above the reference, input.
     CasingTemperature,
@@ -174,25 +174,25 @@ pub enum Quantity {
     ExcitationOrder,
     /// Temperature of a rotor above the reference, input.
     RotorTemperature,
-    /// µ, parameter.
+    /// Friction coefficient µ, parameter.
     Friction,
-    /// Added to every clearance, parameter.
+    /// Offset added to every clearance, parameter.
     GapOffset,
-    /// ξ, parameter.
+    /// Damping ratio ξ of a master, parameter.
     DampingRatio,
-    /// ξ of a structure that carries surfaces, parameter.
+    /// Damping ratio ξ of a surface carrier, parameter.
     CarrierDampingRatio,
-    /// ξ of the first modes, parameter.
+    /// Damping ratios ξ of the first modes of a master, parameter.
     ModeDamping,
-    /// The same of a structure that carries surfaces, parameter.
+    /// Damping ratios ξ of the first modes of a surface carrier, parameter.
     CarrierModeDamping,
-    /// Displacement of blades at the start, parameter.
+    /// Initial displacement of blades, parameter.
     InitialDisplacement,
-    /// Velocity of blades at the start, parameter.
+    /// Initial velocity of blades, parameter.
     InitialRate,
-    /// Velocity of a free master at the start along x, y, z (component 0, 1, 2), parameter.
+    /// Initial velocity of a free master along x, y, z (component 0, 1, 2), parameter.
     InitialVelocity(usize),
-    /// Share of the friction heat that goes into the slave, parameter.
+    /// Fraction of the friction heat that flows into the slave, parameter.
     HeatToSlave,
     /// Largest internal step, parameter.
     StepMax,
@@ -200,21 +200,21 @@ pub enum Quantity {
     SchemeChoice,
     /// Error that a step may make, parameter.
     Tolerance,
-    /// Most internal steps of a communication step, parameter.
+    /// Largest number of internal steps of a communication step, parameter.
     MaxInternalSteps,
     /// Solver, parameter.
     SolverChoice,
     /// Interpolation of inputs between communication points, parameter.
     InputInterpolation,
-    /// Whether derivatives over the last step can be asked for, parameter.
+    /// Choice of derivatives over the last step, parameter.
     StepDerivatives,
-    /// θ_r at the start, parameter.
+    /// Initial rotor angle θ_r, parameter.
     InitialAngle,
     /// Ramp time of the casing shape, parameter.
     RampTime,
     /// Name of the scene, constant.
     SceneName,
-    /// θ_r.
+    /// Rotor angle θ_r.
     RotorAngle,
     /// Gaps of a watched sector (0-based) at the communication point.
     Clearance(usize),
@@ -228,8 +228,8 @@ pub enum Quantity {
     CentreVelocity(usize),
     /// Displacements of all contact nodes of a free master along x, y, z.
     NodeDisplacement(usize),
-    /// Mean moment of the contact forces about fixed x, y, z: on the rotor about the shaft's centre (z: the torque), on a
-    /// free master about the origin.
+    /// Mean moment of the contact forces about fixed x, y, z: on the rotor about the shaft centre (z: the torque), on a free master about
+    /// the origin.
     Moment(usize),
     /// Largest λ of any node within the step.
     NormalForcePeak,
@@ -249,15 +249,15 @@ pub enum Quantity {
     FrictionLoss,
     /// Impact loss.
     ImpactLoss,
-    /// Work of all inputs but loads.
+    /// Work of all inputs except loads.
     ExternalWork,
     /// Energy added by turning normals and curving surfaces within steps.
     CurvatureWork,
-    /// Closure residual relative to initial energy and all work exchanged.
+    /// Residual of the energy balance relative to initial energy and all work exchanged.
     EnergyResidualRelative,
-    /// Internal step in use.
+    /// Current internal step.
     InternalStep,
-    /// An output that nothing but its reader knows.
+    /// Output that only its reader uses.
     Output,
 }
 
@@ -267,7 +267,7 @@ impl Variable {
         self.dimension.unwrap_or(1)
     }
 
-    /// A variable always has at least one element.
+    /// Returns false: a variable always has at least one element.
     pub fn is_empty(&self) -> bool {
         false
     }
@@ -280,7 +280,7 @@ impl Variable {
         }
     }
 
-    /// `Initial` attribute of the standards: true for exact, false for calculated, `None` for inputs and time.
+    /// Returns the `initial` attribute of the standards: true for exact, false for calculated, `None` for inputs and time.
     pub fn initial_is_exact(&self) -> Option<bool> {
         match (self.causality, self.variability) {
             (Causality::Independent | Causality::Input, _) => None,
@@ -289,7 +289,7 @@ impl Variable {
         }
     }
 
-    /// Whether an importer may set it before initialisation ends.
+    /// Returns whether an importer may set it before initialisation ends.
     pub fn is_settable(&self) -> bool {
         matches!(self.causality, Causality::Input | Causality::Parameter)
     }
@@ -305,7 +305,7 @@ pub struct VariableTable {
     places: BTreeMap<(Quantity, usize), usize>,
 }
 
-/// Refuse more values than anything reads.
+/// Rejects more values than any reader supports.
 fn check_count(variables: &[Variable]) -> Result<()> {
     let count = variables.iter().fold(0, |sum: usize, variable| sum.saturating_add(variable.len()));
     let Some(largest) = variables.iter().max_by_key(|variable| variable.len()).filter(|_| count > ranges::VALUES)
@@ -325,10 +325,10 @@ fn check_count(variables: &[Variable]) -> Result<()> {
 }
 
 impl VariableTable {
-    /// A table from rows whose references are consecutive, starting at 0.
+    /// Creates a table from rows whose references are consecutive, starting at 0.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where a reference leaves a gap, a name occurs twice, or there are more than [`ranges::VALUES`] in all.
+    /// [`Error::Invalid`] if references are not consecutive, a name occurs twice, or there are more than [`ranges::VALUES`] values.
     pub fn new(variables: Vec<Variable>) -> Result<Self> {
         check_count(&variables)?;
         let (mut rows, mut names) = (Vec::new(), HashSet::with_capacity(variables.len()));
@@ -361,7 +361,7 @@ impl VariableTable {
         self.variables.iter().find(|variable| variable.quantity == quantity)
     }
 
-    /// The variable with this quantity of one structure or pair.
+    /// Variable with this quantity of one structure or pair.
     pub fn with_quantity_of(&self, quantity: Quantity, of: usize) -> Option<&Variable> {
         self.places.get(&(quantity, of)).map(|row| &self.variables[*row])
     }
@@ -382,7 +382,7 @@ impl VariableTable {
         Ok((variable, (reference - variable.reference) as usize))
     }
 
-    /// Find a variable by its name (scalar or array name, not an element name).
+    /// Finds a variable by its name (scalar or array name, not an element name).
     pub fn find(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|variable| variable.name == name)
     }

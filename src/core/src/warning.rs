@@ -1,4 +1,4 @@
-//! Warnings: each with an identifier by which it is looked up in the guide and silenced.
+//! Warnings, each with an identifier for the guide and for silencing.
 
 use std::borrow::Borrow;
 use std::ops::Deref;
@@ -8,14 +8,14 @@ use crate::{Error, Result};
 /// Severity of a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// Results are as good as without it; it explains the physics of the scene.
+    /// Results are correct; the note explains the physics of the scene.
     Note,
-    /// Results may be worse than they look.
+    /// Results may be worse than they appear.
     Warning,
 }
 
 impl Severity {
-    /// The word that stands before its text.
+    /// Returns the word that precedes the text.
     pub fn name(self) -> &'static str {
         match self {
             Self::Note => "note",
@@ -36,17 +36,17 @@ macro_rules! topics {
             /// Every topic, in the order of the guide.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
-            /// The identifier: `[flutter]` in messages, `--silence flutter` on the command line.
+            /// Returns the identifier: `[flutter]` in messages, `--silence flutter` on the command line.
             pub fn id(self) -> &'static str {
                 match self { $(Self::$variant => $id,)* }
             }
 
-            /// Meaning of the topic, a sentence for the guide.
+            /// Returns the meaning of the topic, a sentence for the guide.
             pub fn meaning(self) -> &'static str {
                 match self { $(Self::$variant => $meaning,)* }
             }
 
-            /// Remedy, a sentence for the guide.
+            /// Returns the remedy, a sentence for the guide.
             pub fn remedy(self) -> &'static str {
                 match self { $(Self::$variant => $remedy,)* }
             }
@@ -158,10 +158,10 @@ topics! {
 }
 
 impl Topic {
-    /// The topic with an identifier.
+    /// Finds the topic with an identifier.
     ///
     /// # Errors
-    /// An unknown identifier, with all that exist; `what` is where it stands.
+    /// Unknown identifier, with a list of the known ones; `what` is its place.
     pub fn find(what: &str, id: &str) -> Result<Self> {
         let found = Self::ALL.iter().copied().find(|topic| topic.id() == id);
         found.ok_or_else(|| {
@@ -172,7 +172,7 @@ impl Topic {
     }
 }
 
-/// A warning: two lines for people, and the whole text, which it dereferences to.
+/// A warning: two lines for messages, and the whole text, to which it dereferences.
 #[derive(Debug, Clone)]
 pub struct Warning {
     topic: Topic,
@@ -182,31 +182,31 @@ pub struct Warning {
 }
 
 impl Warning {
-    /// A warning of two lines: the problem, and what to do about it. Neither ends with a full stop.
+    /// Creates a warning of two lines: problem and remedy. Neither ends with a full stop.
     pub fn new(topic: Topic, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         let lines = [problem.into(), remedy.into()];
         let text = format!("{}. {}", lines[0], lines[1]);
         Self { topic, level: Severity::Warning, lines, text }
     }
 
-    /// With a longer text than its two lines, for logs and for people who want all of it.
+    /// Sets a longer text than the two lines, for logs and for users who want the details.
     pub fn with_text(self, text: impl Into<String>) -> Self {
         Self { text: text.into(), ..self }
     }
 
-    /// With something else to do about it, also at the end of the whole text if that ends with what there was to do.
+    /// Replaces the remedy, also at the end of the whole text if that ends with the old remedy.
     pub fn with_remedy(self, remedy: impl Into<String>) -> Self {
         let ([problem, before], remedy) = (self.lines, remedy.into());
         let text = self.text.strip_suffix(&before).map(|explanation| format!("{explanation}{remedy}"));
         Self { lines: [problem, remedy], text: text.unwrap_or(self.text), ..self }
     }
 
-    /// At another level.
+    /// Sets the severity.
     pub fn at_level(self, level: Severity) -> Self {
         Self { level, ..self }
     }
 
-    /// With the name of a structure before its texts.
+    /// Adds the name of a structure before its texts.
     pub fn named(self, name: &str) -> Self {
         let [problem, remedy] = self.lines;
         Self { lines: [format!("{name}: {problem}"), remedy], text: format!("{name}: {}", self.text), ..self }
@@ -222,19 +222,19 @@ impl Warning {
         self.level
     }
 
-    /// The problem, and what to do about it.
+    /// Returns problem and remedy.
     pub fn lines(&self) -> &[String; 2] {
         &self.lines
     }
 
-    /// Both lines with the identifier, for logs: `[flutter] ...`.
+    /// Returns both lines with the identifier, for logs: `[flutter] ...`.
     pub fn logged(&self) -> String {
         let [problem, remedy] = &self.lines;
         format!("[{}] {problem}. {remedy}", self.topic.id())
     }
 }
 
-/// Whole texts of warnings.
+/// Returns the whole texts of warnings.
 pub fn texts(warnings: &[Warning]) -> Vec<String> {
     warnings.iter().map(|warning| warning.text.clone()).collect()
 }

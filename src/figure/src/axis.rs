@@ -7,10 +7,10 @@ use plotters::coord::{
     types::RangedCoordf64,
 };
 
-/// Most ticks of a logarithmic axis.
+/// Largest number of ticks of a logarithmic axis.
 const MOST_TICKS: u8 = 9;
 
-/// A linear axis, or one of decimal logarithms.
+/// Linear axis, or axis of decimal logarithms.
 #[derive(Debug, Clone)]
 pub struct Axis {
     range: Range<f64>,
@@ -18,7 +18,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Over a range of values, or of their decimal logarithms.
+    /// Creates an axis over a range of values, or of their decimal logarithms.
     pub fn new(range: Range<f64>, logarithmic: bool) -> Self {
         Self { range, logarithmic }
     }
@@ -51,7 +51,7 @@ impl ValueFormatter<f64> for Axis {
     }
 }
 
-/// Decimal logarithms of round numbers in a range of them: decades, or 1, 2 and 5 of each, or evenly spaced numbers.
+/// Returns decimal logarithms of round numbers within their range: decades, or 1, 2 and 5 in each decade, or evenly spaced numbers.
 fn logarithmic_ticks(range: &Range<f64>) -> Vec<f64> {
     let decades: Vec<f64> = multiples(range, &[1.0]);
     if decades.len() > 2 {
@@ -72,7 +72,7 @@ fn logarithmic_ticks(range: &Range<f64>) -> Vec<f64> {
         .collect()
 }
 
-/// Decimal logarithms of the multiples of powers of ten that lie in a range.
+/// Returns decimal logarithms of the multiples of powers of ten within a range.
 fn multiples(range: &Range<f64>, factors: &[f64]) -> Vec<f64> {
     #[expect(clippy::cast_possible_truncation, reason = "exponents of doubles")]
     let powers = range.start.floor() as i32..=range.end.ceil() as i32;
@@ -80,14 +80,14 @@ fn multiples(range: &Range<f64>, factors: &[f64]) -> Vec<f64> {
     all.filter(|value| (range.start - 1e-9..=range.end + 1e-9).contains(value)).collect()
 }
 
-/// The round step (1, 2 or 5 times a power of ten) that is not below `raw`.
+/// Returns the smallest round step (1, 2 or 5 times a power of ten) that is not below `raw`.
 pub fn round_step(raw: f64) -> f64 {
     let power = 10_f64.powf(raw.log10().floor());
     let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= raw * 0.999);
     factor.unwrap_or(10.0) * power
 }
 
-/// Axis number without trailing zeros or round-off digits; never a negative zero.
+/// Formats an axis number without trailing zeros or rounding digits; never a negative zero.
 pub fn tick(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
@@ -112,7 +112,7 @@ mod tests {
         assert_eq!(ticks, ["0", "0.3", "-1500", "2e-7", "1e6", "-0.25"]);
     }
 
-    /// No number like 0.1259, whatever the range.
+    /// Tick labels such as 0.1259 do not occur in any range.
     #[test]
     fn logarithmic_axes_have_round_numbers_at_their_ticks() {
         for start in [-17.3, -2.95, -0.9, 0.02, 1.1] {

@@ -1,4 +1,4 @@
-//! Maps of answers: panels of coloured cells, each with a sign for its kind and its words where the pointer rests.
+//! Maps of answers: panels of coloured cells, each with a symbol for its kind and a tooltip.
 
 use std::fmt::Write as _;
 
@@ -12,56 +12,56 @@ const ABOVE: f64 = 30.0;
 const BELOW: f64 = 56.0;
 const LEGEND: f64 = 34.0;
 
-/// A kind of answer.
+/// Kind of answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CellKind {
-    /// In the legend.
+    /// Label in the legend.
     pub label: String,
     /// Colour of the cell.
     pub color: &'static str,
-    /// Sign in the cell, so that nothing hangs on colour alone.
+    /// Symbol in the cell, so that the meaning does not depend on colour alone.
     pub sign: &'static str,
 }
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cell {
-    /// Which of the kinds.
+    /// Index of the kind.
     pub kind: usize,
-    /// Shown where the pointer rests on the cell.
+    /// Text of the tooltip.
     pub words: String,
 }
 
-/// One panel: rows from top to bottom.
+/// One panel, with rows from top to bottom.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellPanel {
-    /// Above it.
+    /// Title above the panel.
     pub title: String,
-    /// Rows of cells, each as long as the columns.
+    /// Rows of cells, each as long as the list of columns.
     pub cells: Vec<Vec<Cell>>,
-    /// Row and column that are framed.
+    /// Row and column of the framed cell.
     pub framed: Option<(usize, usize)>,
 }
 
-/// All panels, on the same columns and rows.
+/// All panels, with common columns and rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cells {
-    /// Text of the columns' axis.
+    /// Label of the column axis.
     pub x_label: String,
-    /// Text of the rows' axis.
+    /// Label of the row axis.
     pub y_label: String,
-    /// Columns, left to right.
+    /// Column labels, from left to right.
     pub columns: Vec<String>,
-    /// Rows, top to bottom.
+    /// Row labels, from top to bottom.
     pub rows: Vec<String>,
     /// Kinds of answers.
     pub kinds: Vec<CellKind>,
-    /// The panels.
+    /// Panels of the map.
     pub panels: Vec<CellPanel>,
 }
 
 impl Cells {
-    /// Panels beside each other, and room that one takes.
+    /// Returns the number of panels side by side, and the size of one panel.
     fn layout(&self) -> (usize, [f64; 2]) {
         let width = LEFT + CELL[0] * self.columns.len() as f64 + 14.0;
         let height = ABOVE + CELL[1] * self.rows.len() as f64 + BELOW;
@@ -70,7 +70,7 @@ impl Cells {
         (beside, [width, height])
     }
 
-    /// A whole SVG file.
+    /// Returns the complete SVG file.
     pub fn to_svg(&self) -> String {
         let (beside, [width, height]) = self.layout();
         let lines = self.panels.len().div_ceil(beside) as f64;

@@ -1,7 +1,7 @@
-//! Long series made short enough to draw without losing a peak.
+//! Shortens long series for drawing without losing peaks.
 
-/// At most `2 * buckets + 2` points of `points` (x ascending): first and last, and of each of `buckets` equal parts
-/// the smallest and the largest value, in their order. Series that are short enough come back unchanged.
+/// Returns at most `2 * buckets + 2` of the `points` (x ascending): the first, the last, and the smallest and largest value of each of `buckets`
+/// equal parts, in their order. Series that are short enough are returned unchanged.
 pub(crate) fn decimate(points: &[(f64, f64)], buckets: usize) -> Vec<(f64, f64)> {
     if points.len() <= 2 * buckets + 2 || buckets == 0 {
         return points.to_vec();

@@ -1,4 +1,4 @@
-//! Everything that is drawn: line plots, waterfalls, maps of cells, pictures of meshes, tables, and the style of the pages they stand on.
+//! Drawing of line plots, waterfall diagrams, maps of cells, pictures of meshes and tables, and the style of their pages.
 
 pub(crate) mod axis;
 pub mod cells;
@@ -12,7 +12,7 @@ pub mod waterfall;
 /// Style sheet of the pages.
 pub const STYLE: &str = include_str!("../page.css");
 
-/// Text for HTML.
+/// Escapes text for HTML.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

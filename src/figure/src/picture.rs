@@ -1,10 +1,10 @@
-//! The finite-element surface as a picture: orthographic projection, painter's algorithm, displacement as colour.
+//! Draws the finite-element surface: orthographic projection, painter's algorithm, displacement as colour.
 
 use std::fmt::Write as _;
 
 use tiprub_model::{Mesh, surface_quads};
 
-/// Surface of a mesh: four-cornered faces over points (m).
+/// Surface of a mesh: faces with four corners over points (m).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MeshSurface {
     /// Points (x, y, z) in m, z the engine axis.
@@ -13,7 +13,7 @@ pub struct MeshSurface {
     pub faces: Vec<[usize; 4]>,
 }
 
-/// Where the observer stands.
+/// Direction from which the observer looks.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewPoint {
     /// Unit vector to the right in the picture.
@@ -24,10 +24,10 @@ pub struct ViewPoint {
     towards: [f64; 3],
 }
 
-/// Length of the picture's longer edge in SVG units.
+/// Length of the longer edge of the picture in SVG units.
 const EDGE: f64 = 400.0;
 
-/// Anchors of the sequential colour scale, rest to largest, light to dark so that it also reads in grey.
+/// Anchors of the sequential colour scale, from zero to the largest value, light to dark so that it also reads in grey.
 const SCALE_COLORS: [[f64; 3]; 7] = [
     [214.0, 222.0, 231.0],
     [253.0, 224.0, 178.0],
@@ -38,14 +38,14 @@ const SCALE_COLORS: [[f64; 3]; 7] = [
     [127.0, 10.0, 30.0],
 ];
 
-/// Every face of a coloured surface is drawn as this many by this many patches of constant colour.
+/// Number of patches of constant colour along each edge of a face of a coloured surface.
 const PATCHES: usize = 2;
-/// A mark is hidden by what lies in front of it by more than this share of the size of the surface.
+/// Depth difference at which a surface hides a mark behind it, as a fraction of the size of the surface.
 const HIDING: f64 = 1e-6;
 
 impl ViewPoint {
-    /// A view of a blade standing on the z axis: radial direction of its centre upwards, seen from `azimuth` (rad)
-    /// around that direction (0: along the tangential direction, π/2: along the axis) and from `elevation` (rad) above.
+    /// Creates a view of a blade that stands on the z axis: the radial direction of its centre points upwards, seen from `azimuth` (rad) around that
+    /// direction (0: along the tangential direction, π/2: along the axis) and from `elevation` (rad) above.
     pub fn of_blade(surface: &MeshSurface, azimuth: f64, elevation: f64) -> Self {
         let count = surface.points.len().max(1) as f64;
         let centre = surface.points.iter().fold([0.0, 0.0], |sum, point| [sum[0] + point[0], sum[1] + point[1]]);
@@ -65,9 +65,8 @@ impl ViewPoint {
     }
 }
 
-/// The surface, displaced by `scale · displacement`, coloured by |displacement| (0 to its own maximum), as an SVG
-/// element. Without displacement it is plain grey with the lines of the mesh. `marks` are drawn as dots (the contact nodes),
-/// those hidden by the surface as circles.
+/// Draws the surface, displaced by `scale · displacement` and coloured by |displacement| (0 to its own maximum), as an SVG element. Without
+/// displacement it is plain grey with the lines of the mesh. `marks` (the contact nodes) are drawn as dots, or as circles if the surface hides them.
 pub fn draw(
     surface: &MeshSurface,
     displacement: Option<(&[[f64; 3]], f64)>,
@@ -102,7 +101,7 @@ pub fn draw(
     for patch in &patches {
         let base = if displacement.is_some() { scale_color(patch.share) } else { [198.0, 205.0, 214.0] };
         let color = hex(base.map(|channel| channel * patch.shade));
-        // Lines of the mesh belong to the faces: those of far ones are covered by nearer ones.
+        // Mesh lines belong to the faces, so that nearer faces cover the lines of farther ones.
         let line = if displacement.is_some() { &color } else { MESH_LINE };
         let [a, b, c, d] = patch.corners.map(|corner| frame.place(corner));
         let _ = write!(
@@ -130,7 +129,7 @@ fn draw_marks(svg: &mut String, places: &[[f64; 3]], patches: &[FacePatch], fram
     }
 }
 
-/// Where projected points come to lie in a picture: the same for all pictures of one surface.
+/// Mapping from projected points to positions in a picture, the same for all pictures of one surface.
 #[derive(Debug, Clone, Copy)]
 pub struct ProjectionFrame {
     left: f64,
@@ -142,7 +141,7 @@ pub struct ProjectionFrame {
 }
 
 impl ProjectionFrame {
-    /// A frame that holds the surface with `margin` (fraction of its size) on every side, for displaced shapes.
+    /// Creates a frame for the surface with `margin` (fraction of its size) on every side, for displaced shapes.
     pub fn around(surface: &MeshSurface, view: &ViewPoint, margin: f64) -> Self {
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
@@ -175,14 +174,14 @@ impl ProjectionFrame {
         )
     }
 
-    /// SVG coordinates, to a tenth of a unit.
+    /// Returns SVG coordinates, rounded to a tenth of a unit.
     fn place(&self, projected: [f64; 3]) -> (f64, f64) {
         let tenth = |value: f64| (value * 10.0).round() / 10.0;
         (tenth((projected[0] - self.left) * self.magnification), tenth((self.top - projected[1]) * self.magnification))
     }
 }
 
-/// A horizontal colour scale from 0 to the maximum, with end labels.
+/// Draws a horizontal colour scale from 0 to the maximum, with end labels.
 pub fn color_scale(low: &str, high: &str) -> String {
     let mut svg = String::from(
         r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 30" font-family="sans-serif" font-size="14" fill="#343a42">"##,
@@ -196,20 +195,20 @@ pub fn color_scale(low: &str, high: &str) -> String {
     svg
 }
 
-/// A piece of a face, ready to be drawn.
+/// Part of a face, ready to be drawn.
 struct FacePatch {
     /// Projected corners.
     corners: [[f64; 3]; 4],
     /// Distance towards the observer.
     depth: f64,
-    /// Displacement as a share of the largest.
+    /// Displacement as a fraction of the largest.
     share: f64,
-    /// Brightness of the surface in the light.
+    /// Brightness from the illumination.
     shade: f64,
 }
 
 impl FacePatch {
-    /// Distance towards the observer where a projected point lies on the patch, seen as two triangles.
+    /// Returns the distance towards the observer where a projected point lies on the patch, which is treated as two triangles.
     fn depth_at(&self, point: [f64; 3]) -> Option<f64> {
         let [a, b, c, d] = self.corners;
         [[a, b, c], [a, c, d]].into_iter().find_map(|[a, b, c]| {
@@ -223,7 +222,7 @@ impl FacePatch {
     }
 }
 
-/// Cut a face into `pieces` by `pieces` patches by bilinear interpolation of corners and shares.
+/// Divides a face into `pieces` by `pieces` patches by bilinear interpolation of corners and displacements.
 fn subdivide(
     corners: &[[f64; 3]; 4],
     shares: [f64; 4],
@@ -250,7 +249,7 @@ fn subdivide(
     }
 }
 
-/// Normal of a face from its diagonals, of unit length.
+/// Returns the unit normal of a face, computed from its diagonals.
 fn normal([a, b, c, d]: &[[f64; 3]; 4]) -> [f64; 3] {
     let normal = cross(combine(1.0, *c, -1.0, *a), combine(1.0, *d, -1.0, *b));
     let length = dot(normal, normal).sqrt().max(f64::MIN_POSITIVE);
@@ -295,7 +294,7 @@ fn combine(alpha: f64, a: [f64; 3], beta: f64, b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| alpha * a[axis] + beta * b[axis])
 }
 
-/// The outer surface of a mesh.
+/// Returns the outer surface of a mesh.
 pub fn surface_of(mesh: &Mesh) -> MeshSurface {
     let corner = |face: &[usize], index: usize| face[index.min(face.len() - 1)];
     let faces = surface_quads(mesh);
@@ -309,7 +308,7 @@ pub fn surface_of(mesh: &Mesh) -> MeshSurface {
 mod tests {
     use super::*;
 
-    /// Two unit squares at x = 1 and x = 2, seen along x from far away: the nearer one is drawn last.
+    /// Returns two unit squares at x = 1 and x = 2; seen along x from far away, the nearer one is drawn last.
     fn two_squares() -> MeshSurface {
         let square = |x: f64| [[x, -0.5, 0.0], [x, 0.5, 0.0], [x, 0.5, 1.0], [x, -0.5, 1.0]];
         MeshSurface { points: [square(2.0), square(1.0)].concat(), faces: vec![[0, 1, 2, 3], [4, 5, 6, 7]] }
@@ -330,7 +329,7 @@ mod tests {
     #[test]
     fn nearer_faces_are_drawn_last_and_inside_the_frame() {
         let surface = two_squares();
-        // From above: the radial direction (x) points towards the observer.
+        // Seen from above: the radial direction (x) points towards the observer.
         let view = ViewPoint::of_blade(&surface, 0.0, std::f64::consts::FRAC_PI_2);
         let displacement: Vec<[f64; 3]> = (0..8).map(|index| [0.0, 0.0, f64::from(u8::from(index >= 4))]).collect();
         let frame = ProjectionFrame::around(&surface, &view, 0.1);
@@ -354,7 +353,7 @@ mod tests {
         assert_eq!(svg.matches("<path").count(), 1, "one face");
     }
 
-    /// The lines of the far square and a dot on it are covered by the near one; a dot on the near one is not.
+    /// The near square covers the lines of the far one and a dot on it; a dot on the near square is visible.
     #[test]
     fn lines_and_marks_behind_a_face_are_hidden() {
         let surface = two_squares();

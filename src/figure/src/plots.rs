@@ -1,4 +1,4 @@
-//! Line plots as SVG: axes with units, light colours, series shortened without losing peaks.
+//! Draws line plots as SVG: axes with units, light colours, series shortened without losing peaks.
 
 use std::fmt::Write as _;
 
@@ -15,7 +15,7 @@ use crate::{
     escape,
 };
 
-/// Plots are drawn at twice the size they are shown at: the SVG backend rounds to whole units.
+/// Factor between the drawn and the displayed size: the SVG backend rounds to whole units.
 const SCALE: u32 = 2;
 const WIDTH: u32 = 920 * SCALE;
 /// Sizes of a plot, in CSS pixels.
@@ -28,12 +28,12 @@ struct PlotSize {
     buckets: usize,
 }
 const WIDE: PlotSize = PlotSize { width: WIDTH / SCALE, highest: u32::MAX, left: 78, x_labels: 10, buckets: 700 };
-/// For the card of a page on a telephone.
+/// Size on the page for a phone.
 const NARROW: PlotSize = PlotSize { width: 340, highest: 240, left: 62, x_labels: 5, buckets: 260 };
-/// Height of a line of a legend above the plot, and of the room around it, in CSS pixels.
+/// Height of a line of a legend above the plot, and the space around the legend, in CSS pixels.
 const LEGEND_LINE: u32 = 22;
 const LEGEND_ROOM: u32 = 6;
-/// Where the lines of a legend begin, in CSS pixels.
+/// Left edge of the lines of a legend, in CSS pixels.
 const LEGEND_LEFT: u32 = 86;
 const INK: RGBColor = RGBColor(52, 58, 66);
 const GRID: RGBColor = RGBColor(232, 235, 239);
@@ -58,11 +58,11 @@ type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Axis, Axis>>;
 /// One line of a plot.
 #[derive(Debug, Clone)]
 pub struct Series {
-    /// Legend text; empty keeps the line out of the legend.
+    /// Legend text; a line with an empty label does not appear in the legend.
     pub label: String,
     /// Points, x ascending.
     pub points: Vec<(f64, f64)>,
-    /// Index into [`COLORS`], instead of one after the other.
+    /// Index into [`COLORS`]; by default the next colour in order.
     pub color: Option<usize>,
     /// Style of the series.
     pub form: SeriesForm,
@@ -71,21 +71,21 @@ pub struct Series {
 /// Style of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SeriesForm {
-    /// A line, peaks kept where there are too many points.
+    /// Line; peaks are kept if there are too many points.
     Line,
-    /// A thin line through few points.
+    /// Thin line through few points.
     Thin,
-    /// A dot at every point.
+    /// Dot at every point.
     Dots,
 }
 
 impl Series {
-    /// A line.
+    /// Creates a line.
     pub fn line(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self { label: label.into(), points, color: None, form: SeriesForm::Line }
     }
 
-    /// The same in another form and colour.
+    /// Returns the series in another form and colour.
     pub fn drawn(self, form: SeriesForm, color: usize) -> Self {
         Self { form, color: Some(color), ..self }
     }
@@ -102,22 +102,22 @@ pub struct Plot {
     pub x_label: String,
     /// Axis label with unit.
     pub y_label: String,
-    /// Lines; colours repeat beyond [`COLORS`].
+    /// Lines; colours repeat after the last of [`COLORS`].
     pub series: Vec<Series>,
     /// Height in CSS pixels at a width of 920.
     pub height: u32,
     /// Horizontal lines with a meaning (value, text); for linear axes.
     pub levels: Vec<(f64, String)>,
-    /// Logarithmic y axis; values ≤ 0 are left out.
+    /// True for a logarithmic y axis; values ≤ 0 are omitted.
     pub logarithmic: bool,
-    /// Logarithmic x axis; values ≤ 0 are left out.
+    /// True for a logarithmic x axis; values ≤ 0 are omitted.
     pub logarithmic_x: bool,
-    /// Mark the points.
+    /// True to mark the points.
     pub marked: bool,
 }
 
 impl Plot {
-    /// An empty plot with linear axes.
+    /// Creates an empty plot with linear axes.
     pub fn new(x_label: impl Into<String>, y_label: impl Into<String>, series: Vec<Series>) -> Self {
         Self {
             x_label: x_label.into(),
@@ -131,10 +131,10 @@ impl Plot {
         }
     }
 
-    /// Legend (where there is more than one line) and SVG element, as HTML.
+    /// Returns the legend (if there is more than one line) and the SVG element, as HTML.
     ///
     /// # Errors
-    /// As [`Plot::to_svg`].
+    /// The errors of [`Plot::to_svg`].
     pub fn to_html(&self) -> Result<String> {
         let mut html = String::new();
         if self.series.len() > 1 {
@@ -150,35 +150,35 @@ impl Plot {
         Ok(html)
     }
 
-    /// Series that have a label and a curve, with the numbers of their colours.
+    /// Returns the series that have a label and a curve, with the indices of their colours.
     fn legend(&self) -> impl Iterator<Item = (&Series, usize)> {
         let colored = self.series.iter().enumerate().map(|(index, series)| (series, series.color_number(index)));
         colored.filter(|(series, _)| !series.label.is_empty() && self.finite_points_of(series).next().is_some())
     }
 
-    /// The SVG element.
+    /// Returns the SVG element.
     ///
     /// # Errors
-    /// The plotting library refuses (never seen with finite data).
+    /// The plotting library fails (not observed with finite data).
     pub fn to_svg(&self) -> Result<String> {
         self.svg(0, WIDE)
     }
 
-    /// The SVG element with the legend in it, for a file of its own.
+    /// Returns the SVG element including the legend, for a separate file.
     ///
     /// # Errors
-    /// As [`Plot::to_svg`].
+    /// The errors of [`Plot::to_svg`].
     pub fn to_whole_svg(&self) -> Result<String> {
         let lines = self.legend_places().iter().map(|(_, line)| line + 1).max().unwrap_or(0);
         self.svg(if self.series.len() > 1 { LEGEND_LINE * lines + LEGEND_ROOM } else { 0 }, WIDE)
     }
 
-    /// Left edge (CSS pixels) and line of every entry of the legend.
+    /// Returns the left edge (CSS pixels) and the line of every entry of the legend.
     fn legend_places(&self) -> Vec<(u32, u32)> {
         let (mut left, mut line) = (LEGEND_LEFT, 0);
         let mut places = Vec::new();
         for (series, _) in self.legend() {
-            // Widths of letters are not known here: a little more than a usual one each.
+            // Letter widths are unknown here, so that each letter counts slightly more than usual.
             let width = 44 + 8 * u32::try_from(series.label.chars().count()).unwrap_or(0);
             if left + width > WIDTH / SCALE && left > LEGEND_LEFT {
                 (left, line) = (LEGEND_LEFT, line + 1);
@@ -189,7 +189,7 @@ impl Plot {
         places
     }
 
-    /// With so much room for a legend above the plot.
+    /// Draws the plot with `legend` CSS pixels above it for a legend.
     fn svg(&self, legend: u32, size: PlotSize) -> Result<String> {
         let mut svg = String::new();
         {
@@ -260,7 +260,7 @@ impl Plot {
             .map_err(|error| error.to_string())
     }
 
-    /// Dashed horizontal lines with their meaning at the right end.
+    /// Draws dashed horizontal lines with their meaning at the right end.
     fn draw_levels(&self, chart: &mut Chart<'_, '_>) -> Result<(), String> {
         let x_range = self.x_range();
         for (level, label) in &self.levels {
@@ -292,7 +292,7 @@ impl Plot {
         Ok(())
     }
 
-    /// Points that can be drawn; the logarithm of y where the axis is logarithmic.
+    /// Returns the points that can be drawn, with logarithms on logarithmic axes.
     fn finite_points_of<'s>(&self, series: &'s Series) -> impl Iterator<Item = (f64, f64)> + use<'s> {
         let (x_logarithmic, y_logarithmic) = (self.logarithmic_x, self.logarithmic);
         let scaled = |value: f64, logarithmic: bool| if logarithmic { value.log10() } else { value };
@@ -300,7 +300,7 @@ impl Plot {
         points.filter(|(x, y)| x.is_finite() && y.is_finite())
     }
 
-    /// From the first to the last x of all series, drawable or not, so that plots of one run share their axis.
+    /// Returns the range of x over all series, drawable or not, so that plots of one run have the same axis.
     fn x_range(&self) -> std::ops::Range<f64> {
         if self.logarithmic_x {
             return padded(self.finite_points().map(|point| point.0), 0.05);
@@ -314,7 +314,7 @@ impl Plot {
     }
 }
 
-/// Smallest range that holds the values, with a margin; never empty.
+/// Returns the smallest range that contains the values, with a margin; never empty.
 fn padded(values: impl Iterator<Item = f64>, margin: f64) -> std::ops::Range<f64> {
     let (low, high) =
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));

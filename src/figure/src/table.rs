@@ -1,8 +1,8 @@
-//! Tables of text, for the page and for the guide.
+//! Tables of text for the page and for the guide.
 
 use crate::escape;
 
-/// A table with a caption.
+/// Table with a caption.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table {
     /// Caption.
@@ -14,12 +14,12 @@ pub struct Table {
 }
 
 impl Table {
-    /// An empty table.
+    /// Creates an empty table.
     pub fn new<const N: usize>(caption: impl Into<String>, columns: [&str; N]) -> Self {
         Self { caption: caption.into(), columns: columns.map(String::from).to_vec(), rows: Vec::new() }
     }
 
-    /// For the page; folded away if asked for.
+    /// Returns the table as HTML for the page, optionally folded.
     pub fn to_html(&self, folded: bool) -> String {
         let cells = |tag: &str, cells: &[String]| -> String {
             cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect()
@@ -34,7 +34,7 @@ impl Table {
         }
     }
 
-    /// For the guide.
+    /// Returns the table as Markdown for the guide.
     pub fn to_markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let rule = format!("|{}\n", "---|".repeat(self.columns.len()));

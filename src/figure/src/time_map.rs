@@ -1,4 +1,4 @@
-//! Maps over time: a row for every contact node, a colour for its value.
+//! Maps over time: a row for every contact node, coloured by its value.
 
 use std::fmt::Write as _;
 
@@ -7,35 +7,35 @@ use crate::{
     escape,
 };
 
-/// Colours of the scale; their values stand in the style sheet of the page (`--q0` to `--q8`).
+/// Number of colours of the scale, which the style sheet of the page defines (`--q0` to `--q8`).
 const LEVELS: usize = 9;
-/// Heights in the picture (SVG units): of a row, above the rows, and of the axis below them.
+/// Heights in the picture (SVG units): of a row, of the space above the rows, and of the axis below them.
 const ROW: f64 = 14.0;
 const ABOVE: f64 = 4.0;
 const BELOW: f64 = 46.0;
 const RIGHT: f64 = 16.0;
 
-/// Value of a cell that covers several times, and the strong end of the scale.
+/// Value of a cell that covers several times, and the direction of the colour scale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shows {
-    /// The largest value; large values are strong.
+    /// Largest value; large values have strong colours.
     Largest,
-    /// The smallest value; small values are strong.
+    /// Smallest value; small values have strong colours.
     Smallest,
 }
 
-/// A map over time.
+/// Map over time.
 #[derive(Debug, Clone)]
 pub struct TimeMap {
     /// Axis label with unit.
     pub x_label: String,
-    /// Quantity of the colour, with unit.
+    /// Quantity that the colour shows, with unit.
     pub value_label: String,
     /// Rows from top to bottom: name and values, all as long as `times`.
     pub rows: Vec<(String, Vec<f64>)>,
     /// Times, ascending.
     pub times: Vec<f64>,
-    /// Value of the cells.
+    /// Value that a cell shows.
     pub shows: Shows,
 }
 
@@ -55,7 +55,7 @@ const SIZES: [MapSize; 2] = [
 ];
 
 impl TimeMap {
-    /// The picture for wide and for narrow pages, and its scale, as HTML.
+    /// Returns the pictures for wide and for narrow pages and the colour scale, as HTML.
     pub fn to_html(&self) -> String {
         let range = self.range();
         let mut html = self.scale(range);
@@ -65,7 +65,7 @@ impl TimeMap {
         html
     }
 
-    /// Range of the colours: 0, or what lies below it beyond rounding, to a round number.
+    /// Returns the range of the colours: from 0, or from the smallest value if it is negative beyond rounding, to a round number.
     fn range(&self) -> [f64; 2] {
         let values = self.rows.iter().flat_map(|row| row.1.iter().copied()).filter(|value| value.is_finite());
         let [low, high] = values.fold([0.0_f64, 0.0_f64], |[low, high], value| [low.min(value), high.max(value)]);
@@ -81,7 +81,7 @@ impl TimeMap {
         let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
         let share = if self.shows == Shows::Smallest { 1.0 - share } else { share };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ share ≤ 1")]
-        // Only what is at the weak end has its colour: a touch is seen, however light.
+        // Only values at the weak end have the weakest colour, so that even a light contact is visible.
         let level = (share * (LEVELS - 1) as f64).ceil() as usize;
         level.min(LEVELS - 1)
     }
@@ -113,7 +113,7 @@ impl TimeMap {
         svg
     }
 
-    /// One path per colour; neighbouring cells of one colour are one.
+    /// Draws one path per colour; neighbouring cells of one colour are merged.
     fn cells(&self, svg: &mut String, range: [f64; 2], size: &MapSize) {
         let bins = size.bins.min(self.times.len()).max(1);
         let cell = (size.width - size.left - RIGHT) / bins as f64;

@@ -1,4 +1,4 @@
-//! Waterfall pictures: curves one behind the other in oblique projection, the nearer ones hiding those behind.
+//! Waterfall diagrams: curves behind each other in oblique projection; nearer curves hide those behind.
 
 use std::fmt::Write as _;
 
@@ -7,29 +7,29 @@ use crate::escape;
 /// Size of the picture (SVG units).
 const WIDTH: f64 = 920.0;
 const HEIGHT: f64 = 470.0;
-/// Where the front left corner of the floor is.
+/// Position of the front left corner of the floor.
 const ORIGIN: [f64; 2] = [110.0, 400.0];
-/// Extent of the floor to the right, and what depth adds to the right and upwards.
+/// Extent of the floor to the right, and the offsets to the right and upwards over the whole depth.
 const ACROSS: f64 = 560.0;
 const DEPTH: [f64; 2] = [150.0, 170.0];
 /// Height of the value axis.
 const UP: f64 = 190.0;
-/// Most points of one curve that are drawn; peaks are kept.
+/// Largest number of drawn points of one curve; peaks are kept.
 const MOST_POINTS: usize = 500;
 
 /// One axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WaterfallAxis {
-    /// Text with unit.
+    /// Label with unit.
     pub label: String,
-    /// Range shown.
+    /// Displayed range.
     pub range: [f64; 2],
-    /// Whether it runs from the largest value to the smallest.
+    /// True if it runs from the largest value to the smallest.
     pub reversed: bool,
 }
 
 impl WaterfallAxis {
-    /// An axis over the finite ones of these values, never empty.
+    /// Creates an axis over the finite values among these; its range is never empty.
     pub fn over(label: impl Into<String>, values: impl Iterator<Item = f64>) -> Self {
         let extend = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
         let [low, high] = values.filter(|value| value.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], extend);
@@ -41,18 +41,18 @@ impl WaterfallAxis {
         Self { label: label.into(), range, reversed: false }
     }
 
-    /// Where a value lies, 0 to 1.
+    /// Returns the position of a value on the axis, from 0 to 1.
     fn share(&self, value: f64) -> f64 {
         let share = ((value - self.range[0]) / (self.range[1] - self.range[0])).clamp(0.0, 1.0);
         if self.reversed { 1.0 - share } else { share }
     }
 
-    /// The same axis the other way round.
+    /// Returns the axis in reversed direction.
     pub fn reversed(self) -> Self {
         Self { reversed: !self.reversed, ..self }
     }
 
-    /// Round numbers within the range, about `count` of them.
+    /// Returns about `count` round numbers within the range.
     fn ticks(&self, count: f64) -> Vec<f64> {
         let [low, high] = self.range;
         let raw = (high - low) / count;
@@ -65,21 +65,21 @@ impl WaterfallAxis {
     }
 }
 
-/// A family of curves.
+/// Family of curves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Waterfall {
-    /// To the right.
+    /// Axis to the right.
     pub x: WaterfallAxis,
-    /// Into the picture.
+    /// Axis into the picture.
     pub depth: WaterfallAxis,
-    /// Upwards; values beyond are cut off at the ends of the range.
+    /// Upward axis; values beyond its range are cut off.
     pub value: WaterfallAxis,
-    /// Curves: place in depth, and points (x, value) with x ascending.
+    /// Curves: position in depth, and points (x, value) with x ascending.
     pub curves: Vec<(f64, Vec<(f64, f64)>)>,
 }
 
 impl Waterfall {
-    /// The SVG element.
+    /// Returns the SVG element.
     pub fn to_svg(&self) -> String {
         let mut svg = format!(
             r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="14" fill="#343a42" stroke-linejoin="round">"##
@@ -95,7 +95,7 @@ impl Waterfall {
         svg
     }
 
-    /// SVG coordinates of shares of the three axes, to a tenth.
+    /// Returns the SVG coordinates of relative positions on the three axes, to a tenth.
     fn place(x: f64, depth: f64, value: f64) -> String {
         let tenth = |value: f64| (value * 10.0).round() / 10.0;
         let right = ORIGIN[0] + ACROSS * x + DEPTH[0] * depth;
@@ -121,7 +121,7 @@ impl Waterfall {
         line(svg, Self::place(1.0, 0.0, 0.0), Self::place(1.0, 1.0, 0.0), "#99a0a8");
     }
 
-    /// A white area down to the floor hides what is behind; the colour goes from near to far.
+    /// Draws a curve: a white area down to the floor hides the curves behind it; the colour depends on the depth.
     fn draw_curve(&self, svg: &mut String, depth: f64, points: &[(f64, f64)]) {
         let finite: Vec<(f64, f64)> =
             points.iter().copied().filter(|point| point.0.is_finite() && point.1.is_finite()).collect();
@@ -163,7 +163,7 @@ impl Waterfall {
     }
 }
 
-/// Without trailing zeros or round-off digits.
+/// Formats a number without trailing zeros or rounding digits.
 fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".into();

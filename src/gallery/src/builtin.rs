@@ -1,4 +1,4 @@
-//! Models that ship with tiprub, by the name after `builtin:` in a scene; reduced when first asked for.
+//! Built-in models, by their name after `builtin:` in a scene; reduced on first use.
 
 use tiprub_core::Rom;
 use tiprub_model::{
@@ -22,13 +22,13 @@ use crate::{
     rom_cache::RomCache,
 };
 
-/// Rotor 37, recommended: nine patches along the chord in two rows, which stand at the sides of its tip.
+/// Rotor 37, recommended: nine patches along the chord in two rows at the sides of the tip.
 pub(crate) const ROTOR37: &str = "rotor37";
 /// Rotor 37 with one row of patches: contact is averaged over the thickness of the tip.
 pub(crate) const ROTOR37_ONE_ROW: &str = "rotor37-one-row";
-/// [`ROTOR37_ONE_ROW`] with the effects of spin.
+/// [`ROTOR37_ONE_ROW`] with spin matrices.
 pub(crate) const ROTOR37_ONE_ROW_SPIN: &str = "rotor37-one-row-spin";
-/// Rotor 37 with the paper's kind of model: Craig-Bampton modes and three contact nodes.
+/// Rotor 37 as in the paper: Craig-Bampton modes and three contact nodes.
 pub(crate) const ROTOR37_PAPER: &str = "rotor37-paper";
 
 /// Bladed disk of the stage, recommended: nine patches along the chord of every blade in two rows.
@@ -37,17 +37,17 @@ pub(crate) const STAGE: &str = "stage";
 pub(crate) const STAGE_NODES: &str = "stage-nodes";
 /// Casing of the stage.
 pub(crate) const STAGE_CASING: &str = "stage-casing";
-/// [`STAGE_NODES`] on a coarse mesh, for tests and first looks: similar shapes, frequencies some percent off.
+/// [`STAGE_NODES`] on a coarse mesh, for tests and first trials: similar shapes, frequencies differ by some percent.
 pub(crate) const STAGE_NODES_COARSE: &str = "stage-nodes-coarse";
 /// [`STAGE_CASING`] on a coarse mesh.
 pub(crate) const STAGE_CASING_COARSE: &str = "stage-casing-coarse";
 
-/// The cube of the cube between two rings.
+/// Cube of the scene with a cube between two rings.
 pub const CUBE: &str = "cube";
-/// Rings of the cube.
+/// Rings of the scene with the cube, with their sides.
 pub const RINGS: [(&str, RingSide); 2] = [("ring-left", RingSide::Left), ("ring-right", RingSide::Right)];
 
-/// Every name that [`rom`] knows.
+/// All names of models.
 #[cfg(test)]
 pub(crate) const NAMES: [&str; 13] = [
     ROTOR37,
@@ -65,7 +65,7 @@ pub(crate) const NAMES: [&str; 13] = [
     RINGS[1].0,
 ];
 
-/// The model of this name; `None` where there is no such model.
+/// Returns the model of this name; `None` if there is no such model.
 pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
     if let Some(options) = rotor37(name) {
         let reduced = cache.get(name, &options, console, &|| Ok(reduction::rotor37(&options, console)?.rom));
@@ -100,7 +100,7 @@ pub fn rom(name: &str, cache: &RomCache, console: &Console) -> Option<Result<Rom
     })
 }
 
-/// Options of the built-in blade with this name; `None` if there is no such blade.
+/// Returns the options of the built-in blade with this name; `None` if there is no such blade.
 fn rotor37(name: &str) -> Option<Rotor37Options> {
     match name {
         ROTOR37 => Some(Rotor37Options::default()),
@@ -111,27 +111,27 @@ fn rotor37(name: &str) -> Option<Rotor37Options> {
     }
 }
 
-/// Whether the contact nodes of a model can be chosen anew by their number: blades along their chord.
+/// Returns whether the number of contact nodes of a model can be chosen: true for blades, along their chord.
 pub fn has_chord(name: &str) -> bool {
     rotor37(name).is_some() || [STAGE, STAGE_NODES, STAGE_NODES_COARSE].contains(&name)
 }
 
-/// Meshes of blades beside the one that ships: numbers of elements along the edges, as factors on its own, the coarsest first.
+/// Other meshes of the built-in blades: factors on the numbers of elements along the edges, coarsest first.
 pub const MESHES: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, core::f64::consts::SQRT_2];
 
-/// In what a model differs from the one that ships.
+/// Differences of a model from the built-in one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelVariant {
-    /// Number of modes, as a factor on its own.
+    /// Factor on the number of modes.
     pub modes: f64,
     /// Contact of the tip, if the model [has a chord](has_chord).
     pub tip: TipContact,
-    /// Elements along the edges, as a factor on its own, where it has a chord: the number through the thickness stays.
+    /// Factor on the number of elements along the edges, if the model has a chord; the number through the thickness stays.
     pub mesh: f64,
 }
 
 impl ModelVariant {
-    /// For the name of what is kept.
+    /// Returns the name of the cached model.
     fn cache_name(&self, name: &str) -> String {
         let tip = match self.tip {
             TipContact::Nodes(count) => format!("nodes-{count}"),
@@ -142,8 +142,8 @@ impl ModelVariant {
     }
 }
 
-/// The model of this name in another form, as kept or made anew. `None` where there is no such model, or none with more modes: the
-/// cube has all.
+/// Returns a variant of the model of this name, from the cache or newly reduced. `None` if there is no such model, or none with more modes: the cube
+/// has all.
 pub fn refined(name: &str, other: ModelVariant, cache: &RomCache, console: &Console) -> Option<Result<Rom>> {
     let times = |modes: usize| scaled(modes, other.modes);
     let families = |selection: ModeSelection| match selection {
@@ -191,10 +191,11 @@ pub fn refined(name: &str, other: ModelVariant, cache: &RomCache, console: &Cons
     })
 }
 
-/// Nodes of the mesh of a model that [has a chord](has_chord), with so many times its elements along the edges; `None` of another.
+/// Returns the number of nodes of the mesh of a model that [has a chord](has_chord), with this factor on its elements along the edges; otherwise
+/// `None`.
 ///
 /// # Errors
-/// A factor that leaves no element.
+/// The factor leaves no element.
 pub fn mesh_nodes(name: &str, mesh: f64) -> Option<Result<usize>> {
     let nodes = if let Some(blade) = rotor37(name) {
         blade_mesh(rotor37_mesh(blade.mesh, mesh)).map(|blade| blade.mesh.nodes.len())
@@ -208,12 +209,12 @@ pub fn mesh_nodes(name: &str, mesh: f64) -> Option<Result<usize>> {
     Some(nodes.map_err(|error| reduction::failure(name, error)))
 }
 
-/// Elements along chord and span times a factor; along the chord they stay even, so that there is a middle.
+/// Scales the numbers of elements along chord and span; the number along the chord stays even, so that there is a middle.
 fn rotor37_mesh(own: MeshCounts, factor: f64) -> MeshCounts {
     MeshCounts { chord: even(own.chord, factor), span: even(own.span, factor), ..own }
 }
 
-/// The same of a sector; through the thickness of the blade they stay.
+/// Scales the numbers of elements of a sector; the number through the thickness of the blade stays.
 fn stage_mesh(own: SectorCounts, factor: f64) -> SectorCounts {
     let times = |count: usize| if count == 0 { 0 } else { scaled(count, factor).max(1) };
     SectorCounts {
@@ -228,7 +229,7 @@ fn stage_mesh(own: SectorCounts, factor: f64) -> SectorCounts {
     }
 }
 
-/// As a factor that is 1 leaves it; else the next even number.
+/// Scales a count to the nearest even number; a factor of 1 leaves it unchanged.
 fn even(count: usize, factor: f64) -> usize {
     if (factor - 1.0).abs() < 1e-9 { count } else { 2 * scaled(count, 0.5 * factor).max(1) }
 }
@@ -238,7 +239,7 @@ fn scaled(modes: usize, factor: f64) -> usize {
     (modes as f64 * factor).round() as usize
 }
 
-/// Name and options of the bladed disk of the stage with three contact nodes per blade, full size or coarse.
+/// Returns name and options of the bladed disk of the stage with three contact nodes per blade, full size or coarse.
 pub fn stage_nodes(coarse: bool) -> (&'static str, StageOptions) {
     if coarse {
         (STAGE_NODES_COARSE, StageOptions { modes: ModeSelection::Families(12), ..StageOptions::coarse() })
@@ -247,14 +248,14 @@ pub fn stage_nodes(coarse: bool) -> (&'static str, StageOptions) {
     }
 }
 
-/// Name and options of the bladed disk of the stage, full size, with nine patches along the chord in two rows at the sides of the tips.
+/// Returns name and options of the bladed disk of the stage, full size, with nine patches along the chord in two rows at the sides of the tips.
 pub fn stage() -> (&'static str, StageOptions) {
     let options =
         StageOptions { tip: TipContact::Rows([9, 2]), kind: ReductionKind::FreeInterface, ..StageOptions::default() };
     (STAGE, options)
 }
 
-/// A bladed disk of the stage: its name and what it is reduced from.
+/// Bladed disk of the stage: its name and the options of its reduction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiskModel {
     name: &'static str,
@@ -262,13 +263,13 @@ pub struct DiskModel {
 }
 
 impl DiskModel {
-    /// The disk with three contact nodes per blade, full size or coarse; not yet reduced.
+    /// Returns the disk with three contact nodes per blade, full size or coarse; not yet reduced.
     pub fn with_nodes(coarse: bool) -> Self {
         let (name, options) = stage_nodes(coarse);
         Self { name, options }
     }
 
-    /// The built-in disk with this name, [`STAGE`] for any other name.
+    /// Returns the built-in disk with this name; [`STAGE`] for any other name.
     fn named(name: &str) -> Self {
         let (name, options) = match name {
             STAGE_NODES => stage_nodes(false),
@@ -278,15 +279,15 @@ impl DiskModel {
         Self { name, options }
     }
 
-    /// The disk with options of one's own.
+    /// Returns the disk with the given options.
     pub fn with_options(name: &'static str, options: StageOptions) -> Self {
         Self { name, options }
     }
 
-    /// The reduction, and the mesh of one sector.
+    /// Reduces the disk; also returns the mesh of one sector.
     ///
     /// # Errors
-    /// Never with the options that ship.
+    /// The reduction fails, which does not happen with the built-in options.
     pub fn reduce(&self, console: &Console) -> Result<(CyclicReduction, Mesh)> {
         with_progress("Reducing the bladed disk", console, &|listener| {
             let stage = stage_model(&self.options, listener)?;
@@ -299,7 +300,7 @@ impl DiskModel {
     }
 }
 
-/// The casing of the stage, of the paper's size or with an eighth of the elements around.
+/// Returns the options of the casing of the stage, of the paper's size or with an eighth of the elements around.
 pub fn stage_casing(coarse: bool) -> StageCasingOptions {
     let defaults = StageCasingOptions::default();
     if coarse {
@@ -326,7 +327,7 @@ mod tests {
         assert!(has_chord(ROTOR37_ONE_ROW_SPIN) && has_chord(STAGE) && !has_chord(STAGE_CASING) && !has_chord(CUBE));
     }
 
-    /// Every other mesh is one: its nodes grow with the factor, and a factor of 1 is the mesh that ships.
+    /// Each mesh differs: the number of nodes grows with the factor, and a factor of 1 gives the built-in mesh.
     #[test]
     fn mesh_factor_scales_the_node_count() {
         for name in [ROTOR37, ROTOR37_PAPER] {

@@ -1,9 +1,9 @@
-//! What refinement leaves of rubs of the models that ship, found once with long runs: their ROMs carry it.
+//! Discretisation errors of the built-in models in rubs, determined once with long runs; the ROMs carry them.
 //!
-//! A row is of one model, with all of its options. A model with other options has none: nothing here is said of it.
+//! A row applies to one model with all of its options. There are no errors for models with other options.
 //!
-//! Origin of the figures: `lab refinement --scene rotor37-light`, `--scene rotor37-one-row`, `--scene stage` and `--scene stage-nodes-digging`, 2026-11-23,
-//! version 0.1.0; of the paper's model `lab bases`, 2026-11-22, version 0.1.0.
+//! Source of the figures: `lab refinement --scene rotor37-light`, `--scene rotor37-one-row`, `--scene stage` and `--scene stage-nodes-digging`,
+//! 2026-11-23, version 0.1.0; for the paper's model `lab bases`, 2026-11-22, version 0.1.0.
 
 use core::fmt::Debug;
 
@@ -16,17 +16,17 @@ use tiprub_model::{
     stage::{SectorCounts, SectorOptions, StageOptions},
 };
 
-/// One model that ships with what was found of it.
+/// Built-in model with its errors.
 struct KnownModel {
     /// Options of the model in debug form.
     options: String,
-    /// The rub, in words.
+    /// Description of the rub.
     found_on: &'static str,
-    /// Relative errors of the displacements: by modes, patches, rows of them across the thickness, and mesh.
+    /// Relative errors of the displacements by modes, patches, rows of patches across the thickness, and mesh.
     errors: [Option<f64>; 4],
 }
 
-/// All rows.
+/// Returns all rows.
 fn rows() -> [KnownModel; 5] {
     let one_row = Rotor37Options {
         mesh: MeshCounts { chord: 24, thickness: 2, span: 40 },
@@ -87,7 +87,7 @@ fn rows() -> [KnownModel; 5] {
     ]
 }
 
-/// The ROM of a model with these options, with what is known of it.
+/// Adds the known errors to the ROM of a model with these options.
 pub(crate) fn with_known_errors(options: &dyn Debug, mut rom: Rom) -> Rom {
     let options = format!("{options:?}");
     let known = rows().into_iter().find(|row| row.options == options);
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
     use crate::{builtin, reduction};
 
-    /// With other defaults a row is of no model any more: renew the figures.
+    /// If the defaults change, a row no longer matches any model: determine the figures again.
     #[test]
     fn only_the_built_in_blade_has_known_errors() {
         let own = Rotor37Options::default();

@@ -1,7 +1,7 @@
-//! What ships: models and scenes behind `builtin:`, reduced once and kept in the user's cache directory.
+//! Built-in models and scenes (`builtin:`), reduced once and cached in the user's cache directory.
 //!
-//! [`scene_source`] loads any scene with its ROMs, [`builtin`] knows the models, [`rom_cache`] keeps them,
-//! [`mod@reduction`] reduces with progress.
+//! [`scene_source`] loads any scene with its ROMs, [`builtin`] defines the models, [`rom_cache`] caches them, [`mod@reduction`] reduces with
+//! progress.
 
 #![warn(unreachable_pub)]
 pub mod builtin;

@@ -1,4 +1,4 @@
-//! The blade that ships and casings, reduced with progress on the way.
+//! Reduces the built-in blades and casings, with a progress display.
 
 use tiprub_model::{
     CasingOptions, Reduction, Rotor37Options,
@@ -26,57 +26,57 @@ const STAGES: [ReductionStage; 7] = [
     ReductionStage::Spin,
 ];
 
-/// Reduce rotor 37, showing stage and share done.
+/// Reduces rotor 37 and shows the stage of the work and the finished fraction.
 ///
 /// # Errors
-/// Counts that the mesh cannot serve, and whatever the reduction refuses.
+/// The mesh does not permit these counts, or the reduction fails.
 pub fn rotor37(options: &Rotor37Options, console: &Console) -> Result<Reduction> {
     let reduction = with_progress("Reducing rotor 37", console, &|listener| reduce_rotor37(options, listener))?;
     Ok(Reduction { rom: known::with_known_errors(options, reduction.rom), ..reduction })
 }
 
-/// Reduce a casing, showing stage and share done.
+/// Reduces a casing and shows the stage of the work and the finished fraction.
 ///
 /// # Errors
-/// Lengths, counts and contact rings that do not fit each other, and whatever the reduction refuses.
+/// Lengths, counts and contact rings are inconsistent, or the reduction fails.
 pub fn casing(options: &CasingOptions, console: &Console) -> Result<Reduction> {
     with_progress("Reducing the casing", console, &|listener| reduce_ring(options, listener))
 }
 
-/// Reduce the bladed disk of the stage, showing stage and share done.
+/// Reduces the bladed disk of the stage and shows the stage of the work and the finished fraction.
 ///
 /// # Errors
-/// Counts that do not fit each other, and whatever the reduction refuses.
+/// The counts are inconsistent, or the reduction fails.
 pub fn stage(options: &StageOptions, console: &Console) -> Result<CyclicReduction> {
     with_progress("Reducing the stage", console, &|listener| reduce_stage(options, listener))
 }
 
-/// Reduce the casing of the stage, showing stage and share done.
+/// Reduces the casing of the stage and shows the stage of the work and the finished fraction.
 ///
 /// # Errors
-/// Counts that do not fit each other, and whatever the reduction refuses.
+/// The counts are inconsistent, or the reduction fails.
 pub fn stage_casing(options: &StageCasingOptions, console: &Console) -> Result<Reduction> {
     with_progress("Reducing the casing of the stage", console, &|listener| reduce_stage_casing(options, listener))
 }
 
-/// Reduce the cube that flies between two rings, showing stage and share done.
+/// Reduces the cube between two rings and shows the stage of the work and the finished fraction.
 ///
 /// # Errors
-/// More modes than degrees of freedom.
+/// There are more modes than degrees of freedom.
 pub fn cube(options: &CubeOptions, console: &Console) -> Result<Reduction> {
     with_progress("Reducing the cube", console, &|listener| reduce_cube(options, listener))
 }
 
-/// Reduce one of these rings, showing stage and share done.
+/// Reduces one of these rings and shows the stage of the work and the finished fraction.
 ///
 /// # Errors
-/// More modes than degrees of freedom, or more static responses than contact forces.
+/// There are more modes than degrees of freedom, or more static responses than contact forces.
 pub fn cube_ring(options: &RingOptions, console: &Console) -> Result<Reduction> {
     let title = format!("Reducing {}", options.name.replace('_', "-"));
     with_progress(&title, console, &|listener| reduce_cube_ring(options, listener))
 }
 
-/// Work that tells where it stands, shown as a task; `title` says what is done.
+/// Runs work that reports its progress, and shows it as a task; `title` describes the work.
 ///
 /// # Errors
 /// The errors of the work.
@@ -94,7 +94,7 @@ pub fn with_progress<T>(
     work(&listener).map_err(|error| failure(title, error))
 }
 
-/// An error of the model floor, met at the work called `title`.
+/// Converts an error of the model crate during the work called `title`.
 pub fn failure(title: &str, error: tiprub_model::Error) -> Failure {
     match error {
         tiprub_model::Error::Invalid { what, problem, remedy } => Failure::new(what, problem, remedy),

@@ -1,9 +1,9 @@
-//! Built-in models that were reduced before, kept in the user's cache directory.
+//! Cache of reduced built-in models in the user's cache directory.
 //!
-//! A file is found by everything that decides its content: the options of the model, the sources it was made by, the
-//! release and the file format. It is never trusted: its first line repeats the key and states the SHA-256 of the ROM file
-//! that follows, and whatever does not fit is made anew. Files appear whole or not at all, so that two processes may
-//! fill the cache at once. A cache that cannot be written is no reason to stop.
+//! The key of a file consists of everything that determines its content: the options of the model, the sources, the release and the file format. A
+//! file is always verified: its first line repeats the key and states the SHA-256 of the ROM file that follows; if either does not match, the model
+//! is reduced again. Files are written completely or not at all, so that two processes may fill the cache at the same time. A cache that cannot be
+//! written does not stop the work.
 
 use std::{
     fmt::Debug,
@@ -21,32 +21,32 @@ use tiprub_shell::{Result, console::Console, output_file};
 const LAYOUT: &str = "1";
 /// First word of a cached file.
 const MARK: &str = "tiprub-cached-rom";
-/// Names the directory, or is empty to keep no files.
+/// Environment variable for the directory; if it is empty, the cache is off.
 const VARIABLE: &str = "TIPRUB_CACHE";
-/// Largest file (bytes): a line and a ROM.
+/// Largest file (bytes): the first line and a ROM.
 const LARGEST: u64 = tiprub_format::LARGEST_ROM + (1 << 10);
-/// Versions of one model that are kept: other options and releases may be in use side by side.
+/// Number of versions of one model that are cached: several options and releases may be in use side by side.
 const KEPT: usize = 4;
 
-/// Where models are kept, if anywhere.
+/// Cache directory, if there is one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RomCache {
     directory: Option<PathBuf>,
 }
 
 impl RomCache {
-    /// Keep nothing, and look nothing up.
+    /// Returns a cache that stores and finds nothing.
     pub fn off() -> Self {
         Self { directory: None }
     }
 
-    /// Keep models in this directory.
+    /// Returns a cache in this directory.
     pub(crate) fn at(directory: impl Into<PathBuf>) -> Self {
         Self { directory: Some(directory.into()) }
     }
 
-    /// The directory that the environment variable TIPRUB_CACHE names (off where it is empty), else `tiprub` in the user's
-    /// cache directory (XDG_CACHE_HOME, ~/.cache, or what the system has in its place).
+    /// Returns the cache in the directory that the environment variable TIPRUB_CACHE names (off if it is empty), else in `tiprub` in the user's
+    /// cache directory (XDG_CACHE_HOME, ~/.cache, or the equivalent of the system).
     pub fn of_user() -> Self {
         match std::env::var_os(VARIABLE) {
             Some(directory) if directory.is_empty() => Self::off(),
@@ -57,12 +57,12 @@ impl RomCache {
         }
     }
 
-    /// Where models are kept; none where nothing is kept.
+    /// Returns the cache directory; `None` if the cache is off.
     pub fn directory(&self) -> Option<&Path> {
         self.directory.as_deref()
     }
 
-    /// The model `name` with these options: as kept, or as `make` makes it, which is then kept.
+    /// Returns the model `name` with these options from the cache, or calls `make` and caches the result.
     ///
     /// # Errors
     /// The errors of `make`.
@@ -99,8 +99,7 @@ impl RomCache {
     }
 }
 
-/// Everything that decides what a model is. The debug form of options is complete, and writes numbers so that they read
-/// back to the same bits.
+/// Returns the key: everything that determines a model. The debug form of options is complete, and its numbers read back to the same bits.
 fn key(name: &str, options: &dyn Debug) -> String {
     let versions = [LAYOUT, env!("CARGO_PKG_VERSION"), env!("TIPRUB_MODEL_SOURCES"), std::env::consts::ARCH];
     let mut hash = Sha256::new();
@@ -125,12 +124,12 @@ fn content(rom: &Rom, key: &str) -> Vec<u8> {
     [first.as_bytes(), &bytes].concat()
 }
 
-/// The ROM in the file; `Err(None)` where there is no file, else what is wrong with it.
+/// Reads the ROM in the file; `Err(None)` if there is no file, otherwise the problem of the file.
 fn read(path: &Path, key: &str) -> Result<Rom, Option<String>> {
     let unreadable = |error: std::io::Error| {
         (error.kind() != std::io::ErrorKind::NotFound).then(|| format!("cannot be read ({error})"))
     };
-    // A pipe would be waited for without end.
+    // Reading a pipe might block.
     if !fs::metadata(path).map_err(unreadable)?.is_file() {
         return Err(Some("is not a file".to_owned()));
     }
@@ -144,7 +143,7 @@ fn read(path: &Path, key: &str) -> Result<Rom, Option<String>> {
     tiprub_format::read_rom(rom, &path.display().to_string()).map_err(|error| Some(error.to_string()))
 }
 
-/// Remove the oldest versions of a model beyond [`KEPT`]. Files that cannot be removed stay.
+/// Removes the oldest versions of a model beyond [`KEPT`]. Files that cannot be removed stay.
 fn prune(directory: &Path, name: &str) {
     let Ok(entries) = fs::read_dir(directory) else { return };
     let is_version = |path: &Path| {
@@ -194,7 +193,7 @@ mod tests {
         }
     }
 
-    /// A cache in a directory of its own that counts how often a model is made; its options are the stiffness.
+    /// Cache in a temporary directory that counts how often a model is made; its options are the stiffness.
     struct Bench {
         root: tempfile::TempDir,
         made: Cell<usize>,
@@ -242,7 +241,7 @@ mod tests {
         let path = &bench.files()[0];
         let good = fs::read(path).unwrap();
         let line = good.iter().position(|byte| *byte == b'\n').unwrap();
-        // Whole and sound, but of other options.
+        // The file is complete and valid, but for other options.
         let other = content(&rom(9.0), &key("a", &9.0));
         let mut damaged = vec![good[..good.len() / 2].to_vec(), Vec::new(), b"hello".to_vec(), other];
         damaged.push([&good[..line], &tiprub_format::write_rom(&rom(9.0))].concat());

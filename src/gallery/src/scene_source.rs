@@ -1,4 +1,4 @@
-//! A scene file with its ROMs, or a scene that ships with tiprub.
+//! Loads a scene file with its ROMs, or a built-in scene.
 
 use std::{
     cell::RefCell,
@@ -12,21 +12,21 @@ use tiprub_shell::{Failure, Result, console::Console};
 
 use crate::{builtin, rom_cache::RomCache};
 
-/// The scene of the demo, as a user would write it.
+/// Scene of the demo, in the form of a user's scene file.
 pub const ROTOR37_SCENE: &str = include_str!("../scenes/rotor37.toml");
-/// The same with one row of patches and steps of one length.
+/// Scene of the demo with one row of patches and fixed steps.
 pub const ROTOR37_ONE_ROW_SCENE: &str = include_str!("../scenes/rotor37-one-row.toml");
 
-/// The same rub with the paper's model and method.
+/// Scene of the demo with the paper's model and method.
 pub const ROTOR37_PAPER_SCENE: &str = include_str!("../scenes/rotor37-paper.toml");
 
-/// Coupled blades in an oval flexible casing, each with three contact nodes, as the paper's.
+/// Coupled blades in an oval flexible casing, each with three contact nodes as in the paper.
 pub(crate) const STAGE_NODES_SCENE: &str = include_str!("../scenes/stage-nodes.toml");
 
-/// A cube that flies between two rings.
+/// Free cube between two rings.
 pub const CUBE_SCENE: &str = include_str!("../scenes/cube-between-rings.toml");
 
-/// Scenes that ship with tiprub: what stands behind `builtin:`, and the text.
+/// Built-in scenes: name after `builtin:`, and text.
 pub const BUILTIN_SCENES: [(&str, &str); 8] = [
     ("rotor37", ROTOR37_SCENE),
     ("rotor37-one-row", ROTOR37_ONE_ROW_SCENE),
@@ -38,14 +38,14 @@ pub const BUILTIN_SCENES: [(&str, &str); 8] = [
     ("cube-between-rings", CUBE_SCENE),
 ];
 
-/// Beginning of the names of embedded scenes and models.
+/// Prefix of the names of built-in scenes and models.
 pub const BUILTIN: &str = "builtin:";
 
-/// Load a scene: a path, or `builtin:` and the name of one of [`BUILTIN_SCENES`]. Built-in models come from `cache`, or
-/// are reduced on the way, with progress.
+/// Loads a scene: a path, or `builtin:` and the name of one of [`BUILTIN_SCENES`]. Built-in models come from `cache`, or are reduced with a progress
+/// display.
 ///
 /// # Errors
-/// Missing or wrong files, naming file, line, field and remedy.
+/// Files are missing or wrong; the error names file, line, field and remedy.
 pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) -> Result<Scene> {
     let reduce = |name: &str| Some(builtin::rom(name, cache, console)?.map_err(|failure| failure.to_string()));
     match source(argument.as_ref())? {
@@ -57,7 +57,7 @@ pub fn load(argument: impl AsRef<OsStr>, cache: &RomCache, console: &Console) ->
 /// Loads the settings of a scene without its models: nothing is reduced.
 ///
 /// # Errors
-/// As [`load`], but for the models.
+/// The errors of [`load`], except those of the models.
 pub fn settings(argument: impl AsRef<OsStr>) -> Result<SceneSettings> {
     Ok(match source(argument.as_ref())? {
         SceneSource::Embedded(name, text) => tiprub_format::parse_scene(text, name)?,
@@ -65,7 +65,7 @@ pub fn settings(argument: impl AsRef<OsStr>) -> Result<SceneSettings> {
     })
 }
 
-/// The files that [`load`] would read: the scene and its ROMs; none of a scene that ships, or of one that is wrong.
+/// Returns the files that [`load`] would read: the scene and its ROMs; empty for a built-in or invalid scene.
 pub fn files(argument: &str) -> Vec<PathBuf> {
     let Ok(SceneSource::File(path)) = source(argument.as_ref()) else { return Vec::new() };
     let structures = tiprub_format::load_settings(path).map(|settings| settings.structures).unwrap_or_default();
@@ -74,7 +74,7 @@ pub fn files(argument: &str) -> Vec<PathBuf> {
     [path.to_path_buf()].into_iter().chain(roms.map(|structure| beside(&structure.rom))).collect()
 }
 
-/// A failure of a scene whose remedy names `time.step`, with the place of that key in the scene's file.
+/// Adds the place of `time.step` in the scene file to a failure whose remedy names this key.
 pub fn located(argument: impl AsRef<OsStr>, failure: Failure) -> Failure {
     const KEY: &str = "time.step";
     let place = || {
@@ -91,7 +91,7 @@ pub fn located(argument: impl AsRef<OsStr>, failure: Failure) -> Failure {
     }
 }
 
-/// Where a scene is.
+/// Source of a scene.
 enum SceneSource<'a> {
     /// One of [`BUILTIN_SCENES`].
     Embedded(&'a str, &'static str),
@@ -127,7 +127,7 @@ fn source(argument: &OsStr) -> Result<SceneSource<'_>> {
     }
 }
 
-/// An embedded scene with embedded models from `reduce`.
+/// Builds an embedded scene with embedded models from `reduce`.
 fn builtin_scene(name: &str, text: &str, reduce: &dyn Fn(&str) -> Option<Result<Rom, String>>) -> Result<Scene> {
     tiprub_format::read_scene(text, name, |_, structure| {
         let model = builtin_model(structure).and_then(reduce).unwrap_or_else(|| Err("unknown built-in model".into()));
@@ -135,19 +135,19 @@ fn builtin_scene(name: &str, text: &str, reduce: &dyn Fn(&str) -> Option<Result<
     })
 }
 
-/// [`ROTOR37_ONE_ROW_SCENE`] around a blade reduced before.
+/// Builds [`ROTOR37_ONE_ROW_SCENE`] with a blade that is already reduced.
 ///
 /// # Errors
-/// Never with the scene that ships.
+/// Only if the built-in scene is invalid.
 pub fn rotor37_scene_with(rom: Rom) -> Result<Scene> {
     let rom = RefCell::new(Some(rom));
     builtin_scene("builtin:rotor37-one-row", ROTOR37_ONE_ROW_SCENE, &|_| rom.borrow_mut().take().map(Ok))
 }
 
-/// The scene of the stage with contact nodes, or the same with coarse models.
+/// Returns the scene of the stage with contact nodes, with the full or the coarse models.
 ///
 /// # Errors
-/// Never with what ships.
+/// Only if the built-in scene or a model is invalid.
 pub fn stage_scene(coarse: bool, cache: &RomCache, console: &Console) -> Result<Scene> {
     let suffix = if coarse { "-coarse" } else { "" };
     let reduce = |name: &str| {
@@ -157,7 +157,7 @@ pub fn stage_scene(coarse: bool, cache: &RomCache, console: &Console) -> Result<
     builtin_scene("builtin:stage-nodes", STAGE_NODES_SCENE, &reduce)
 }
 
-/// The embedded scene as text, with its ROM read from `rom_file` and the stop time replaced.
+/// Returns the embedded scene as text, with its ROM read from `rom_file` and the stop time replaced.
 pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
     let mut text = String::new();
     for line in ROTOR37_SCENE.lines() {
@@ -173,10 +173,10 @@ pub fn rotor37_text(rom_file: &str, stop: f64) -> String {
     text
 }
 
-/// Read a ROM file.
+/// Reads a ROM file.
 ///
 /// # Errors
-/// Missing or damaged file, naming the array.
+/// The file is missing or damaged; the error names the array.
 pub fn read_rom(path: &Path) -> Result<Rom> {
     let bytes = tiprub_format::read_file(path, tiprub_format::LARGEST_ROM)
         .map_err(|error| Failure::file(path, "cannot be read", &error))?;

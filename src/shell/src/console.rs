@@ -1,4 +1,4 @@
-//! What the user sees while a command works: progress on stderr, one result on stdout.
+//! Terminal output of a command: progress on stderr, one result on stdout.
 
 use std::{
     borrow::Cow,
@@ -14,18 +14,18 @@ use tiprub_core::warning::{self, Warning};
 
 use crate::{Failure, Result};
 
-/// Text without what a terminal would obey: control characters and marks of writing direction, which names and descriptions in
-/// files may hold, are shown as `\u{1b}` and the like. Lines stay lines.
+/// Escapes control characters and marks of writing direction, which names and descriptions in files may contain, as `\u{1b}` and the like. Line
+/// breaks are kept.
 pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |character| format!("\\u{{{:x}}}", u32::from(character)))
 }
 
-/// The same for JSON, where nothing but strings can hold such characters.
+/// Escapes these characters in JSON, where only strings can contain them.
 fn printable_json(text: &str) -> Cow<'_, str> {
     escaped(text, |character| format!("\\u{:04x}", u32::from(character)))
 }
 
-/// A path for people and for JSON, both of which know text only: what is none in it is replaced.
+/// Returns a path as text for messages and JSON; invalid characters are replaced.
 pub fn shown_path(path: &Path) -> String {
     path.display().to_string()
 }
@@ -43,23 +43,23 @@ fn is_obeyed(character: char) -> bool {
     turns || (character.is_control() && !matches!(character, '\n' | '\t'))
 }
 
-/// Exit code where the reader of stdout left early, such as `head`: what shells show of a program that SIGPIPE ends.
+/// Exit code if the reader of stdout closed it early, such as `head`: the code that shells report for a program ended by SIGPIPE.
 const READER_LEFT: u8 = 128 + 13;
 
-/// Result of a command, in both forms the user can ask for.
+/// Result of a command, as text and as JSON.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct CommandOutcome {
-    /// For people: the answer.
+    /// Answer as text.
     pub text: String,
-    /// Warnings that belong to the answer; they follow it on stderr.
+    /// Warnings that belong to the answer; they are printed after it on stderr.
     pub warnings: Vec<Warning>,
-    /// Lines after the warnings: where to find more.
+    /// Lines after the warnings, with references to more results.
     pub rest: String,
-    /// For programs: one object.
+    /// Answer as one JSON object.
     pub json: serde_json::Value,
 }
 
-/// Warnings for programs: their whole texts, and their identifiers, levels and lines in the same order.
+/// Returns warnings as JSON: their full texts, and their identifiers, levels and lines in the same order.
 pub fn warnings_json(warnings: &[Warning]) -> [serde_json::Value; 2] {
     let each = |warning: &Warning| {
         let [problem, remedy] = warning.lines();
@@ -69,7 +69,7 @@ pub fn warnings_json(warnings: &[Warning]) -> [serde_json::Value; 2] {
     [warning::texts(warnings).into(), warnings.iter().map(each).collect()]
 }
 
-/// Two lines for every topic: its first warning, and how many more there are.
+/// Returns two lines for every topic: its first warning, and the number of others.
 fn warning_lines(warnings: &[Warning]) -> Vec<String> {
     let first =
         |(index, warning): &(usize, &Warning)| !warnings[..*index].iter().any(|other| other.topic() == warning.topic());
@@ -83,7 +83,7 @@ fn warning_lines(warnings: &[Warning]) -> Vec<String> {
     warnings.iter().enumerate().filter(first).map(lines).collect()
 }
 
-/// Where progress and results go.
+/// Destination of progress and results.
 #[derive(Debug, Clone, Copy)]
 pub struct Console {
     quiet: bool,
@@ -92,17 +92,17 @@ pub struct Console {
 }
 
 impl Console {
-    /// `quiet` drops progress (warnings and errors stay); `json` prints results as one JSON object instead of text.
+    /// Creates a console. `quiet` suppresses progress (warnings and errors stay); `json` prints results as one JSON object instead of text.
     pub fn new(quiet: bool, json: bool) -> Self {
         Self { quiet, json, terminal: std::io::stderr().is_terminal() }
     }
 
-    /// Whether the result is wanted as JSON.
+    /// Returns whether the result is printed as JSON.
     pub fn is_json(&self) -> bool {
         self.json
     }
 
-    /// One line of progress on stderr.
+    /// Prints one line of progress on stderr.
     pub fn print_progress(&self, line: impl std::fmt::Display) {
         if !self.quiet {
             // A closed stderr must not stop the work.
@@ -110,7 +110,7 @@ impl Console {
         }
     }
 
-    /// Warnings of the work without an identifier, one line each on stderr; `quiet` does not silence them.
+    /// Prints warnings without an identifier, one line each, on stderr; `quiet` does not suppress them.
     pub fn warn_texts(&self, warnings: &[String]) {
         for warning in warnings {
             // A closed stderr must not stop the work.
@@ -118,7 +118,7 @@ impl Console {
         }
     }
 
-    /// Warnings of the work, two lines for every topic on stderr; `quiet` does not silence them.
+    /// Prints warnings, two lines for every topic, on stderr; `quiet` does not suppress them.
     pub fn warn(&self, warnings: &[Warning]) {
         for lines in warning_lines(warnings) {
             // A closed stderr must not stop the work.
@@ -126,7 +126,7 @@ impl Console {
         }
     }
 
-    /// A task of known length (`Some(total)`) or of unknown length (`None`: a spinner).
+    /// Starts a task of known length (`Some(total)`) or of unknown length (`None`: a spinner).
     pub fn task(&self, title: &str, total: Option<u64>) -> Task {
         if self.quiet {
             return Task { bar: ProgressBar::hidden(), lines: false };
@@ -148,7 +148,7 @@ impl Console {
         Task { bar, lines: false }
     }
 
-    /// Print what came of the command: the result on stdout, or the failure. Returns the exit code of the program.
+    /// Prints the result on stdout, or the failure. Returns the exit code of the program.
     pub fn finish(&self, result: Result<CommandOutcome>) -> ExitCode {
         match result.and_then(|outcome| self.deliver(&outcome)) {
             Ok(code) => code,
@@ -159,10 +159,10 @@ impl Console {
         }
     }
 
-    /// Print the result of the command on stdout.
+    /// Prints the result of the command on stdout.
     ///
     /// # Errors
-    /// Stdout takes it not or in part, such as a file on a full disk.
+    /// Stdout does not accept all bytes, for example a file on a full disk.
     fn deliver(&self, outcome: &CommandOutcome) -> Result<ExitCode> {
         let json = self.json.then(|| format!("{:#}", outcome.json));
         let text = json.as_deref().map_or_else(|| printable(outcome.text.trim_end()), printable_json);
@@ -174,14 +174,14 @@ impl Console {
         print(&printable(outcome.rest.trim_end()))
     }
 
-    /// Print a failure: text on stderr, and with `--json` the object on stdout.
+    /// Prints a failure: text on stderr, and with `--json` the object on stdout.
     pub fn fail(&self, failure: &Failure) {
         self.warn(&failure.warnings);
         let _ = writeln!(std::io::stderr(), "error: {}", printable(&failure.to_string()));
         self.answer(failure);
     }
 
-    /// With `--json`, the object of a failure on stdout.
+    /// Prints the object of a failure on stdout if `--json` is set.
     pub fn answer(&self, failure: &Failure) {
         if self.json {
             let _ = writeln!(std::io::stdout(), "{}", printable_json(&format!("{:#}", failure.to_json())));
@@ -189,7 +189,7 @@ impl Console {
     }
 }
 
-/// A text on stdout, with the end of its last line.
+/// Prints a text on stdout, with a line break at its end.
 fn print(text: &str) -> Result<ExitCode> {
     let mut stdout = std::io::stdout().lock();
     match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
@@ -199,21 +199,21 @@ fn print(text: &str) -> Result<ExitCode> {
     }
 }
 
-/// A running task; its progress line disappears when it is dropped.
+/// Running task; its progress line disappears when it is dropped.
 #[derive(Debug)]
 pub struct Task {
     bar: ProgressBar,
-    /// Progress goes out line by line: stderr is no terminal, and not to be quiet.
+    /// True if progress is printed line by line: stderr is not a terminal, and progress is not suppressed.
     lines: bool,
 }
 
 impl Task {
-    /// Units done so far.
+    /// Sets the number of finished units.
     pub fn at(&self, position: u64) {
         self.bar.set_position(position);
     }
 
-    /// A line of a long task, for where no progress bar shows: into a log, minutes without a sign look like a hang.
+    /// Prints a line of a long task if no progress bar is shown; without it, a task of minutes would look like a hang in a log.
     pub fn line(&self, line: &str) {
         if self.lines {
             // A closed stderr must not stop the work.

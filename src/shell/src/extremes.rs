@@ -1,28 +1,28 @@
-//! What was largest and smallest in a run, and when.
+//! Largest and smallest values of a run, with their times.
 
 use serde_json::{Value, json};
 use tiprub_core::shown;
 
 use crate::recording::Recording;
 
-/// The largest or smallest value of a variable over a run.
+/// Largest or smallest value of a variable over a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extreme {
-    /// For programs: `largest_total_normal_force`.
+    /// Name for programs: `largest_total_normal_force`.
     pub name: &'static str,
-    /// For people.
+    /// Description for people.
     pub text: &'static str,
-    /// Unit; empty of a number.
+    /// Unit; empty for a number without unit.
     pub unit: &'static str,
     /// The value.
     pub value: f64,
-    /// End of the communication step in which it was found, or the communication point (s).
+    /// End of the communication step of the extreme, or the communication point (s).
     pub time: f64,
 }
 
 /// Returns the extremes of the variables that a recording has: forces, clearance, contacts.
 pub fn extremes(recording: &Recording) -> Vec<Extreme> {
-    // The largest of a column, or with `sense` −1 the smallest, and when it is reached first.
+    // Finds the largest value of a column, or with `sense` −1 the smallest, and the first time at which it is reached.
     let found = |name, text, unit, sense: f64, values: Option<Vec<f64>>| {
         let values = values?.into_iter().zip(recording.times.iter().copied());
         let further = |best: (f64, f64), next: (f64, f64)| if sense * (next.0 - best.0) > 0.0 { next } else { best };
@@ -45,7 +45,7 @@ pub fn extremes(recording: &Recording) -> Vec<Extreme> {
     all.into_iter().flatten().collect()
 }
 
-/// Impulse of every communication step over its length (N); 0 at the start.
+/// Returns the impulse of every communication step divided by its length (N); 0 at the start.
 fn total_normal_force(recording: &Recording) -> Option<Vec<f64>> {
     let impulses = recording.column("normal_impulse")?;
     let steps = recording.times.windows(2).map(|two| two[1] - two[0]);
@@ -53,7 +53,7 @@ fn total_normal_force(recording: &Recording) -> Option<Vec<f64>> {
 }
 
 impl Extreme {
-    /// A line of a summary. What never was other than 0 has no time.
+    /// Returns a line for the summary; an extreme of 0 has no time.
     pub fn line(&self) -> String {
         let Self { text, unit, value, time, .. } = self;
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
@@ -64,14 +64,14 @@ impl Extreme {
         }
     }
 
-    /// For programs, all of a run.
+    /// Returns all extremes of a run as JSON.
     pub fn json(all: &[Self]) -> Value {
         let one = |extreme: &Self| (extreme.name.to_owned(), json!({ "value": extreme.value, "time": extreme.time }));
         all.iter().map(one).collect::<serde_json::Map<_, _>>().into()
     }
 }
 
-/// A value with six significant digits; never a negative zero.
+/// Formats a value with six significant digits; never a negative zero.
 pub fn six_digits(value: f64) -> String {
     match format!("{value:.5e}").parse::<f64>() {
         Ok(0.0) => "0".to_owned(),
@@ -99,7 +99,7 @@ mod tests {
             [&[1e-3, 0.0, 0.0, 0.0], &[1.234_567e-5, 30.0, 4.0, 2.0], &[0.0, 80.0, 3.0, 5.0], &[0.0, 20.0, 4.0, 5.0]];
         let found = extremes(&recording(&names, &rows));
         let lines: Vec<String> = found.iter().map(Extreme::line).collect();
-        // 4 N s in 0.5 s.
+        // 4 N·s in 0.5 s.
         assert!(lines[0].ends_with("nodes, mean over a communication step: 8 N at t = 0.5 s"), "{lines:?}");
         assert!(lines[1].ends_with("internal step: 80 N at t = 1 s"), "{lines:?}");
         assert_eq!(lines[2], "smallest clearance: 0 m at t = 1 s");

@@ -1,4 +1,4 @@
-//! The one error of the command line: what, where and the remedy, and the exit code that goes with it.
+//! Error type of the command line: place, problem and remedy, and the matching exit code.
 
 use std::{fmt, path::Path};
 
@@ -6,7 +6,7 @@ use tiprub_core::Warning;
 
 use crate::console::warnings_json;
 
-/// Why a command did not do what it was asked.
+/// Reason why a command failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
     /// The file, option or scene field with the problem.
@@ -15,42 +15,42 @@ pub struct Failure {
     pub problem: String,
     /// The remedy; empty if the problem already contains it.
     pub remedy: String,
-    /// True when the command line itself was wrong (exit code 2), false when the work failed (exit code 1).
+    /// True if the command line itself is wrong (exit code 2), false if the work failed (exit code 1).
     pub usage: bool,
-    /// Warnings of the work up to the failure: they often name its cause.
+    /// Warnings before the failure, which often name its cause.
     pub warnings: Vec<Warning>,
 }
 
-/// Failed operations on a file that is only read.
+/// Operations that fail on a file that is only read.
 const READING: [&str; 2] = ["cannot be read", "cannot be opened"];
 
-/// Result of everything in this crate.
+/// Result type of this crate.
 pub type Result<T, E = Failure> = std::result::Result<T, E>;
 
 impl Failure {
-    /// The work failed: exit code 1.
+    /// Creates a failure of the work: exit code 1.
     pub fn new(what: impl fmt::Display, problem: impl fmt::Display, remedy: impl fmt::Display) -> Self {
         let (what, problem, remedy) = (what.to_string(), problem.to_string(), remedy.to_string());
         Self { what, problem, remedy, usage: false, warnings: Vec::new() }
     }
 
-    /// The command line is wrong: exit code 2.
+    /// Creates a failure of the command line: exit code 2.
     pub fn usage(what: impl fmt::Display, problem: impl fmt::Display, remedy: impl fmt::Display) -> Self {
         Self { usage: true, ..Self::new(what, problem, remedy) }
     }
 
-    /// The same failure after work that had these warnings.
+    /// Adds the warnings that occurred before the failure.
     #[must_use]
     pub fn with_warnings(self, warnings: Vec<Warning>) -> Self {
         Self { warnings, ..self }
     }
 
-    /// An error of a lower floor whose text already names what, where and the remedy, met while handling `what`.
+    /// Creates a failure from an error of a lower layer while handling `what`; the text of the error already contains place, problem and remedy.
     pub fn from_below(what: impl fmt::Display, error: impl fmt::Display) -> Self {
         Self::new(what, error, "")
     }
 
-    /// An error of the core, met while handling `what`.
+    /// Creates a failure from an error of the core while handling `what`.
     pub fn from_core(what: impl fmt::Display, error: tiprub_core::Error) -> Self {
         match error {
             tiprub_core::Error::Invalid { what: field, problem, remedy } => {
@@ -61,7 +61,7 @@ impl Failure {
         }
     }
 
-    /// A file operation failed.
+    /// Creates a failure of a file operation.
     pub fn file(path: &Path, doing: &str, error: &std::io::Error) -> Self {
         let remedy = match error.kind() {
             std::io::ErrorKind::NotFound => "Check the path",
@@ -76,12 +76,12 @@ impl Failure {
         Self::new(path.display(), format!("{doing}: {error}"), remedy)
     }
 
-    /// Process exit code.
+    /// Returns the process exit code.
     pub fn exit_code(&self) -> u8 {
         if self.usage { 2 } else { 1 }
     }
 
-    /// The same as a JSON object, for `--json`.
+    /// Returns the failure as a JSON object, for `--json`.
     pub fn to_json(&self) -> serde_json::Value {
         let mut json = serde_json::json!({
             "error": { "what": self.what, "problem": self.problem, "remedy": self.remedy, "exit_code": self.exit_code() }
@@ -93,7 +93,7 @@ impl Failure {
     }
 }
 
-/// End `text` with exactly one full stop, unless it ends in a question mark.
+/// Ends `text` with exactly one full stop, unless it ends in a question mark.
 fn sentence(text: &str) -> String {
     let text = text.trim_end().trim_end_matches('.');
     if text.ends_with('?') { text.to_string() } else { format!("{text}.") }
@@ -101,7 +101,7 @@ fn sentence(text: &str) -> String {
 
 impl fmt::Display for Failure {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Names of files may hold line ends.
+        // File names may contain line breaks.
         write!(out, "{}: {}", self.what.replace('\n', "\\n"), sentence(&self.problem))?;
         if self.remedy.is_empty() { Ok(()) } else { write!(out, " {}", sentence(&self.remedy)) }
     }

@@ -1,8 +1,8 @@
-//! Progress of long work, and how long the rest takes: from what the work at hand has cost so far.
+//! Progress of long work, and the remaining time, estimated from the time that the finished part took.
 //!
-//! Work is planned in units (internal steps, answers, runs) of several kinds, which differ in seconds per unit. The first estimate takes
-//! the rate it is given. Each piece of work that is done measures the rate of its kind, and corrects those of the others in the same
-//! proportion. The share shown never falls, and is 1 at the end only.
+//! Work is planned in units (internal steps, answers, runs) of several kinds, which differ in seconds per unit. The first estimate uses the given
+//! rate. Each finished piece of work measures the rate of its kind, and corrects the rates of the other kinds in the same proportion. The displayed
+//! fraction never decreases, and reaches 1 only at the end.
 
 use std::{
     cell::RefCell,
@@ -11,14 +11,14 @@ use std::{
 
 use crate::console::{Console, Task};
 
-/// Parts that a progress bar has.
+/// Number of parts of a progress bar.
 const PARTS: u64 = 1000;
-/// Into a log a line goes for so much more of the work, or after so long.
+/// Fraction of the work, or time (s), after which another line is written to a log.
 const LINE_SHARE: f64 = 0.1;
 const LINE_AFTER: Duration = Duration::from_secs(30);
-/// Largest share shown while anything is left.
+/// Largest displayed fraction before the work is finished.
 const MOST_SHOWN: f64 = 0.999;
-/// Shorter work is not announced (s).
+/// Shortest duration (s) that is announced.
 const LONG: f64 = 20.0;
 
 /// Work of one kind.
@@ -33,24 +33,24 @@ struct WorkKind {
 #[derive(Debug, Clone)]
 pub struct WorkPlan {
     kinds: Vec<WorkKind>,
-    /// Seconds per unit before anything is measured.
+    /// Rate (s per unit) before anything is measured.
     rate: f64,
-    /// Largest share given so far.
+    /// Largest fraction displayed so far.
     shown: f64,
 }
 
 impl WorkPlan {
-    /// Nothing planned; `rate` is in seconds per unit.
+    /// Creates an empty plan; `rate` is in seconds per unit.
     pub fn new(rate: f64) -> Self {
         Self { kinds: Vec::new(), rate, shown: 0.0 }
     }
 
-    /// Plan more work of a kind.
+    /// Plans more work of a kind.
     pub fn plan(&mut self, kind: usize, units: f64) {
         self.kind(kind).planned += units;
     }
 
-    /// Work of a kind that took a time (s).
+    /// Records finished work of a kind that took `seconds` (s).
     pub fn done(&mut self, kind: usize, units: f64, seconds: f64) {
         let own = self.kind(kind);
         own.done += units;
@@ -65,7 +65,7 @@ impl WorkPlan {
         &mut self.kinds[kind]
     }
 
-    /// Time that the rest takes (s).
+    /// Returns the estimated time of the remaining work (s).
     pub fn remaining(&self) -> f64 {
         let measured = self.kinds.iter().filter(|kind| kind.done > 0.0);
         let (units, seconds) = measured.fold((0.0, 0.0), |(units, all), kind| (units + kind.done, all + kind.seconds));
@@ -77,7 +77,7 @@ impl WorkPlan {
         self.kinds.iter().map(left).sum()
     }
 
-    /// Share of the work that is done: by time, never less than before, below 1 while anything is left.
+    /// Returns the finished fraction of the work, measured in time: it never decreases, and stays below 1 until everything is finished.
     pub fn share(&mut self) -> f64 {
         let spent: f64 = self.kinds.iter().map(|kind| kind.seconds).sum();
         let is_done = self.kinds.iter().all(|kind| kind.done >= kind.planned);
@@ -87,7 +87,7 @@ impl WorkPlan {
     }
 }
 
-/// A ledger that is shown while it is kept.
+/// Work plan with a progress display.
 #[derive(Debug)]
 pub struct Forecast {
     task: Task,
@@ -98,14 +98,14 @@ pub struct Forecast {
 #[derive(Debug)]
 struct ForecastState {
     ledger: WorkPlan,
-    /// When the last work was done.
+    /// Time at which the last work finished.
     last: Instant,
-    /// Share and time of the last line.
+    /// Fraction and time of the last line.
     line: (f64, Instant),
 }
 
 impl Forecast {
-    /// Show planned work, and say how long it takes where that is long.
+    /// Displays planned work, and announces its duration if it is long.
     pub fn new(console: &Console, title: &str, ledger: WorkPlan) -> Self {
         let seconds = ledger.remaining();
         if seconds >= LONG {
@@ -116,12 +116,12 @@ impl Forecast {
         Self { task, title: title.to_owned(), state: RefCell::new(ForecastState { ledger, last, line }) }
     }
 
-    /// Plan more work of a kind.
+    /// Plans more work of a kind.
     pub fn plan(&self, kind: usize, units: f64) {
         self.state.borrow_mut().ledger.plan(kind, units);
     }
 
-    /// Work of a kind that is done, since the last of any kind. Work that is done in parallel counts by what all threads do together.
+    /// Records work of a kind that has finished since the last call. For parallel work, the time is that of all threads together.
     pub fn done(&self, kind: usize, units: f64) {
         let mut state = self.state.borrow_mut();
         let now = Instant::now();
@@ -139,14 +139,14 @@ impl Forecast {
         }
     }
 
-    /// All is done, whatever was planned.
+    /// Finishes the display, even if not all planned work was done.
     pub fn finish(self) {
         self.task.at(PARTS);
         self.task.line("100 %");
     }
 }
 
-/// "40 s", "3 min", "2.5 h": no more digits than a forecast has.
+/// Formats a duration with the accuracy of a forecast: "40 s", "3 min", "2.5 h".
 pub fn duration(seconds: f64) -> String {
     match seconds {
         _ if seconds < 90.0 => format!("{:.0} s", 10.0 * (seconds / 10.0).ceil()),
@@ -159,7 +159,7 @@ pub fn duration(seconds: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Costs that are wrong by factors, and of kinds that differ by a factor of a hundred.
+    /// First estimates that are wrong by factors, and kinds whose rates differ by a factor of a hundred.
     #[test]
     fn progress_never_falls_and_ends_at_one_for_any_first_estimate() {
         let truth = |kind: usize, index: usize| [0.01, 1.0, 0.1][kind] * (1.0 + 0.5 * (index % 3) as f64);
@@ -185,12 +185,12 @@ mod tests {
         ledger.plan(0, 10.0);
         ledger.plan(1, 10.0);
         assert!((ledger.remaining() - 20.0).abs() < 1e-12);
-        // Five times slower than thought, of both kinds until the second is measured.
+        // Five times slower than estimated; this applies to both kinds until the second is measured.
         ledger.done(0, 2.0, 10.0);
         assert!((ledger.remaining() - 5.0 * 18.0).abs() < 1e-12);
         ledger.done(1, 1.0, 0.5);
         assert!((ledger.remaining() - (8.0 * 5.0 + 9.0 * 0.5)).abs() < 1e-12);
-        // Work that is found on the way.
+        // Work that is added later.
         ledger.plan(1, 1.0);
         assert!((ledger.remaining() - (8.0 * 5.0 + 10.0 * 0.5)).abs() < 1e-12);
     }

@@ -1,4 +1,4 @@
-//! Inputs over time from a CSV file, which a run follows without delay.
+//! Inputs over time from a CSV file; a run applies them without delay.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -13,29 +13,29 @@ use tiprub_core::{
 
 use crate::{Failure, Result, native};
 
-/// Largest file (bytes): ten million values at full precision take less than half of it.
+/// Largest file (bytes); ten million values at full precision need less than half of it.
 const LARGEST: u64 = 512 << 20;
-/// Longer lines are not shown whole in messages (characters).
+/// Longest line that messages show in full (characters).
 const MOST_SHOWN: usize = 60;
 
-/// Inputs over time: a column each, linear between the rows, and as in the first and the last row before and after them.
+/// Inputs over time: one column each, linear between the rows, constant before the first and after the last row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputHistory {
-    /// Where it is from, for messages.
+    /// Origin of the data, for messages.
     name: String,
     /// Names of the columns after the time.
     names: Vec<String>,
-    /// Times of the rows (s), growing.
+    /// Times of the rows (s), increasing.
     times: Vec<f64>,
     /// Values, row after row.
     values: Vec<f64>,
 }
 
 impl InputHistory {
-    /// Read a CSV file whose first column is `time` (s), the others inputs and tunable parameters by their names of FMI 2.0.
+    /// Reads a CSV file whose first column is `time` (s); the other columns are inputs and tunable parameters with their FMI 2.0 names.
     ///
     /// # Errors
-    /// A file that cannot be read, a header without `time`, names that are there twice, rows that are not numbers, times that do not grow.
+    /// The file cannot be read, the header has no `time` or repeats a name, a row is not numeric, or the times do not increase.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes =
             tiprub_format::read_file(path, LARGEST).map_err(|error| Failure::file(path, "cannot be read", &error))?;
@@ -47,7 +47,7 @@ impl InputHistory {
             |place: String, problem: String, remedy: &str| Failure::new(format!("{name}{place}"), problem, remedy);
         let whole = |problem: String, remedy: &str| refused(String::new(), problem, remedy);
         let header = "Start the file with a header line: time,NAME,NAME,...";
-        // Spreadsheets write a mark before the first name.
+        // Spreadsheets write a byte order mark before the first name.
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
         let names = reader.headers().map_err(|error| whole(error.to_string(), header))?;
@@ -88,7 +88,7 @@ impl InputHistory {
         Ok(Self { name: name.to_owned(), names: names[1..].to_vec(), times, values })
     }
 
-    /// Value of a column at a time (s).
+    /// Returns the value of a column at a time (s).
     fn at(&self, column: usize, time: f64) -> f64 {
         let value = |row: usize| self.values[row * self.names.len() + column];
         match self.times.partition_point(|own| *own <= time) {
@@ -101,10 +101,10 @@ impl InputHistory {
         }
     }
 
-    /// The columns as variables of a simulation.
+    /// Assigns the columns to variables of a simulation.
     ///
     /// # Errors
-    /// Names that are no input and no tunable parameter of it.
+    /// A name is neither an input nor a tunable parameter.
     pub fn drive(&self, simulation: &Simulation) -> Result<Driver<'_>> {
         let rows = simulation.table().variables();
         let each = |row| {
@@ -132,7 +132,7 @@ impl InputHistory {
         Ok(Driver { history: self, elements })
     }
 
-    /// Whether this variable, or an element of it, has a column.
+    /// Returns whether there is a column for this variable or one of its elements.
     pub fn holds(&self, name: &str) -> bool {
         self.names.iter().any(|own| own == name || own.strip_prefix(name).is_some_and(|rest| rest.starts_with('[')))
     }
@@ -152,7 +152,7 @@ impl InputHistory {
     }
 }
 
-/// A line as messages show it: quoted, and of a long one the beginning.
+/// Quotes a line for messages; long lines are shortened.
 fn beginning(line: &str) -> String {
     match line.char_indices().nth(MOST_SHOWN) {
         Some((end, _)) => format!("{:?}...", &line[..end]),
@@ -160,24 +160,24 @@ fn beginning(line: &str) -> String {
     }
 }
 
-/// Real inputs and tunable parameters.
+/// Returns whether a variable is a real input or a tunable parameter.
 fn is_drivable(row: &Variable) -> bool {
     let tunable = row.causality == Causality::Parameter && row.variability == Variability::Tunable;
     row.kind == DataType::Real && (row.causality == Causality::Input || tunable)
 }
 
-/// Values of a variable that follow a column.
+/// Rule by which a variable follows a column.
 #[derive(Debug, Clone, Copy)]
 enum ColumnTarget {
-    /// Value at the start of a communication step and its derivative over it.
+    /// Set to the value at the start of a communication step, with the derivative over the step.
     Line(u32),
-    /// Ramped, without derivative: the value of the end, which is reached there.
+    /// Set to the value at the end of the step, to which it is ramped, without derivative.
     Reached(u32),
-    /// Jumps to the value at the start of a step.
+    /// Set to the value at the start of a step, where it jumps.
     Held(u32),
 }
 
-/// Columns of a history with the variables that follow them.
+/// Columns of a history, assigned to variables.
 #[derive(Debug)]
 pub struct Driver<'a> {
     history: &'a InputHistory,
@@ -185,10 +185,10 @@ pub struct Driver<'a> {
 }
 
 impl Driver<'_> {
-    /// Start values.
+    /// Sets the start values.
     ///
     /// # Errors
-    /// Values that the variables do not take.
+    /// A variable rejects a value.
     pub fn start(&self, simulation: &mut Simulation, time: f64) -> Result<()> {
         for (column, element) in self.elements.iter().enumerate() {
             let (ColumnTarget::Line(reference) | ColumnTarget::Reached(reference) | ColumnTarget::Held(reference)) =
@@ -201,7 +201,7 @@ impl Driver<'_> {
     /// Sets the inputs of a communication step from one time to another (s).
     ///
     /// # Errors
-    /// Values that the variables do not take.
+    /// A variable rejects a value.
     pub fn step(&self, simulation: &mut Simulation, [from, to]: [f64; 2]) -> Result<()> {
         for (column, element) in self.elements.iter().enumerate() {
             match *element {
@@ -212,7 +212,7 @@ impl Driver<'_> {
                     set.map_err(|error| self.refused(column, from, error))?;
                 }
                 ColumnTarget::Reached(reference) => self.set(simulation, (column, reference), to)?,
-                // What rests is not judged anew.
+                // A constant value is not set and checked again.
                 ColumnTarget::Held(reference) if self.rests(simulation, (column, reference), from) => {}
                 ColumnTarget::Held(reference) => self.set(simulation, (column, reference), from)?,
             }
@@ -224,7 +224,7 @@ impl Driver<'_> {
         simulation.real(reference).is_ok_and(|value| value.to_bits() == self.history.at(column, time).to_bits())
     }
 
-    /// Set a variable to what its column has at a time.
+    /// Sets a variable to the value of its column at a time.
     fn set(&self, simulation: &mut Simulation, (column, reference): (usize, u32), time: f64) -> Result<()> {
         let set = simulation.set_real(reference, self.history.at(column, time));
         set.map_err(|error| self.refused(column, time, error))
@@ -264,7 +264,7 @@ mod tests {
         assert!(history.warnings(0.6)[0].contains("5.000e-1 s apart"));
     }
 
-    /// Names that are compared with each other would take 10 s here.
+    /// If all names were compared with each other, this would take 10 s.
     #[test]
     fn reads_a_hundred_thousand_columns_quickly() {
         let names = (0..100_000).map(|column| format!(",n{column}")).collect::<String>();

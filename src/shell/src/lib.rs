@@ -1,11 +1,11 @@
-//! What programs around the core share.
+//! Parts that the programs around the core share.
 //!
-//! - [`failure`], [`console`]: what went wrong, for people and programs; the terminal and progress;
-//! - [`output_file`], [`places`]: files that appear whole or not at all, and no output that is an input;
+//! - [`failure`], [`console`]: errors as text and JSON; the terminal and progress;
+//! - [`output_file`], [`places`]: files that are written completely or not at all, and the check that no output is an input;
 //! - [`schedule`], [`history`], [`native`], [`recording`], [`extremes`]: communication points, inputs, the run without FMI, its table of
 //!   results;
-//! - [`forecast`]: progress of long work and how long the rest takes;
-//! - [`sweep`]: runs that do not depend on each other.
+//! - [`forecast`]: progress of long work and its remaining time;
+//! - [`sweep`]: independent runs in parallel.
 
 pub mod console;
 pub mod extremes;

@@ -1,4 +1,4 @@
-//! A scene run without FMI: the same core, the same communication points, the same outputs.
+//! Runs a scene without FMI, with the core, communication points and outputs of the FMU.
 
 use std::time::{Duration, Instant};
 
@@ -18,13 +18,13 @@ pub struct NativeRun {
     pub recording: Recording,
     /// Time spent stepping (not in initialisation or recording).
     pub stepping: Duration,
-    /// The longest that one communication step took.
+    /// Longest duration of one communication step.
     pub slowest: Duration,
-    /// Internal steps done, of all blades together where each takes its own.
+    /// Number of internal steps; with adaptive steps, of all blades together.
     pub internal_steps: u64,
-    /// Work of adaptive steps, if the run has them.
+    /// Work of adaptive steps, if the run uses them.
     pub effort: Option<Effort>,
-    /// Warnings of the initialisation, of the run and of the schedule.
+    /// Warnings of the initialisation, the run and the schedule.
     pub warnings: Vec<Warning>,
 }
 
@@ -37,14 +37,14 @@ pub struct RunInputs<'a> {
     pub history: Option<&'a InputHistory>,
 }
 
-/// Run `scene` over the schedule with other start values and inputs over time.
+/// Runs `scene` over the schedule with replaced start values and inputs over time.
 ///
 /// # Errors
-/// Unknown or wrong settings, refused scenes, a step that failed: its failure carries the warnings up to then.
+/// Settings are unknown or wrong, the scene is rejected, or a step fails; the failure then contains the warnings so far.
 pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &dyn Fn(usize)) -> Result<NativeRun> {
     let name = scene.settings.name.clone();
     let in_scene = |error: tiprub_core::Error| Failure::from_core(format!("scene `{name}`"), error);
-    // Checks and warnings are for the step that is taken.
+    // Checks and warnings apply to the step that is used.
     let mut scene = scene.clone();
     scene.settings.experiment.communication_step = schedule.time(1) - schedule.time(0);
     let mut simulation = Simulation::new(&scene).map_err(in_scene)?;
@@ -61,7 +61,7 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
         driver.start(&mut simulation, schedule.start)?;
     }
     simulation.initialise(schedule.start).map_err(in_scene)?;
-    // Those of the start: what comes up in the run is told by its notes.
+    // Warnings of the start; those of the run are reported as its notes.
     let mut warnings = [simulation.warnings(), &schedule.warnings()].concat();
     warnings.extend(given.history.map(|history| history.warnings(schedule.step)).unwrap_or_default());
     warnings.retain(|warning| !scene.settings.is_silenced(warning.topic()));
@@ -93,15 +93,15 @@ pub fn run(scene: &Scene, schedule: &Schedule, given: RunInputs<'_>, progress: &
     Ok(NativeRun { recording, stepping, slowest, internal_steps: system.steps_taken(), effort, warnings })
 }
 
-/// All numeric outputs as they are now, in the order of the table.
+/// Returns the current values of all numeric outputs, in the order of the table.
 pub fn numeric_outputs(simulation: &Simulation) -> Vec<f64> {
     let mut values = Vec::new();
-    // Every reference comes from the table that it is read from.
+    // Every reference comes from the table from which it is read.
     let _ = Outputs::of(simulation.table()).read(simulation, &mut values);
     values
 }
 
-/// The numeric outputs of a table, element by element.
+/// Numeric outputs of a table, element by element.
 struct Outputs {
     names: Vec<String>,
     elements: Vec<(DataType, u32)>,
@@ -133,8 +133,8 @@ impl Outputs {
     }
 }
 
-/// Set a start value by name: a scalar, one element `name[i]`, all elements of an array to one value, or each to its own
-/// of a list in brackets.
+/// Sets a start value by name: a scalar, one element `name[i]`, all elements of an array to one value, or each element to its value of a list in
+/// brackets.
 pub fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
     let (kind, dimension, first) = locate(simulation.table(), name)?;
     for (reference, text) in (first..).zip(texts(name, text, dimension)?) {
@@ -157,7 +157,7 @@ pub fn set(simulation: &mut Simulation, name: &str, text: &str) -> Result<()> {
     Ok(())
 }
 
-/// The text of each element of an array of that dimension, or of a scalar.
+/// Returns the text of each element of an array of that dimension, or of a scalar.
 fn texts<'a>(name: &str, text: &'a str, dimension: Option<usize>) -> Result<Vec<&'a str>> {
     let refused = |problem: String, remedy: String| Err(Failure::usage(format!("--set {name}"), problem, remedy));
     let list = text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
@@ -190,7 +190,7 @@ fn example(kind: &str) -> &'static str {
     if kind == "f64" { ", for example 1.5e-3" } else { "" }
 }
 
-/// Kind, dimension and first value reference of a variable or of one of its elements.
+/// Returns type, dimension and first value reference of a variable or of one of its elements.
 fn locate(table: &VariableTable, name: &str) -> Result<(DataType, Option<usize>, u32)> {
     if let Some(variable) = table.find(name) {
         return Ok((variable.kind, variable.dimension, variable.reference));
@@ -211,7 +211,7 @@ fn locate(table: &VariableTable, name: &str) -> Result<(DataType, Option<usize>,
     Err(Failure::usage(format!("--set {name}"), "no such variable", suggestion(name, &settable)))
 }
 
-/// More names are not listed in a message.
+/// Largest number of names that a message lists.
 const MOST_LISTED: usize = 60;
 
 pub(crate) fn suggestion(name: &str, candidates: &[&str]) -> String {

@@ -1,8 +1,8 @@
-//! Files appear whole or not at all. What is being written has no name yet where the system allows it (Linux: `O_TMPFILE`), so that
-//! nothing stays when the program is killed; elsewhere it is a hidden temporary file beside the target. Then it is renamed.
+//! Writes files completely or not at all. A file has no name while it is written, if the system supports this (Linux: `O_TMPFILE`), so that nothing
+//! remains when the program is killed; otherwise it is a hidden temporary file beside the target. Then it is renamed.
 //!
-//! New files get the permissions that the user's umask leaves, replaced ones keep theirs. Symbolic links are followed.
-//! Devices and pipes (`/dev/null`, a FIFO) are written to, never replaced.
+//! New files get the permissions of the user's umask, replaced ones keep theirs. Symbolic links are followed. Devices and pipes (`/dev/null`, a
+//! FIFO) are written to, never replaced.
 
 use std::{
     fs::{self, File},
@@ -14,22 +14,22 @@ use tempfile::NamedTempFile;
 
 use crate::{Failure, Result};
 
-/// Links followed one after the other before they are taken for a circle.
+/// Largest number of symbolic links in a chain; more count as a loop.
 const MOST_LINKS: usize = 40;
 
-/// Create the directory (and its parents) if it is not there.
+/// Creates the directory and its parents if they do not exist.
 ///
 /// # Errors
-/// The directory cannot be made.
+/// The directory cannot be created.
 pub fn create_directory(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(|error| Failure::file(path, "cannot create the directory", &error))
 }
 
-/// Whether files can be written into the directory, made for the trial if it is not there: so that long work does not end at a
-/// wrong path. Nothing stays.
+/// Checks that files can be written into the directory, which is created for this check if it does not exist, so that a wrong path is reported
+/// before long work. Nothing remains.
 ///
 /// # Errors
-/// The directory cannot be made, or not be written to.
+/// The directory cannot be created or cannot be written to.
 pub fn try_directory(path: &Path) -> Result<()> {
     let named = path.ancestors().filter(|ancestor| !ancestor.as_os_str().is_empty());
     let missing: Vec<&Path> = named.take_while(|ancestor| !ancestor.exists()).collect();
@@ -37,16 +37,16 @@ pub fn try_directory(path: &Path) -> Result<()> {
         PendingFile::new(path).map(drop).map_err(|error| Failure::file(path, "cannot write to this directory", &error))
     });
     for made in missing {
-        // Those that were not made are not there.
+        // Only directories that were created here exist.
         let _ = fs::remove_dir(made);
     }
     trial
 }
 
-/// Whether a file can be written under this name, as far as that shows before it is. Nothing stays.
+/// Checks that a file can be written under this name, as far as this can be known in advance. Nothing remains.
 ///
 /// # Errors
-/// As [`begin`].
+/// The errors of [`begin`].
 pub fn try_target(target: &Path) -> Result<()> {
     match place(target)? {
         OutputTarget::File(path) => try_directory(&parent(&path)),
@@ -54,10 +54,10 @@ pub fn try_target(target: &Path) -> Result<()> {
     }
 }
 
-/// Refuse a device or a pipe, for files that nobody named: writing to them might wait without end.
+/// Rejects a device or a pipe for files that the user did not name, since writing to them might block.
 ///
 /// # Errors
-/// What is there is no file.
+/// The existing entry is not a file.
 pub fn only_a_file(target: &Path) -> Result<()> {
     match place(target)? {
         OutputTarget::File(_) => Ok(()),
@@ -65,11 +65,11 @@ pub fn only_a_file(target: &Path) -> Result<()> {
     }
 }
 
-/// Existing file under the name of a target.
+/// Existing entry under the name of a target.
 enum OutputTarget {
-    /// Nothing, or a file to replace, at this path (symbolic links resolved).
+    /// No entry, or a file to replace, at this path (symbolic links resolved).
     File(PathBuf),
-    /// Something that takes bytes but is no file: a device or a pipe.
+    /// Device or pipe, which is written to but not replaced.
     Stream,
 }
 
@@ -84,20 +84,20 @@ fn place(target: &Path) -> Result<OutputTarget> {
             Some(_) if !target.as_os_str().as_encoded_bytes().ends_with(b"/") => Ok(OutputTarget::File(path)),
             _ => Err(is_directory()),
         },
-        // A file where a directory should be: said by whoever makes the directory.
+        // A file in the place of a directory is reported when the directory is created.
         Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(OutputTarget::File(path)),
         Err(error) => Err(Failure::file(target, "cannot be written", &error)),
     }
 }
 
-/// The path itself, or where symbolic links lead, whether something is there or not.
+/// Returns the path with symbolic links resolved, whether it exists or not.
 pub fn destination(target: &Path) -> io::Result<PathBuf> {
     if let Ok(real) = fs::canonicalize(target) {
         return Ok(real);
     }
     let mut path = target.to_path_buf();
     for _ in 0..MOST_LINKS {
-        // What is open has a link in /proc/self/fd that leads nowhere, and is there all the same.
+        // An open file has a link in /proc/self/fd whose target may not exist, although the file does.
         match fs::read_link(&path) {
             Ok(link) if !path.exists() => path = parent(&path).join(link),
             _ => return Ok(path),
@@ -106,16 +106,16 @@ pub fn destination(target: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("the symbolic links form a loop"))
 }
 
-/// A file in the making.
+/// File that is being written.
 #[derive(Debug)]
 pub struct PendingFile {
     file: File,
-    /// Where it has a name already.
+    /// Temporary file, if it already has a name.
     named: Option<NamedTempFile>,
 }
 
 impl PendingFile {
-    /// In this directory.
+    /// Creates a file in this directory.
     fn new(directory: &Path) -> io::Result<Self> {
         if let Some(file) = unnamed(directory) {
             return Ok(Self { file, named: None });
@@ -124,7 +124,7 @@ impl PendingFile {
         Ok(Self { file: named.reopen()?, named: Some(named) })
     }
 
-    /// Hidden under a name of its own, ready to be renamed.
+    /// Gives the file a hidden temporary name, from which it can be renamed.
     fn name(self, directory: &Path) -> io::Result<tempfile::TempPath> {
         if let Some(named) = self.named {
             return Ok(named.into_temp_path());
@@ -156,7 +156,7 @@ fn ordinary() -> fs::Permissions {
     std::os::unix::fs::PermissionsExt::from_mode(0o666)
 }
 
-/// A file without a name; none where the file system knows none.
+/// Opens a file without a name; `None` if the file system does not support this.
 #[cfg(target_os = "linux")]
 fn unnamed(directory: &Path) -> Option<File> {
     use std::os::unix::fs::OpenOptionsExt;
@@ -168,7 +168,7 @@ fn unnamed(_directory: &Path) -> Option<File> {
     None
 }
 
-/// Give a file without a name one.
+/// Gives a name to a file without one.
 #[cfg(target_os = "linux")]
 fn link(file: &File, path: &Path) -> io::Result<()> {
     use rustix::fs::{AtFlags, CWD};
@@ -182,11 +182,10 @@ fn link(_file: &File, _path: &Path) -> io::Result<()> {
     Err(io::ErrorKind::Unsupported.into())
 }
 
-/// Begin a file in the directory of `target` (which is created if missing). Nothing shows under the target's name before
-/// [`persist`].
+/// Begins a file in the directory of `target`, which is created if missing. Nothing appears under the target's name before [`persist`].
 ///
 /// # Errors
-/// The directory cannot be written to, or `target` is itself a directory or no possible name.
+/// The directory cannot be written to, or `target` is a directory or an impossible name.
 pub fn begin(target: &Path) -> Result<PendingFile> {
     let place = place(target)?;
     let directory = match &place {
@@ -201,7 +200,7 @@ pub fn begin(target: &Path) -> Result<PendingFile> {
     draft.map_err(|error| Failure::file(target, "cannot be created", &error))
 }
 
-/// A file that replaces another is no more open to others than that one.
+/// Keeps the permissions of a replaced file, so that the new one is not more accessible.
 fn keep_permissions(file: &File, target: &Path) -> io::Result<()> {
     match fs::metadata(target) {
         Ok(metadata) => file.set_permissions(metadata.permissions()),
@@ -209,10 +208,10 @@ fn keep_permissions(file: &File, target: &Path) -> io::Result<()> {
     }
 }
 
-/// Give the finished file its name, replacing an older file of that name.
+/// Gives the finished file its name, replacing an older file of that name.
 ///
 /// # Errors
-/// The rename failed, and the temporary file is gone and an older target untouched; or a device or pipe took only a part.
+/// The rename failed: the temporary file is removed and an older target is unchanged; or a device or pipe accepted only a part.
 pub fn persist(draft: PendingFile, target: &Path) -> Result<()> {
     let OutputTarget::File(path) = place(target)? else { return copy_into_stream(draft, target) };
     let named = draft.name(&parent(&path));
@@ -228,7 +227,7 @@ fn copy_into_stream(draft: PendingFile, target: &Path) -> Result<()> {
     copied.map(drop).map_err(|error| Failure::file(target, "cannot be written", &error))
 }
 
-/// Open a device or a pipe to write. A pipe that nobody reads is waited for, and not in silence.
+/// Opens a device or a pipe for writing. If a pipe has no reader, a message is printed before waiting for one.
 fn open_stream(target: &Path) -> io::Result<File> {
     #[cfg(unix)]
     {
@@ -245,7 +244,7 @@ fn open_stream(target: &Path) -> io::Result<File> {
     fs::OpenOptions::new().write(true).open(target)
 }
 
-/// Write `bytes` to `target` in one piece.
+/// Writes `bytes` to `target` in one piece.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -255,11 +254,11 @@ pub fn write(target: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
     persist(draft, target)
 }
 
-/// Refuse to replace a file that holds something else than `bytes`: what a user changed is not lost without notice. Devices
-/// and pipes are not read.
+/// Rejects the replacement of a file whose content differs from `bytes`, so that changes by the user are not lost silently. Devices and pipes are
+/// not read.
 ///
 /// # Errors
-/// The file is there and differs (or cannot be read); `remedy` says what to do.
+/// The file exists and differs (or cannot be read); `remedy` is the remedy of the error.
 pub fn refuse_to_replace(target: &Path, bytes: impl AsRef<[u8]>, remedy: &str) -> Result<()> {
     if fs::metadata(target).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
         return Ok(());

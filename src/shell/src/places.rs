@@ -1,4 +1,4 @@
-//! What a command reads and what it writes, kept apart: no output is an input, another output, or where the summary goes.
+//! Keeps inputs and outputs of a command apart: no output is an input, another output, or the destination of the summary.
 
 use std::{
     fs::{self, Metadata},
@@ -8,40 +8,40 @@ use std::{
 
 use crate::{Failure, Result, output_file};
 
-/// A file, with the words of the command line for it.
+/// File with its description on the command line.
 #[derive(Debug, Clone)]
 pub struct NamedFile {
-    /// Words of the command line.
+    /// Description on the command line.
     pub role: String,
     /// The file.
     pub path: PathBuf,
 }
 
 impl NamedFile {
-    /// Makes a file at `path` with its `role`.
+    /// Creates a file at `path` with its `role`.
     pub fn new(role: impl Into<String>, path: impl Into<PathBuf>) -> Self {
         Self { role: role.into(), path: path.into() }
     }
 
-    /// The same of an option that may be left out.
+    /// Creates the file of an option that may be omitted.
     pub fn option(role: &str, path: &Option<PathBuf>) -> Option<Self> {
         path.as_ref().map(|path| Self::new(role, path))
     }
 }
 
-/// [`apart`], and every output can be written as far as that shows.
+/// Checks [`apart`], and that every output can be written as far as this can be known in advance.
 ///
 /// # Errors
-/// As said there.
+/// The errors of these checks.
 pub fn outputs(inputs: &[NamedFile], outputs: &[NamedFile]) -> Result<()> {
     apart(inputs, outputs)?;
     outputs.iter().try_for_each(|output| output_file::try_target(&output.path))
 }
 
-/// No output is one of the inputs, another output, or the file or pipe that stdout or stderr goes to.
+/// Checks that no output is one of the inputs, another output, or the file or pipe to which stdout or stderr goes.
 ///
 /// # Errors
-/// Two names for one file, whatever they look like: links of both kinds, open files, directories that do not exist yet.
+/// Two names stand for one file, also through hard or symbolic links, open files, and directories that do not exist yet.
 pub fn apart(inputs: &[NamedFile], outputs: &[NamedFile]) -> Result<()> {
     let mut known: Vec<(&str, String, Identity)> = Vec::new();
     let streams = [("stdout", stream(io::stdout())), ("stderr", stream(io::stderr()))];
@@ -86,7 +86,7 @@ fn key(path: &Path, _metadata: &Metadata) -> Option<Key> {
     fs::canonicalize(path).ok()
 }
 
-/// `None` for what may be named twice, and for what is no possible name.
+/// Returns the identity of a path; `None` for entries that may be named twice, and for impossible names.
 pub fn identity(path: &Path) -> Option<Identity> {
     let path = output_file::destination(path).ok()?;
     let path = if path.is_absolute() { path } else { std::env::current_dir().ok()?.join(path) };
@@ -94,7 +94,7 @@ pub fn identity(path: &Path) -> Option<Identity> {
     let mut below = PathBuf::new();
     for part in path.components() {
         match part {
-            // Nothing is there whose parent could be asked for: what is not made yet will be a plain directory.
+            // The directory does not exist yet, and will be created as a plain directory.
             Component::ParentDir if below.as_os_str().is_empty() => there.push(part),
             Component::ParentDir => drop(below.pop()),
             Component::CurDir => {}
@@ -106,7 +106,7 @@ pub fn identity(path: &Path) -> Option<Identity> {
     Some(Identity { there: key(&there, &metadata)?, below })
 }
 
-/// Where a stream of this process goes.
+/// Returns the identity of the destination of a stream of this process.
 #[cfg(unix)]
 fn stream(stream: impl std::os::fd::AsFd) -> Option<Identity> {
     let metadata = fs::File::from(stream.as_fd().try_clone_to_owned().ok()?).metadata().ok()?;
@@ -161,7 +161,7 @@ mod tests {
         for (one, two) in [("file", "a/other"), ("a/new", "new"), ("new/x", "new/y"), ("a/x/y", "b/x/z")] {
             assert!(!same(root, one, two), "{one} {two}");
         }
-        // A device takes whatever comes.
+        // A device may be named twice.
         assert!(!same(root, "/dev/null", "/dev/null"));
     }
 

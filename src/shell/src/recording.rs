@@ -1,4 +1,4 @@
-//! The table of results of a run, and its CSV form.
+//! Table of results of a run, and its CSV form.
 
 use std::{
     io::{BufWriter, Write},
@@ -7,10 +7,10 @@ use std::{
 
 use crate::{Failure, Result, output_file};
 
-/// Largest table (bytes); the demo holds three at a time.
+/// Largest table (bytes); the demo holds three tables in memory.
 const MOST_BYTES: f64 = 4e9;
 
-/// Numbers of one run: one row per communication point, one column per recorded variable.
+/// Results of one run: one row per communication point, one column per recorded variable.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
     /// Column names: FMI 2.0 scalar names, without time.
@@ -21,14 +21,14 @@ pub struct Recording {
     pub values: Vec<f64>,
 }
 
-/// Where two recordings first differ, and by how much at most.
+/// First difference of two recordings, and the largest difference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingDifference {
     /// Communication points compared.
     pub points: usize,
     /// Variables compared.
     pub variables: usize,
-    /// Values that are not the same bits.
+    /// Number of values whose bits differ.
     pub different: usize,
     /// Largest absolute difference over all values.
     pub largest: f64,
@@ -37,17 +37,17 @@ pub struct RecordingDifference {
 }
 
 impl RecordingDifference {
-    /// Every bit of every value is the same.
+    /// Returns whether every bit of every value is the same.
     pub fn is_exact(&self) -> bool {
         self.different == 0
     }
 }
 
 impl Recording {
-    /// An empty table with these columns and room for `rows` rows.
+    /// Creates an empty table with these columns and room for `rows` rows.
     ///
     /// # Errors
-    /// More than 4 GB, or than the memory has.
+    /// The table needs more than 4 GB, or more than the available memory.
     pub fn with_columns(names: Vec<String>, rows: usize) -> Result<Self> {
         let bytes = 8.0 * rows as f64 * (names.len() + 1) as f64;
         let refuse = || {
@@ -68,32 +68,32 @@ impl Recording {
         Ok(Self { names, times, values })
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.times.len()
     }
 
-    /// Row `index`.
+    /// Returns the row `index`.
     pub fn row(&self, index: usize) -> &[f64] {
         &self.values[index * self.names.len()..(index + 1) * self.names.len()]
     }
 
-    /// Column by name.
+    /// Returns a column by its name.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
         let column = self.names.iter().position(|candidate| candidate == name)?;
         Some((0..self.rows()).map(|row| self.row(row)[column]).collect())
     }
 
-    /// Last value of a column.
+    /// Returns the last value of a column.
     pub fn last(&self, name: &str) -> Option<f64> {
         let column = self.names.iter().position(|candidate| candidate == name)?;
         self.rows().checked_sub(1).map(|row| self.row(row)[column])
     }
 
-    /// Compare with another recording of the same run, bit by bit.
+    /// Compares this recording with another one of the same run, bit by bit.
     ///
     /// # Errors
-    /// Different columns or numbers of rows.
+    /// The recordings differ in columns or in the number of rows.
     pub fn compare(&self, other: &Self) -> Result<RecordingDifference> {
         if self.names != other.names || self.rows() != other.rows() {
             return Err(Failure::new(
@@ -125,7 +125,7 @@ impl Recording {
         Ok(agreement)
     }
 
-    /// CSV text: header `time,...`, numbers in the shortest form that reads back to the same bits.
+    /// Returns CSV text: header `time,...`, numbers in the shortest form that reads back to the same bits.
     pub fn to_csv(&self) -> String {
         let lines = (0..self.rows()).map(|row| self.line(row));
         [self.header()].into_iter().chain(lines).collect()
@@ -145,7 +145,7 @@ impl Recording {
         line + "\n"
     }
 
-    /// Write the CSV text to a file, whole or not at all.
+    /// Writes the CSV text to a file, completely or not at all.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -174,13 +174,13 @@ impl RecordingDifference {
     }
 }
 
-/// Shortest decimal that reads back to the same bits; exponent form where the plain one would be long.
+/// Returns the shortest decimal that reads back to the same bits; in exponent form if the plain form would be long.
 pub fn shortest(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude != 0.0 && !(1e-4..1e15).contains(&magnitude) { format!("{value:e}") } else { format!("{value}") }
 }
 
-/// Names with commas or quotes are quoted as RFC 4180 wants it.
+/// Quotes names with commas or quotes according to RFC 4180.
 fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_string() }
 }

@@ -1,13 +1,13 @@
-//! Communication points, counted rather than accumulated.
+//! Communication points, computed from their index instead of accumulated.
 
 use tiprub_core::{Warning, ranges, settings::ExperimentSettings, shown, warning::Topic};
 
 use crate::{Failure, Result};
 
-/// Most communication points one run may have; beyond it the table of results would not fit in memory.
+/// Largest number of communication points of one run; the table of results would not fit in memory otherwise.
 const MOST_STEPS: f64 = 50e6;
 
-/// Equally spaced communication points from start to stop; the last step is shorter where they do not divide.
+/// Equally spaced communication points from start to stop; the last step is shorter if the step does not divide the interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
     /// Start time (s).
@@ -21,10 +21,10 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// The experiment of the scene, with the stop time and the step optionally replaced.
+    /// Creates the schedule of the experiment of the scene, with an optional other stop time and step.
     ///
     /// # Errors
-    /// Stop not after start, step not positive, or too many communication points.
+    /// The stop is not after the start, the step is not positive, or there are too many communication points.
     pub fn new(experiment: &ExperimentSettings, stop: Option<f64>, step: Option<f64>) -> Result<Self> {
         let start = experiment.start;
         let (stop_option, stop) = (stop.is_some(), stop.unwrap_or(experiment.stop));
@@ -74,24 +74,24 @@ impl Schedule {
         one_step.then(warning).into_iter().collect()
     }
 
-    /// Communication point `index` (0 is the start, `count` the stop): start + index·H.
+    /// Returns communication point `index` (0 is the start, `count` the stop): start + index·H.
     ///
-    /// Points on the grid are never moved to the stop time by round-off, so that importers that count in the
-    /// same way (FMPy among them) ask for exactly these.
+    /// Points on the grid are never moved to the stop time because of rounding, so that importers that count in the same way (such as FMPy) request
+    /// exactly these times.
     pub fn time(&self, index: usize) -> f64 {
         let regular = self.start + index as f64 * self.step;
         if index == self.count && regular > self.stop && !is_close(regular, self.stop) { self.stop } else { regular }
     }
 }
 
-/// Relative closeness of two times, as in Python's `math.isclose`.
+/// Returns whether two times are close to each other (relative), as in Python's `math.isclose`.
 fn is_close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-9 * a.abs().max(b.abs())
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 < steps ≤ MOST_STEPS, checked")]
 fn count_steps(steps: f64) -> usize {
-    // A quotient like 1000.0000000001 is 1000 steps, not 1001.
+    // A quotient such as 1000.0000000001 means 1000 steps, not 1001.
     ((steps - 1e-9 * steps).ceil() as usize).max(1)
 }
 

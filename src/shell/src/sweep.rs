@@ -1,4 +1,4 @@
-//! Runs that do not depend on each other, on as many threads as there are processors; results in the order of the tasks.
+//! Independent runs on as many threads as there are processors; results in the order of the tasks.
 
 use std::{
     num::NonZero,
@@ -12,16 +12,16 @@ use std::{
 
 use crate::{Failure, Result};
 
-/// Threads to use where the user named no number.
+/// Returns the number of threads to use by default.
 pub fn processors() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get)
 }
 
-/// `work` of every item, on `threads` threads. `progress` is called on the calling thread with the number of tasks done.
-/// Which thread does what has no influence on the results.
+/// Applies `work` to every item on `threads` threads. `progress` is called on the calling thread with the number of finished tasks. The distribution
+/// over threads does not affect the results.
 ///
 /// # Errors
-/// The first failure, by the order of the items among those that were tried; no new task begins after one.
+/// The first failure in the order of the items that were tried; no new task begins after a failure.
 pub fn sweep<T: Sync, R: Send>(
     items: &[T],
     threads: usize,

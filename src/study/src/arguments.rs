@@ -1,4 +1,4 @@
-//! What a study is asked for on a command line.
+//! Command-line arguments of the studies.
 
 use std::{ffi::OsStr, path::PathBuf};
 
@@ -130,21 +130,21 @@ pub struct ConvergenceArguments {
 /// A range of numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NumberRange {
-    /// First.
+    /// First value.
     pub from: f64,
-    /// Last.
+    /// Last value.
     pub to: f64,
-    /// Number of values, ends included.
+    /// Number of values, including both ends.
     pub count: usize,
 }
 
 impl NumberRange {
-    /// All of them, ascending and evenly spaced.
+    /// Returns all values, ascending and evenly spaced.
     pub fn values(&self) -> Vec<f64> {
         self.shares().map(|share| self.from + (self.to - self.from) * share).collect()
     }
 
-    /// The same evenly on a logarithmic scale.
+    /// Returns all values, ascending and evenly spaced on a logarithmic scale.
     pub fn geometric(&self) -> Vec<f64> {
         self.shares().map(|share| self.from * (self.to / self.from).powf(share)).collect()
     }
@@ -155,7 +155,7 @@ impl NumberRange {
     }
 }
 
-/// Two growing numbers and a count of at most `most`.
+/// Parses two increasing numbers and a count of at most `most`.
 fn counted(text: &str, most: usize) -> Option<NumberRange> {
     let parts: Vec<&str> = text.split(':').collect();
     let [from, to, count] = parts.as_slice() else { return None };
@@ -164,7 +164,7 @@ fn counted(text: &str, most: usize) -> Option<NumberRange> {
     (growing && (2..=most).contains(&range.count)).then_some(range)
 }
 
-/// Most values of one range of a map of answers: more cannot be looked at.
+/// Maximum number of values of one range, so that the map of answers stays readable.
 const MOST_ANSWERS: usize = 200;
 
 fn range(text: &str) -> Result<NumberRange, String> {
@@ -187,7 +187,7 @@ fn steps(text: &str) -> Result<NumberRange, String> {
     })
 }
 
-/// A range of angular velocities (rad/s).
+/// Range of angular velocities (rad/s).
 pub type Speeds = NumberRange;
 
 /// Changes of the command line to a scene.
@@ -202,10 +202,10 @@ pub struct SceneOptions {
 }
 
 impl SceneOptions {
-    /// Load a scene with the keys that these options set.
+    /// Loads a scene and sets the keys that these options change.
     ///
     /// # Errors
-    /// As [`scene_source::load`].
+    /// The errors of [`scene_source::load`].
     pub fn load(&self, name: impl AsRef<OsStr>, cache: &RomCache, console: &Console) -> tiprub_shell::Result<Scene> {
         let mut scene = scene_source::load(name, cache, console)?;
         scene.settings.accept_implausible |= self.accept_implausible;
@@ -214,7 +214,7 @@ impl SceneOptions {
     }
 }
 
-/// The identifier of a warning.
+/// Parses the identifier of a warning.
 fn topic(text: &str) -> Result<String, String> {
     Topic::find("--silence", text).map(|topic| topic.id().to_owned()).map_err(|error| error.to_string())
 }
@@ -229,13 +229,13 @@ pub struct CacheArguments {
 }
 
 impl CacheArguments {
-    /// The cache to use.
+    /// Returns the cache to use.
     pub fn cache(&self) -> RomCache {
         if self.no_cache { RomCache::off() } else { RomCache::of_user() }
     }
 }
 
-/// More would not end in days.
+/// Maximum number of revolutions before the window; more would take days.
 const MOST_TRANSIENT: usize = 1_000_000;
 
 fn transient(text: &str) -> Result<usize, String> {
@@ -243,10 +243,10 @@ fn transient(text: &str) -> Result<usize, String> {
     count.ok_or_else(|| format!("give a number of revolutions, at most {MOST_TRANSIENT}"))
 }
 
-/// A positive number.
+/// Parses a positive number.
 ///
 /// # Errors
-/// The problem with the text.
+/// The text is not a positive number.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -254,10 +254,10 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// `FROM:TO:COUNT` of positive angular velocities.
+/// Parses `FROM:TO:COUNT`, a range of positive angular velocities.
 ///
 /// # Errors
-/// The problem with the text.
+/// The text is not such a range.
 pub fn speeds(text: &str) -> Result<Speeds, String> {
     counted(text, 1000).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
         "give increasing positive angular velocities in rad/s and a count from 2 to 1000 as FROM:TO:COUNT, for example \
@@ -266,10 +266,10 @@ pub fn speeds(text: &str) -> Result<Speeds, String> {
     })
 }
 
-/// `NAME=VALUE`.
+/// Parses `NAME=VALUE`.
 ///
 /// # Errors
-/// The problem with the text.
+/// The text is not such an assignment.
 pub fn assignment(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {

@@ -1,10 +1,9 @@
-//! What steps, modes, patches along the chord and rows of them across the thickness leave, estimated from coarser runs: a scene alone is
-//! needed, no mesh and no truth. What the mesh leaves stands in the ROM, where somebody has found it (`tiprub study convergence --into`).
+//! Estimates the discretisation errors of steps, modes, patches along the chord and rows of patches across the thickness from coarser runs: only a
+//! scene is needed, no mesh and no reference. The mesh error comes from the ROM, if it has been determined (`tiprub study convergence --into`).
 //!
-//! Three levels of a direction, each about twice as fine as the one before, the scene's own the finest: changes c₁ and c₂ from level
-//! to level. Where they shrink as a power, r = c₁/c₂ tells which, and c₂/(r − 1) is what all further refinement would change; r counts
-//! as what later levels can make it. Where they hardly shrink, nothing is known. Longer steps
-//! may be refused: then shorter ones are tried, and c₁ + c₂/(r − 1) is left.
+//! Each direction has three levels, each about twice as fine as the one before, with the scene's own as the finest; c₁ and c₂ are the changes
+//! between them. If they decrease as a power, the remaining error is c₂/(r − 1) with r = c₁/c₂, limited to the ratios that later levels can have. If
+//! they hardly decrease, the error is unknown. Longer steps may be rejected: then shorter ones are tried, and the error is c₁ + c₂/(r − 1).
 
 use serde_json::{Value, json};
 use tiprub_core::{Rom, Scene, rom::RubErrors};
@@ -18,10 +17,10 @@ use crate::convergence::{
 };
 use crate::error::user_scene::own_division;
 
-/// Least ratio of two changes of the displacements that lets the rest be estimated.
+/// Smallest ratio of two changes of the displacements from which the error is estimated.
 const SHRINKING: f64 = 1.3;
-/// Least and largest ratio of changes later on. Steps go at first order through contact, whatever long ones promise: all further changes
-/// together are as large as the last. Modes go at first order at least, patches at nearly the second: their hat functions follow a
+/// Smallest and largest ratio of later changes. Steps converge with first order through contact, whatever long steps suggest: all further changes
+/// together are as large as the last. Modes converge at least with first order, patches with nearly second order, since their hat functions follow a
 /// smooth pressure.
 const LATER: [(&str, [f64; 2]); 4] = [
     ("steps", [2.0, 2.0]),
@@ -38,9 +37,10 @@ const WORDS: [(&str, &str); 2] =
 pub struct Estimate {
     /// `steps`, `modes`, `patches`, `rows` or `mesh`.
     pub direction: &'static str,
-    /// Error of the displacements (relative L2), or why it is unknown. Impulse and work pass the truth by chance too often for estimates.
+    /// Error of the displacements (relative L2), or the reason why it is unknown. Impulse and work are too often close to the limit by chance to be
+    /// estimated.
     pub left: std::result::Result<f64, String>,
-    /// The scene it was found on, where the ROM tells it.
+    /// Name of the scene on which it was determined, if the error comes from the ROM.
     pub found_on: Option<String>,
 }
 
@@ -49,7 +49,7 @@ impl Estimate {
         Self { direction, left: Err(why.into()), found_on: None }
     }
 
-    /// Where it is not known here, what the ROM says of it.
+    /// Replaces an unknown error by the error that the ROM carries.
     fn or_of(self, rom: &Rom) -> Self {
         let Some(errors) = rom.checks.rub_errors.as_ref().filter(|_| self.left.is_err()) else { return self };
         let known = match self.direction {
@@ -84,7 +84,7 @@ impl Estimate {
         Self { direction, left: Ok(left), found_on: None }
     }
 
-    /// Name and value, or why it is not known.
+    /// Returns the name and the value, or the reason why it is unknown.
     pub fn json(&self) -> (String, Value) {
         let value = match &self.left {
             Ok(left) => json!({ "displacements": left, "found_on": self.found_on }),
@@ -97,7 +97,7 @@ impl Estimate {
         WORDS.iter().find(|(name, _)| *name == self.direction).map_or(self.direction, |(_, words)| words)
     }
 
-    /// "modes 1.2 %"; "mesh unknown".
+    /// Formats the error: "modes 1.2 %"; "mesh unknown".
     pub fn text(&self) -> String {
         match self.left {
             Ok(left) => format!("{} {:.2} %", self.source_text(), 100.0 * left),
@@ -106,7 +106,7 @@ impl Estimate {
     }
 }
 
-/// By how much changes shrink from level to level, within bounds; `None` where they hardly do.
+/// Returns the ratio by which changes decrease between levels, within bounds; `None` if they hardly decrease.
 fn ratio(before: f64, last: f64, [least, most]: [f64; 2]) -> Option<f64> {
     if before <= 0.0 || last <= 0.0 {
         return (before <= 0.0 && last <= 0.0).then_some(least);
@@ -120,12 +120,12 @@ pub fn rom_errors_text(estimates: &[Estimate]) -> Option<String> {
     (!of_model.is_empty()).then(|| errors_text(&of_model))
 }
 
-/// Names and values for programs.
+/// Returns names and values as JSON.
 pub fn json_of(estimates: &[Estimate]) -> Value {
     estimates.iter().map(Estimate::json).collect::<serde_json::Map<_, _>>().into()
 }
 
-/// One line for reports: errors of this run, then those that the ROM has from another run.
+/// Returns one line for reports: errors of this run, then those that the ROM carries from another run.
 pub fn errors_text(estimates: &[Estimate]) -> String {
     let list = |of_rom: bool| {
         let chosen = estimates.iter().filter(|one| one.found_on.is_some() == of_rom);
@@ -168,8 +168,8 @@ fn steps(scene: &Scene, own: u32, divisions: [u32; 3]) -> RefinementDirection {
     direction(title, unit, divisions.map(level).into())
 }
 
-/// Estimates the error of the steps: from longer steps, or from shorter ones if longer ones are impossible or rejected. With a tolerance: from
-/// smaller tolerances, a decade apart, since errors follow it in steps.
+/// Estimates the error of the steps: from longer steps, or from shorter ones if longer ones are impossible or rejected. With adaptive steps: from
+/// smaller tolerances, a decade apart, since errors follow the tolerance in steps.
 fn of_steps(scene: &Scene, own: u32, runner: &Runner) -> Result<Estimate> {
     if is_adaptive(scene) {
         let decades = [1, 10, 100].map(|times| own.saturating_mul(times));
@@ -184,7 +184,7 @@ fn of_steps(scene: &Scene, own: u32, runner: &Runner) -> Result<Estimate> {
     Ok(Estimate::of("steps", &runner.as_it_is(steps(scene, own, [own, 2 * own, 4 * own]))?))
 }
 
-/// Half and a quarter of the modes of the master.
+/// Returns the direction with half and a quarter of the modes of the master.
 fn modes(scene: &Scene, division: u32) -> std::result::Result<RefinementDirection, String> {
     let master = crate::master(scene);
     let rom = &scene.roms[master];
@@ -212,7 +212,7 @@ fn patches(scene: &Scene, division: u32) -> std::result::Result<RefinementDirect
     Ok(direction("contact patches", "patches", levels))
 }
 
-/// One and two of three rows across the thickness; fewer rows do not tell what more would change.
+/// Returns the direction with one and two of three rows across the thickness; fewer rows do not show the effect of more.
 pub(crate) fn rows(scene: &Scene, division: u32) -> std::result::Result<RefinementDirection, String> {
     let master = crate::master(scene);
     let rom = &scene.roms[master];
@@ -240,11 +240,11 @@ fn with_rom(scene: &Scene, index: usize, value: usize, rom: Rom, division: u32) 
     RefinementLevel { value: value as f64, own: false, scene, division }
 }
 
-/// Estimates of a scene over a window of `samples` communication steps, with start values replaced (name, value as text); the mesh is
-/// not known from a scene.
+/// Estimates the errors of a scene over a window of `samples` communication steps, with replaced start values (name, value as text); a scene alone
+/// does not show the mesh error.
 ///
 /// # Errors
-/// Never of coarser runs that are refused: these are estimates that are not known.
+/// Errors other than rejected coarser runs, which make an estimate unknown.
 pub fn estimates(
     scene: &Scene,
     settings: &[(String, String)],
@@ -288,7 +288,7 @@ mod tests {
 
     #[test]
     fn remaining_error_of_a_power_law_is_extrapolated() {
-        // Values 1 + h^p at h = 4, 2, 1: what is left at 1 is 1.
+        // Values 1 + h^p at h = 4, 2, 1: the remaining error at 1 is 1.
         for order in [1.0, 2.0, 3.5_f64] {
             let value = |level: f64| level.powf(order);
             let (before, last) = (value(4.0) - value(2.0), value(2.0) - value(1.0));

@@ -1,8 +1,8 @@
-//! Studies: what a question about a model needs of runs, pictures and figures, and whether they show what they should.
+//! Studies: answer a question about a model with runs, pictures and figures, and check whether they show the expected results.
 //!
-//! A study is a function that returns a [`Study`]: facts, figures with the numbers behind them, and statements with what
-//! was found. [`output`] writes it, always in the same way: one HTML page that opens offline, an SVG and a CSV per
-//! figure, and `results.json`. Runs that do not depend on each other go through `tiprub_shell::sweep`.
+//! A study is a function that returns a [`Study`]: facts, figures with the numbers behind them, and statements with their results. [`output`] writes
+//! every study in the same form: one HTML page that opens offline, an SVG and a CSV per figure, and `results.json`. Independent runs go through
+//! `tiprub_shell::sweep`.
 
 pub mod arguments;
 pub mod convergence;
@@ -18,16 +18,16 @@ use tiprub_core::{Scene, settings::SceneSettings};
 use tiprub_figure::{plots::Plot, waterfall::Waterfall};
 use tiprub_shell::{Failure, Result, recording::shortest};
 
-/// Index of the structure whose tips touch.
+/// Returns the index of the structure whose tips have the contact nodes.
 pub fn master(scene: &Scene) -> usize {
     let name = &scene.settings.contacts[0].master;
     scene.settings.structures.iter().position(|structure| structure.name == *name).unwrap_or(0)
 }
 
-/// Refuse scenes in which several structures touch: such a study varies one, its speed or its ROM.
+/// Rejects scenes with contact nodes on several structures: such a study varies one, its speed or its ROM.
 ///
 /// # Errors
-/// Several structures touch.
+/// Several structures have contact nodes.
 pub fn one_rotor(settings: &SceneSettings) -> Result<()> {
     let first = &settings.contacts[0].master;
     match settings.contacts.iter().find(|contact| contact.master != *first) {
@@ -40,10 +40,10 @@ pub fn one_rotor(settings: &SceneSettings) -> Result<()> {
     }
 }
 
-/// The same, and scenes whose pairs differ in friction.
+/// Rejects scenes with contact nodes on several structures, and scenes whose pairs differ in friction.
 ///
 /// # Errors
-/// Several structures touch, or pairs differ in friction.
+/// Several structures have contact nodes, or pairs differ in friction.
 pub fn one_rotor_and_friction(settings: &SceneSettings) -> Result<()> {
     one_rotor(settings)?;
     let first = settings.contacts[0].friction.to_bits();
@@ -58,7 +58,7 @@ fn several(settings: &SceneSettings, problem: String) -> Failure {
     Failure::usage(format!("scene `{}`", settings.name), problem, remedy)
 }
 
-/// Internal steps of at most `step` (s) in a communication step of length `interval` (s).
+/// Returns the number of internal steps of at most `step` (s) in a communication step of length `interval` (s).
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
 pub(crate) fn divisions(interval: f64, step: f64) -> u32 {
     (interval / step * (1.0 - 1e-9)).ceil().clamp(1.0, 1e8) as u32
@@ -67,7 +67,7 @@ pub(crate) fn divisions(interval: f64, step: f64) -> u32 {
 /// A finished study.
 #[derive(Debug, Clone)]
 pub struct Study {
-    /// Short name, for file names: `stage`.
+    /// Short name, for files: `stage`.
     pub name: &'static str,
     /// Title of the page.
     pub title: String,
@@ -75,39 +75,39 @@ pub struct Study {
     pub summary: String,
     /// Facts of the study: names and values with units.
     pub facts: Vec<(String, String)>,
-    /// Expectations, and whether the figures fulfil them.
+    /// Expectations with their results.
     pub statements: Vec<Statement>,
     /// The figures.
     pub figures: Vec<StudyFigure>,
-    /// Numbers for programs, beside those of the figures.
+    /// Results for programs, beside the numbers of the figures.
     pub results: Value,
     /// Further files to write: name, meaning, bytes.
     pub files: Vec<(String, String, Vec<u8>)>,
 }
 
-/// Something that a study should show.
+/// Expectation of a study with its result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Statement {
     /// The expectation.
     pub expected: String,
     /// The result, with numbers.
     pub found: String,
-    /// Whether it is so; `None` where it cannot be decided here.
+    /// True if the result fulfils the expectation; `None` if it cannot be decided here.
     pub holds: Option<bool>,
 }
 
 impl Statement {
-    /// A statement that was tested.
+    /// Creates a statement that was tested.
     pub fn tested(expected: impl Into<String>, holds: bool, found: impl Into<String>) -> Self {
         Self { expected: expected.into(), found: found.into(), holds: Some(holds) }
     }
 
-    /// Something to know that is neither right nor wrong.
+    /// Creates a remark, which has no verdict.
     pub fn remark(expected: impl Into<String>, found: impl Into<String>) -> Self {
         Self { expected: expected.into(), found: found.into(), holds: None }
     }
 
-    /// The verdict in a word.
+    /// Returns the verdict as one word.
     pub fn verdict(&self) -> &'static str {
         match self.holds {
             Some(true) => "yes",
@@ -117,38 +117,38 @@ impl Statement {
     }
 }
 
-/// A picture, its numbers and its caption.
+/// Picture with its numbers and its caption.
 #[derive(Debug, Clone)]
 pub struct StudyFigure {
-    /// For file names: `clearances`.
+    /// Name for files: `clearances`.
     pub name: &'static str,
-    /// Caption, plain text.
+    /// Caption as plain text.
     pub caption: String,
-    /// SVG and what goes into the page.
+    /// SVG file and the HTML for the page.
     pub picture: Picture,
     /// The numbers shown.
     pub sheet: Sheet,
 }
 
-/// SVG for a file of its own, and HTML for the page.
+/// Picture as an SVG file, and as HTML for the page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// A whole SVG file.
+    /// Complete SVG file.
     pub svg: String,
-    /// The same for the page.
+    /// HTML for the page.
     pub html: String,
 }
 
 impl Picture {
-    /// A line plot.
+    /// Draws a line plot.
     ///
     /// # Errors
-    /// The plotting library refuses.
+    /// The plotting library fails.
     pub fn plot(plot: &Plot) -> Result<Self> {
         Ok(Self { svg: plot.to_whole_svg()?, html: plot.to_html()? })
     }
 
-    /// A waterfall.
+    /// Draws a waterfall diagram.
     pub fn waterfall(waterfall: &Waterfall) -> Self {
         let svg = waterfall.to_svg();
         Self { html: svg.clone(), svg }
@@ -165,12 +165,12 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// An empty sheet.
+    /// Creates an empty sheet.
     pub fn new<const N: usize>(columns: [&str; N]) -> Self {
         Self { columns: columns.map(String::from).to_vec(), rows: Vec::new() }
     }
 
-    /// Comma-separated values; numbers read back to the same bits.
+    /// Returns comma-separated values; numbers are read back to the same bits.
     pub fn to_csv(&self) -> String {
         let quoted = |name: &String| if name.contains([',', '"']) { format!("{name:?}") } else { name.clone() };
         let mut text = self.columns.iter().map(quoted).collect::<Vec<_>>().join(",");
@@ -184,7 +184,7 @@ impl Sheet {
 }
 
 impl Study {
-    /// Facts, statements and results for programs; the numbers of the figures are in their CSV files.
+    /// Returns facts, statements and results as JSON; the numbers of the figures are in their CSV files.
     pub fn to_json(&self) -> Value {
         json!({
             "study": self.name,
@@ -201,7 +201,7 @@ impl Study {
         })
     }
 
-    /// For people.
+    /// Returns the study as text for the terminal.
     pub fn to_text(&self) -> String {
         let mut text = format!("{}\n{}\n\n", self.title, self.summary);
         let width = self.facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
@@ -215,10 +215,10 @@ impl Study {
         text
     }
 
-    /// A figure by its name.
+    /// Returns a figure by its name.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no such figure.
     pub fn figure(&self, name: &str) -> Result<&StudyFigure> {
         let missing = || Failure::new(format!("study {}", self.name), format!("no figure {name}"), "");
         self.figures.iter().find(|figure| figure.name == name).ok_or_else(missing)

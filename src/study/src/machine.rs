@@ -1,10 +1,10 @@
-//! The machine a study ran on, and when.
+//! Machine on which a study ran, and the date.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use tiprub_shell::sweep;
 
-/// Names and values.
+/// Returns names and values.
 pub fn facts() -> Vec<(String, String)> {
     let cores = sweep::processors();
     vec![
@@ -15,20 +15,20 @@ pub fn facts() -> Vec<(String, String)> {
     ]
 }
 
-/// Name of the processor, where the system tells.
+/// Returns the name of the processor, if the system provides it.
 fn processor() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// Seconds since 1970: SOURCE_DATE_EPOCH where it is set.
+/// Returns the seconds since 1970, or SOURCE_DATE_EPOCH if it is set.
 fn now() -> u64 {
     let given = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.parse().ok());
     given.unwrap_or_else(|| SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()))
 }
 
-/// Year, month and day (Gregorian, UTC) of seconds since 1970, by counting eras of 400 years from the first of March.
+/// Returns year, month and day (Gregorian, UTC) for seconds since 1970, by counting eras of 400 years from the first of March.
 fn date(seconds: u64) -> String {
     let days = seconds / 86_400 + 719_468;
     let (era, day) = (days / 146_097, days % 146_097);

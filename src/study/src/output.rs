@@ -1,4 +1,4 @@
-//! A study as files: one HTML page, an SVG and a CSV per figure, `results.json`, and what the study adds.
+//! Writes a study as files: one HTML page, an SVG and a CSV per figure, `results.json`, and further files of the study.
 
 use std::{fmt::Write as _, path::Path};
 
@@ -7,15 +7,15 @@ use tiprub_shell::{Result, console::CommandOutcome, output_file};
 
 use super::Study;
 
-/// The page.
+/// File name of the page.
 pub const PAGE: &str = "index.html";
-/// Facts, statements and results for programs.
+/// File name of the facts, statements and results in JSON.
 pub const RESULTS: &str = "results.json";
 
-/// Write everything into `directory` and sum up.
+/// Writes all files into `directory` and returns a summary.
 ///
 /// # Errors
-/// Files cannot be written.
+/// A file cannot be written.
 pub fn write(study: &Study, directory: &Path) -> Result<CommandOutcome> {
     output_file::create_directory(directory)?;
     for figure in &study.figures {

@@ -431,6 +431,9 @@ fn invalid_command_lines_are_reported_as_json() {
         let error = &serde_json::from_slice::<Value>(&output.stdout).unwrap()["error"];
         assert_eq!((output.status.code(), error["exit_code"].as_i64()), (Some(2), Some(2)), "{line}");
         assert!(error["what"].as_str().unwrap().contains(what), "{line}: {error}");
-        assert!(error["remedy"].as_str().unwrap().ends_with("See `lab --help` or the `--help` of the command"), "{error}");
+        assert!(
+            error["remedy"].as_str().unwrap().ends_with("See `lab --help` or the `--help` of the command"),
+            "{error}"
+        );
     }
 }

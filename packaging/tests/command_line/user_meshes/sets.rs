@@ -1,14 +1,14 @@
-//! What is asked about a mesh of one's own: sets that hold a part of the tip or the root, and a blade for a rotor that turns the other way.
+//! Questions about a user mesh: sets that contain a part of the tip or the root, and a blade for the opposite rotation.
 
 use super::ModelProject;
 
-/// A coarse rotor 37 as a user's mesh, `blade.inp`.
+/// Exports a coarse rotor 37 as a user mesh, `blade.inp`.
 fn exported(project: &ModelProject) -> String {
     project.succeed("reduce rotor37 --mesh 6x1x6 --modes 6 --inp blade.inp -o own.rom.safetensors");
     std::fs::read_to_string(project.root.path().join("blade.inp")).unwrap()
 }
 
-/// The mesh without the last line of the nodes of a set.
+/// Returns the mesh without the last line of the nodes of a set.
 fn without_a_line(mesh: &str, set: &str) -> String {
     let (before, rest) = mesh.split_once(&format!("*NSET, NSET={set}\n")).unwrap();
     let end = rest.find('*').unwrap();
@@ -18,14 +18,14 @@ fn without_a_line(mesh: &str, set: &str) -> String {
     format!("{before}*NSET, NSET={set}\n{kept}\n{}", &rest[end..])
 }
 
-/// Numbers of the nodes of a set.
+/// Returns the numbers of the nodes of a set.
 fn numbers_of(mesh: &str, set: &str) -> Vec<usize> {
     let (_, rest) = mesh.split_once(&format!("*NSET, NSET={set}\n")).unwrap();
     let words = rest[..rest.find('*').unwrap()].split([',', '\n']).map(str::trim);
     words.filter(|word| !word.is_empty()).map(|word| word.parse().unwrap()).collect()
 }
 
-/// The mesh turned by half a turn about the x axis: the same blade for a rotor that turns the other way about the z axis.
+/// Returns the mesh rotated by half a turn about the x axis: the same blade for the opposite rotation about the z axis.
 fn turned_over(mesh: &str) -> String {
     let (head, rest) = mesh.split_once("*NODE, NSET=NALL\n").unwrap();
     let end = rest.find('*').unwrap();
@@ -50,7 +50,7 @@ fn warns_of_sets_that_cover_only_part_of_tip_or_root() {
     let both = "--contact-set TIP --clamp-set HUB";
     let whole = warnings(&project, &mesh, both);
     assert!(!whole.contains("nodes of the"), "{whole}");
-    // Six by one quadratic elements: 33 nodes of the tip.
+    // Six by one quadratic elements have 33 nodes at the tip.
     let tip = warnings(&project, &without_a_line(&mesh, "TIP"), &format!("{both} --contact-patches 3"));
     assert!(tip.contains("TIP has ") && tip.contains(" of the 33 nodes of the outermost faces"), "{tip}");
     let root = warnings(&project, &without_a_line(&mesh, "HUB"), both);
@@ -60,7 +60,7 @@ fn warns_of_sets_that_cover_only_part_of_tip_or_root() {
     let more = mesh.replace("*NSET, NSET=TIP\n", &format!("*NSET, NSET=TIP\n{other},\n"));
     let larger = warnings(&project, &more, both);
     assert!(larger.contains("TIP has 34 nodes, but only 33 are on the outermost faces"), "{larger}");
-    // Single contact nodes are meant as they are.
+    // Single contact nodes cause no question.
     let nodes = warnings(&project, &without_a_line(&mesh, "TIP"), &format!("{both} --contact-nodes 3"));
     assert!(nodes.contains("contact at 3 nodes"), "{nodes}");
 }

@@ -1,4 +1,4 @@
-//! The tip of a mesh of one's own: where it is found, patches over it, and what is said of contact at points.
+//! Tip of a user mesh: its detection, patches over it, and warnings about contact at points.
 
 use std::{fs, path::Path};
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{ModelProject, data, guide};
 
-/// Patches over the whole tip of an exported mesh: those of the blade itself; a scene runs with them.
+/// Patches over the whole tip of an exported mesh agree with those of the blade itself; a scene runs with them.
 #[test]
 fn user_mesh_patches_match_the_built_in_blade() {
     let project = ModelProject::new(&[]);
@@ -55,7 +55,8 @@ fn user_mesh_patches_match_the_built_in_blade() {
     }
 }
 
-/// Rows of patches across the thickness of an exported mesh: those of the blade itself, with a row in every name and their number in the ROM.
+/// Rows of patches across the thickness of an exported mesh agree with those of the blade itself, with a row in every name and their number in the
+/// ROM.
 #[test]
 fn user_mesh_patch_rows_match_the_built_in_blade() {
     let project = ModelProject::new(&[]);
@@ -83,7 +84,7 @@ fn user_mesh_patch_rows_match_the_built_in_blade() {
     }
     let [first, last] = [&own.contact_nodes[0], &own.contact_nodes[7]];
     assert_eq!([first.name.as_str(), last.name.as_str()], ["patch_1_row_1", "patch_4_row_2"]);
-    // The sides of the tip, not thirds of its thickness: rθ apart by the mesh's own sides, which lines of patches follow.
+    // The sides of the tip, not thirds of its thickness: their distance in rθ is that of the mesh's sides, which lines of patches follow.
     let across = own.contact_nodes[6].position[1] - own.contact_nodes[2].position[1];
     assert!((2e-3..2e-2).contains(&across.abs()), "{across}");
     let named = format!("{common} --contact-patches 2 --contact-rows 2 --contact-names a,b -o named.rom.safetensors");
@@ -91,7 +92,7 @@ fn user_mesh_patch_rows_match_the_built_in_blade() {
     let names: Vec<String> =
         project.rom("named.rom.safetensors").contact_nodes.into_iter().map(|node| node.name).collect();
     assert_eq!(names, ["a_row_1", "b_row_1", "a_row_2", "b_row_2"]);
-    // The scene that ships with rows, around the coarse blade.
+    // Built-in scene with rows, around the coarse blade.
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/gallery/scenes/rotor37.toml");
     let scene = fs::read_to_string(path).unwrap().replace("builtin:rotor37", "read.rom.safetensors");
     project.write("scene.toml", &scene);
@@ -124,7 +125,7 @@ fn user_mesh_patch_rows_match_the_built_in_blade() {
     }
 }
 
-/// The tip is found where no set names it: the nodes of the set TIP, of every kind of element; five patches, free-interface modes.
+/// The tip is found if no set names it: the nodes of the set TIP, for every kind of element; five patches, free-interface modes.
 #[test]
 fn finds_and_reports_the_tip_of_a_mesh() {
     let files = [
@@ -146,7 +147,7 @@ fn finds_and_reports_the_tip_of_a_mesh() {
         let radii = [0, 1].map(|end| tip["radius"][end].as_f64().unwrap());
         assert!((radii[0] - 0.2597).abs() < 4e-4 && (radii[1] - 0.2601).abs() < 4e-4, "{file}: {tip}");
         let patches = found["model"]["contact_nodes"].as_array().unwrap();
-        // Nine in two rows, or as many as the elements are wide.
+        // Nine patches in two rows, or as many as the elements permit.
         let (count, rows) = (patches.len(), found["rom"]["contact_rows"].as_u64().unwrap());
         assert!(
             rows == 2
@@ -172,7 +173,7 @@ fn finds_and_reports_the_tip_of_a_mesh() {
     }
 }
 
-/// Contact at points is warned of where the mesh could carry more, and at one place always.
+/// Contact at points causes a warning if the mesh permits patches, and always if there is only one point.
 #[test]
 fn warns_of_point_contact_on_a_fine_tip() {
     let project = ModelProject::new(&["blade_hex20.inp", "bar.inp", "blade_tet10.msh"]);
@@ -210,7 +211,7 @@ fn warns_of_point_contact_on_a_fine_tip() {
     assert!(!own(7).contains("contact patches"), "{}", own(7));
 }
 
-/// The mesh of the tests twice: the same blade again, turned about the axis and a little farther in or as far out.
+/// Returns the mesh of the tests twice: the second blade is rotated about the axis, and slightly farther in or equally far out.
 fn two_blades(farther_in: f64) -> String {
     const NEXT: usize = 5000;
     let text = fs::read_to_string(data("blade_hex20.inp")).unwrap();
@@ -238,7 +239,7 @@ fn two_blades(farther_in: f64) -> String {
     found
 }
 
-/// A second surface as far out is told of, one well inside is not; the tip is that of one blade. The texts are those of the guide.
+/// A second surface at the same radius is reported, one well inside is not; the tip is that of one blade. The texts are those of the guide.
 #[test]
 fn reports_a_second_surface_at_the_tip_radius() {
     let project = ModelProject::new(&[]);
@@ -266,7 +267,7 @@ fn reports_a_second_surface_at_the_tip_radius() {
     }
 }
 
-/// Of a sector the tip is found as well, and both kinds take patches; static flexibility at them is one.
+/// The tip of a sector is found as well, and both kinds of reduction accept patches with the same static flexibility.
 #[test]
 fn both_reduction_kinds_support_patches_on_a_sector() {
     let project = ModelProject::new(&["sector.msh"]);

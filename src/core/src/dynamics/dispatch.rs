@@ -1,9 +1,9 @@
-//! Run-time choice of the instruction set for the hot loops.
+//! Run-time selection of the instruction set for the hot loops.
 //!
-//! The loop bodies are the same source for every instruction set and uses neither fused multiply-add nor horizontal
-//! sums, so wider registers change the speed and not one bit of the result.
+//! The loop bodies have the same source for every instruction set and use neither fused multiply-add nor horizontal sums, so
+//! wider registers change the speed but not a single bit of the result.
 
-/// Instruction sets the hot loops are compiled for.
+/// Instruction set for which the hot loops are compiled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InstructionSet {
     /// Instructions that every target of the build supports (SSE2 on x86-64).
@@ -17,7 +17,7 @@ pub enum InstructionSet {
 }
 
 impl InstructionSet {
-    /// The widest the processor has.
+    /// Returns the widest instruction set of the processor.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
@@ -31,12 +31,12 @@ impl InstructionSet {
         Self::Baseline
     }
 
-    /// Run `kernel` compiled for this instruction set.
+    /// Runs `kernel` compiled for this instruction set.
     #[inline]
     pub fn run(self, kernel: impl Kernel) {
         match self {
             Self::Baseline => kernel.run(),
-            // SAFETY: the variants are only made by `detect`, after the processor reported the feature.
+            // SAFETY: the variants are only created by `detect`, after the processor reported the feature.
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => unsafe { with_avx2(kernel) },
             // SAFETY: as above.
@@ -46,9 +46,9 @@ impl InstructionSet {
     }
 }
 
-/// A loop nest that is compiled once per instruction set. `run` must be `#[inline(always)]`; a closure would not be.
+/// A loop nest that is compiled once per instruction set. `run` must be `#[inline(always)]`, which a closure would not be.
 pub trait Kernel {
-    /// Do the work.
+    /// Runs the loops.
     fn run(self);
 }
 

@@ -1,24 +1,25 @@
-//! Loads on the blades that travel around the disk: of something that stands still, seen from sectors that turn through it.
+//! Loads that travel around the disk: a stationary pattern, seen from sectors that rotate through it.
 //!
-//! Blade s = 0 … N − 1 feels F cos(ψ + 2πks/N) at one of its contact rows, with engine order k and ψ = kθ_r − phase. Of one mode that is
-//! the modal load F φ cos(…). Coupled sectors see k as a wave of nodal diameter n = k mod N, or, above N/2, of n = N − k that travels
-//! the other way: Re(z e^(2πins/N)) with z = F e^(iψ), or F e^(−iψ). Its modal load is Ψ* z N/2, and Ψ* Re(z) N where modes are real.
+//! Blade s = 0 … N − 1 is loaded by F cos(ψ + 2πks/N) at one of its contact rows, with engine order k and ψ = kθ_r − phase. The
+//! modal load of one mode is F φ cos(…). For coupled sectors, k is a wave of nodal diameter n = k mod N or, above N/2, of n = N −
+//! k that travels in the other direction: Re(z e^(2πins/N)) with z = F e^(iψ) or F e^(−iψ). Its modal load is Ψ* z N/2, and Ψ*
+//! Re(z) N if the modes are real.
 
 use super::cyclic::CyclicModel;
 use super::modal::ModalModel;
 
-/// Which blades' modes are loaded, and by what.
+/// Definition of an excitation: engine order, loaded modes and contact row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Excitation {
-    /// Engine order at first.
+    /// Initial engine order.
     pub order: u32,
-    /// The mode (0-based) that alone is loaded; all of them where absent.
+    /// The only loaded mode (0-based); `None` if all modes are loaded.
     pub mode: Option<usize>,
-    /// Contact row that the force acts on; where absent the one that `mode` moves most.
+    /// Contact row on which the force acts; `None` for the row with the largest displacement in `mode`.
     pub row: Option<usize>,
 }
 
-/// The first of the rows that are moved most, with equal ones up to rounding.
+/// Returns the index of the largest value, the first one if several are equal up to rounding.
 pub fn most_moved(sizes: impl Iterator<Item = f64>) -> usize {
     let most = sizes
         .enumerate()
@@ -41,15 +42,15 @@ fn wave(order: u64, sector: usize, sectors: usize) -> [f64; 2] {
     [cosine, sine]
 }
 
-/// On sectors that do not know of each other.
+/// Excitation of uncoupled sectors.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SectorLoads {
     /// Modal load per unit force, of each mode (1/√kg).
     pub load: Vec<f64>,
     pattern: Vec<[f64; 2]>,
-    /// Forces on the sectors in the step under way (N).
+    /// Forces on the sectors in the current step (N).
     pub now: Vec<f64>,
-    /// In the step before.
+    /// Forces on the sectors in the previous step (N).
     pub before: Vec<f64>,
 }
 
@@ -76,7 +77,7 @@ impl SectorLoads {
         }
     }
 
-    /// Forces of the step to come: amplitude (N), phase ψ (rad).
+    /// Sets the forces of the next step from amplitude (N) and phase ψ (rad).
     pub fn set(&mut self, amplitude: f64, phase: f64) {
         let (sine, cosine) = libm::sincos(phase);
         for (force, [across, along]) in self.now.iter_mut().zip(&self.pattern) {
@@ -90,16 +91,16 @@ impl SectorLoads {
     }
 }
 
-/// On a disk of coupled sectors.
+/// Excitation of a disk of coupled sectors.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct DiskLoads {
     excitation: Excitation,
-    /// The nodal diameter that is loaded.
+    /// Loaded nodal diameter.
     pub diameter: usize,
     backward: bool,
-    /// N, or N/2 where modes are complex.
+    /// N, or N/2 if the modes are complex.
     share: f64,
-    /// Modal load per unit z (re, im), of each mode (1/√kg); 0 where there is none.
+    /// Modal load per unit z (re, im), of each mode (1/√kg); 0 for entries without a mode.
     load: Vec<[f64; 2]>,
     now: [f64; 2],
     pub before: [f64; 2],
@@ -135,7 +136,7 @@ impl DiskLoads {
         }
     }
 
-    /// Forces of the step to come: amplitude (N), phase ψ (rad).
+    /// Sets the forces of the next step from amplitude (N) and phase ψ (rad).
     pub fn set(&mut self, amplitude: f64, phase: f64, is_real: bool) {
         let (sine, cosine) = libm::sincos(phase);
         let along = if is_real {
@@ -148,12 +149,12 @@ impl DiskLoads {
         self.now = [cosine, along].map(|part| self.share * amplitude * part);
     }
 
-    /// Modal force (re, im) on a mode now.
+    /// Modal force (re, im) on a mode in the current step.
     pub fn of_mode(&self, mode: usize) -> [f64; 2] {
         times(self.load[mode], self.now)
     }
 
-    /// The same in the step before.
+    /// Modal force (re, im) on a mode in the previous step.
     pub fn of_mode_before(&self, mode: usize) -> [f64; 2] {
         times(self.load[mode], self.before)
     }

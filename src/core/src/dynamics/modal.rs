@@ -8,13 +8,13 @@ use crate::schemes::ModeCoefficients;
 use crate::settings::Scheme;
 use crate::{Error, Result, Rom, shown};
 
-/// Eigenvalues below this fraction of the largest are not resolved by the eigenproblem; the Rayleigh quotient decides.
+/// Eigenvalues below this fraction of the largest are not resolved by the eigenproblem; their Rayleigh quotient is used.
 pub(super) const RIGID_FRACTION: f64 = 1e-13;
 
 /// Modes of the reduced pencil (K, M), mass-normalised.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalModel {
-    /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid modes.
+    /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid-body modes.
     pub frequencies: Vec<f64>,
     /// Damping ratios ξ (-), one per mode.
     pub damping_ratios: Vec<f64>,
@@ -29,9 +29,9 @@ pub struct ModalModel {
 /// Effects of spin in modal coordinates (see [`crate::rom::Spin`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalSpin {
-    /// Speed whose stiffness the modes are those of (rad/s).
+    /// Speed of the stiffness that defines the modes (rad/s).
     pub reference_speed: f64,
-    /// Temperature whose stiffness they are those of (K).
+    /// Temperature of the stiffness that defines the modes (K).
     pub reference_temperature: f64,
     /// Change of the stiffness per kelvin, −s φᵀKφ, modes²; `None` without softening.
     pub softening: Option<DMatrix<f64>>,
@@ -44,7 +44,7 @@ pub struct ModalSpin {
 }
 
 impl ModalSpin {
-    /// Project the spin matrices of a ROM; `reference_speed` is the speed `model` was made for.
+    /// Projects the spin matrices of a ROM; `reference_speed` is the speed for which `model` was computed.
     pub fn new(spin: &crate::rom::Spin, model: &ModalModel, reference_speed: f64) -> Self {
         let shapes = &model.shapes;
         let project = |matrix: &DMatrix<f64>| shapes.transpose() * matrix * shapes;
@@ -63,7 +63,7 @@ impl ModalSpin {
         }
     }
 
-    /// Makes the matrices of modes that no spin couples: zeros.
+    /// Creates zero matrices for modes that are not coupled by spin.
     pub fn without_spin(model: &ModalModel) -> Self {
         let none = || DMatrix::zeros(model.len(), model.len());
         let (reference_speed, reference_temperature, softening) = (0.0, 0.0, None);
@@ -71,8 +71,8 @@ impl ModalSpin {
         Self { reference_speed, reference_temperature, softening, stiffness_speed2, stiffness_speed4, coriolis }
     }
 
-    /// The same of a structure that loses `share` of the elastic `stiffness` of its ROM per kelvin above `temperature`, whose modes
-    /// `model` are.
+    /// Adds softening: the structure loses the fraction `share` of the elastic `stiffness` of its ROM per kelvin above
+    /// `temperature`, for which the modes `model` were computed.
     #[must_use]
     pub fn softened(self, stiffness: &DMatrix<f64>, model: &ModalModel, share: f64, temperature: f64) -> Self {
         let projected = model.shapes.transpose() * stiffness * &model.shapes;
@@ -81,7 +81,7 @@ impl ModalSpin {
     }
 }
 
-/// One ratio for all modes but the first, which have their `own`; each stands `copies` times in `ratios`.
+/// Sets one ratio for all modes; the first modes have their `own`. Each value is repeated `copies` times in `ratios`.
 pub fn fill_ratios(ratios: &mut [f64], ratio: f64, own: &[f64], copies: usize) {
     ratios.fill(ratio);
     for (ratios, own) in ratios.chunks_mut(copies).zip(own) {
@@ -90,18 +90,18 @@ pub fn fill_ratios(ratios: &mut [f64], ratio: f64, own: &[f64], copies: usize) {
 }
 
 impl ModalModel {
-    /// Solve the symmetric eigenproblem of the ROM's matrices and attach one damping ratio to all modes.
+    /// Solves the symmetric eigenproblem of the ROM's matrices and assigns one damping ratio to all modes.
     ///
     /// # Errors
-    /// Invalid ROM, or a stiffness that is not positive semidefinite.
+    /// The ROM is invalid, or a stiffness is not positive semidefinite.
     pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
         Self::at_stiffness(rom, &rom.stiffness, damping_ratio)
     }
 
-    /// Modes at a steady speed Ω (rad/s): those of K + Ω²K₁ + Ω⁴K₂ where the ROM has spin matrices.
+    /// Computes the modes at a steady speed Ω (rad/s): those of K + Ω²K₁ + Ω⁴K₂ if the ROM has spin matrices.
     ///
     /// # Errors
-    /// As [`ModalModel::from_rom`]; a speed at which the stiffness is lost.
+    /// The errors of [`ModalModel::from_rom`], and a speed at which the stiffness is not positive semidefinite.
     pub fn at_speed(rom: &Rom, damping_ratio: f64, speed: f64) -> Result<Self> {
         let Some(spin) = &rom.extras.spin else { return Self::from_rom(rom, damping_ratio) };
         let square = speed * speed;
@@ -109,10 +109,11 @@ impl ModalModel {
         Self::at_stiffness(rom, &stiffness, damping_ratio)
     }
 
-    /// The same of a structure that heat leaves a `share` of its elastic stiffness; `speed` is `None` without stiffening.
+    /// Computes the modes of a structure whose elastic stiffness is reduced by heat to the fraction `share`; `speed` is `None`
+    /// without stiffening.
     ///
     /// # Errors
-    /// As [`ModalModel::at_speed`].
+    /// The errors of [`ModalModel::at_speed`].
     pub fn softened(rom: &Rom, damping_ratio: f64, speed: Option<f64>, share: f64) -> Result<Self> {
         let mut stiffness = &rom.stiffness * share;
         if let (Some(spin), Some(speed)) = (&rom.extras.spin, speed) {
@@ -142,7 +143,7 @@ impl ModalModel {
         })
     }
 
-    /// φᵀf of a load on the reduced coordinates.
+    /// Returns φᵀf of a load on the reduced coordinates.
     pub fn modal_load(&self, load: &[f64]) -> Vec<f64> {
         self.shapes.column_iter().map(|shape| shape.iter().zip(load).map(|(a, b)| a * b).sum()).collect()
     }
@@ -152,7 +153,7 @@ impl ModalModel {
         if scheme.is_massless() { self.len().saturating_sub(self.quasi_static) } else { self.len() }
     }
 
-    /// Coefficients of one mode at the step size `step` (s), its frequency times `factor` (mistuning; 1 = tuned).
+    /// Coefficients of one mode at the step size `step` (s), with its frequency multiplied by `factor` (mistuning; 1 if tuned).
     pub fn coefficient(&self, mode: usize, factor: f64, scheme: Scheme, step: f64) -> ModeCoefficients {
         let (frequency, ratio) = (self.frequencies[mode] * factor, self.damping_ratios[mode]);
         ModeCoefficients::of_mode(scheme, mode < self.dynamic_modes(scheme), frequency, ratio, step)
@@ -163,7 +164,7 @@ impl ModalModel {
         (0..self.len()).map(|mode| self.coefficient(mode, 1.0, scheme, step)).collect()
     }
 
-    /// The same modes seen at the contact rows of both, one after the other.
+    /// Returns the modes with the contact rows of both models, one after the other.
     pub fn seen_at_both(self, other: Self) -> Self {
         let rows = (self.contact_modes.nrows(), other.contact_modes.nrows());
         let mut contact_modes = DMatrix::zeros(rows.0 + rows.1, self.contact_modes.ncols());
@@ -172,13 +173,13 @@ impl ModalModel {
         Self { contact_modes, ..self }
     }
 
-    /// Several structures side by side as one: modes concatenated, contact rows relative (master − slave).
+    /// Combines several structures into one: modes concatenated, contact rows relative (master − slave).
     ///
     /// `pairs` lists (master structure, master node, slave) with an optional slave (structure, node); the rows of
     /// the result are the relative displacements of the pairs, three components each.
     ///
     /// # Errors
-    /// A structure or node index that does not exist.
+    /// A structure or node index does not exist.
     pub fn combined(structures: &[Self], pairs: &[NodePair]) -> Result<Self> {
         let modes = structures.iter().map(|structure| structure.frequencies.len()).sum();
         let mut contact_modes = DMatrix::zeros(3 * pairs.len(), modes);
@@ -224,7 +225,7 @@ impl ModalModel {
         })
     }
 
-    /// The same modes seen at some of the contact nodes only.
+    /// Returns the modes with some of the contact nodes only.
     pub fn with_nodes(&self, nodes: &[usize]) -> Self {
         let rows: Vec<usize> = nodes.iter().flat_map(|node| 3 * node..3 * node + 3).collect();
         Self { contact_modes: self.contact_modes.select_rows(&rows), ..self.clone() }
@@ -235,7 +236,7 @@ impl ModalModel {
         self.frequencies.len()
     }
 
-    /// True when there is no mode at all.
+    /// Returns whether there are no modes.
     pub fn is_empty(&self) -> bool {
         self.frequencies.is_empty()
     }
@@ -246,16 +247,16 @@ impl ModalModel {
     }
 }
 
-/// A node of one structure against a node of another, or against something rigid.
+/// A node of one structure and the node of another, or a rigid surface, that it can touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NodePair {
     /// (structure, contact node) of the master.
     pub master: (usize, usize),
-    /// (structure, contact node) of the slave; `None` for a rigid one.
+    /// (structure, contact node) of the slave; `None` for a rigid surface.
     pub slave: Option<(usize, usize)>,
 }
 
-/// Eigenvalues ω² (ascending, rigid ones exactly 0) and mass-normalised modes of K φ = ω² M φ; errors name the arrays
+/// Eigenvalues ω² (ascending, exactly 0 for rigid-body modes) and mass-normalised modes of K φ = ω² M φ; errors name the arrays
 /// `mass` and `stiffness` with `suffix`.
 pub(super) fn real_modes(
     mass: &DMatrix<f64>,
@@ -265,7 +266,7 @@ pub(super) fn real_modes(
     modal_already(mass, stiffness).map_or_else(|| generalised_modes(mass, stiffness, suffix), Ok)
 }
 
-/// A ROM delivered in modal coordinates (M = I, K diagonal and ascending) needs no eigenproblem.
+/// Returns modes without solving the eigenproblem if the ROM is in modal coordinates (M = I, K diagonal and ascending).
 fn modal_already(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let order = mass.nrows();
     let diagonal: Vec<f64> = (0..order).map(|mode| stiffness[(mode, mode)]).collect();
@@ -306,7 +307,7 @@ fn generalised_modes(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>, suffix: &str
     Ok((values, shapes))
 }
 
-/// Refuse a lowest eigenvalue of K φ = ω² M φ below zero by more than rounding.
+/// Rejects a lowest eigenvalue of K φ = ω² M φ that is below zero by more than rounding.
 pub(super) fn check_semidefinite(smallest: f64, largest: f64, suffix: &str) -> Result<()> {
     if smallest >= -1e-9 * largest {
         return Ok(());
@@ -329,8 +330,8 @@ pub(super) fn check_semidefinite(smallest: f64, largest: f64, suffix: &str) -> R
     ))
 }
 
-/// φᵀKφ of a mode far below the largest: its error is of second order in that of the mode shape, so that it tells a
-/// soft mode from a rigid one (exactly 0) wherever the stiffness matrix itself does.
+/// Returns φᵀKφ of a mode far below the largest. Its error is of second order in the error of the mode shape, so that it
+/// distinguishes a soft mode from a rigid-body mode (exactly 0) wherever the stiffness matrix itself does.
 fn unresolved_eigenvalue(stiffness: &DMatrix<f64>, shapes: &DMatrix<f64>, mode: usize) -> f64 {
     let (mut quotient, mut magnitude) = (0.0, 0.0);
     for column in 0..stiffness.ncols() {
@@ -345,7 +346,7 @@ fn unresolved_eigenvalue(stiffness: &DMatrix<f64>, shapes: &DMatrix<f64>, mode: 
     if quotient > rounding { quotient } else { 0.0 }
 }
 
-/// An eigenvector's sign is arbitrary; make its largest entry positive so that saved numbers are comparable.
+/// Makes the largest entry of each eigenvector positive, because its sign is arbitrary and saved numbers should be comparable.
 fn fix_signs(shapes: &mut DMatrix<f64>) {
     for mut column in shapes.column_iter_mut() {
         let largest = column.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
@@ -405,7 +406,7 @@ mod tests {
 
     #[test]
     fn rigid_modes_are_exactly_zero() {
-        // A free chain of three masses: one rigid mode; and nothing but rigid modes without stiffness.
+        // A free chain of three masses has one rigid-body mode; without stiffness all modes are rigid.
         let mut rom = rom(3, 6);
         rom.mass = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[1.0, 0.3, 7.0]));
         rom.stiffness = DMatrix::from_row_slice(3, 3, &[1e9, -1e9, 0.0, -1e9, 1e9 + 3e3, -3e3, 0.0, -3e3, 3e3]);

@@ -1,48 +1,48 @@
-//! Rigid translations of a structure that nothing holds.
+//! Rigid-body translations of an unconstrained structure.
 //!
 //! The unit translations t_x, t_y, t_z are null vectors of K that move every contact node by one metre along their axis.
-//! Numerically the rigid modes of a pencil are any basis of its null space. Here they are turned so that the first three
-//! are the translations, orthonormal in the mass: flight along a line is then the motion of these modes alone, and the
-//! momentum along an axis is found in them exactly.
+//! Numerically, the rigid-body modes of a pencil are any basis of its null space. Here they are rotated so that the first three
+//! are the translations, orthonormal in the mass: motion along a line is then the motion of these modes alone, which give the
+//! momentum along an axis exactly.
 
 use nalgebra::DMatrix;
 
 use super::modal::ModalModel;
 use crate::{Error, Result, Rom};
 
-/// Modes below this share of the highest frequency are looked at as rigid.
+/// Modes below this fraction of the highest frequency are treated as possibly rigid.
 const RIGID_SHARE: f64 = 1e-6;
-/// Contact nodes of a translation may be off by this (m per m).
+/// Tolerance for the displacement of contact nodes in a translation (m per m).
 const SAME_TRANSLATION: f64 = 1e-6;
 
-/// The translations in the coordinates of the first three modes: t_i = Σ_j φ_j R_ji, R upper triangular.
+/// The translations in terms of the first three modes: t_i = Σ_j φ_j R_ji, R upper triangular.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Translations {
     factor: [[f64; 3]; 3],
 }
 
 impl Translations {
-    /// Velocities of the first three modes where the whole body moves with `velocity` (m/s).
+    /// Returns the velocities of the first three modes when the whole body moves with `velocity` (m/s).
     pub fn modal(&self, velocity: [f64; 3]) -> [f64; 3] {
         self.factor.map(|row| (0..3).map(|i| row[i] * velocity[i]).sum())
     }
 
-    /// Centre-of-mass value along an axis, t_iᵀM x/t_iᵀM t_i, of a motion whose first three modal values are given.
+    /// Centre-of-mass value along an axis, t_iᵀM x/t_iᵀM t_i, of a motion with the given first three modal values.
     pub fn centre(&self, axis: usize, modal: [f64; 3]) -> f64 {
         let along = |j: usize| self.factor[j][axis];
         (0..3).map(|j| along(j) * modal[j]).sum::<f64>() / self.mass(axis)
     }
 
-    /// Mass that a translation along an axis moves, t_iᵀM t_i (kg).
+    /// Mass that moves in a translation along an axis, t_iᵀM t_i (kg).
     pub fn mass(&self, axis: usize) -> f64 {
         (0..3).map(|j| self.factor[j][axis] * self.factor[j][axis]).sum()
     }
 }
 
-/// Modes of a free structure, the translations first.
+/// Computes the modes of a free structure, the translations first.
 ///
 /// # Errors
-/// The errors of [`ModalModel::from_rom`]; a structure that something holds.
+/// The errors of [`ModalModel::from_rom`], and a structure that is constrained.
 pub fn free_modes(rom: &Rom, damping_ratio: f64) -> Result<(ModalModel, Translations)> {
     let mut model = ModalModel::from_rom(rom, damping_ratio)?;
     let largest = model.largest_frequency();
@@ -61,7 +61,7 @@ pub fn free_modes(rom: &Rom, damping_ratio: f64) -> Result<(ModalModel, Translat
     };
     let shapes = model.shapes.columns(0, rigid) * &basis;
     turn(&mut model.shapes, shapes);
-    // Every contact node moves alike, to the last bit.
+    // Every contact node has exactly the same motion.
     let inverse = inverse_of(&factor);
     let contact = DMatrix::from_fn(units.nrows(), 3, |row, mode| inverse[row % 3][mode]);
     turn(&mut model.contact_modes, contact);
@@ -70,7 +70,7 @@ pub fn free_modes(rom: &Rom, damping_ratio: f64) -> Result<(ModalModel, Translat
     Ok((model, Translations { factor }))
 }
 
-/// The combinations of rigid modes that are unit translations of all contact nodes, rigid × 3.
+/// Finds the combinations of rigid-body modes that are unit translations of all contact nodes, rigid × 3.
 fn translations(seen: &DMatrix<f64>, units: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     if seen.ncols() < 3 {
         return None;
@@ -93,11 +93,11 @@ fn held(rom: &Rom, model: &ModalModel) -> Error {
     )
 }
 
-/// Gram and Schmidt: orthonormal columns, and the upper triangular factor.
+/// Gram-Schmidt orthogonalisation: orthonormal columns and the upper triangular factor.
 fn orthonormal(columns: &DMatrix<f64>) -> (DMatrix<f64>, [[f64; 3]; 3]) {
     let (mut basis, mut factor) = (columns.clone(), [[0.0; 3]; 3]);
     for column in 0..3 {
-        // Twice is enough for orthogonality to rounding.
+        // Two passes are enough for orthogonality to rounding.
         for _ in 0..2 {
             for before in 0..column {
                 let share = basis.column(before).dot(&basis.column(column));
@@ -118,7 +118,7 @@ fn inverse_of(factor: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     [[1.0 / a, -b / (a * d), (b * e / d - c) / (a * f)], [0.0, 1.0 / d, -e / (d * f)], [0.0, 0.0, 1.0 / f]]
 }
 
-/// Orthonormal basis of what is orthogonal to three orthonormal columns.
+/// Returns an orthonormal basis of the orthogonal complement of three orthonormal columns.
 fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = basis.nrows();
     let eigen = (DMatrix::identity(rows, rows) - basis * basis.transpose()).symmetric_eigen();
@@ -126,7 +126,7 @@ fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     eigen.eigenvectors.select_columns(&kept)
 }
 
-/// The rest of the rigid modes and what frequencies they have: exactly 0, or those of very soft modes.
+/// Returns the other rigid-body modes and their frequencies: exactly 0, or those of very soft modes.
 fn uncoupled(rest: &DMatrix<f64>, frequencies: &[f64]) -> (DMatrix<f64>, Vec<f64>) {
     if frequencies.iter().all(|frequency| *frequency == 0.0) {
         return (rest.clone(), vec![0.0; rest.ncols()]);

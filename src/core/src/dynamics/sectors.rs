@@ -1,4 +1,4 @@
-//! The two kinds of sectors a step can be made of: uncoupled ones, and a disk of coupled ones.
+//! The two kinds of sectors: uncoupled sectors and a disk of coupled sectors.
 
 use super::bank::{BankOptions, ModalBank};
 use super::cyclic::{CyclicBank, CyclicModel};
@@ -19,13 +19,13 @@ pub enum SectorModel<'a> {
 #[derive(Debug, Clone)]
 #[expect(clippy::large_enum_variant, reason = "a system has one of them for good; a box would cost every access")]
 pub enum Sectors {
-    /// Sectors that do not know of each other.
+    /// Uncoupled sectors.
     Uncoupled(ModalBank),
     /// Sectors of one elastic disk.
     Coupled(CyclicBank),
 }
 
-/// The same call on either kind.
+/// Forwards a call to either kind.
 macro_rules! delegate {
     ($($(#[$doc:meta])* $name:ident[$($kind:tt)?]($($argument:ident: $type:ty),*) $(-> $result:ty)?;)+) => {
         $($(#[$doc])* #[inline(always)]
@@ -39,10 +39,10 @@ macro_rules! delegate {
 }
 
 impl Sectors {
-    /// All sectors at rest; [`Sectors::set_step`] must be called before stepping.
+    /// Creates sectors at rest; call [`Sectors::set_step`] before stepping.
     ///
     /// # Panics
-    /// When options are given that coupled sectors do not have: mistuning, and spin that couples modes.
+    /// If coupled sectors get options that they do not support: mistuning, or spin that couples modes.
     pub fn new(model: SectorModel, options: BankOptions) -> Self {
         match model {
             SectorModel::Uncoupled(model, sectors) => Self::Uncoupled(ModalBank::with_options(model, sectors, options)),
@@ -59,73 +59,72 @@ impl Sectors {
     delegate! {
         /// Number of sectors.
         sectors[]() -> usize;
-        /// Lanes of a displacement row: sectors rounded up to whole registers.
+        /// Number of lanes of a displacement row: sectors rounded up to whole registers.
         lanes[]() -> usize;
         /// Number of contact rows of a sector (3 per contact node).
         rows[]() -> usize;
-        /// Step size of the coefficients in use (s).
+        /// Step size of the current coefficients (s).
         step[]() -> f64;
         /// Displacements of the contact rows at the current step (m), `[row][lane]`.
         displacement[]() -> &[f64];
-        /// The same one step earlier (m).
+        /// Displacements of the contact rows one step earlier (m), `[row][lane]`.
         displacement_before[]() -> &[f64];
-        /// New step size: coefficients and flexibility; the state is not touched.
+        /// Sets a new step size: coefficients and flexibility; the state is unchanged.
         set_step[mut](scheme: Scheme, step: f64);
-        /// Modal damping ratio of all modes but the first, which have their `own` (takes effect with the next [`Sectors::set_step`]).
+        /// Sets the modal damping ratio of all modes; the first modes have their `own` (takes effect with the next [`Sectors::set_step`]).
         set_damping_ratio[mut](damping_ratio: f64, own: &[f64]);
-        /// Carry the state to another step size under the last contact forces (`forces[row · lanes + sector]`, N) and the
-        /// modal loads.
+        /// Converts the state to another step size under the last contact forces (`forces[row · lanes + sector]`, N) and the modal loads.
         resample[mut](scheme: Scheme, new_step: f64, forces: &[f64]);
-        /// Static equilibrium under modal loads: of every sector, or of nodal diameter 0.
+        /// Sets the static equilibrium under modal loads of every sector, or of nodal diameter 0.
         settle[mut](modal_load: &[f64]);
-        /// Recompute the contact displacements from the modal state (after setting it).
+        /// Recomputes the contact displacements from the modal state (after setting it).
         recover[mut]();
-        /// Everything at rest and undeformed.
+        /// Sets the state to rest, undeformed.
         rest[mut]();
         /// Modal loads of the next step, of every sector or of nodal diameter 0; to be set before [`Sectors::predict`].
         loads_mut[mut]() -> &mut [f64];
-        /// Engine order of the excitation, where there is one.
+        /// Sets the engine order of the excitation, if any.
         set_excitation_order[mut](order: u32);
-        /// Excitation of the next step, to be set before [`Sectors::predict`]: amplitude (N) and phase ψ (rad).
+        /// Sets the excitation of the next step, before [`Sectors::predict`]: amplitude (N) and phase ψ (rad).
         excite[mut](amplitude: f64, phase: f64);
-        /// Work of the excitation over the step just done (J), once contact has corrected it.
+        /// Returns the work of the excitation over the last step (J), after the contact correction.
         finish_excitation[mut]() -> f64;
-        /// Displacements of now become those before.
+        /// Makes the current displacements the previous ones.
         begin_span[mut]();
-        /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements.
+        /// Predicts one step without contact (eq. 9 of the paper) and recovers the contact displacements.
         predict[mut](with_loss: bool);
-        /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves.
+        /// Kinetic and strain energy of all sectors (J), in the form that the scheme conserves.
         energies[]() -> (f64, f64);
-        /// Kinetic and strain energy of all sectors at this instant (J), under the contact forces that last
+        /// Instantaneous kinetic and strain energy of all sectors (J), under the persistent contact forces
         /// (`forces[row · lanes + sector]`, N) and the modal loads.
         energies_now[mut](forces: &[f64]) -> (f64, f64);
         /// Damping loss since the last call (J).
         collect_loss[mut]() -> f64;
-        /// Work of the modal loads over the step just done (J), once contact has corrected it.
+        /// Returns the work of the modal loads over the last step (J), after the contact correction.
         finish_loads[mut]() -> f64;
-        /// Set amplitudes that have decayed to nothing to exactly zero.
+        /// Sets amplitudes that have decayed almost to zero to exactly zero.
         flush[mut]();
-        /// True when every modal coordinate is finite.
+        /// Returns whether every modal coordinate is finite.
         is_finite[]() -> bool;
-        /// Save the state (not the step size).
+        /// Saves the state (not the step size).
         save[](writer: &mut StateWriter);
-        /// Pass over a saved state and refuse what is none.
+        /// Reads over a saved state and rejects invalid values.
         check[](reader: &mut StateReader);
-        /// Restore a saved state, after [`Sectors::set_step`].
+        /// Restores a saved state, after [`Sectors::set_step`].
         restore[mut](reader: &mut StateReader);
     }
 
-    /// The uncoupled sectors.
+    /// Returns the uncoupled sectors, if any.
     pub fn uncoupled(&self) -> Option<&ModalBank> {
         if let Self::Uncoupled(bank) = self { Some(bank) } else { None }
     }
 
-    /// The disk of coupled sectors.
+    /// Returns the disk of coupled sectors, if any.
     pub fn coupled(&self) -> Option<&CyclicBank> {
         if let Self::Coupled(bank) = self { Some(bank) } else { None }
     }
 
-    /// The disk of coupled sectors, to set initial conditions.
+    /// Returns the disk of coupled sectors, to set initial conditions.
     pub fn coupled_mut(&mut self) -> Option<&mut CyclicBank> {
         if let Self::Coupled(bank) = self { Some(bank) } else { None }
     }
@@ -136,14 +135,13 @@ impl Sectors {
         self.displacement()[row * self.lanes() + sector]
     }
 
-    /// The same one step earlier (m).
+    /// Displacement of one contact row of one sector one step earlier (m).
     #[inline(always)]
     pub fn row_before(&self, row: usize, sector: usize) -> f64 {
         self.displacement_before()[row * self.lanes() + sector]
     }
 
-    /// Modal position and increment of one mode of an uncoupled sector. Of coupled sectors it is the real part of nodal
-    /// diameter `sector`.
+    /// Modal position and increment of one mode of an uncoupled sector; for coupled sectors, the real part of nodal diameter `sector`.
     pub fn modal_state(&self, mode: usize, sector: usize) -> (f64, f64) {
         match self {
             Self::Uncoupled(bank) => bank.modal_state(mode, sector),
@@ -154,7 +152,7 @@ impl Sectors {
         }
     }
 
-    /// Set position and velocity of one mode of an uncoupled sector, or of the real part of nodal diameter `sector`.
+    /// Sets position and velocity of one mode of an uncoupled sector, or of the real part of nodal diameter `sector`.
     pub fn set_modal_state(&mut self, mode: usize, sector: usize, position: f64, velocity: f64) {
         match self {
             Self::Uncoupled(bank) => bank.set_modal_state(mode, sector, position, velocity),
@@ -162,21 +160,21 @@ impl Sectors {
         }
     }
 
-    /// Load uncoupled sectors in the next step by the free expansion of a temperature (K), after [`Sectors::loads_mut`].
+    /// Adds the load of a temperature (K) to uncoupled sectors for the next step, after [`Sectors::loads_mut`].
     pub fn expand(&mut self, temperature: f64) {
         if let Self::Uncoupled(bank) = self {
             bank.expand(temperature);
         }
     }
 
-    /// Move uncoupled sectors that are at rest by the free expansion of a temperature (K), after [`Sectors::settle`].
+    /// Moves uncoupled sectors at rest by the free expansion of a temperature (K), after [`Sectors::settle`].
     pub fn settle_expansion(&mut self, temperature: f64) {
         if let Self::Uncoupled(bank) = self {
             bank.settle_expansion(temperature);
         }
     }
 
-    /// Work of heat on quasi-static modes over the step just done (J), beyond what [`Sectors::set_speed`] returned before it.
+    /// Returns the work of heat on quasi-static modes over the last step (J), in addition to the result of [`Sectors::set_speed`] before it.
     pub fn finish_stiffening(&mut self) -> f64 {
         match self {
             Self::Uncoupled(bank) => bank.finish_stiffening(),
@@ -184,7 +182,7 @@ impl Sectors {
         }
     }
 
-    /// Follow the speed of the rotor (rad/s) and its temperature (K) where modes are coupled by them; returns the change of energy (J).
+    /// Sets the rotor speed (rad/s) and temperature (K) if they couple the modes; returns the change of energy (J).
     pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         match self {
             Self::Uncoupled(bank) => bank.set_speed(speed, temperature),

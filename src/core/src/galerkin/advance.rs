@@ -1,4 +1,4 @@
-//! The modes of a sector from the start of a step to its end.
+//! Advances the modes of a sector from the start of a step to its end.
 
 use super::basis::MOST;
 use super::kernels::PADDED;
@@ -8,10 +8,10 @@ use super::rows::ContactRows;
 use super::state::SectorState;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 
-/// Scratch; made once.
+/// Scratch memory, allocated once.
 #[derive(Debug, Clone)]
 pub struct Advance {
-    /// Rows under a force, and the coefficients of θᵃ of what acts on them (N).
+    /// Rows with a force, and the coefficients of θᵃ of these forces (N).
     rows: Vec<usize>,
     forces: [Vec<f64>; MOST],
     /// φᵀp_a of every mode.
@@ -20,12 +20,12 @@ pub struct Advance {
     instructions: InstructionSet,
 }
 
-/// All modes to the end of a step, `TERMS` of them with forces and 2 without, and their damping losses (J).
+/// Advances all modes to the end of a step (`TERMS` coefficients with forces, 2 without) and computes their damping losses (J).
 struct End<'a, const COUNT: usize> {
     tables: &'a ModeSteps,
     state: [&'a mut [f64]; 2],
     modal: [&'a [f64]; MOST],
-    /// None where nothing is damped.
+    /// `None` if no mode is damped.
     losses: Option<&'a mut [f64]>,
 }
 
@@ -75,7 +75,7 @@ impl<const COUNT: usize> Kernel for End<'_, COUNT> {
 }
 
 impl Advance {
-    /// Room for so many modes and contact nodes.
+    /// Creates scratch memory for `modes` modes and `nodes` contact nodes.
     pub fn new(modes: usize, nodes: usize) -> Self {
         let padded = || vec![0.0; modes.next_multiple_of(PADDED)];
         Self {
@@ -87,12 +87,13 @@ impl Advance {
         }
     }
 
-    /// q and q̇ at the end of a step without any force, and the damping loss (J).
+    /// Advances q and q̇ over a step without forces and returns the damping loss (J).
     pub fn freely(&mut self, level: &StepTables, state: &mut SectorState) -> f64 {
         self.finish::<2>(level, state)
     }
 
-    /// The same under forces: `forces(node)` has the coefficients of θᵃ of those on a node (N), if there are any.
+    /// Advances q and q̇ under forces and returns the damping loss (J). `forces(node)` returns the coefficients of θᵃ of the
+    /// force on a node (N), if any.
     pub fn under(
         &mut self,
         (level, rows): (&StepTables, &ContactRows),
@@ -118,7 +119,7 @@ impl Advance {
         self.finish::<TERMS>(level, state)
     }
 
-    /// The same where what acts on all modes is known: coefficients of θᵃ.
+    /// Advances q and q̇ under known modal forces, given as coefficients of θᵃ, and returns the damping loss (J).
     pub fn driven(&mut self, level: &StepTables, state: &mut SectorState, modal: &[Vec<f64>; MOST]) -> f64 {
         self.modal.iter_mut().zip(modal).for_each(|(own, modal)| own[..modal.len()].copy_from_slice(modal));
         self.finish::<TERMS>(level, state)
@@ -138,7 +139,7 @@ impl Advance {
     }
 }
 
-/// Sum in eight parts, whatever registers there are.
+/// Sums in eight parts, so that the result does not depend on the register width.
 fn sum(values: &[f64]) -> f64 {
     let mut parts = [0.0; PADDED];
     for chunk in values.chunks(PADDED) {

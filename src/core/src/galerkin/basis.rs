@@ -1,18 +1,18 @@
-//! Polynomials of degree s through the Lobatto points of a step, s = 1, 2, 3, on 0 ≤ θ ≤ 1.
+//! Polynomials of degree s = 1, 2, 3 through the Lobatto points of a step, on 0 ≤ θ ≤ 1.
 
 use crate::cubic;
 
 /// Largest degree.
 pub const MOST: usize = 3;
-/// Points of the largest degree.
+/// Number of points of the largest degree.
 pub const POINTS: usize = MOST + 1;
-/// Places between the points at which a gap is looked at.
+/// Number of positions between the points at which a gap is evaluated.
 pub const PLACES: usize = 9;
 
 /// Points, weights and polynomials of one degree. Entries beyond `degree` are 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeBasis {
-    /// s.
+    /// Degree s.
     pub degree: usize,
     /// Points c₀ = 0 … c_s = 1.
     pub points: [f64; POINTS],
@@ -20,21 +20,21 @@ pub struct TimeBasis {
     pub monomials: [[f64; POINTS]; POINTS],
     /// b_i = ∫L_i dθ.
     pub weights: [f64; POINTS],
-    /// S_ik = ∫L_i L_k′ dθ: f at the points and u there do the work Σ f_i S_ik u_k.
+    /// S_ik = ∫L_i L_k′ dθ: forces f and displacements u at the points do the work Σ f_i S_ik u_k.
     pub work: [[f64; POINTS]; POINTS],
     /// `[a][i]`: coefficient of θᵃ of the L2 projection of L_i on degree s − 1.
     pub projection: [[f64; POINTS]; MOST],
-    /// Weights of the values at the points whose sum is what the highest divided difference leaves out of an integral.
+    /// Weights of the values at the points that estimate the part of an integral that the highest divided difference misses.
     pub left_out: [f64; POINTS],
-    /// `[place][i]`: L_i at places between the points.
+    /// `[place][i]`: L_i at positions between the points.
     pub between: [[f64; POINTS]; PLACES],
 }
 
 impl TimeBasis {
-    /// Makes the basis of degree s.
+    /// Creates the basis of degree s.
     ///
     /// # Panics
-    /// For another degree than 1, 2, 3.
+    /// If `degree` is not 1, 2 or 3.
     pub fn new(degree: usize) -> Self {
         let points = match degree {
             1 => [0.0, 1.0, 0.0, 0.0],
@@ -79,7 +79,7 @@ impl TimeBasis {
         basis
     }
 
-    /// Coefficients of θᵃ of the polynomial through values at the points.
+    /// Coefficients of θᵃ of the polynomial with the given values at the points.
     pub fn coefficients(&self, values: &[f64; POINTS]) -> [f64; POINTS] {
         let mut sums = [0.0; POINTS];
         for (value, row) in values[..self.count()].iter().zip(&self.monomials) {
@@ -98,7 +98,7 @@ impl TimeBasis {
         self.monomials.map(|row| row[1] + theta * (2.0 * row[2] + theta * 3.0 * row[3]))
     }
 
-    /// Number of points, the start included.
+    /// Number of points including the start.
     pub fn count(&self) -> usize {
         self.degree + 1
     }
@@ -118,7 +118,7 @@ fn slopes_at(i: usize, points: &[f64]) -> [f64; POINTS] {
     slopes
 }
 
-/// Small numbers as reals.
+/// Converts a small integer to a real number.
 #[expect(clippy::cast_precision_loss, reason = "below 100")]
 pub(super) fn real(value: usize) -> f64 {
     value as f64
@@ -134,7 +134,7 @@ fn projection(degree: usize, monomials: &[[f64; POINTS]; POINTS]) -> [[f64; POIN
     std::array::from_fn(|a| std::array::from_fn(|i| if a < degree && i <= degree { solved[(a, i)] } else { 0.0 }))
 }
 
-/// The divided difference over all points times |∫Π(θ − c)|, Π over all points but the last before the end.
+/// The divided difference over all points times |∫Π(θ − c)|, where Π omits the last point before the end.
 fn left_out(degree: usize, points: &[f64; POINTS]) -> [f64; POINTS] {
     let kept = (0..=degree).filter(|i| degree == 1 && *i == 0 || degree > 1 && *i + 1 != degree);
     // Coefficients of the product, lowest first.
@@ -182,7 +182,7 @@ mod tests {
         }
     }
 
-    /// S + Sᵀ is what the ends leave of a product; S of a constant is 0.
+    /// S + Sᵀ contains only the end values of a product; S of a constant is 0.
     #[test]
     fn force_work_and_displacement_work_share_one_product() {
         for degree in 1..=MOST {

@@ -1,15 +1,15 @@
-//! How contact forces at the points of a step move the contact rows at these points.
+//! Displacements of the contact rows at the points of a step caused by contact forces at these points.
 
 use super::kernels::PADDED;
 use nalgebra::DMatrix;
 
-/// Lanes of a step: points 1 … s one after the other, nodes within them, filled up to whole registers. What has three components has
-/// one row of lanes for each.
+/// Lanes of a step: points 1 … s one after the other, with all nodes at each point, padded to whole registers. Vectors have one
+/// row of lanes for each of their three components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Lanes {
-    /// s.
+    /// Number of points, s.
     pub points: usize,
-    /// Contact nodes.
+    /// Number of contact nodes.
     pub nodes: usize,
 }
 
@@ -19,12 +19,12 @@ impl Lanes {
         self.points * self.nodes
     }
 
-    /// Without any.
+    /// Returns whether there are no lanes.
     pub fn is_empty(self) -> bool {
         self.len() == 0
     }
 
-    /// Length of a row.
+    /// Length of a row including padding.
     pub fn width(self) -> usize {
         self.len().next_multiple_of(PADDED)
     }
@@ -39,12 +39,12 @@ impl Lanes {
         (lane / self.nodes + 1, lane % self.nodes)
     }
 
-    /// Three components of a lane.
+    /// Returns the three components of a lane.
     pub fn vector3(self, values: &[f64], lane: usize) -> [f64; 3] {
         [0, 1, 2].map(|component| values[component * self.width() + lane])
     }
 
-    /// Set them.
+    /// Sets the three components of a lane.
     pub fn set(self, values: &mut [f64], lane: usize, to: [f64; 3]) {
         for (component, value) in to.into_iter().enumerate() {
             values[component * self.width() + lane] = value;
@@ -52,25 +52,25 @@ impl Lanes {
     }
 }
 
-/// Displacements (m) of all lanes per force (N), a column of three rows of lanes for each component of force.
+/// Displacements of all lanes per force (m/N), with a column of three rows of lanes for each force component.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaneCompliance {
     lanes: Lanes,
-    /// Forces at point 0 and at points 1 … s: column 3(k·nodes + node) + component.
+    /// Columns of forces at points 0 … s: column 3(k·nodes + node) + component.
     columns: Vec<f64>,
-    /// Forces that are the same at points 1 … s: column 3·node + component.
+    /// Columns of forces that are equal at points 1 … s: column 3·node + component.
     held: Vec<f64>,
 }
 
 impl LaneCompliance {
-    /// All zero.
+    /// Creates a compliance with all entries zero.
     pub fn new(lanes: Lanes) -> Self {
         let stride = 3 * lanes.width();
         let column = 3 * lanes.nodes * stride;
         Self { lanes, columns: vec![0.0; (lanes.points + 1) * column], held: vec![0.0; column] }
     }
 
-    /// Lanes.
+    /// Returns the lanes.
     pub fn lanes(&self) -> Lanes {
         self.lanes
     }
@@ -85,20 +85,20 @@ impl LaneCompliance {
         &self.columns
     }
 
-    /// Columns of forces that stay from point 1 on.
+    /// Columns of forces that are equal from point 1 on.
     pub fn held(&self) -> &[f64] {
         &self.held
     }
 
-    /// Three columns, of a force at lane `lane`.
+    /// The three columns of a force at lane `lane`.
     pub fn of_lane(&self, lane: usize) -> [&[f64]; 3] {
         let stride = self.stride();
         let first = 3 * (lane + self.lanes.nodes);
         [0, 1, 2].map(|component| &self.columns[(first + component) * stride..][..stride])
     }
 
-    /// Enter P_ik (rows × rows, m/N) of points i = 1 … s and k = 0 … s. After the last the columns that are held follow with
-    /// [`LaneCompliance::hold`].
+    /// Sets P_ik (rows × rows, m/N) of points i = 1 … s and k = 0 … s. After the last block, call [`LaneCompliance::hold`] to
+    /// compute the columns of constant forces.
     pub fn set(&mut self, i: usize, k: usize, block: &DMatrix<f64>) {
         let (lanes, stride) = (self.lanes, self.stride());
         for (force, column) in block.column_iter().enumerate() {
@@ -109,7 +109,7 @@ impl LaneCompliance {
         }
     }
 
-    /// Add up the columns of points 1 … s.
+    /// Sums the columns of points 1 … s into those of constant forces.
     pub fn hold(&mut self) {
         self.held.fill(0.0);
         if self.held.is_empty() {

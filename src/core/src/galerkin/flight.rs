@@ -2,12 +2,12 @@
 
 use super::level::ContactModes;
 
-/// A mode of angular frequency ω and damping ratio ξ < 1 over one length of time.
+/// Motion of a mode with angular frequency ω and damping ratio ξ < 1 over one length of time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Swing {
-    /// q and q̇ at the end by (q, q̇).
+    /// Coefficients of q and q̇ in q and q̇ at the end.
     end: [[f64; 2]; 2],
-    /// Damping loss 2ξω∫q̇² dt by q², 2qq̇ and q̇² (J).
+    /// Coefficients of q², 2qq̇ and q̇² in the damping loss 2ξω∫q̇² dt (J).
     loss: [f64; 3],
 }
 
@@ -28,7 +28,7 @@ impl Swing {
         if a == 0.0 {
             return Self { end, loss: [0.0; 3] };
         }
-        // ∫e^(−2at) of 1, cos 2ω_d t, sin 2ω_d t.
+        // ∫e^(−2at) times 1, cos 2ω_d t and sin 2ω_d t.
         let (double, left) = (2.0 * sine * cosine, decay * decay);
         let (even, norm) = (left * (1.0 - 2.0 * sine * sine), 2.0 * square);
         let plain = -libm::expm1(-2.0 * a * length) / (2.0 * a);
@@ -42,7 +42,7 @@ impl Swing {
     }
 }
 
-/// Modes of one kind of sector over one length of time.
+/// Free flight of the modes of one kind of sector over one length of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeFlight {
     length: f64,
@@ -52,14 +52,14 @@ pub struct FreeFlight {
 }
 
 impl FreeFlight {
-    /// Makes tables of these modes; call [`FreeFlight::set_length`] before the first flight.
+    /// Creates tables of these modes; call [`FreeFlight::set_length`] before the first flight.
     pub fn new(modes: &ContactModes) -> Self {
         let ratios = modes.frequencies.iter().zip(&modes.damping_ratios);
         let modes: Vec<[f64; 2]> = ratios.map(|(frequency, ratio)| [*frequency, *ratio]).collect();
         Self { length: 0.0, swings: vec![Swing::default(); modes.len()], modes }
     }
 
-    /// Fill the table for a length of time (s). Does not allocate.
+    /// Fills the tables for a length of time (s). Does not allocate.
     pub fn set_length(&mut self, length: f64) {
         if self.length.to_bits() != length.to_bits() {
             self.length = length;
@@ -69,7 +69,7 @@ impl FreeFlight {
         }
     }
 
-    /// Take q and q̇ there; the damping loss (J).
+    /// Advances q and q̇ over the flight and returns the damping loss (J).
     pub fn take(&self, position: &mut [f64], velocity: &mut [f64]) -> f64 {
         let mut loss = 0.0;
         for (Swing { end, loss: form }, (q, v)) in self.swings.iter().zip(position.iter_mut().zip(velocity)) {
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
     use crate::galerkin::response::ModalResponse;
 
-    /// Against the matrix exponential, and energy at long times, where that overflows.
+    /// Compares with the matrix exponential, and checks the energy at long times, where the exponential overflows.
     #[test]
     fn flight_propagation_matches_the_step_response() {
         for (frequency, ratio) in [(4e3, 0.0), (5e3, 0.005), (3e3, 0.3), (8e2, 0.99), (0.0, 0.0)] {
@@ -93,7 +93,7 @@ mod tests {
             let scale: f64 = if frequency == 0.0 { 1.0 } else { frequency };
             for (of, (row, exact)) in swing.end.iter().zip([response.position, response.velocity]).enumerate() {
                 for (term, (value, exact)) in row.iter().zip(&exact[..2]).enumerate() {
-                    // q by q and q̇ by q̇ are numbers, q by q̇ a time, q̇ by q a frequency squared times it.
+                    // q per q and q̇ per q̇ are dimensionless, q per q̇ is a time, and q̇ per q a frequency squared times a time.
                     let size = [[1.0, 1.0 / scale], [scale, 1.0]][of][term];
                     assert!((value - exact).abs() < 1e-12 * size, "{frequency} {ratio}: {value} {exact}");
                 }

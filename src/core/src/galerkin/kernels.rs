@@ -1,27 +1,27 @@
-//! Loops over columns and lanes, compiled for every set of instructions.
+//! Loops over columns and lanes, compiled for every instruction set.
 
 use crate::dynamics::dispatch::Kernel;
 use nalgebra::DMatrix;
 
-/// Tables have columns of a multiple of so many entries, filled up with zeros.
+/// Column lengths are multiples of this number of entries, padded with zeros.
 pub const PADDED: usize = 8;
 
 /// `sums[a][i]` = Σ_t `coefficients[a][t]` · `table[columns[t]·stride + i]` for `N` sets of coefficients, in the order of t.
 pub struct Combine<'a, const N: usize> {
-    /// Columns one after the other.
+    /// Columns, one after the other.
     pub table: &'a [f64],
     /// Length of a column, a multiple of [`PADDED`].
     pub stride: usize,
-    /// Which columns.
+    /// Indices of the columns.
     pub columns: &'a [usize],
-    /// As many as columns, for each set.
+    /// Coefficients of the columns, for each set.
     pub coefficients: [&'a [f64]; N],
-    /// One column each.
+    /// One sum of columns for each set.
     pub sums: [&'a mut [f64]; N],
 }
 
 impl<const N: usize> Combine<'_, N> {
-    /// `K` registers of all sums, from entry `from` on. Loops of fixed length over arrays: what compiles to registers.
+    /// Computes `K` registers of all sums from entry `from` on. Loops of fixed length over arrays stay in registers.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "iterators over these arrays do not stay in registers")]
     fn registers<const K: usize>(&mut self, from: usize) {
@@ -75,7 +75,7 @@ impl Kernel for Add<'_> {
     }
 }
 
-/// `to` = `base` − n·u, lane by lane.
+/// `to` = `base` − n·u for every lane.
 pub struct Withdraw<'a> {
     pub(super) base: &'a [f64],
     pub(super) normals: &'a [f64],
@@ -83,7 +83,7 @@ pub struct Withdraw<'a> {
     pub(super) to: &'a mut [f64],
 }
 
-/// Three rows of lanes.
+/// Splits three rows of lanes.
 #[inline(always)]
 fn split(values: &[f64], width: usize) -> [&[f64]; 3] {
     [0, 1, 2].map(|component| &values[component * width..][..width])
@@ -101,7 +101,7 @@ impl Kernel for Withdraw<'_> {
     }
 }
 
-/// Displacements of all lanes per λ of one, from those per force: column = Σ d_c Z_c, and closing = n·column.
+/// Displacements of all lanes per λ of one lane, from those per force: column = Σ d_c Z_c and closing = n·column.
 pub struct ClosingColumn<'a> {
     pub(super) parts: [&'a [f64]; 3],
     pub(super) direction: [f64; 3],
@@ -125,7 +125,7 @@ impl Kernel for ClosingColumn<'_> {
     }
 }
 
-/// y += A x for the entries of x that are not 0.
+/// y += A x, using only the nonzero entries of x.
 pub struct AddProduct<'a> {
     pub(super) matrix: &'a DMatrix<f64>,
     pub(super) x: &'a [f64],
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
     use crate::dynamics::dispatch::InstructionSet;
 
-    /// Numbers that no order of summation leaves alone.
+    /// Numbers whose sum depends on the order of summation.
     fn numbers(count: usize) -> Vec<f64> {
         (0..count).map(|i| f64::from(u32::try_from(i * 7919 % 1009).unwrap()).sqrt() - 15.0).collect()
     }

@@ -1,4 +1,4 @@
-//! Tables of the modes of one sector at one length of the step.
+//! Tables of the modes of one sector for one step length.
 
 use super::basis::{MOST, POINTS, TimeBasis};
 use super::compliance::{LaneCompliance, Lanes};
@@ -7,16 +7,16 @@ use super::response::{ModalResponse, TERMS, by_points};
 use super::trial::ForceInterpolation;
 use nalgebra::DMatrix;
 
-/// Modes with inertia and residual flexibility of a sector, seen at its contact rows (three per contact node).
+/// Modes with inertia and residual flexibility of a sector at its contact rows (three per contact node).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactModes {
-    /// ω (rad/s).
+    /// Angular frequencies ω (rad/s).
     pub frequencies: Vec<f64>,
-    /// ξ.
+    /// Damping ratios ξ.
     pub damping_ratios: Vec<f64>,
-    /// Φ of the contact rows, rows × modes (1/√kg).
+    /// Mode shapes Φ at the contact rows, rows × modes (1/√kg).
     pub shapes: DMatrix<f64>,
-    /// G: static displacement of the rows under forces there that the modes leave out, rows × rows (m/N).
+    /// Residual flexibility G: static displacement of the rows per force on the rows that the modes do not represent, rows × rows (m/N).
     pub residual: DMatrix<f64>,
 }
 
@@ -26,12 +26,12 @@ impl ContactModes {
         self.frequencies.len()
     }
 
-    /// Without any mode.
+    /// Returns whether there are no modes.
     pub fn is_empty(&self) -> bool {
         self.frequencies.is_empty()
     }
 
-    /// A mode before this one with its frequency and damping ratio: its neighbour, or the real part of its pair in a row of lanes.
+    /// Returns an earlier mode with the same frequency and damping ratio: its neighbour, or the real part of its pair in a row of lanes.
     fn twin(&self, mode: usize) -> Option<usize> {
         let of = |mode: usize| [self.frequencies[mode].to_bits(), self.damping_ratios[mode].to_bits()];
         [1, PADDED].into_iter().filter_map(|back| mode.checked_sub(back)).find(|twin| of(*twin) == of(mode))
@@ -42,7 +42,7 @@ impl ContactModes {
         self.shapes.nrows()
     }
 
-    /// Σ c_m φφᵀ of the contact rows, written to `sum`.
+    /// Writes Σ c_m φφᵀ of the contact rows to `sum`.
     fn weigh(&self, weight: impl Fn(usize) -> f64, sum: &mut DMatrix<f64>) {
         sum.fill(0.0);
         for (mode, shape) in self.shapes.column_iter().enumerate() {
@@ -53,16 +53,16 @@ impl ContactModes {
         }
     }
 
-    /// The same, made.
+    /// Returns Σ c_m φφᵀ of the contact rows.
     fn weighted(&self, weight: impl Fn(usize) -> f64) -> DMatrix<f64> {
         let mut sum = DMatrix::zeros(self.rows(), self.rows());
         self.weigh(weight, &mut sum);
         sum
     }
 
-    /// The form δ² = JᵀQJ of the displacement δ (m) that an impulse J (N·s) on the contact rows leaves: the root of the mean square over
-    /// rows of what modes swing by, added up over modes as if they had nothing to do with each other. Rigid modes count by what they
-    /// move in the period of the lowest that vibrates.
+    /// The form δ² = JᵀQJ of the displacement error δ (m) caused by an impulse J (N·s) on the contact rows: the root mean square
+    /// over rows of the modal amplitudes, summed over modes as if they were independent. Rigid-body modes count with their
+    /// displacement in the period of the lowest vibration mode.
     pub fn error_form(&self) -> DMatrix<f64> {
         let lowest =
             self.frequencies.iter().copied().filter(|frequency| *frequency > 0.0).fold(f64::INFINITY, f64::min);
@@ -76,8 +76,9 @@ impl ContactModes {
         self.weighted(scale)
     }
 
-    /// Whether contact problems of degree 3 are solvable without friction at all steps between half of `step` (s) and it: where
-    /// G ⪰ 0.04 h² Σ φφᵀ over ωh < 4.3. (0.0233 is where the first counter-example was found.) Those of degree 2 always are.
+    /// Returns whether frictionless contact problems of degree 3 are solvable for all steps between `step`/2 and `step` (s). The
+    /// criterion is G ⪰ 0.04 h² Σ φφᵀ over ωh < 4.3 (the first counter-example was found at 0.0233). Problems of degree 2 are
+    /// always solvable.
     pub fn allows_cubics(&self, step: f64) -> bool {
         let slow: Vec<usize> = (0..self.len()).filter(|mode| self.frequencies[*mode] * step < 8.6).collect();
         let shapes = self.shapes.select_columns(&slow);
@@ -93,9 +94,9 @@ impl ContactModes {
 pub struct ModeSteps {
     /// `[i][0, 1]`: coefficients of q and q̇ in the displacement at point i + 1.
     pub points: [[Vec<f64>; 2]; MOST],
-    /// q and q̇ at the end by (q, q̇, p_a).
+    /// Coefficients of (q, q̇, p_a) in q and q̇ at the end.
     pub end: [[Vec<f64>; TERMS]; 2],
-    /// Damping loss (J): a symmetric form of the same.
+    /// Damping loss (J), a symmetric form of (q, q̇, p_a).
     pub loss: [[Vec<f64>; TERMS]; TERMS],
 }
 
@@ -134,26 +135,26 @@ impl ModeSteps {
 pub struct Influence {
     /// `[i - 1][k]`: displacement at point i per modal force at point k.
     pub points: [[f64; POINTS]; MOST],
-    /// Displacement at the end per modal force that is constant.
+    /// Displacement at the end per constant modal force.
     pub constant: f64,
 }
 
-/// Tables of one length of the step.
+/// Tables for one step length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepTables {
     /// h (s).
     pub step: f64,
-    /// The same as a share of the span.
+    /// Step length as a fraction of the span.
     pub share: f64,
     /// Points of the step.
     pub basis: TimeBasis,
     /// Motion of all modes over the step.
     pub modes: ModeSteps,
-    /// Displacements at the points per force at the points, residual flexibility included.
+    /// Displacements at the points per force at the points, including residual flexibility.
     pub compliance: LaneCompliance,
-    /// Displacement at the end per force that is constant over the step, residual flexibility included.
+    /// Displacement at the end per constant force over the step, including residual flexibility.
     pub constant: LaneCompliance,
-    /// Whether any mode is damped.
+    /// True if any mode is damped.
     pub damped: bool,
     /// Displacement of each mode at point i per force at point k, and at the end per constant force.
     pub influence: Vec<Influence>,
@@ -161,7 +162,7 @@ pub struct StepTables {
 }
 
 impl StepTables {
-    /// Room for tables of degree s; [`StepTables::set_step`] fills them.
+    /// Allocates tables of degree s; [`StepTables::set_step`] fills them.
     pub fn new(modes: &ContactModes, degree: usize) -> Self {
         let nodes = modes.rows() / 3;
         Self {
@@ -177,7 +178,7 @@ impl StepTables {
         }
     }
 
-    /// Returns the displacements of all lanes under forces of a kind.
+    /// Returns the displacements of all lanes per force of a kind.
     pub fn compliance_of(&self, kind: ForceInterpolation) -> &LaneCompliance {
         match kind {
             ForceInterpolation::Polynomial => &self.compliance,
@@ -185,7 +186,7 @@ impl StepTables {
         }
     }
 
-    /// Fill the tables for step h (s). Does not allocate.
+    /// Fills the tables for step h (s). Does not allocate.
     pub fn set_step(&mut self, modes: &ContactModes, step: f64) {
         let Self { basis, influence, block, .. } = self;
         self.step = step;
@@ -223,7 +224,7 @@ impl StepTables {
 mod tests {
     use super::*;
 
-    /// All combinations of closed points of one node have one solution, with as little residual flexibility as degree 3 is taken for.
+    /// All combinations of closed points of one node have one solution, even with the smallest residual flexibility for which degree 3 is used.
     #[test]
     fn selected_degree_gives_solvable_contact_problems() {
         let (frequency, mut threes) = (1e4, 0);

@@ -1,62 +1,62 @@
-//! A span of time in steps as long as the tolerance and the energy allow, of one sector or of all that step together.
+//! Integrates a sector, or sectors that step together, over a span with steps that the tolerance and the energy balance allow.
 
 use super::sector::{Effort, HALVINGS, StepGoal, Stopped};
 use super::trial::{ForceInterpolation, TrialResult};
 
-/// Below this share of the tolerance the next step is twice as long.
+/// The next step is twice as long if the error is below this fraction of the tolerance.
 const LENGTHEN: f64 = 1.0 / 32.0;
-/// Steps that would pay into a bank which is not spent are halved down to this level.
+/// Steps that would add to a bank that still holds energy are halved down to this level.
 const SAVED: usize = 3;
-/// The bank is full with this share of the largest energy there was: steps that would pay into it are halved down to the shortest then.
+/// The bank is full at this fraction of the largest energy so far; steps that would add to a full bank are halved down to the shortest.
 const FULL: f64 = 0.01;
-/// Nearness between points is looked at down to this step (s).
+/// Shortest step that is halved because a node comes near between the points (s).
 const SHORTEST_LOOK: f64 = 2.5e-6;
 
-/// A step within a span: its level, and where it begins and how long it is as shares of the span.
+/// A step within a span: its level, and its start and length as fractions of the span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpanStep {
-    /// Number of times that the span is halved.
+    /// Number of halvings of the span.
     pub level: usize,
-    /// Start.
+    /// Start, as a fraction of the span.
     pub from: f64,
-    /// Length.
+    /// Length, as a fraction of the span.
     pub length: f64,
 }
 
 /// A system that is integrated with adaptive steps.
 pub trait AdaptiveStepper {
-    /// Energy left by contacts that opened and closed (J), and level of the next step; both go on from step to step.
+    /// Returns the energy bank of contacts that opened and closed (J) and the level of the next step; both persist from step to step.
     fn step_control(&mut self) -> (&mut f64, &mut usize);
 
-    /// Largest energy up to now, that of the start of the step included (J).
+    /// Largest energy so far, including the start of the step (J).
     fn largest_energy(&mut self) -> f64;
 
-    /// Length of steps of a level (s).
+    /// Length of the steps of a level (s).
     fn length(&self, level: usize) -> f64;
 
     /// Returns the number of sectors.
     fn count(&self) -> u64;
 
-    /// Take the step without a trial, if nothing can touch on the way.
+    /// Takes the step without a trial if no contact is possible during the step, and returns whether it did.
     fn fly(&mut self, step: SpanStep) -> bool;
 
-    /// Try a step.
+    /// Tries a step.
     fn attempt(&mut self, step: SpanStep, kind: ForceInterpolation) -> TrialResult;
 
-    /// Take the step that was tried last; what contacts leave to those to come (J).
+    /// Accepts the step of the last trial and returns the energy that its contacts add to the bank (J).
     fn take(&mut self, step: SpanStep, kind: ForceInterpolation, verdict: &TrialResult) -> f64;
 }
 
-/// March over a span.
+/// Integrates over a span.
 ///
 /// # Errors
-/// [`Stopped`]; the state is then where the last step taken left it.
+/// [`Stopped`]; the state is then that after the last accepted step.
 pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Effort) -> Result<(), Stopped> {
     const WHOLE: u64 = 1 << HALVINGS;
     let (count, mut done) = (body.count(), 0_u64);
     while done < WHOLE {
         let level = *body.step_control().1;
-        // The shortest may take two.
+        // A shortest step may need two trials.
         let next = count * if level == HALVINGS { 2 } else { 1 };
         if effort.tried().saturating_add(next) > demand.most {
             return Err(Stopped::Exhausted);
@@ -95,13 +95,13 @@ pub fn march(body: &mut impl AdaptiveStepper, demand: StepGoal, effort: &mut Eff
     Ok(())
 }
 
-/// Whether the bank would hold more than it may with `paid` (J) paid in. Where there was no energy yet, nobody knows what is much.
+/// Returns whether the bank would exceed its limit if `paid` (J) were added. Without any energy so far there is no limit.
 fn overflows(body: &mut impl AdaptiveStepper, paid: f64) -> bool {
     let largest = body.largest_energy();
     largest > 0.0 && *body.step_control().0 + paid > FULL * largest
 }
 
-/// Try one step; the shortest with a constant force where a polynomial cannot be taken.
+/// Tries one step; a shortest step is tried with a constant force if the polynomial is rejected.
 fn attempt(body: &mut impl AdaptiveStepper, step: SpanStep, effort: &mut Effort) -> (TrialResult, ForceInterpolation) {
     let count = body.count();
     let mut run = |body: &mut _, kind: ForceInterpolation| {
@@ -121,7 +121,7 @@ fn attempt(body: &mut impl AdaptiveStepper, step: SpanStep, effort: &mut Effort)
     (verdict, ForceInterpolation::Constant)
 }
 
-/// Small counts as a share.
+/// Returns a fraction of small integers.
 #[expect(clippy::cast_precision_loss, reason = "below 2^HALVINGS")]
 fn share(part: u64, whole: u64) -> f64 {
     part as f64 / whole as f64

@@ -1,9 +1,11 @@
-//! Continuous Galerkin in time of one sector: contact forces as polynomials, modes driven by them exactly, steps by a tolerance.
+//! Continuous Galerkin in time of one sector: contact forces are polynomials, the modes follow them exactly, and a tolerance
+//! controls the steps.
 //!
-//! The road: [`level`] makes tables of all modes at one length of the step, from the [`response`] of each and the points of a [`basis`];
-//! [`trial`] solves contact at these points, as lanes of registers ([`compliance`], [`kernels`]), and judges the step; [`sector`] takes
-//! it ([`advance`]), or tries one half as long. What a sector may touch is an [`trial::Obstacle`], and who keeps the books a
-//! [`sector::Witness`]: nothing here knows a scene. A [`flight`] is as long as nothing comes near.
+//! [`level`] makes tables of all modes for one step length, from the [`response`] of each mode and the points of a [`basis`].
+//! [`trial`] solves the contact problem at these points, as lanes of registers ([`compliance`], [`kernels`]), and judges the
+//! step. [`sector`] accepts it ([`advance`]) or tries a step of half the length. The surfaces are a [`trial::Obstacle`], and a
+//! [`sector::Witness`] records the steps; this module is independent of the scene. A [`flight`] lasts as long as nothing comes
+//! near.
 
 pub mod advance;
 pub mod basis;

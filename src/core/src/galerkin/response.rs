@@ -1,4 +1,4 @@
-//! What one mode does over a step under a force that is a polynomial in time, exactly.
+//! Exact response of one mode over a step to a force that is a polynomial in time.
 
 use super::basis::{MOST, POINTS, TimeBasis, real};
 use nalgebra::SMatrix;
@@ -6,7 +6,7 @@ use nalgebra::SMatrix;
 /// Modal state and force: q, q̇, and the coefficients p_a of θᵃ of the modal force.
 pub const TERMS: usize = 2 + MOST;
 
-/// q̈ + 2ξωq̇ + ω²q = Σ p_a θᵃ over one step: linear in (q, q̇, p₀, p₁, p₂) at its start.
+/// Solution of q̈ + 2ξωq̇ + ω²q = Σ p_a θᵃ over one step, linear in (q, q̇, p₀, p₁, p₂) at its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModalResponse {
     /// q at the end.
@@ -15,11 +15,11 @@ pub struct ModalResponse {
     pub velocity: [f64; TERMS],
     /// ∫θʲ q dθ, j = 0, 1.
     pub moments: [[f64; TERMS]; 2],
-    /// Damping loss 2ξω∫q̇² dt: a symmetric form (J).
+    /// Damping loss 2ξω∫q̇² dt, a symmetric form (J).
     pub loss: [[f64; TERMS]; TERMS],
 }
 
-/// Places in the state whose exponential is taken.
+/// Indices of the state vector of the matrix exponential.
 const POSITION: usize = 0;
 const SPEED: usize = 1;
 const FORCE: usize = 2;
@@ -29,9 +29,9 @@ const STATES: usize = DOUBLE + 1;
 const BOTH: usize = 2 * TERMS;
 
 impl ModalResponse {
-    /// For angular frequency ω (rad/s; 0: rigid), damping ratio ξ and step h (s).
+    /// Response for angular frequency ω (rad/s; 0 for a rigid-body mode), damping ratio ξ and step h (s).
     ///
-    /// The state is (q, q̇h/κ, p and its derivatives by θ, ∫q, ∫∫q) with κ = max(ωh, 1), and its flow a matrix
+    /// The state is (q, q̇h/κ, p and its derivatives with respect to θ, ∫q, ∫∫q) with κ = max(ωh, 1). Its flow is a matrix
     /// exponential (Taylor series, scaling and squaring).
     pub fn new(frequency: f64, damping_ratio: f64, step: f64) -> Self {
         let angle = frequency * step;
@@ -47,7 +47,7 @@ impl ModalResponse {
         flow[(INTEGRAL, POSITION)] = 1.0;
         flow[(DOUBLE, INTEGRAL)] = 1.0;
         let end = exponential(&flow);
-        // Columns of (q, q̇, p_a) for those of the state: p has the derivatives a! p_a.
+        // Columns of (q, q̇, p_a) from those of the state: p has the derivatives a! p_a.
         let forced = step * step / kappa;
         let scale = [1.0, step / kappa, forced, forced, 2.0 * forced];
         let row = |row: usize, factor: f64| -> [f64; TERMS] {
@@ -63,8 +63,8 @@ impl ModalResponse {
         }
     }
 
-    /// Coefficients of q at point i = 1 … s of the polynomial of degree s that keeps both ends and the moments up to s − 2: those of
-    /// (q, q̇, p_a).
+    /// Coefficients of (q, q̇, p_a) in q at point i = 1 … s, for the polynomial of degree s that preserves both end values and
+    /// the moments up to s − 2.
     pub fn at_points(&self, basis: &TimeBasis) -> [[f64; TERMS]; MOST] {
         let s = basis.degree;
         let moment = |j: usize, i: usize| -> f64 {
@@ -90,8 +90,8 @@ impl ModalResponse {
     }
 }
 
-/// e^A by scaling to a norm below ½, twenty terms of the series, and squaring. (nalgebra's needs the standard library's mathematics,
-/// whose bits depend on the machine.)
+/// e^A by scaling to a norm below ½, twenty terms of the series, and squaring. (The version of nalgebra needs the mathematics of
+/// the standard library, whose bits depend on the machine.)
 fn exponential<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
     let mut largest = matrix.row_iter().map(|row| row.iter().map(|entry| entry.abs()).sum()).fold(0.0, f64::max);
     let (mut squarings, mut scale) = (0, 1.0);
@@ -129,7 +129,7 @@ fn loss(flow: &SMatrix<f64, STATES, STATES>, factor: f64, scale: &[f64; TERMS]) 
 mod tests {
     use super::*;
 
-    /// Fourth-order steps so short that rounding is what is left.
+    /// Fourth-order steps so short that only rounding errors remain.
     fn marched(frequency: f64, ratio: f64, step: f64, start: [f64; TERMS]) -> ([f64; 4], f64) {
         let count = 20_000;
         let h = 1.0 / f64::from(count);
@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    /// ΔE = ∫p q̇ − loss, with the work told by the points.
+    /// ΔE = ∫p q̇ − loss, with the work computed from the values at the points.
     #[test]
     fn energy_change_equals_work_minus_loss() {
         let mut worst: f64 = 0.0;

@@ -1,4 +1,4 @@
-//! Shapes of the modes at the contact rows, laid out for sums over modes and over rows.
+//! Mode shapes at the contact rows, arranged for sums over modes and over rows.
 
 use super::kernels::{Combine, PADDED};
 use super::level::{ContactModes, StepTables};
@@ -6,38 +6,38 @@ use super::state::SectorState;
 use crate::dynamics::dispatch::{InstructionSet, Kernel};
 use nalgebra::DMatrix;
 
-/// Data that all lengths of the step share.
+/// Data that all step lengths share.
 #[derive(Debug, Clone)]
 pub struct ContactRows {
-    /// Mode by mode: all nodes of the first component, of the second, of the third, filled up with zeros.
+    /// Shapes mode by mode: all nodes of the first component, then of the second and the third, padded with zeros.
     by_mode: Vec<f64>,
-    /// The same without signs.
+    /// Magnitudes of `by_mode`.
     magnitudes: Vec<f64>,
     stride: usize,
-    /// Row by row (3·node + component), filled up with zeros.
+    /// Shapes row by row (3·node + component), padded with zeros.
     by_row: Vec<f64>,
     instructions: InstructionSet,
     residual: DMatrix<f64>,
     error_form: DMatrix<f64>,
-    /// ξω and 1/ω_d of each mode; the latter infinite of rigid ones.
+    /// ξω and 1/ω_d of each mode; 1/ω_d is infinite for rigid-body modes.
     rates: Vec<[f64; 2]>,
-    /// 0, 1, 2, …
+    /// The indices 0, 1, 2, …
     all: Vec<usize>,
 }
 
 /// Largest phase angle of a mode over a step that resolves its motion (rad).
 const RESOLVED: f64 = 2.0;
 
-/// Coefficients of all modes, and what they add up to; made once.
+/// Coefficients of all modes and the sums over modes; allocated once.
 #[derive(Debug, Clone)]
 pub struct Sums<const N: usize> {
     coefficients: [Vec<f64>; N],
-    /// Rows of each set: all nodes of the first component, of the second, of the third.
+    /// Rows of each set: all nodes of the first component, then of the second and the third.
     pub rows: [Vec<f64>; N],
 }
 
 impl<const N: usize> Sums<N> {
-    /// For so many modes and contact nodes.
+    /// Allocates sums for `modes` modes and `nodes` contact nodes.
     pub fn new(modes: usize, nodes: usize) -> Self {
         Self {
             coefficients: std::array::from_fn(|_| vec![0.0; modes]),
@@ -45,13 +45,13 @@ impl<const N: usize> Sums<N> {
         }
     }
 
-    /// Three components of a node in a set.
+    /// Returns the three components of a node in a set.
     pub fn vector3(&self, set: usize, node: usize, nodes: usize) -> [f64; 3] {
         [0, 1, 2].map(|component| self.rows[set][component * nodes + node])
     }
 }
 
-/// `to` = `a`·q + `b`·v of all modes.
+/// `to` = `a`·q + `b`·v for all modes.
 struct Weigh<'a> {
     tables: [&'a [f64]; 2],
     state: [&'a [f64]; 2],
@@ -69,7 +69,7 @@ impl Kernel for Weigh<'_> {
 }
 
 impl ContactRows {
-    /// Makes the rows of the modes of a sector.
+    /// Arranges the rows of the modes of a sector.
     pub fn new(modes: &ContactModes) -> Self {
         let (nodes, count) = (modes.rows() / 3, modes.len());
         let stride = modes.rows().next_multiple_of(PADDED);
@@ -98,7 +98,7 @@ impl ContactRows {
         }
     }
 
-    /// G (m/N), rows 3·node + component.
+    /// Residual flexibility G (m/N), rows 3·node + component.
     pub fn residual(&self) -> &DMatrix<f64> {
         &self.residual
     }
@@ -108,7 +108,7 @@ impl ContactRows {
         &self.error_form
     }
 
-    /// For the first `points` points of the step, or for its end alone, the sums Σ φ (A q + B q̇).
+    /// Sums Σ φ (A q + B q̇) for the range `points` of the points of a step.
     pub fn free(&self, level: &StepTables, state: &SectorState, points: std::ops::Range<usize>, sums: &mut Sums<3>) {
         for (point, to) in points.clone().zip(&mut sums.coefficients) {
             let [a, b] = &level.modes.points[point];
@@ -123,7 +123,7 @@ impl ContactRows {
         }
     }
 
-    /// Three components at a node of what all modes add up to.
+    /// Returns the three components of the sum over modes at a node.
     pub fn at_node(&self, node: usize, modes: &[f64]) -> [f64; 3] {
         let padded = self.all.len().next_multiple_of(PADDED);
         [0, 1, 2].map(|component| {
@@ -132,18 +132,18 @@ impl ContactRows {
         })
     }
 
-    /// Displacements and velocities of the modes with inertia.
+    /// Finds displacements and velocities by the modes with inertia.
     pub fn now(&self, state: &SectorState, sums: &mut Sums<2>) {
         let [one, two] = &mut sums.rows;
         self.add_up(&self.by_mode, [&state.position, &state.velocity], [one, two]);
     }
 
-    /// Adds the largest displacement of each row from rest (m) at any time without contact: the amplitudes of all modes together.
+    /// Adds the largest displacement of each row from rest (m) at any time without contact: the summed amplitudes of all modes.
     pub fn add_largest_displacements(&self, state: &SectorState, sums: &mut Sums<1>) {
         self.unresolved_amplitudes(f64::INFINITY, state, sums);
     }
 
-    /// Sums the amplitudes of the modes that turn by more than `RESOLVED` within a step of this length (s): displacements of the rows (m).
+    /// Sums the amplitudes of the modes that turn by more than `RESOLVED` within a step of this length (s), as displacements of the rows (m).
     pub fn unresolved_amplitudes(&self, step: f64, state: &SectorState, sums: &mut Sums<1>) {
         let [amplitudes] = &mut sums.coefficients;
         let modes = self.rates.iter().zip(state.position.iter().zip(&state.velocity));
@@ -163,7 +163,7 @@ impl ContactRows {
         self.add_up(&self.by_mode, [to], [one]);
     }
 
-    /// Forces on all modes, filled up to whole registers, for sets of forces on the rows `rows` (N).
+    /// Computes the forces on all modes, padded to whole registers, for sets of forces on the rows `rows` (N).
     pub fn modal_forces<const N: usize>(&self, rows: &[usize], forces: [&[f64]; N], sums: [&mut [f64]; N]) {
         let stride = self.all.len().next_multiple_of(PADDED);
         self.instructions.run(Combine { table: &self.by_row, stride, columns: rows, coefficients: forces, sums });
@@ -180,7 +180,7 @@ mod tests {
     use crate::galerkin::advance::Advance;
     use tiprub_test_models::SeededRandom;
 
-    /// Decaying vibration stays within reach, and without damping goes there.
+    /// Decaying vibration stays within the largest displacement; undamped vibration attains it.
     #[test]
     fn free_motion_bound_is_valid_and_tight() {
         let mut random = SeededRandom(6);

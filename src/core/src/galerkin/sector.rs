@@ -1,4 +1,4 @@
-//! One sector over a span of time: steps as long as the tolerance and the energy allow.
+//! Integrates one sector over a span with steps that the tolerance and the energy balance allow.
 
 use super::advance::Advance;
 use super::basis::MOST;
@@ -9,29 +9,29 @@ use super::state::SectorState;
 use super::trial::{ForceInterpolation, Obstacle, Trial, TrialResult};
 use crate::persist::persist_fields;
 
-/// Halvings of the span that a step may have.
+/// Largest number of halvings of the span.
 pub const HALVINGS: usize = 10;
 
-/// Tables of one kind of sector: spans of one length halved again and again. All have one degree.
+/// Tables of one kind of sector for a span that is halved repeatedly. All levels have the same degree.
 #[derive(Debug, Clone)]
 pub struct Tables {
     /// Data that all levels share.
     pub rows: ContactRows,
-    /// Span, half of it, a quarter, …
+    /// Tables for the span, half of it, a quarter, …
     pub levels: Vec<StepTables>,
-    /// The same of a higher degree, for steps in which no contact changes that may stick; empty without sticking.
+    /// Tables of a higher degree, for steps in which no sticking contact changes its status; empty without sticking.
     pub steady: Vec<StepTables>,
     modes: ContactModes,
 }
 
 impl Tables {
-    /// For spans up to `longest` (s); [`Tables::set_span`] comes before the first.
+    /// Creates tables for spans up to `longest` (s); call [`Tables::set_span`] before the first span.
     pub fn new(modes: ContactModes, longest: f64) -> Self {
         let degree = modes.degree_up_to(longest);
         Self::of_degree(modes, degree)
     }
 
-    /// The same of a degree that is known to do.
+    /// Creates tables of a degree that is known to be suitable.
     pub fn of_degree(modes: ContactModes, degree: usize) -> Self {
         let levels = (0..=HALVINGS).map(|_| StepTables::new(&modes, degree)).collect();
         Self { rows: ContactRows::new(&modes), levels, steady: Vec::new(), modes }
@@ -43,14 +43,14 @@ impl Tables {
         kinetic + strain
     }
 
-    /// The same with steps of degree `degree` while no contact changes.
+    /// Adds tables of degree `degree` for steps in which no contact changes its status.
     #[must_use]
     pub fn steady(mut self, degree: usize) -> Self {
         self.steady = (0..=HALVINGS).map(|_| StepTables::new(&self.modes, degree)).collect();
         self
     }
 
-    /// Tables of a level, for so many points.
+    /// Tables of a level with the given number of points.
     pub fn of_points(&self, level: usize, kind: ForceInterpolation, points: usize) -> &StepTables {
         let steady = self
             .steady
@@ -59,7 +59,7 @@ impl Tables {
         steady.unwrap_or(&self.levels[level])
     }
 
-    /// Fill the tables for spans of length `span` (s). Does not allocate.
+    /// Fills the tables for spans of length `span` (s). Does not allocate.
     pub fn set_span(&mut self, span: f64) {
         if self.levels[0].step.to_bits() == span.to_bits() {
             return;
@@ -74,112 +74,112 @@ impl Tables {
 }
 
 impl ContactModes {
-    /// Largest degree that does for spans up to `longest` (s). They may be shorter: all lengths down to a thousandth of the shortest
-    /// step are looked at.
+    /// Largest suitable degree for spans up to `longest` (s). Shorter spans are possible, so all lengths down to a thousandth of
+    /// the shortest step are checked.
     pub fn degree_up_to(&self, longest: f64) -> usize {
         let lengths = (0..2 * HALVINGS).map(|halvings| halved(longest, halvings));
         if lengths.into_iter().all(|length| self.allows_cubics(length)) { MOST } else { MOST - 1 }
     }
 }
 
-/// The shortest step of spans of length `span` (s).
+/// Shortest step of spans of length `span` (s).
 pub fn shortest(span: f64) -> f64 {
     halved(span, HALVINGS)
 }
 
-/// `span` halved so many times (s).
+/// `span` divided by 2 `halvings` times (s).
 fn halved(span: f64, halvings: usize) -> f64 {
     libm::ldexp(span, -i32::try_from(halvings).unwrap_or(i32::MAX))
 }
 
-/// Work done to keep the tolerance.
+/// Counters of the work of adaptive integration.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effort {
-    /// Steps taken.
+    /// Number of accepted steps.
     pub steps: u64,
-    /// Steps in which nothing was in reach, without a trial.
+    /// Number of steps without a trial, because no contact was possible.
     pub flights: u64,
-    /// Trials, those taken included.
+    /// Number of trials, including accepted ones.
     pub trials: u64,
-    /// Contact problems without a solution found.
+    /// Number of contact problems for which no solution was found.
     pub unsolved: u64,
-    /// Steps with a constant force.
+    /// Number of trials with a constant force.
     pub constant: u64,
-    /// Shortest steps that miss the tolerance.
+    /// Number of shortest steps that miss the tolerance.
     pub missed: u64,
-    /// Linear systems factorised.
+    /// Number of factorised linear systems.
     pub factorisations: u64,
 }
 
 persist_fields!(Effort { steps, flights, trials, unsolved, constant, missed, factorisations });
 
 impl Effort {
-    /// Steps tried, with contact or without.
+    /// Number of attempted steps, with and without contact.
     pub fn tried(&self) -> u64 {
         self.trials + self.flights
     }
 }
 
-/// Tolerances and limits of the steps of a sector.
+/// Tolerance and limits of the steps of a sector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepGoal {
-    /// Error of a step in displacements (m).
+    /// Largest displacement error of a step (m).
     pub tolerance: f64,
-    /// Gaps of contacts that count as closed (m).
+    /// Largest gap of a contact that counts as closed (m).
     pub precision: f64,
-    /// No more are tried ([`Effort::tried`]).
+    /// Largest number of attempted steps ([`Effort::tried`]).
     pub most: u64,
 }
 
-/// A step that is taken.
+/// A step that is accepted.
 #[derive(Debug)]
 pub struct AcceptedStep<'a> {
-    /// Tables of its length.
+    /// Tables for the length of the step.
     pub level: &'a StepTables,
-    /// Kind of its force.
+    /// Interpolation of the contact force.
     pub kind: ForceInterpolation,
-    /// Forces, gaps and displacements at its points.
+    /// Forces, gaps and displacements at the points of the step.
     pub trial: &'a Trial,
     /// Damping loss (J).
     pub damping_loss: f64,
-    /// ½ΔfᵀGΔf, what a constant force loses against the one before (J).
+    /// ½ΔfᵀGΔf, the energy lost by the change to a constant force (J).
     pub dropped: f64,
 }
 
 /// Records the steps of a span while it is integrated.
 pub trait Witness: Obstacle {
-    /// A step of `length` from `from` (shares of the span) is about to be tried, with forces at the points of `level`.
+    /// Called before a step of `length` from `from` (fractions of the span) is tried, with forces at the points of `level`.
     fn begin_step(&mut self, from: f64, length: f64, level: &StepTables, kind: ForceInterpolation);
 
-    /// Whether nodes that stay within `reach` (m, three per node) of where they rest cannot touch over a step of `length` from `from`
-    /// (shares of the span).
+    /// Returns whether nodes that stay within `reach` of their rest positions (m, three per node) cannot touch during a step of
+    /// `length` from `from` (fractions of the span).
     fn is_clear(&self, from: f64, length: f64, reach: &[f64]) -> bool;
 
-    /// Whether a node that stays within `reach` may come closer within that step than at its ends, by more than the tolerance.
+    /// Returns whether a node that stays within `reach` may come closer during the step than at its ends, by more than the tolerance.
     fn may_come_closer(&self, _from: f64, _length: f64, _reach: &[f64]) -> bool {
         false
     }
 
-    /// The same step is about to be taken, with these gaps and displacements at its points.
+    /// Called before the tried step is accepted, with gaps and displacements at its points.
     fn record_gaps(&mut self, _level: &StepTables, _trial: &Trial) {}
 
-    /// A step has been taken in which nothing was in reach; its damping loss (J).
+    /// Records a step in which no contact was possible, and its damping loss (J).
     fn record_flight(&mut self, damping_loss: f64);
 
-    /// The step has been taken.
+    /// Records an accepted step.
     fn record_step(&mut self, step: &AcceptedStep);
 }
 
-/// Why a span is not marched to its end.
+/// Reason why a span was not integrated to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stopped {
-    /// No step is short enough for contacts to have a solution.
+    /// Even the shortest step has no solution of the contact problem.
     Unsolved,
-    /// More steps would have to be tried than are allowed.
+    /// The limit of attempted steps is exceeded.
     Exhausted,
 }
 
-/// Marches sectors over spans, one after the other; allocates only when made.
+/// Integrates sectors over spans, one after the other; allocates only on creation.
 #[derive(Debug, Clone)]
 pub struct SectorIntegrator {
     trial: Trial,
@@ -187,12 +187,12 @@ pub struct SectorIntegrator {
 }
 
 impl SectorIntegrator {
-    /// Room for the modes and contact nodes of one sector.
+    /// Creates an integrator for the modes and contact nodes of one sector.
     pub fn new(modes: usize, nodes: usize) -> Self {
         Self { trial: Trial::new(modes, nodes), advance: Advance::new(modes, nodes) }
     }
 
-    /// The same where contacts may stick.
+    /// Enables contacts that may stick.
     #[must_use]
     pub fn sticking(mut self) -> Self {
         self.trial = self.trial.sticking().steady();
@@ -215,10 +215,10 @@ impl SectorIntegrator {
         self.trial.entered()
     }
 
-    /// March `state` over a span.
+    /// Integrates `state` over a span.
     ///
     /// # Errors
-    /// [`Stopped`]; the state is then where the last step taken left it.
+    /// [`Stopped`]; the state is then that after the last accepted step.
     pub fn march(
         &mut self,
         tables: &Tables,
@@ -232,7 +232,7 @@ impl SectorIntegrator {
     }
 }
 
-/// One sector that steps by itself.
+/// One sector that steps independently of others.
 struct SingleSector<'a, W> {
     marcher: &'a mut SectorIntegrator,
     tables: &'a Tables,

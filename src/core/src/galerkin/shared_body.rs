@@ -1,5 +1,4 @@
-//! A body that several sectors move, or whose surface they touch: a disk, or a casing. All of its modes over one step, under forces at
-//! the points of that step.
+//! A body that several sectors move or touch, a disk or a casing: all of its modes over one step, under forces at the points of the step.
 
 use super::advance::Advance;
 use super::basis::{MOST, POINTS, TimeBasis};
@@ -10,21 +9,21 @@ use super::state::SectorState;
 use super::trial::ForceInterpolation;
 use nalgebra::DMatrix;
 
-/// Modal coordinates of a body: those with inertia, those that follow forces at once, and places without a mode.
+/// Modal coordinates of a body: modes with inertia, quasi-static modes, and entries without a mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coordinates {
-    /// ω of those with inertia (rad/s), 0 of the others.
+    /// ω of the modes with inertia (rad/s), 0 for the others.
     pub frequencies: Vec<f64>,
-    /// ξ.
+    /// Damping ratios ξ.
     pub damping_ratios: Vec<f64>,
-    /// 1 with inertia, else 0.
+    /// 1 for modes with inertia, otherwise 0.
     pub inertia: Vec<f64>,
-    /// 1/ω² of those that follow at once (s²), else 0.
+    /// 1/ω² of quasi-static modes (s²), otherwise 0.
     pub softness: Vec<f64>,
 }
 
 impl Coordinates {
-    /// Makes a body of modes, the first `dynamic` of which have inertia.
+    /// Creates coordinates from modes, the first `dynamic` of which have inertia.
     pub fn new(frequencies: &[f64], damping_ratios: &[f64], dynamic: usize) -> Self {
         let of = |with: fn(f64) -> f64, without: fn(f64) -> f64| -> Vec<f64> {
             let value = |(mode, w): (usize, &f64)| if mode < dynamic { with(*w) } else { without(*w) };
@@ -38,7 +37,7 @@ impl Coordinates {
         }
     }
 
-    /// Modes with inertia as they are seen at rows, with the flexibility of the others there. `shapes` (rows × coordinates, 1/√kg).
+    /// Returns the modes with inertia at rows and the flexibility of the other modes there. `shapes`: rows × coordinates (1/√kg).
     pub fn seen_at(&self, shapes: &DMatrix<f64>) -> ContactModes {
         let (mut dynamic, rows) = (shapes.clone(), shapes.nrows());
         let mut residual = DMatrix::zeros(rows, rows);
@@ -58,7 +57,7 @@ impl Coordinates {
     }
 }
 
-/// State, tables and scratch of a body; allocates only when made.
+/// State, tables and scratch memory of a body; allocates only on creation.
 #[derive(Debug, Clone)]
 pub struct SharedBody {
     coordinates: Coordinates,
@@ -67,22 +66,22 @@ pub struct SharedBody {
     advance: Advance,
     /// Modal forces at points 0 … s.
     forces: [Vec<f64>; POINTS],
-    /// Coefficients of θᵃ of what acts on modes with inertia.
+    /// Coefficients of θᵃ of the forces on modes with inertia.
     polynomial: [Vec<f64>; MOST],
-    /// Coordinates at points 1 … s without forces, and at points 0 … s with them.
+    /// Coordinates at points 1 … s without forces, and at points 0 … s with forces.
     free: [Vec<f64>; MOST],
     at: [Vec<f64>; POINTS],
-    /// Modal loads beside contact at the start and the end of the span, linear in between, and at the points of the step; of modes with
-    /// inertia. Empty where nothing loads it.
+    /// Modal loads of modes with inertia, without contact forces: at the start and the end of the span, with linear
+    /// interpolation, and at the points of the step. Empty without loads.
     loads: [Vec<f64>; 2],
     loads_at: [Vec<f64>; POINTS],
-    /// Damping loss, and work of loads, since they were collected (J).
+    /// Damping loss and work of loads since the last collection (J).
     loss: f64,
     load_work: f64,
 }
 
 impl SharedBody {
-    /// With polynomials of degree `degree`; [`SharedBody::set_span`] comes before the first step.
+    /// Creates a body with polynomials of degree `degree`; call [`SharedBody::set_span`] before the first step.
     pub fn new(coordinates: Coordinates, degree: usize) -> Self {
         let count = coordinates.inertia.len();
         let zeros = || vec![0.0; count];
@@ -103,7 +102,7 @@ impl SharedBody {
         }
     }
 
-    /// The same with modal loads beside contact.
+    /// Enables modal loads in addition to contact forces.
     #[must_use]
     pub fn loaded(mut self) -> Self {
         let count = self.len();
@@ -117,7 +116,7 @@ impl SharedBody {
         &mut self.loads
     }
 
-    /// Tables for spans of length `span` (s).
+    /// Fills the tables for spans of length `span` (s).
     pub fn set_span(&mut self, span: f64) {
         self.tables.set_span(span);
     }
@@ -127,22 +126,22 @@ impl SharedBody {
         self.coordinates.inertia.len()
     }
 
-    /// Without any.
+    /// Returns whether there are no coordinates.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Coordinates of the body.
+    /// Returns the coordinates of the body.
     pub fn coordinates(&self) -> &Coordinates {
         &self.coordinates
     }
 
-    /// q and q̇ of now; to be set where there is inertia.
+    /// Current q and q̇; the caller sets them for modes with inertia.
     pub fn state_mut(&mut self) -> [&mut [f64]; 2] {
         [&mut self.state.position, &mut self.state.velocity]
     }
 
-    /// q̇ of now.
+    /// Current q̇.
     pub fn velocity(&self) -> &[f64] {
         &self.state.velocity
     }
@@ -152,17 +151,17 @@ impl SharedBody {
         &mut self.forces[point]
     }
 
-    /// Coordinates at point 0 … s of the step that is tried, under the forces there.
+    /// Coordinates at point 0 … s of the tried step, under the forces there.
     pub fn at(&self, point: usize) -> &[f64] {
         &self.at[point]
     }
 
-    /// Displacement of the coordinates at points per force at points.
+    /// Displacement of the coordinates at the points per force at the points.
     pub fn influence(&self, level: usize) -> &[Influence] {
         &self.tables.levels[level].influence
     }
 
-    /// Modes without inertia have no state.
+    /// Sets the state of modes without inertia to zero.
     pub fn keep_inertia(&mut self) {
         for (mode, inertia) in self.coordinates.inertia.iter().enumerate() {
             self.state.position[mode] *= inertia;
@@ -170,14 +169,14 @@ impl SharedBody {
         }
     }
 
-    /// Coordinates of now, under the forces set at point 0.
+    /// Computes the current coordinates under the forces at point 0.
     pub fn settle(&mut self) {
         for (mode, at) in self.at[0].iter_mut().enumerate() {
             *at = self.state.position[mode] + self.coordinates.softness[mode] * self.forces[0][mode];
         }
     }
 
-    /// A step begins: coordinates without forces after its start, and with loads.
+    /// Starts a step: computes the coordinates without contact forces after its start, but with loads.
     pub fn begin(&mut self, step: SpanStep, kind: ForceInterpolation) {
         self.find_loads(step, kind);
         let Self { coordinates, tables, state, free, loads_at, .. } = self;
@@ -200,7 +199,7 @@ impl SharedBody {
         }
     }
 
-    /// Loads at the points of a step; under a constant force their mean.
+    /// Finds the loads at the points of a step; for a constant force, their mean.
     fn find_loads(&mut self, step: SpanStep, kind: ForceInterpolation) {
         let Self { coordinates, tables, loads: [start, end], loads_at, .. } = self;
         let basis = &tables.levels[step.level].basis;
@@ -225,7 +224,7 @@ impl SharedBody {
         (0..self.loads[0].len()).map(of).sum()
     }
 
-    /// Coordinates at the points under the forces set there.
+    /// Computes the coordinates at the points under the forces there.
     pub fn push(&mut self, level: usize, kind: ForceInterpolation) {
         let Self { coordinates, tables, forces, free, at, .. } = self;
         let table = &tables.levels[level];
@@ -245,7 +244,7 @@ impl SharedBody {
         }
     }
 
-    /// The step is taken: the state goes to its end, whose forces become those of the start.
+    /// Accepts the step: advances the state to its end, whose forces become those at the start.
     pub fn take(&mut self, level: usize, kind: ForceInterpolation) {
         self.load_work += self.work_of_loads(&self.tables.levels[level].basis, kind);
         let Self { coordinates, tables, state, forces, polynomial, advance, loads_at, .. } = self;
@@ -268,22 +267,22 @@ impl SharedBody {
         self.loss += advance.driven(table, state, polynomial);
     }
 
-    /// A step without any force.
+    /// Takes a step without contact forces.
     pub fn fly(&mut self, level: usize) {
         self.loss += self.advance.freely(&self.tables.levels[level], &mut self.state);
     }
 
-    /// Damping loss since the last call (J).
+    /// Returns the damping loss since the last call (J).
     pub fn collect_loss(&mut self) -> f64 {
         std::mem::take(&mut self.loss)
     }
 
-    /// Work of loads since the last call (J).
+    /// Returns the work of loads since the last call (J).
     pub fn collect_load_work(&mut self) -> f64 {
         std::mem::take(&mut self.load_work)
     }
 
-    /// ½ΔpᵀGΔp of the coordinates that follow at once, of the change to a constant force (J).
+    /// ½ΔpᵀGΔp of the quasi-static coordinates, the energy lost by the change to a constant force (J).
     pub fn dropped(&self) -> f64 {
         let change = self.forces[1].iter().zip(&self.forces[0]).map(|(new, old)| new - old);
         0.5 * change.zip(&self.coordinates.softness).map(|(change, softness)| change * change * softness).sum::<f64>()
@@ -299,7 +298,7 @@ impl SharedBody {
         0.5 * (0..self.len()).map(mode).sum::<f64>()
     }
 
-    /// Largest amplitude of each coordinate from now on while nothing pushes.
+    /// Largest amplitude of each coordinate in the future motion without forces.
     pub fn amplitudes(&self, to: &mut [f64]) {
         for (mode, to) in to.iter_mut().enumerate() {
             let (w, ratio) = (self.coordinates.frequencies[mode], self.coordinates.damping_ratios[mode]);
@@ -316,8 +315,8 @@ mod tests {
     use super::*;
     use tiprub_test_models::SeededRandom;
 
-    /// Forces at the points do the work Σ p_i S_ik q_k on a body; kept as energy or lost to damping to round-off. And steps of any
-    /// length go where those half as long go, if forces are polynomials.
+    /// The work Σ p_i S_ik q_k of forces at the points equals the change of energy plus the damping loss, to rounding. And for
+    /// polynomial forces, a step gives the same result as two steps of half the length.
     #[test]
     fn work_on_body_equals_stored_plus_damped_energy() {
         let mut random = SeededRandom(11);

@@ -5,32 +5,32 @@ use nalgebra::DMatrix;
 /// State of a sector between steps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SectorState {
-    /// q.
+    /// Modal amplitudes q.
     pub position: Vec<f64>,
-    /// q̇.
+    /// Modal velocities q̇.
     pub velocity: Vec<f64>,
     /// Contact forces on the rows (N).
     pub forces: Vec<f64>,
-    /// λ of the nodes (N).
+    /// Multipliers λ of the nodes (N).
     pub multipliers: Vec<f64>,
     /// Gaps of the nodes (m).
     pub gaps: Vec<f64>,
-    /// Normals of the nodes that push, for which their forces were found.
+    /// Normals of the nodes in contact for which their forces were found.
     pub normals: Vec<f64>,
-    /// Slopes of the forces over the last step (N/s), where contacts may stick; else empty.
+    /// Slopes of the forces over the last step (N/s) if contacts may stick, otherwise empty.
     pub slopes: Vec<f64>,
-    /// Whether gaps and normals are those of now: nobody looked at the end of free flight.
+    /// True if gaps and normals are current; they are not evaluated at the end of a free flight.
     pub gaps_known: bool,
-    /// Energy that contacts which opened or closed have left to those to come (J).
+    /// Energy bank: energy lost by contacts that opened or closed, available to later steps (J).
     pub bank: f64,
-    /// Largest energy that has been asked for (J).
+    /// Largest energy that has been computed (J).
     pub largest: f64,
     /// Level of the last step.
     pub level: usize,
 }
 
 impl SectorState {
-    /// At rest, away from everything.
+    /// State at rest without contact.
     pub fn new(modes: usize, nodes: usize) -> Self {
         Self {
             position: vec![0.0; modes],
@@ -47,14 +47,14 @@ impl SectorState {
         }
     }
 
-    /// The same where contacts may stick.
+    /// Enables contacts that may stick.
     #[must_use]
     pub fn sticking(mut self) -> Self {
         self.slopes = vec![0.0; self.forces.len()];
         self
     }
 
-    /// Kinetic and strain energy (J), that of the residual flexibility included.
+    /// Kinetic energy and strain energy (J), the latter including the residual flexibility.
     pub fn energies(&self, frequencies: &[f64], residual: &DMatrix<f64>) -> (f64, f64) {
         let kinetic = 0.5 * self.velocity.iter().map(|v| v * v).sum::<f64>();
         let strain = self.position.iter().zip(frequencies).map(|(q, w)| (w * q) * (w * q)).sum::<f64>();

@@ -1,4 +1,4 @@
-//! Sectors against a wall that moves: energy, order, tolerance.
+//! Sectors that rub a moving wall: energy, order, tolerance.
 
 use super::level::{ContactModes, StepTables};
 use super::sector::{AcceptedStep, Effort, SectorIntegrator, StepGoal, Tables, Witness};
@@ -6,7 +6,7 @@ use super::state::SectorState;
 use super::trial::{ForceInterpolation, Obstacle, SlidingState};
 use nalgebra::DMatrix;
 
-/// Numbers between −1 and 1.
+/// Random numbers between −1 and 1.
 struct RandomNumbers(u64);
 
 impl RandomNumbers {
@@ -16,7 +16,7 @@ impl RandomNumbers {
     }
 }
 
-/// Modes from some hundred to some 10⁵ rad/s and what as many beyond leave.
+/// Modes from a few hundred to a few 10⁵ rad/s, and the residual flexibility of as many higher modes.
 fn modes(count: usize, nodes: usize, damping: f64, random: &mut RandomNumbers) -> ContactModes {
     let all = 2 * count;
     let shapes = DMatrix::from_fn(3 * nodes, all, |_, _| 3.0 * random.next());
@@ -34,13 +34,13 @@ fn modes(count: usize, nodes: usize, damping: f64, random: &mut RandomNumbers) -
     }
 }
 
-/// A plane across x that swings, along which it slides in y.
+/// A plane normal to x that vibrates and slides in y.
 struct MovingWall {
     clearance: f64,
     amplitude: f64,
     frequency: f64,
     friction: f64,
-    /// Start of the span and its length (s), times of the points of the step.
+    /// Start and length of the span (s), and times of the points of the step.
     start: f64,
     span: f64,
     times: [f64; 4],
@@ -143,9 +143,9 @@ struct TestRun {
     displacements: Vec<f64>,
     effort: Effort,
     wall: MovingWall,
-    /// Largest residual of the ledger, relative to the largest energy.
+    /// Largest residual of the energy balance, relative to the largest energy.
     residual: f64,
-    /// Energy at the start, at the end, and the most at the end of any span (J).
+    /// Energy at the start and at the end, and the largest energy at the end of any span (J).
     start: f64,
     energy: f64,
     most: f64,
@@ -199,7 +199,7 @@ fn energy_balance_closes_with_all_losses() {
     }
 }
 
-/// Statistics: single impacts may be missed by more.
+/// A statistical check: single impacts may exceed the tolerance by more.
 #[test]
 fn errors_meet_the_requested_tolerance() {
     let mut random = RandomNumbers(1234);
@@ -221,8 +221,8 @@ fn errors_meet_the_requested_tolerance() {
     }
 }
 
-/// Whatever the tolerance, none ever has more. What lossy switches pay in is spent, so that little is lost even where the tolerance asks for
-/// nothing.
+/// The energy never exceeds the initial energy, whatever the tolerance. Later steps spend the energy that lossy switches add to
+/// the bank, so that little is lost even with a coarse tolerance.
 #[test]
 fn an_undamped_sector_never_has_more_energy_than_it_was_given() {
     let mut random = RandomNumbers(11);

@@ -1,4 +1,4 @@
-//! Directions of a place around the axis, and vectors in them.
+//! Radial, tangential and axial directions, and conversion of vectors to them.
 
 /// Radial and tangential direction at an angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -8,21 +8,21 @@ pub struct PolarFrame {
 }
 
 impl PolarFrame {
-    /// That of a structure described in fixed directions.
+    /// Frame of a structure described in fixed directions.
     pub const FIXED: Self = Self { sine: 0.0, cosine: 1.0 };
 
-    /// At `angle` (rad).
+    /// Frame at `angle` (rad).
     pub fn new(angle: f64) -> Self {
         let (sine, cosine) = libm::sincos(angle);
         Self { sine, cosine }
     }
 
-    /// (radial, tangential, axial) of a vector given in fixed directions.
+    /// Returns the (radial, tangential, axial) components of a vector given in fixed directions.
     pub fn local(self, v: [f64; 3]) -> [f64; 3] {
         [v[0] * self.cosine + v[1] * self.sine, v[1] * self.cosine - v[0] * self.sine, v[2]]
     }
 
-    /// Fixed directions of a vector given as (radial, tangential, axial).
+    /// Returns the fixed components of a vector given as (radial, tangential, axial).
     pub fn fixed(self, v: [f64; 3]) -> [f64; 3] {
         [v[0] * self.cosine - v[1] * self.sine, v[0] * self.sine + v[1] * self.cosine, v[2]]
     }

@@ -1,10 +1,10 @@
-//! Where the contact nodes of all sectors stand around the axis, and how they move as a whole.
+//! Positions of the contact nodes of all sectors around the axis, and their rigid motion.
 
 use super::PrescribedMotion;
 use super::frame::PolarFrame;
 use crate::{Error, Result, Rom};
 
-/// Contact nodes of equally spaced sectors, arrays `[node · lanes + lane]` where they differ by sector.
+/// Contact nodes of equally spaced sectors; arrays that differ by sector are `[node · lanes + lane]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Lanes of a row: sectors and padding.
@@ -22,7 +22,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Place `rom.sectors` sectors around the axis; `clearances` holds one radial clearance (m) per sector.
+    /// Places `rom.sectors` sectors around the axis; `clearances` contains one radial clearance (m) per sector.
     ///
     /// # Errors
     /// Wrong number of clearances.
@@ -31,7 +31,7 @@ impl Layout {
         Self::of_places(&places, rom.sectors, clearances, lanes)
     }
 
-    /// The same of points at these places (m, rad, m) of a sector.
+    /// Creates a layout of points at these places (m, rad, m) of a sector.
     ///
     /// # Errors
     /// Wrong number of clearances.
@@ -67,8 +67,8 @@ impl Layout {
         self.radii.len()
     }
 
-    /// Velocity with the rotor (m/s) of a node displaced by `moved` (m), in the coordinates of its displacements: r Ω around,
-    /// since a displacement around is an arc of the undeformed radius r, and what the shaft's centre moves.
+    /// Velocity by the motion of the rotor (m/s) of a node displaced by `moved` (m), in the coordinates of its displacements: r Ω around,
+    /// since a displacement around is an arc of the undeformed radius r, plus the motion of the shaft centre.
     #[inline(always)]
     pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
         let spin = drive.speed * self.radii[node];
@@ -79,8 +79,8 @@ impl Layout {
         [x, spin + y, z]
     }
 
-    /// A displacement or velocity `shaft` of the shaft's centre in fixed directions, in the coordinates of the displacements
-    /// of a node displaced by `moved` (m).
+    /// Displacement or velocity `shaft` of the shaft centre in fixed directions, converted to the coordinates of the displacements of a
+    /// node displaced by `moved` (m).
     pub fn shaft_motion(
         &self,
         node: usize,
@@ -96,7 +96,7 @@ impl Layout {
         [outwards, around / (1.0 + moved[0] * self.per_radius[node]), along]
     }
 
-    /// Directions at a node that an arc `around` (m) has displaced, at a rotor angle (rad).
+    /// Directions at a node that is displaced by an arc `around` (m), at a rotor angle (rad).
     pub fn displaced_frame(&self, node: usize, index: usize, rotor_angle: f64, around: f64) -> PolarFrame {
         PolarFrame::new(self.angles[index] + rotor_angle + around * self.per_radius[node])
     }

@@ -1,11 +1,10 @@
-//! Gap functions: where the master nodes are with respect to the slave, as affine functions of their displacement.
+//! Gap functions: distances of the master nodes from the slave, as affine functions of the displacements.
 //!
-//! The gap of a node (eq. 3 of the paper) is evaluated at its predicted place and linear in the correction of the
-//! step from there, g = g_p + n·(u − u_p). One kind of gap function is a file
-//! here and a variant of [`GapLaw`].
+//! The gap of a node (eq. 3 of the paper) is evaluated at its predicted position and is linear in the correction of the step from there, g
+//! = g_p + n·(u − u_p). Each kind of gap function has a file here and a variant of [`GapLaw`].
 //!
-//! Displacements are those of the structure: along fixed axes, or along (r, θ, z) of a sector that turns. Forces of contacts are in
-//! the same coordinates; [`wrench`] gives them in fixed directions.
+//! Displacements are those of the structure: along fixed axes, or along (r, θ, z) of a rotating sector. Contact forces have the same
+//! coordinates; [`wrench`] converts them to fixed directions.
 
 pub mod frame;
 pub mod layout;
@@ -35,17 +34,17 @@ pub struct PrescribedMotion {
     pub rotor_angle: f64,
     /// Speed of the rotor Ω (rad/s).
     pub speed: f64,
-    /// Added to every radial clearance (m).
+    /// Offset added to every radial clearance (m).
     pub gap_offset: f64,
-    /// Factor on the shape of the casing (-), ramp included.
+    /// Factor on the shape of the casing (-), with its ramp.
     pub shape_factor: f64,
     /// Rotation of the shape about +z (rad).
     pub shape_rotation: f64,
     /// Uniform change of the casing radius (m).
     pub radius_change: f64,
-    /// Displacement of the shaft's centre along fixed x, y and z (m): whirl and axial shift.
+    /// Displacement of the shaft centre along fixed x, y and z (m): whirl and axial shift.
     pub shaft: [f64; 3],
-    /// Velocity of the shaft's centre (m/s).
+    /// Velocity of the shaft centre (m/s).
     pub shaft_velocity: [f64; 3],
 }
 
@@ -60,12 +59,12 @@ persist_fields!(PrescribedMotion {
     shaft_velocity
 });
 
-/// Unit normals of one instant, arrays `[node · lanes + lane]`.
+/// Unit normals at one instant, arrays `[node · lanes + lane]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Geometry {
     /// Components of the unit normal, pointing from the slave to the master.
     pub normal: [Vec<f64>; 3],
-    /// Closest places on a surface spline; empty for other surfaces.
+    /// Closest points on a surface spline; empty for other surfaces.
     pub places: Vec<ClosestPoint>,
 }
 
@@ -78,7 +77,7 @@ impl Geometry {
         Self { normal: [vec![0.0; len], vec![0.0; len], vec![0.0; len]], places: vec![ClosestPoint::default(); places] }
     }
 
-    /// Closest place of one node of one lane, on surfaces that have places.
+    /// Closest point of one node of one lane, on surfaces that have closest points.
     #[inline(always)]
     pub fn place_at(&self, index: usize) -> ClosestPoint {
         self.places.get(index).copied().unwrap_or_default()
@@ -90,8 +89,8 @@ impl Geometry {
     }
 }
 
-/// The gap function of a contact pair, compiled for stepping: of some contact nodes of a structure in all sectors. Arrays are
-/// those of the structure, `[node · lanes + lane]`; a pair reads and writes the places of its nodes.
+/// Gap function of a contact pair, compiled for stepping, for some contact nodes of a structure in all sectors. Arrays have the size of the
+/// structure, `[node · lanes + lane]`; a pair reads and writes the elements of its nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GapLaw {
     /// Constant normals and gaps: plane obstacles and node-to-node pairs.
@@ -105,7 +104,7 @@ pub enum GapLaw {
 }
 
 impl GapLaw {
-    /// Number of contact nodes per sector of the structure, those of other pairs included.
+    /// Number of contact nodes per sector of the structure, including those of other pairs.
     pub fn nodes(&self) -> usize {
         match self {
             Self::Fixed(law) => law.gaps.len(),
@@ -115,7 +114,7 @@ impl GapLaw {
         }
     }
 
-    /// The contact nodes of this pair.
+    /// Returns the contact nodes of this pair.
     pub fn members(&self) -> Vec<usize> {
         match self {
             Self::Fixed(law) => (0..law.gaps.len()).collect(),
@@ -125,7 +124,7 @@ impl GapLaw {
         }
     }
 
-    /// The surface through data points that the nodes meet.
+    /// Returns the surface through data points that the nodes can touch.
     #[inline(always)]
     pub fn spline(&self) -> Option<&SurfaceSpline> {
         match self {
@@ -135,7 +134,7 @@ impl GapLaw {
         }
     }
 
-    /// Where the nodes stand around the axis, if there is one.
+    /// Returns the positions of the nodes around the axis, if there is one.
     pub fn layout(&self) -> Option<&Layout> {
         match self {
             Self::Fixed(_) | Self::Open(_) => None,
@@ -144,8 +143,8 @@ impl GapLaw {
         }
     }
 
-    /// Whether a node that stays within `reach` (m, own directions) of where it rests cannot touch while the rotor turns from where it is
-    /// to `turned` (rad) and nothing else moves. False where it is not known.
+    /// Returns whether a node that stays within `reach` (m, own directions) of its position cannot touch the surface while the rotor turns
+    /// from its current angle to `turned` (rad) and nothing else moves. False if this is unknown.
     pub fn is_clear(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> bool {
         match self {
             Self::Fixed(law) => law.gaps[at.node] > dot(law.normals[at.node].map(f64::abs), reach),
@@ -154,8 +153,8 @@ impl GapLaw {
         }
     }
 
-    /// By how much the gap of a node that stays within `reach` (m, own directions) of where it rests may be smaller on the way than at its
-    /// ends (m), while the rotor turns from where it is to `turned` (rad) and nothing else moves.
+    /// Largest difference by which the gap of a node that stays within `reach` (m, own directions) of its position may be smaller in
+    /// between than at both ends (m), while the rotor turns from its current angle to `turned` (rad) and nothing else moves.
     pub fn approach(&self, at: At<'_>, turned: f64, reach: [f64; 3]) -> f64 {
         match self {
             Self::Fixed(law) => 2.0 * dot(law.normals[at.node].map(f64::abs), reach),
@@ -164,9 +163,9 @@ impl GapLaw {
         }
     }
 
-    /// The gap that a node which stays within `reach` (m, own directions) of where it rests keeps at least on a way to `end` that
-    /// is linear in time, while the rotor turns by `turn` against the shape (rad): that of the narrowest place at the narrowest time,
-    /// less the reach. `None` where that is not known, or not met on the way (m).
+    /// Lower bound on the gap (m) of a node that stays within `reach` (m, own directions) of its position, for a motion to `end` that is
+    /// linear in time while the rotor turns by `turn` relative to the shape (rad): the gap at the narrowest place and time minus the reach.
+    /// `None` if it is unknown or the node may leave the surface.
     pub fn least(&self, at: At<'_>, end: &PrescribedMotion, turn: f64, reach: [f64; 3]) -> Option<f64> {
         match self {
             Self::Revolution(law) => law.least(at, end, turn, reach),
@@ -174,7 +173,7 @@ impl GapLaw {
         }
     }
 
-    /// Smallest radial clearance, or fixed gap, above 0 (m); infinite where there is none. Of open surfaces a thousandth of the smallest
+    /// Smallest positive radial clearance, or fixed gap (m); infinite if there is none. For open surfaces a thousandth of the smallest
     /// extent.
     pub fn clearance(&self) -> f64 {
         let all = match self {
@@ -192,7 +191,7 @@ impl GapLaw {
         let far = match self {
             Self::Fixed(_) | Self::Revolution(_) => 0.0,
             Self::Spline(law) => largest(&mut law.layout.radii.iter().copied()),
-            // Its displacements are those of all its flight.
+            // Its displacements contain the whole flight.
             Self::Open(law) => 8.0 * largest(&mut law.positions().iter().map(|place| dot(*place, *place).sqrt())),
         };
         64.0 * f64::EPSILON * far
@@ -207,22 +206,22 @@ impl GapLaw {
         }
     }
 
-    /// Normals and places of the nodes of a structure that meets nothing else, with rows of `lanes` lanes.
+    /// Returns normals and closest points of the nodes of a structure with this pair only, with rows of `lanes` lanes.
     pub fn geometry(&self, lanes: usize) -> Geometry {
         let mut geometry = Geometry::new(self.nodes() * lanes, self.spline().is_some());
         self.prepare(lanes, &mut geometry);
         geometry
     }
 
-    /// Write what never changes, with rows of `lanes` lanes.
+    /// Writes the constant values, with rows of `lanes` lanes.
     pub fn prepare(&self, lanes: usize, geometry: &mut Geometry) {
         if let Self::Fixed(law) = self {
             law.prepare(lanes, geometry);
         }
     }
 
-    /// Gap (m), unit normal and place of one node displaced by `moved` (m, own directions) against a surface as it is now; a place
-    /// only on surfaces through data points. On open ones it is sought from `guess`, if there is one.
+    /// Returns gap (m), unit normal and closest point of one node displaced by `moved` (m, own directions) against the current surface; a
+    /// closest point only for surfaces through data points. For open surfaces the search starts at `guess`, if there is one.
     pub fn gap_of_node(
         &mut self,
         at: At<'_>,
@@ -238,10 +237,9 @@ impl GapLaw {
         (gap, normal, ClosestPoint::default())
     }
 
-    /// Gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and `moved` of the
-    /// control points of a surface that is carried by a structure. `before` is the geometry of the step before, from which
-    /// closest points are sought. Gaps are infinite where there is nothing to touch; padding lanes and nodes of other pairs are
-    /// not written.
+    /// Computes gaps (m) and normals at an instant, for the displacements `[row · lanes + lane]` of the contact rows (m) and `moved` of the
+    /// control points of a surface that a structure carries. `before` is the geometry of the previous step, from which the search for
+    /// closest points starts. Gaps are infinite if there is no surface to touch; padding lanes and nodes of other pairs are not written.
     pub fn evaluate(
         &mut self,
         drive: &PrescribedMotion,
@@ -260,7 +258,7 @@ impl GapLaw {
         }
     }
 
-    /// The surface is as with this factor of its shape and control points displaced by `moved` (m, three per control point).
+    /// Deforms the surface to this factor of its shape, with control points displaced by `moved` (m, three per control point).
     pub fn bend(&mut self, factor: f64, moved: &[f64]) {
         match self {
             Self::Fixed(_) | Self::Revolution(_) => {}
@@ -269,7 +267,8 @@ impl GapLaw {
         }
     }
 
-    /// The rotor has turned by `angle` (rad), to whole turns, since the last evaluation: closest points are sought from there.
+    /// Records that the rotor has turned by `angle` (rad), up to whole turns, since the last evaluation: the search for closest points
+    /// starts from there.
     pub fn turn(&mut self, angle: f64) {
         if let Self::Spline(law) = self {
             law.turned = angle / std::f64::consts::TAU;
@@ -288,15 +287,15 @@ impl GapLaw {
     /// Returns the largest change of a gap (m) when the rotor turns by `angle` (rad): under the shape at `factor`, and under a surface through points
     /// that are displaced by up to `moved` (m).
     pub fn turned_under(&self, angle: f64, factor: f64, moved: f64) -> f64 {
-        // From one end of the range of a change to the other at most.
+        // At most from one end of the range of a change to the other.
         let part = |scale: f64| 2.0 * (angle / scale).min(1.0);
         let shape = if factor == 0.0 { 0.0 } else { factor * self.shape_size() * part(self.angular_scale()) };
         let Self::Spline(law) = self else { return shape };
         shape + (law.ripple + moved) * part(law.surface.spacing())
     }
 
-    /// Changes of a gap below this (m) say nothing: a share of the radius, or of the extent of open surfaces, for the
-    /// curvature that a linear gap leaves out; rounding of fixed gaps.
+    /// Changes of a gap below this (m) are insignificant: a fraction of the radius, or of the extent of open surfaces, since a linear gap
+    /// neglects curvature; rounding for fixed gaps.
     pub fn indifferent(&self, node: usize) -> f64 {
         const CURVED: f64 = 1e-5;
         match self {
@@ -307,13 +306,13 @@ impl GapLaw {
         }
     }
 
-    /// The first node, `node · lanes + lane`, that has left a surface around an axis for good.
+    /// Returns the first node, `node · lanes + lane`, that has left a surface around an axis.
     pub fn out_of_reach(&self) -> Option<usize> {
         if let Self::Spline(law) = self { law.out_of_reach } else { None }
     }
 
-    /// Largest displacement (m) that counts as small: a tenth of the smallest radius, or of the extent of open surfaces and
-    /// what they meet; no limit for fixed obstacles.
+    /// Largest displacement (m) that counts as small: a tenth of the smallest radius, or of the extent of the nodes and of their open
+    /// surfaces; no limit for fixed obstacles.
     pub fn largest_displacement(&self) -> f64 {
         if let Self::Open(law) = self {
             return law.largest();
@@ -322,8 +321,8 @@ impl GapLaw {
         radii.map_or(f64::INFINITY, |radii| SMALL * radii.fold(f64::INFINITY, |low: f64, radius| low.min(*radius)))
     }
 
-    /// Whether a contact is within what small displacements and a casing seen from inside can describe: less deep than
-    /// a tenth of the radius, on a flank below 45°. On open surfaces the depth alone counts.
+    /// Returns whether small displacements and a casing seen from inside can describe a contact: not deeper than a tenth of the radius, on
+    /// a flank below 45°. For open surfaces only the depth counts.
     pub fn is_plausible(&self, node: usize, gap: f64, normal: [f64; 3]) -> bool {
         match self {
             Self::Fixed(_) => true,
@@ -333,8 +332,8 @@ impl GapLaw {
         }
     }
 
-    /// Prescribed velocity of the master relative to the slave (m/s), of a node displaced by `moved` (m, own directions);
-    /// `index` is `node · lanes + lane`. In the coordinates of the displacements, whose arcs are r times angles.
+    /// Prescribed velocity of the master relative to the slave (m/s), of a node displaced by `moved` (m, own directions), in the
+    /// coordinates of the displacements, whose arcs are r times angles; `index` is `node · lanes + lane`.
     #[inline(always)]
     pub fn sliding_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
         match self {
@@ -346,13 +345,13 @@ impl GapLaw {
         }
     }
 
-    /// Whether sliding takes any direction of the tangent plane, so that it turns within a step.
+    /// Returns whether sliding may have any direction in the tangent plane, so that it turns within a step.
     pub fn slides_anywhere(&self) -> bool {
         matches!(self, Self::Open(_))
     }
 
-    /// Unit slip direction of the master in the tangent plane, from the predicted relative velocity (m/s); zero
-    /// when nothing slides. On surfaces of revolution axial slip is neglected, as in section 4.3 of the paper.
+    /// Unit slip direction of the master in the tangent plane, from the predicted relative velocity (m/s); zero without slip. On surfaces
+    /// of revolution axial slip is neglected, as in section 4.3 of the paper.
     pub fn slip_direction(&self, velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
         let candidate = match self {
             Self::Fixed(_) | Self::Open(_) => velocity,

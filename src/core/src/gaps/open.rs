@@ -1,39 +1,39 @@
 //! Gaps of structures described in fixed directions: contact nodes against a surface through a contact grid.
 //!
-//! A node stands at x = X + u, rigid flight included, and meets the closest point of its surface: g = (x − S)·n with
-//! n = S_t × S_s/|S_t × S_s|. A node beyond a free edge has nothing to touch: its gap is infinite and its normal zero.
+//! A node is at x = X + u, which includes the rigid flight, and can touch the closest point of its surface: g = (x − S)·n with n = S_t ×
+//! S_s/|S_t × S_s|. A node beyond a free edge has no surface to touch: its gap is infinite and its normal zero.
 
 use super::spline::NOTHING_TO_TOUCH;
 use super::surface_spline::{ClosestPoint, Projection, SurfaceSpline};
 use super::{Geometry, dot};
 use crate::ranges::SMALL;
 
-/// [`OpenGap::clearance`] as a share of the largest displacement that counts as small.
+/// [`OpenGap::clearance`] as a fraction of the largest displacement that counts as small.
 const CLEARANCE: f64 = 1e-2;
 
-/// Largest distance of a node behind a surface that is continued beyond its edge: as a fraction of the node's path in the step, since the surface may
-/// be curved, and of the largest small displacement.
+/// Largest distance of a node behind a surface that is continued beyond its edge: as a fraction of the path of the node in the step, since
+/// the surface may be curved, and of the largest small displacement.
 const BEHIND_EDGE: [f64; 2] = [1e-3, 1e-6];
 
 /// A surface through the contact grid of a structure, in fixed directions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenSurface {
-    /// The surface as it is now.
+    /// The current surface.
     pub surface: SurfaceSpline,
-    /// Control points undeformed (m).
+    /// Undeformed control points (m).
     undeformed: Vec<[f64; 3]>,
     /// Control points in use.
     control: Vec<[f64; 3]>,
 }
 
 impl OpenSurface {
-    /// Undeformed.
+    /// Creates the undeformed surface.
     pub fn new(surface: SurfaceSpline) -> Self {
         let undeformed = surface.control_points().to_vec();
         Self { surface, control: undeformed.clone(), undeformed }
     }
 
-    /// Displace the control points by `moved` (m, three per control point); a rigid surface is moved by nothing.
+    /// Displaces the control points by `moved` (m, three per control point; empty for a rigid surface).
     pub(super) fn follow(&mut self, moved: &[f64]) {
         if moved.is_empty() {
             return;
@@ -45,7 +45,7 @@ impl OpenSurface {
         self.surface.set_control_points(&self.control);
     }
 
-    /// Longest side of the box around its undeformed control points (m).
+    /// Longest side of the bounding box of its undeformed control points (m).
     pub fn extent(&self) -> f64 {
         extent(&self.undeformed)
     }
@@ -56,7 +56,7 @@ impl OpenSurface {
 pub struct OpenGap {
     /// Undeformed positions of the contact nodes of the structure (m).
     positions: Vec<[f64; 3]>,
-    /// Contact nodes that meet the surface.
+    /// Contact nodes that can touch the surface.
     nodes: Vec<usize>,
     /// The surface.
     pub surface: OpenSurface,
@@ -65,18 +65,18 @@ pub struct OpenGap {
 }
 
 impl OpenGap {
-    /// `nodes` of those at `positions` (m) face the surface.
+    /// Creates the gap function of `nodes` of the contact nodes at `positions` (m).
     pub fn new(positions: Vec<[f64; 3]>, nodes: Vec<usize>, surface: OpenSurface) -> Self {
         let smallest = surface.extent().min(extent(&positions));
         Self { positions, nodes, surface, largest: SMALL * smallest }
     }
 
-    /// With another pair of the same structure, whose surface has this extent (m).
+    /// Takes into account another pair of the same structure, whose surface has this extent (m).
     pub fn beside(self, extent: f64) -> Self {
         Self { largest: self.largest.min(SMALL * extent), ..self }
     }
 
-    /// The contact nodes of the pair.
+    /// Returns the contact nodes of the pair.
     pub fn nodes(&self) -> &[usize] {
         &self.nodes
     }
@@ -86,19 +86,19 @@ impl OpenGap {
         &self.positions
     }
 
-    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of
-    /// the surfaces they meet.
+    /// Largest displacement and penetration that count as small (m): a tenth of the smallest extent of the contact nodes and of their
+    /// surfaces.
     pub fn largest(&self) -> f64 {
         self.largest
     }
 
-    /// The point of the surface at a place (m).
+    /// Returns the point of the surface at a closest point (m).
     pub fn contact_point(&self, place: ClosestPoint) -> [f64; 3] {
         self.surface.surface.evaluate(place).point
     }
 
-    /// Gaps (m), normals and places of the nodes for the displacements of the contact rows (m), of a surface whose control points
-    /// are displaced by `moved` (m; empty for a rigid one). Closest points are sought from `guess`, or from the nearest data
+    /// Computes gaps (m), normals and closest points of the nodes for the displacements of the contact rows (m), for a surface whose
+    /// control points are displaced by `moved` (m; empty for a rigid surface). The search starts from `guess`, or from the nearest data
     /// point.
     pub fn evaluate(
         &mut self,
@@ -120,8 +120,8 @@ impl OpenGap {
         }
     }
 
-    /// Gap (m), normal and place of one node displaced by `moved` (m) before the surface as it is now. A gap that is no number is found
-    /// out by the caller: the state is not what the model describes any more.
+    /// Returns gap (m), normal and closest point of one node displaced by `moved` (m) against the current surface. The caller detects a NaN
+    /// gap: the model no longer describes such a state.
     pub(super) fn gap_of_node(
         &self,
         node: usize,
@@ -142,20 +142,20 @@ impl OpenGap {
         }
     }
 
-    /// Returns the length that takes the place of a clearance, which free bodies do not have: a thousandth of the smallest extent (m).
+    /// Returns the length that replaces the clearance, which free bodies do not have: a thousandth of the smallest extent (m).
     pub(super) fn clearance(&self) -> f64 {
         CLEARANCE * self.largest
     }
 
-    /// Whether a node that now has this gap (m) was behind the surface, continued beyond its edge, before it moved by `moved` against it
-    /// (m).
+    /// Returns whether a node with the current gap (m) was behind the surface, continued beyond its edge, before it moved by `moved`
+    /// relative to it (m).
     pub fn was_behind(&self, moved: [f64; 3], normal: [f64; 3], gap: f64) -> bool {
         let (approach, travel) = (dot(moved, normal), dot(moved, moved).sqrt());
         gap - approach < -(BEHIND_EDGE[0] * travel + BEHIND_EDGE[1] * self.largest)
     }
 
-    /// Whether the contact nodes have moved against each other by more than what counts as small: displacements less
-    /// their mean.
+    /// Returns whether the contact nodes have moved relative to each other by more than small displacements: displacements minus their
+    /// mean.
     pub fn is_distorted(&self, displacement: &[f64]) -> bool {
         let (moved, _) = displacement.as_chunks::<3>();
         #[expect(clippy::cast_precision_loss, reason = "node counts are far below 2^52")]
@@ -167,7 +167,7 @@ impl OpenGap {
     }
 }
 
-/// Longest side of the box around points (m).
+/// Longest side of the bounding box of points (m).
 fn extent(points: &[[f64; 3]]) -> f64 {
     let side = |i: usize| {
         let values = || points.iter().map(|point| point[i]);
@@ -176,7 +176,7 @@ fn extent(points: &[[f64; 3]]) -> f64 {
     (0..3).map(side).fold(0.0, f64::max)
 }
 
-/// Unit tangent along a velocity (m/s); zero when nothing slides.
+/// Unit tangent along a velocity (m/s); zero without slip.
 #[inline(always)]
 pub fn tangent(velocity: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
     let along = dot(velocity, normal);

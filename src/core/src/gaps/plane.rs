@@ -1,4 +1,4 @@
-//! Plane obstacles and node-to-node pairs: normals and gaps that do not change.
+//! Plane obstacles and node-to-node pairs, with constant normals.
 
 use super::{Geometry, dot};
 
@@ -14,14 +14,14 @@ pub struct FixedGap {
 }
 
 impl FixedGap {
-    /// Gaps (m) for the displacements of the contact rows of one structure (m).
+    /// Computes gaps (m) for the displacements of the contact rows of one structure (m).
     pub(super) fn evaluate(&self, displacement: &[f64], gap: &mut [f64]) {
         for (node, (normal, initial)) in self.normals.iter().zip(&self.gaps).enumerate() {
             gap[node] = initial + dot(*normal, std::array::from_fn(|i| displacement[3 * node + i]));
         }
     }
 
-    /// Write the normals, with rows of `lanes` lanes.
+    /// Writes the normals, with rows of `lanes` lanes.
     pub(super) fn prepare(&self, lanes: usize, geometry: &mut Geometry) {
         for (node, normal) in self.normals.iter().enumerate() {
             for component in 0..3 {

@@ -1,13 +1,12 @@
 //! Sectors around an axis inside a rigid surface of revolution with a shape around the circumference.
 //!
-//! For a surface of revolution with shape s(θ) and meridional slope m,
-//! F = r_c(θ + u_θ/r, z) − r − u_r + m u_z has the gradient (−1, s'/r, m) with respect to (radial, tangential, axial)
-//! displacement; dividing by its length N gives the unit normal from the casing to the blade and the gap F/N. The
-//! slope is what lets a frictionless lobe draw power from the shaft: r n_θ λ is the torque conjugate to θ_r.
+//! For a surface of revolution with shape s(θ) and meridional slope m, F = r_c(θ + u_θ/r, z) − r − u_r + m u_z has the gradient (−1, s'/r,
+//! m) with respect to (radial, tangential, axial) displacement; dividing by its length N gives the unit normal from the casing to the blade
+//! and the gap F/N. Because of the slope s' a frictionless lobe can draw power from the shaft: r n_θ λ is the torque conjugate to θ_r.
 //!
-//! u_θ is an arc: the node stands at φ = θ_node + θ_r + u_θ/r and the radius r + u_r, so that what is conjugate to u_θ is
-//! (1 + u_r/r) times the tangential force there. With the shaft's centre at (e_r, e_t, e_z), seen along the directions at φ, the node is at the
-//! radius ρ = √(a² + e_t²), a = r + u_r + e_r, and at φ + δ, tan δ = e_t/a, from the axis of the casing:
+//! u_θ is an arc: the node is at φ = θ_node + θ_r + u_θ/r and the radius r + u_r, so that the force conjugate to u_θ is (1 + u_r/r) times
+//! the tangential force there. With the shaft centre at (e_r, e_t, e_z) in the directions at φ, the node is at the radius ρ = √(a² + e_t²),
+//! a = r + u_r + e_r, and at φ + δ, tan δ = e_t/a, from the axis of the casing:
 //!
 //! F = r_c(φ + δ) − ρ + m (u_z + e_z),  ∇F = (−cos δ − s' sin δ/ρ, (1 + u_r/r)(−sin δ + s' cos δ/ρ), m).
 
@@ -25,20 +24,20 @@ use crate::{Result, Rom};
 pub struct RevolutionGap {
     pub(super) surface: CompiledShape,
     instruction_set: InstructionSet,
-    /// Where the contact nodes of the structure are.
+    /// Positions of the contact nodes of the structure.
     pub layout: Layout,
-    /// Contact nodes that meet the surface.
+    /// Contact nodes that can touch the surface.
     pub(super) nodes: Vec<usize>,
     /// Meridional slope per contact node of the structure.
     slopes: Vec<f64>,
-    /// The shaft's centre moves.
+    /// True if the shaft centre moves.
     shaft_moves: bool,
-    /// Scratch of one row where it does: the node's place from the axis of the casing along its own directions (m).
+    /// Scratch of one row if the shaft centre moves: the position of the node from the axis of the casing along its own directions (m).
     arms: [Vec<f64>; 2],
 }
 
 impl RevolutionGap {
-    /// Place `rom.sectors` sectors around the axis, all contact nodes facing the surface; `clearances` holds one radial clearance
+    /// Places `rom.sectors` sectors around the axis, with all contact nodes facing the surface; `clearances` contains one radial clearance
     /// (m) per sector.
     ///
     /// # Errors
@@ -62,27 +61,27 @@ impl RevolutionGap {
         })
     }
 
-    /// Only these contact nodes of the structure.
+    /// Restricts the gap function to these contact nodes of the structure.
     pub fn of_nodes(self, nodes: Vec<usize>) -> Self {
         Self { nodes, ..self }
     }
 
-    /// Contact nodes that meet the surface.
+    /// Contact nodes that can touch the surface.
     pub fn members(&self) -> &[usize] {
         &self.nodes
     }
 
-    /// Meridional slope per contact node of the structure, as the surface has it.
+    /// Meridional slope of the surface per contact node of the structure.
     pub fn slopes(&self) -> &[f64] {
         &self.slopes
     }
 
-    /// Points at other places instead of contact nodes, with the slopes of the surface there.
+    /// Replaces the contact nodes by points at other places, with the slopes of the surface there.
     pub fn of_points(self, layout: Layout, slopes: Vec<f64>) -> Self {
         Self { nodes: (0..layout.nodes()).collect(), layout, slopes, ..self }
     }
 
-    /// Let whirl and axial shift of the shaft act.
+    /// Enables whirl and axial shift of the shaft.
     pub fn with_moving_shaft(self, shaft_moves: bool) -> Self {
         let room = || vec![0.0; if shaft_moves { self.layout.lanes } else { 0 }];
         Self { shaft_moves, arms: [room(), room()], ..self }
@@ -124,7 +123,7 @@ impl RevolutionGap {
         facing / tilt * (motion.opening + motion.shape_factor * shape - turned)
     }
 
-    /// Gap (m) and unit normal of one node displaced by `moved` (m).
+    /// Returns gap (m) and unit normal of one node displaced by `moved` (m).
     pub fn gap_of_node(&self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3]) {
         let (node, drive, radius) = (at.node, at.drive, self.layout.radii[at.node]);
         let (slope, per_radius) = (self.slopes[node], self.layout.per_radius[node]);
@@ -157,7 +156,7 @@ impl RevolutionGap {
         let shape = self.surface.least_between(from - around, to + around);
         let clearance = self.layout.clearances[at.index % self.layout.lanes] + drive.gap_offset + drive.radius_change;
         let left = clearance + drive.shape_factor * shape - reach[0] - self.slopes[node].abs() * reach[2];
-        // On a shaft that moves, and with a shape turned inside out, nobody knows.
+        // Unknown if the shaft moves or the shape is turned inside out.
         !self.shaft_moves && drive.shape_factor >= 0.0 && left > 0.0
     }
 
@@ -189,12 +188,12 @@ impl RevolutionGap {
         Some(left / (1.0 + slope * slope).sqrt())
     }
 
-    /// Angle of a displaced node about the shaft's centre (rad).
+    /// Angle of a displaced node about the shaft centre (rad).
     fn angle(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
         self.layout.angles[at.index] + at.drive.rotor_angle + moved[1] * self.layout.per_radius[at.node]
     }
 
-    /// Displacement of the shaft's centre across and along the circumference at an angle (m).
+    /// Radial and tangential displacement of the shaft centre at an angle (m).
     fn shaft_offset(&self, angle: f64, drive: &PrescribedMotion) -> [f64; 2] {
         if !self.shaft_moves {
             return [0.0; 2];
@@ -203,7 +202,7 @@ impl RevolutionGap {
         [outwards, sideways]
     }
 
-    /// Angle at which a displaced node faces the casing (rad), in the fixed frame.
+    /// Angle of the position of a displaced node on the casing (rad), in the fixed frame.
     pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
         let angle = self.angle(at, moved);
         let [outwards, sideways] = self.shaft_offset(angle, at.drive);
@@ -219,13 +218,13 @@ fn small_arc_tangent(t: f64) -> f64 {
     t * (1.0 - square * series.fold(1.0 / 21.0, |sum, odd: f64| 1.0 / odd - square * sum))
 }
 
-/// Nodes of one sector at several instants, each a lane, before a surface that nothing but the rotor's angle moves past a shaft that
-/// stays: what their gaps depend on beside displacements. Allocates only when made.
+/// Nodes of one sector at several instants, each a lane, against a surface past which only the rotor turns, about a fixed shaft: all data
+/// of their gaps other than displacements. Allocates only when created.
 #[derive(Debug, Clone, Default)]
 pub struct Instants {
-    /// Angle of the undisplaced node, from where the shape starts (rad).
+    /// Angle of the undisplaced node, from the origin of the shape (rad).
     angles: Vec<f64>,
-    /// Clearance without the shape (m), and factor of the shape.
+    /// Clearance without the shape (m), and factor on the shape.
     clearances: Vec<f64>,
     factors: Vec<f64>,
     per_radius: Vec<f64>,
@@ -235,7 +234,7 @@ pub struct Instants {
 }
 
 impl Instants {
-    /// Room for so many lanes, all infinitely far away.
+    /// Allocates `lanes` lanes, all infinitely far away.
     pub fn new(lanes: usize) -> Self {
         let zeros = || vec![0.0; lanes];
         Self {
@@ -250,7 +249,7 @@ impl Instants {
 }
 
 impl RevolutionGap {
-    /// A lane is this node at this instant. False, and nothing done, where gaps depend on more than [`Instants`].
+    /// Fills a lane with this node at this instant. Returns false and does nothing if gaps depend on more than [`Instants`].
     pub fn enter(&self, at: At<'_>, lane: usize, instants: &mut Instants) -> bool {
         if self.shaft_moves {
             return false;
@@ -264,13 +263,13 @@ impl RevolutionGap {
         true
     }
 
-    /// Gaps (m) and unit normals of all lanes for the displacements `moved` (m): three rows of lanes of `moved` and of `normals`.
+    /// Computes gaps (m) and unit normals of all lanes for the displacements `moved` (m): `moved` and `normals` have three rows of lanes.
     pub fn of_lanes(&self, instants: &mut Instants, moved: &[f64], gaps: &mut [f64], normals: &mut [f64]) {
         self.instruction_set.run(EvaluateLanes { surface: &self.surface, instants, moved, gaps, normals });
     }
 }
 
-/// Gaps and normals of lanes.
+/// Evaluation of gaps and normals of lanes.
 struct EvaluateLanes<'a> {
     surface: &'a CompiledShape,
     instants: &'a mut Instants,
@@ -307,7 +306,7 @@ impl Kernel for EvaluateLanes<'_> {
     }
 }
 
-/// Gaps and normals of all nodes and lanes on a surface of revolution. `SHAFT`: the shaft's centre moves.
+/// Evaluation of gaps and normals of all nodes and lanes on a surface of revolution; with `SHAFT` the shaft centre moves.
 struct Evaluate<'a, const SHAFT: bool> {
     law: &'a RevolutionGap,
     drive: &'a PrescribedMotion,
@@ -346,7 +345,7 @@ impl<const SHAFT: bool> Kernel for Evaluate<'_, SHAFT> {
                     let distance = (arm * arm + offset * offset).sqrt();
                     normal_0[lane] += small_arc_tangent(offset / arm);
                     (arms[lane], offsets[lane]) = (arm, offset);
-                    // ρ − r − u_r without cancellation: what the shaft closes of the gap; set before the gap is written.
+                    // ρ − r − u_r without cancellation: the part of the gap that the shaft closes; set before the gap is written.
                     gap[lane] = outwards + offset * offset / (distance + arm) - slope * drive.shaft[2];
                 }
             }
@@ -378,7 +377,7 @@ mod tests {
     use super::*;
     use crate::settings::Shape;
 
-    /// Lanes are nodes at instants: what one node's gap is at one of them.
+    /// Each lane has the gap of a single node at one instant.
     #[test]
     fn vector_lanes_match_scalar_gaps_of_nodes() {
         let shape = Shape::TwoLobe { depth: 0.6, width: 0.15, phase: 0.3 };

@@ -1,14 +1,13 @@
 //! Rigid surfaces of revolution with a shape around the circumference (the slave side).
 //!
-//! The surface runs parallel to the tip contour at the radial distance `gap`. Its shape adds s(θ), the change of
-//! the casing radius, in the fixed frame; positive s opens the clearance. What the kernels need per contact
-//! node is s and its slope ds/dθ.
+//! The surface runs parallel to the tip contour at the radial distance `gap`. Its shape adds s(θ), the change of the casing radius, in the
+//! fixed frame; positive s opens the clearance. The kernels need s and its slope ds/dθ for each contact node.
 
 use crate::cubic::{evaluate, interior_minimum};
 use crate::settings::Shape;
 use crate::{Error, Result};
 
-/// Shape compiled for evaluation.
+/// Shape, compiled for evaluation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CompiledShape {
     /// s = 0.
@@ -43,10 +42,10 @@ pub enum CompiledShape {
 }
 
 impl CompiledShape {
-    /// Compile a shape; `gap` is the nominal clearance that the two-lobe law refers to (m).
+    /// Compiles a shape; `gap` is the nominal clearance to which the two-lobe law refers (m).
     ///
     /// # Errors
-    /// A table too short or not finite.
+    /// Table too short or not finite.
     pub fn new(shape: &Shape, gap: f64) -> Result<Self> {
         Ok(match shape {
             Shape::Circular {} => Self::Circular,
@@ -74,7 +73,7 @@ impl CompiledShape {
         }
     }
 
-    /// Smallest s (m), which it reaches.
+    /// Minimum of s (m).
     pub fn least(&self) -> f64 {
         match self {
             Self::Circular => 0.0,
@@ -85,10 +84,10 @@ impl CompiledShape {
         }
     }
 
-    /// Smallest s between two angles (m), which it reaches.
+    /// Minimum of s between two angles (m).
     pub fn lowest_between(&self, from: f64, to: f64) -> f64 {
         let ends = self.evaluate(from).0.min(self.evaluate(to).0);
-        // Whether one of the angles `first` + n·`period` lies between.
+        // Checks whether one of the angles `first` + n·`period` is in between.
         let passes = |first: f64, period: f64| ((to - first) / period).floor() > ((from - first) / period).floor();
         match self {
             Self::Circular => 0.0,
@@ -96,7 +95,7 @@ impl CompiledShape {
                 let crest = if *amplitude >= 0.0 { *phase } else { *phase + std::f64::consts::PI };
                 if passes(crest / order, std::f64::consts::TAU / order) { -amplitude.abs() } else { ends }
             }
-            // Of bumps the crest; of dents the ridge between two.
+            // For bumps the crest; for dents the ridge between two.
             Self::TwoLobe { height, phase, .. } => {
                 let (half, whole) = (std::f64::consts::FRAC_PI_2, std::f64::consts::PI);
                 let crest = if *height >= 0.0 { *phase + half } else { *phase };
@@ -131,12 +130,12 @@ impl CompiledShape {
         }
     }
 
-    /// A bound that s stays above between two angles (m): the lower of its values there, less what its curvature allows between.
+    /// Lower bound of s between two angles (m): the lower of its end values, minus the difference that its curvature allows.
     pub fn least_between(&self, from: f64, to: f64) -> f64 {
         let curvature = match self {
             Self::Circular => return 0.0,
             Self::Lobes { amplitude, order, .. } => amplitude.abs() * order * order,
-            // Dents take nothing away. Where two bumps meet there is a ridge, which is above any chord.
+            // Dents lower nothing. Between two bumps there is a ridge, which is above any chord.
             Self::TwoLobe { height, .. } if *height < 0.0 => return 0.0,
             Self::TwoLobe { height, width, .. } => 2.0 * height.abs() / (width * width),
             Self::Table { curvature, .. } => *curvature,
@@ -145,7 +144,7 @@ impl CompiledShape {
         self.evaluate(from).0.min(self.evaluate(to).0) - 0.125 * curvature * width * width
     }
 
-    /// [`CompiledShape::evaluate`] for a row of angles, in a form that compiles to vector instructions where it can.
+    /// Evaluates [`CompiledShape::evaluate`] for a row of angles, in a form that the compiler can vectorise.
     #[inline(always)]
     pub fn evaluate_row(&self, angles: &[f64], shape: &mut [f64], slope: &mut [f64]) {
         let places = angles.iter().zip(shape).zip(slope);
@@ -212,7 +211,7 @@ fn exp_of_negative(x: f64) -> f64 {
     sum * scale
 }
 
-/// Smallest value between two angles of a periodic cubic, at a knot or between two; infinite where it has no minimum there.
+/// Smallest value between two angles of a periodic cubic spline, at a knot or between two; infinite if it has no minimum there.
 fn lowest_of_spline(knots: &[[f64; 2]], from: f64, to: f64) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "tables are far shorter than 2^52")]
     let count = knots.len() as f64;
@@ -236,7 +235,7 @@ fn lowest_of_spline(knots: &[[f64; 2]], from: f64, to: f64) -> f64 {
     lowest
 }
 
-/// Coefficients of the cubic after a knot, by the share of the spacing.
+/// Coefficients of the cubic after a knot, in terms of the fraction of the spacing.
 fn hermite(knots: &[[f64; 2]], index: usize, spacing: f64) -> [f64; 4] {
     let [a, slope_a] = knots[index];
     let [b, slope_b] = knots[(index + 1) % knots.len()];
@@ -264,7 +263,7 @@ fn evaluate_spline(knots: &[[f64; 2]], angle: f64) -> (f64, f64) {
     let place = angle / spacing;
     let floor = place.floor();
     let t = place - floor;
-    // rem_euclid keeps the index in range whatever the angle; the cast cannot then truncate.
+    // rem_euclid keeps the index in range for any angle, so that the cast cannot truncate.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value < len")]
     let index = (floor.rem_euclid(count) as usize).min(knots.len() - 1);
     let [a, p, quadratic, cubic] = hermite(knots, index, spacing);
@@ -324,7 +323,7 @@ mod tests {
                 assert!(bound <= least + 1e-15, "{shape:?}, {from}, {width}: {bound} {least}");
                 (tightest, lowest) = (tightest.min(least - bound), lowest.min(least));
             }
-            // And it says something.
+            // The bound is not trivial.
             let dent = matches!(shape, Shape::TwoLobe { depth, .. } if depth < 0.0);
             assert!(dent || tightest < 1e-6 && lowest <= 0.0);
         }

@@ -1,4 +1,4 @@
-//! Gaps to a surface through data points: closest point, normal, and the place where the force is handed over.
+//! Gaps to a surface through data points: closest point, normal, and the place at which the force is transferred.
 
 use super::frame::PolarFrame;
 use super::layout::Layout;
@@ -7,21 +7,21 @@ use super::wrench::{At, MotionIncrement};
 use super::{Geometry, PrescribedMotion, dot};
 use crate::persist::{Persist, StateReader, StateWriter};
 
-/// Gap of a node that has nothing to touch: infinite, so that no distance can be made of it.
+/// Gap of a node without a surface to touch: infinite, so that it is never used as a distance.
 pub const NOTHING_TO_TOUCH: f64 = f64::INFINITY;
 
 /// Contact nodes of equally spaced sectors facing a surface spline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplineGap {
-    /// Where the contact nodes of the structure are.
+    /// Positions of the contact nodes of the structure.
     pub layout: Layout,
-    /// Contact nodes that meet the surface.
+    /// Contact nodes that can touch the surface.
     pub nodes: Vec<usize>,
-    /// The first data point among the nodes of the contact grid that carries the surface.
+    /// Index of the first data point among the nodes of the contact grid that carries the surface.
     pub first_node: usize,
-    /// Clearance that the data points were placed with (m).
+    /// Clearance at which the data points were placed (m).
     pub nominal_clearance: f64,
-    /// The surface as it is now.
+    /// The current surface.
     pub surface: SurfaceSpline,
     /// Control points of the round surface (m).
     pub round: Vec<[f64; 3]>,
@@ -31,20 +31,20 @@ pub struct SplineGap {
     pub angular_scale: f64,
     /// Largest change of a control point by the shape at factor 1 (m).
     pub shape_size: f64,
-    /// By how much a ring through so many points is less round than a circle (m).
+    /// Deviation of a ring through this number of points from a circle (m).
     pub ripple: f64,
     /// Control points in use.
     control: Vec<[f64; 3]>,
     factor: f64,
-    /// Revolutions of the rotor over the step under way.
+    /// Revolutions of the rotor over the current step.
     pub turned: f64,
-    /// The first node, `node · lanes + lane`, that is further beyond the edge than the surface goes on
-    /// ([`super::surface_spline::REACH`]).
+    /// The first node, `node · lanes + lane`, that is beyond the extension of the surface ([`super::surface_spline::REACH`]).
     pub out_of_reach: Option<usize>,
 }
 
 impl SplineGap {
-    /// `surface` is the round one; `shape` its change of control points at factor 1, empty if there is none.
+    /// Creates the gap function; `surface` is the round one, and `shape` is its change of control points at factor 1, empty if there is
+    /// none.
     pub fn new(
         layout: Layout,
         nominal_clearance: f64,
@@ -74,7 +74,7 @@ impl SplineGap {
         }
     }
 
-    /// Move the control points: shape factor, and displacements `moved` (m, three per control point; empty = rigid).
+    /// Moves the control points: shape factor, and displacements `moved` (m, three per control point; empty = rigid).
     pub fn follow(&mut self, factor: f64, moved: &[f64]) {
         if moved.is_empty() && (self.shape.is_empty() || factor.to_bits() == self.factor.to_bits()) {
             return;
@@ -95,9 +95,9 @@ impl SplineGap {
         self.surface.set_control_points(&self.control);
     }
 
-    /// Gaps (m), normals and places of all nodes, for the displacements of the contact rows (m) and of the control
-    /// points. `guess` holds the places of the step before; without one (`None`) the search starts from the angle.
-    /// Nodes out of reach have nothing to touch, and are told of in [`SplineGap::out_of_reach`].
+    /// Computes gaps (m), normals and closest points of all nodes, for the displacements of the contact rows (m) and of the control points.
+    /// `guess` contains the closest points of the previous step; with `None` the search starts from the angle. Nodes out of reach have no
+    /// surface to touch and are reported by [`SplineGap::out_of_reach`].
     pub fn evaluate(
         &mut self,
         drive: &PrescribedMotion,
@@ -131,13 +131,14 @@ impl SplineGap {
                     geometry.places[index] = place;
                     self.out_of_reach = self.out_of_reach.or(Some(index));
                 }
-                // Found out by the caller: the state is not what the model describes any more.
+                // The caller detects this: the model no longer describes such a state.
                 Projection::Lost => gap[index] = f64::NAN,
             }
         }
     }
 
-    /// The closest point of a node displaced by `moved` (m), sought from the place it had, or from its angle; and its directions.
+    /// Returns the closest point of a node displaced by `moved` (m), searched from its previous place or from its angle, and the directions
+    /// of the node.
     #[inline(always)]
     fn project(&self, at: At<'_>, moved: [f64; 3], guess: Option<ClosestPoint>) -> (Projection, PolarFrame) {
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle - at.drive.shape_rotation;
@@ -150,12 +151,12 @@ impl SplineGap {
         (self.surface.project(point, start), frame)
     }
 
-    /// Points at other places instead of contact nodes.
+    /// Replaces the contact nodes by points at other places.
     pub fn of_points(self, layout: Layout) -> Self {
         Self { nodes: (0..layout.nodes()).collect(), layout, ..self }
     }
 
-    /// Gap (m) of one node displaced by `moved` (m) to the surface as it is now; infinite beyond its edges.
+    /// Gap (m) of one node displaced by `moved` (m) to the current surface; infinite beyond its edges.
     pub fn gap_of_one(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
         match self.project(at, moved, None).0 {
             Projection::Found { gap, .. } => gap,
@@ -164,7 +165,7 @@ impl SplineGap {
         }
     }
 
-    /// Gap (m), unit normal and place of one node displaced by `moved` (m); the surface is rigid.
+    /// Returns gap (m), unit normal and closest point of one node displaced by `moved` (m); the surface is rigid.
     pub(super) fn gap_of_node(&mut self, at: At<'_>, moved: [f64; 3]) -> (f64, [f64; 3], ClosestPoint) {
         self.follow(at.drive.shape_factor, &[]);
         match self.project(at, moved, None) {
@@ -174,7 +175,7 @@ impl SplineGap {
         }
     }
 
-    /// Displacement of the shaft's centre along the directions of a node at `angle` from the shape (m).
+    /// Displacement of the shaft centre along the directions of a node at `angle` from the shape (m).
     fn shaft_offset(&self, angle: f64, drive: &PrescribedMotion) -> [f64; 3] {
         let [x, y, z] = drive.shaft;
         if x == 0.0 && y == 0.0 {
@@ -184,15 +185,15 @@ impl SplineGap {
         }
     }
 
-    /// A node displaced by `moved` from the shaft's centre (m, own directions); clearance that the surface does not have
-    /// moves it inwards.
+    /// Position of a node displaced by `moved` from the shaft centre (m, own directions); additional clearance, which the surface does not
+    /// contain, moves it inwards.
     #[inline(always)]
     pub fn arm(&self, node: usize, lane: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
         let clearance = self.layout.clearances[lane] - self.nominal_clearance + drive.gap_offset + drive.radius_change;
         [self.layout.radii[node] - clearance + moved[0], moved[1], self.layout.axial[node] + moved[2]]
     }
 
-    /// Velocity with the rotor (m/s) of a node displaced by `moved` (m), in its own directions: Ω × (x − e) + ė.
+    /// Velocity by the motion of the rotor (m/s) of a node displaced by `moved` (m), in its own directions: Ω × (x − e) + ė.
     pub fn rigid_velocity(&self, node: usize, index: usize, drive: &PrescribedMotion, moved: [f64; 3]) -> [f64; 3] {
         let [outwards, around, _] = self.arm(node, index % self.layout.lanes, drive, moved);
         let [x, y, z] = drive.shaft_velocity;
@@ -201,7 +202,7 @@ impl SplineGap {
         [radial - drive.speed * around, tangential + drive.speed * outwards, axial]
     }
 
-    /// The contact point at `place` from the shaft's centre (m), in the directions of the node.
+    /// Position of the contact point at `place` from the shaft centre (m), in the directions of the node.
     pub fn contact_arm(&self, index: usize, drive: &PrescribedMotion, place: ClosestPoint) -> [f64; 3] {
         let angle = self.layout.angles[index] + drive.rotor_angle - drive.shape_rotation;
         let point = PolarFrame::new(angle).local(self.surface.evaluate(place).point);
@@ -209,8 +210,8 @@ impl SplineGap {
         std::array::from_fn(|i| point[i] - shaft[i])
     }
 
-    /// Returns the displacement of the surface along `normal` by its prescribed motion (m), at a contact point `arm` from the shaft's centre (m,
-    /// directions of the node).
+    /// Returns the displacement of the surface along `normal` by its prescribed motion (m), at a contact point `arm` from the shaft centre
+    /// (m, directions of the node).
     pub fn surface_motion(
         &self,
         at: At<'_>,
@@ -235,7 +236,7 @@ impl SplineGap {
         normal[0] * motion.opening + dot(normal, grown) + dot(normal, turned)
     }
 
-    /// Angle at which a displaced node faces the casing (rad), in the fixed frame.
+    /// Angle of the position of a displaced node on the casing (rad), in the fixed frame.
     pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
         let angle = self.layout.angles[at.index] + at.drive.rotor_angle;
         let arm = self.arm(at.node, at.index % self.layout.lanes, at.drive, moved);
@@ -249,7 +250,7 @@ impl SplineGap {
     }
 }
 
-/// Whether a normal seen from a node is one of a casing seen from inside, on a flank below 45°.
+/// Returns whether a normal in the directions of a node is that of a casing seen from inside, on a flank below 45°.
 pub fn faces_inwards(normal: [f64; 3]) -> bool {
     let sideways = dot([0.0, normal[1], normal[2]], [0.0, normal[1], normal[2]]).sqrt();
     sideways <= -normal[0]

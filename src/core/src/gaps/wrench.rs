@@ -1,13 +1,13 @@
-//! Contact forces in fixed directions: at which point they act, and what moment they have.
+//! Contact forces in fixed directions: points of action and moments.
 //!
-//! Forces of contacts are found in the coordinates of the displacements, so that their work on the structures, and on a
-//! rotor that turns or a shaft that moves, is what the ledger books. Here they become vectors at a point x, with one
-//! moment for master and slave. The moment on a rotor is (x − e) × F with e the shaft's centre, its z part the torque
-//! conjugate to the rotor angle; on a free master it is x × F about the origin.
+//! Contact forces are computed in the coordinates of the displacements, so that their work on the structures, on a turning rotor or on a
+//! moving shaft is the work in the energy ledger. Here they become vectors at a point x, with one moment for master and slave. The moment
+//! on a rotor is (x − e) × F with the shaft centre e, and its z part is the torque conjugate to the rotor angle; on a free master it is x ×
+//! F about the origin.
 //!
-//! On a surface of revolution x is at the radius r + u_r and the angle φ = θ_node + θ_r + u_θ/r from the shaft's centre, the
-//! tangential force there is r/(r + u_r) times the one conjugate to u_θ, and the torque r times the latter. On a surface
-//! through data points x is the contact point on the surface, where the force is handed to its control points.
+//! On a surface of revolution x is at the radius r + u_r and the angle φ = θ_node + θ_r + u_θ/r from the shaft centre, the tangential force
+//! there is r/(r + u_r) times the one conjugate to u_θ, and the torque is r times the latter. On a surface through data points x is the
+//! contact point on the surface, where the force is transferred to its control points.
 
 use super::frame::PolarFrame;
 use super::surface_spline::ClosestPoint;
@@ -16,11 +16,11 @@ use super::{GapLaw, PrescribedMotion};
 /// A contact force on the master in fixed directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {
-    /// Where it acts (m), from the middle of the casing or the origin.
+    /// Point of action (m), from the middle of the casing or the origin.
     pub point: [f64; 3],
-    /// Along fixed x, y, z (N).
+    /// Force along fixed x, y, z (N).
     pub force: [f64; 3],
-    /// Moment (N·m) about the shaft's centre, which moves with whirl and axial shift, or about the origin.
+    /// Moment (N·m) about the shaft centre, which moves with whirl and axial shift, or about the origin.
     pub moment: [f64; 3],
 }
 
@@ -29,13 +29,13 @@ pub struct Wrench {
 pub struct MotionIncrement {
     /// Length of the step (s).
     pub step: f64,
-    /// The rotor (rad), over the step.
+    /// Rotation of the rotor over the step (rad).
     pub turn: f64,
-    /// The shaft's centre along fixed x, y, z (m).
+    /// Displacement of the shaft centre along fixed x, y, z (m).
     pub shaft: [f64; 3],
-    /// Clearance of round surfaces (m).
+    /// Change of the clearance of round surfaces (m).
     pub opening: f64,
-    /// Factor on the shape (-).
+    /// Change of the factor on the shape (-).
     pub shape_factor: f64,
     /// Rotation of the shape (rad).
     pub shape_rotation: f64,
@@ -44,8 +44,8 @@ pub struct MotionIncrement {
 crate::persist::persist_fields!(MotionIncrement { step, turn, shaft, opening, shape_factor, shape_rotation });
 
 impl MotionIncrement {
-    /// From `before` to `now`, a step of length `step` (s). Angles are known to whole turns only: the rotor's turn is the one
-    /// nearest to what its speed tells, that of the shape the smallest.
+    /// Computes the change from `before` to `now`, a step of length `step` (s). Angles are known only up to whole turns: the turn of the
+    /// rotor is the one nearest to the value by its speed, that of the shape the smallest.
     pub fn between(before: &PrescribedMotion, now: &PrescribedMotion, step: f64) -> Self {
         let full = std::f64::consts::TAU;
         let turned = now.rotor_angle - before.rotor_angle;
@@ -60,8 +60,8 @@ impl MotionIncrement {
         }
     }
 
-    /// Mean of this step and the one before, as the displacements are that a force at the time between works on; the rotor's
-    /// turn is that of this step alone, so that the mean torque times the speed is the power of the shaft.
+    /// Returns the mean of this step and the one before, like the displacements on which a force at the time in between does work; the turn
+    /// of the rotor is that of this step alone, so that the mean torque times the speed is the power of the shaft.
     pub fn centred(&self, before: &Self) -> Self {
         Self {
             step: self.step,
@@ -73,7 +73,7 @@ impl MotionIncrement {
         }
     }
 
-    /// This step and the one before together.
+    /// Returns the sum of this step and the one before.
     pub fn since(&self, before: &Self) -> Self {
         Self {
             step: self.step + before.step,
@@ -90,12 +90,12 @@ impl MotionIncrement {
         self.since(&other.over(-1.0))
     }
 
-    /// Whether no input moves the casing.
+    /// Returns whether no input moves the casing.
     pub fn casing_rests(&self) -> bool {
         self.opening == 0.0 && self.shape_factor == 0.0 && self.shape_rotation == 0.0
     }
 
-    /// The same rates over a step `ratio` times as long.
+    /// Returns the change at the same rates over a step `ratio` times as long.
     pub fn over(&self, ratio: f64) -> Self {
         Self {
             step: ratio * self.step,
@@ -108,7 +108,7 @@ impl MotionIncrement {
     }
 }
 
-/// A contact of one node at the instant its force is found.
+/// A contact of one node at the instant at which its force is computed.
 #[derive(Debug, Clone, Copy)]
 pub struct At<'a> {
     /// Contact node.
@@ -120,8 +120,8 @@ pub struct At<'a> {
 }
 
 impl GapLaw {
-    /// Returns the data from which the contact point of a node displaced by `moved` (m, own directions) with the closest point `place` follows: the
-    /// displacement itself on surfaces of revolution, else the point relative to the shaft's centre or the origin (m).
+    /// Returns the data that determine the contact point of a node displaced by `moved` (m, own directions) with the closest point `place`:
+    /// the displacement itself on surfaces of revolution, otherwise the point relative to the shaft centre or the origin (m).
     #[inline(always)]
     pub fn contact_point(&self, at: At<'_>, moved: [f64; 3], place: ClosestPoint) -> [f64; 3] {
         match self {
@@ -131,7 +131,7 @@ impl GapLaw {
         }
     }
 
-    /// The `force` on the master (N, in the coordinates of its displacements) at a contact point found by
+    /// Returns the wrench of a `force` on the master (N, in the coordinates of its displacements) at a contact point found by
     /// [`GapLaw::contact_point`].
     #[inline(always)]
     pub fn wrench(&self, at: At<'_>, point: [f64; 3], force: [f64; 3]) -> Wrench {
@@ -152,7 +152,7 @@ impl GapLaw {
         }
     }
 
-    /// Displacement over a step (m) with the rotor, or with what slides along fixed obstacles, in the coordinates of the
+    /// Displacement over a step (m) with the rotor, or along fixed obstacles with prescribed sliding, in the coordinates of the
     /// displacements of a node with this contact point.
     #[inline(always)]
     pub fn spin_motion(&self, at: At<'_>, point: [f64; 3], motion: &MotionIncrement) -> [f64; 3] {
@@ -164,7 +164,7 @@ impl GapLaw {
         }
     }
 
-    /// The same with the shaft's centre.
+    /// Displacement over a step (m) with the shaft centre, in the same coordinates.
     #[inline(always)]
     pub fn shaft_motion(
         &self,
@@ -196,7 +196,7 @@ impl GapLaw {
         }
     }
 
-    /// Angle at which a node displaced by `moved` (m, own directions) faces the casing (rad), in the fixed frame.
+    /// Angle of the position of a node displaced by `moved` (m, own directions) on the casing (rad), in the fixed frame.
     pub fn angle_on_casing(&self, at: At<'_>, moved: [f64; 3]) -> f64 {
         match self {
             Self::Fixed(_) | Self::Open(_) => 0.0,
@@ -206,7 +206,7 @@ impl GapLaw {
     }
 }
 
-/// A force at `arm` from the shaft's centre, both in the directions of `frame`.
+/// Returns the wrench of a force at `arm` from the shaft centre, both in the directions of `frame`.
 #[inline(always)]
 fn around(frame: PolarFrame, drive: &PrescribedMotion, arm: [f64; 3], force: [f64; 3]) -> Wrench {
     let point = frame.fixed(arm);

@@ -1,16 +1,16 @@
-//! The unilateral contact problem of one step on one group of coupled nodes.
+//! The unilateral contact problem of one step for one group of coupled nodes.
 //!
 //! With g the predicted gaps and W = C_Nᵀ A⁻¹ C_NT the Delassus matrix (normal gap of node i per multiplier of
 //! node j, friction included), the corrected gaps are g + Wλ.
 //!
 //! * [`ContactSolver::film`]: the paper's rule (eqs 10-11). Penetration is detected once; equality is enforced on that set, and
-//!   neither a negative λ nor a penetration caused elsewhere is looked at again.
-//! * [`ContactSolver::lcp`]: 0 ≤ λ ⟂ g + Wλ ≥ 0 on all nodes by block principal pivoting, started from the last step's
-//!   set. When the number of infeasible nodes stops falling it continues with Murty's least-index rule, which is
-//!   finite for every P-matrix (J. J. Júdice, F. M. Pires, Computers & Operations Research 21, 1994). With more than a
-//!   few nodes finite can mean 2ⁿ, and the violated contacts are driven to closure one by one instead. All of this needs
-//!   a P-matrix. Without friction W may be singular instead, as it is with more contacts than modes; there a solution is
-//!   approached (`laws::proximal`) when those rules do not end.
+//!   neither a negative λ nor a penetration caused elsewhere is checked again.
+//! * [`ContactSolver::lcp`]: 0 ≤ λ ⟂ g + Wλ ≥ 0 on all nodes by block principal pivoting, started from the set of the last
+//!   step. When the number of infeasible nodes stops falling it continues with Murty's least-index rule, which is finite for
+//!   every P-matrix (J. J. Júdice, F. M. Pires, Computers & Operations Research 21, 1994). With more than a few nodes finite
+//!   can mean 2ⁿ, and the violated contacts are driven to closure one by one instead. All of this needs a P-matrix. Without
+//!   friction W may be singular instead, for example with more contacts than modes; then the solution is approximated
+//!   iteratively (`laws::proximal`) if those rules do not end.
 
 mod drive;
 mod elimination;
@@ -20,7 +20,7 @@ use nalgebra::DMatrix;
 use super::proximal::{ROUNDS, Yielding};
 use crate::dynamics::dispatch::InstructionSet;
 
-/// Pivots below this fraction of their node's own diagonal belong to redundant contacts (coincident nodes).
+/// Pivots below this fraction of the diagonal entry of their node belong to redundant contacts (coincident nodes).
 const REDUNDANT_PIVOT: f64 = 1e-12;
 /// Gaps and multipliers within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-13;
@@ -31,60 +31,60 @@ const PATIENCE: usize = 8;
 const ENUMERABLE: usize = 14;
 /// Factorisations allowed to larger ones before contacts are driven one by one; block exchanges need about ten.
 const BLOCK_LIMIT: usize = 50;
-/// Factorisations allowed to approaching a solution, as a multiple of those for driving.
+/// Factorisations allowed for the iterative approximation of a solution, as a multiple of those for driving.
 const APPROACH: usize = 4;
 /// Largest problem with an unreduced limit of factorisations for driving.
 const FULL_PATIENCE: usize = 256;
 
-/// Systems from this order on are worked on column by column, as they are stored.
+/// Systems of at least this order are processed column by column, in storage order.
 const LARGE: usize = 32;
 
 /// Effort of one solution, and whether it succeeded.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SolverOutcome {
-    /// The complementarity conditions hold.
+    /// True if the complementarity conditions hold.
     pub solved: bool,
-    /// Linear systems factorised.
+    /// Number of linear systems factorised.
     pub factorisations: usize,
-    /// Gauss-Seidel sweeps (Coulomb solver only).
+    /// Number of Gauss-Seidel sweeps (Coulomb solver only).
     pub sweeps: usize,
-    /// Largest residual, relative to the terms it is made of (Coulomb solver only; 0 otherwise).
+    /// Largest residual, relative to the terms that it is computed from (Coulomb solver only; 0 otherwise).
     pub residual: f64,
-    /// Newton's method had to help the sweeps (Coulomb solver only).
+    /// True if Newton's method was needed after the sweeps (Coulomb solver only).
     pub fallback: bool,
 }
 
 impl SolverOutcome {
-    /// The outcome of a direct method.
+    /// Creates the outcome of a direct method.
     pub(super) fn direct(solved: bool, factorisations: usize) -> Self {
         Self { solved, factorisations, sweeps: 0, residual: 0.0, fallback: false }
     }
 }
 
-/// Scratch for problems up to a largest size; allocates only when made. Arrays have the largest size, and a solve uses
-/// their first `size` entries (the leading block of the matrix).
+/// Scratch for problems up to a largest size; allocates only when created. Arrays have the largest size, and a solve uses their first
+/// `size` entries (the leading block of the matrix).
 #[derive(Debug, Clone)]
 pub struct ContactSolver {
     size: usize,
     /// Delassus matrix (m/N), filled by the caller.
     pub delassus: DMatrix<f64>,
-    /// The symmetric part of the matrix is positive semidefinite, as it is without friction: a solution is found whenever there
-    /// is one. Set by the caller; false when made.
+    /// True if the symmetric part of the matrix is positive semidefinite, as without friction: a solution is found whenever there is one.
+    /// Set by the caller; false at first.
     pub monotone: bool,
     /// Predicted gaps (m), filled by the caller; corrected gaps on return.
     pub gaps: Vec<f64>,
     /// Multipliers (N), set by the solvers; 0 beyond the size.
     pub multipliers: Vec<f64>,
-    /// Active set: for the complementarity solver, start and result; false beyond the size.
+    /// Active set: start and result of the complementarity solver; false beyond the size.
     pub active: Vec<bool>,
     factor: DMatrix<f64>,
     /// Diagonal of W_AA in the order of `members`, without sign.
     diagonal: Vec<f64>,
-    /// Matrix that remains after elimination.
+    /// Remaining matrix after elimination.
     remaining: Vec<f64>,
     right: Vec<f64>,
     members: Vec<usize>,
-    /// Node i is one of `members`; made when some active node is not.
+    /// True for nodes that are among `members`; filled if some active node is not.
     enforced: Vec<bool>,
     corrected: Vec<f64>,
     /// Multipliers and gaps while contacts are driven to closure.
@@ -95,7 +95,7 @@ pub struct ContactSolver {
 }
 
 impl ContactSolver {
-    /// Room for problems of up to `size` nodes, and set to that size.
+    /// Allocates scratch for problems of up to `size` nodes, and sets the size to it.
     pub fn new(size: usize) -> Self {
         Self {
             size,
@@ -118,7 +118,7 @@ impl ContactSolver {
         }
     }
 
-    /// Number of nodes.
+    /// Number of nodes of the current problem.
     pub fn size(&self) -> usize {
         self.size
     }
@@ -128,10 +128,10 @@ impl ContactSolver {
         self.gaps.len()
     }
 
-    /// Set the number of nodes of the next problems. Does not allocate.
+    /// Sets the number of nodes of the next problems. Does not allocate.
     ///
     /// # Panics
-    /// When `size` exceeds the capacity.
+    /// If `size` exceeds the capacity.
     pub fn set_size(&mut self, size: usize) {
         assert!(size <= self.capacity(), "{size} contact nodes exceed the solver capacity of {}", self.capacity());
         self.size = size;
@@ -139,7 +139,7 @@ impl ContactSolver {
         self.active[size..].fill(false);
     }
 
-    /// The paper's correction (eqs 10-11): equality on the nodes that penetrate in the prediction.
+    /// Solves by the paper's correction (eqs 10-11): equality on the nodes that penetrate in the prediction.
     pub fn film(&mut self) -> SolverOutcome {
         for node in 0..self.size {
             self.active[node] = self.gaps[node] < 0.0;
@@ -150,7 +150,7 @@ impl ContactSolver {
         SolverOutcome::direct(true, 1)
     }
 
-    /// Complementarity on all nodes; `active` is the starting guess and returns the set found.
+    /// Solves the complementarity problem on all nodes; `active` is the initial guess and contains the resulting set on return.
     pub fn lcp(&mut self) -> SolverOutcome {
         let scale = self.gaps[..self.size].iter().fold(0.0, |largest: f64, gap| largest.max(gap.abs()));
         self.yielding.begin();
@@ -166,7 +166,7 @@ impl ContactSolver {
         outcome
     }
 
-    /// Block exchanges, and the least-index rule where they make no progress.
+    /// Exchanges blocks, and uses the least-index rule if they make no progress.
     fn exchange(&mut self, scale: f64) -> SolverOutcome {
         for node in 0..self.size {
             self.active[node] |= self.gaps[node] < 0.0;
@@ -201,7 +201,7 @@ impl ContactSolver {
         SolverOutcome::direct(false, limit)
     }
 
-    /// Solve from the predicted gaps, whatever the rank of W. Not solved where no motion opens all contacts.
+    /// Solves iteratively from the predicted gaps, for any rank of W. Fails if no motion opens all contacts.
     fn approach(&mut self, gap_scale: f64) -> SolverOutcome {
         let (size, limit, mut factorisations) = (self.size, APPROACH * drive_limit(self.size), 0);
         self.yielding.keep(&self.delassus, &self.gaps[..size], gap_scale);
@@ -240,7 +240,7 @@ impl ContactSolver {
         }
     }
 
-    /// True when a contact left out as redundant is not closed by the contacts it was taken to depend on.
+    /// Returns whether a contact that was omitted as redundant is not closed by the contacts on which it was assumed to depend.
     fn redundant_contact_violated(&mut self, gap_scale: f64) -> bool {
         let active = self.active[..self.size].iter().filter(|active| **active).count();
         if active == self.members.len() {
@@ -254,7 +254,7 @@ impl ContactSolver {
         (0..self.size).filter(left_out).any(|node| self.corrected[node] < -ZERO_FRACTION * gap_scale)
     }
 
-    /// Remove rounding from a solution: λ ≥ 0 exactly, gap ≥ 0 exactly. False, and nothing done, where it is none.
+    /// Removes rounding from a solution: λ ≥ 0 exactly, gap ≥ 0 exactly. Returns false and does nothing if there is no solution.
     fn settle(&mut self, gap_scale: f64) -> bool {
         if self.yielding.is_pinched(self.size, gap_scale, |node| self.multipliers[node]) {
             return false;
@@ -262,7 +262,7 @@ impl ContactSolver {
         for node in 0..self.size {
             self.multipliers[node] = self.multipliers[node].max(0.0);
             self.active[node] = self.multipliers[node] > 0.0;
-            // A redundant contact that carries nothing may stand open.
+            // A redundant contact without force may be open.
             self.gaps[node] = if self.active[node] { 0.0 } else { self.corrected[node].max(0.0) };
         }
         true
@@ -277,7 +277,7 @@ impl ContactSolver {
             }
             return;
         }
-        // The same sums, columns outside; like the sum of an iterator they start from −0.
+        // The same sums with columns as the outer loop; they start from −0 like the sum of an iterator.
         self.corrected[..size].fill(-0.0);
         for member in &self.members {
             let (multiplier, column) = (self.multipliers[*member], self.delassus.column(*member));
@@ -290,9 +290,9 @@ impl ContactSolver {
         }
     }
 
-    /// W_AA λ_A = −g_A on the active set by elimination with diagonal pivoting, λ = 0 elsewhere. A P-matrix needs no
-    /// other pivots; a vanishing pivot marks a contact that the others already enforce, and its λ stays 0.
-    /// With a driven node the right-hand side is −W_Ad instead: how λ_A follows that node's multiplier.
+    /// Solves W_AA λ_A = −g_A on the active set by elimination with diagonal pivoting; λ = 0 elsewhere. A P-matrix needs no other pivots; a
+    /// vanishing pivot marks a contact that the others already enforce, whose λ stays 0. With a driven node the right-hand side is −W_Ad
+    /// instead: the derivative of λ_A with respect to the multiplier of that node.
     fn solve_active(&mut self, driven: Option<usize>) {
         self.members.clear();
         self.members.extend((0..self.size).filter(|node| self.active[*node]));
@@ -320,7 +320,7 @@ impl ContactSolver {
     }
 }
 
-/// Factorisations of the exchange rules. Every set is tried only where nothing else is left: with friction.
+/// Largest number of factorisations of the exchange rules. All sets are tried only if there is no other method: with friction.
 fn exchange_limit(size: usize, monotone: bool) -> usize {
     match size {
         0..=ENUMERABLE if monotone => 100 + 20 * size,
@@ -329,8 +329,8 @@ fn exchange_limit(size: usize, monotone: bool) -> usize {
     }
 }
 
-/// Factorisations of the drives: twenty per contact. Beyond `FULL_PATIENCE` contacts the number falls with the square of
-/// the size, so that the whole effort, size³ each, grows no faster than the square of the size.
+/// Largest number of factorisations of the drives: twenty per contact. Beyond `FULL_PATIENCE` contacts it falls with the square of the
+/// size, so that the total effort, size³ each, grows no faster than the square of the size.
 fn drive_limit(size: usize) -> usize {
     let limit = 100 + 20 * size;
     if size <= FULL_PATIENCE { limit } else { limit * FULL_PATIENCE * FULL_PATIENCE / (size * size) }

@@ -1,4 +1,4 @@
-//! Contact with an abradable coating: rods that are free, elastic or yielding, and the hard casing behind them.
+//! Contact with an abradable coating: rods that are free, elastic or yielding, and the hard casing behind the coating.
 
 use nalgebra::DMatrix;
 
@@ -6,13 +6,13 @@ use super::{ContactLaw, ContactPrediction};
 use crate::laws::active_set::SolverOutcome;
 use crate::laws::coating::{CoatedProblem, Coating};
 
-/// A coating with its wear, and the problem of the blades on it. Groups are whole blades, whose nodes share cells.
+/// A coating with its wear, and the contact problem of its blades. Groups are whole blades, whose nodes share cells.
 #[derive(Debug, Clone)]
 pub struct Coated {
     coating: Coating,
     problem: CoatedProblem,
     size: usize,
-    /// Angles at which the contacts face the casing (rad), predicted gaps (m), and which rest on the hard casing at first.
+    /// Angles of the contacts on the casing (rad), predicted gaps (m), and the contacts that are initially on the hard casing.
     angles: Vec<f64>,
     gaps: Vec<f64>,
     closed: Vec<bool>,
@@ -21,7 +21,7 @@ pub struct Coated {
 }
 
 impl Coated {
-    /// Room for `contacts` contacts, all of whole blades.
+    /// Allocates for `contacts` contacts, all of whole blades.
     pub fn new(coating: Coating, contacts: usize) -> Self {
         Self {
             problem: coating.problem(contacts / coating.nodes()),
@@ -34,17 +34,17 @@ impl Coated {
         }
     }
 
-    /// The coating.
+    /// Returns the coating.
     pub fn coating(&self) -> &Coating {
         &self.coating
     }
 
-    /// The same, to change its wear.
+    /// Returns the coating for changes of its wear.
     pub fn coating_mut(&mut self) -> &mut Coating {
         &mut self.coating
     }
 
-    /// Take over the wear of the last solution; returns the energy it takes (J).
+    /// Applies the wear of the last solution; returns the energy it consumes (J).
     pub fn commit(&mut self) -> f64 {
         self.coating.commit(&self.problem)
     }

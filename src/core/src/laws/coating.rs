@@ -1,11 +1,11 @@
-//! Abradable coating: cells around the circumference and along the axis, each a rod that the blade wears off.
+//! Abradable coating: cells around the circumference and along the axis, each a rod that the blade wears.
 //!
-//! A blade is a band in θ around the line through its contact nodes, as wide as its tip. Axial row j of cells sees the penetration
-//! δ_j = −Σ N_ij g_i interpolated between its two neighbouring nodes. Every cell that the band covers returns its force F = σ·b Δz, b
-//! being the covered arc, to these nodes by the transpose of the same N, so that virtual work is exact. The arcs of a row add up to the
-//! width of the tip, however wide cells are: cells only resolve the wear. Gaps are measured to the unworn surface; the hard casing lies h₀
-//! behind it, g ≥ −h₀. [`CoatedProblem`] finds gaps, rod forces and hard contact forces of one step together; wear
-//! grows only in [`Coating::commit`].
+//! A blade is a band in θ around the line through its contact nodes, with the width of its tip. Axial row j of cells has the penetration
+//! δ_j = −Σ N_ij g_i, interpolated between its two neighbouring nodes. Every cell that the band covers returns its force F = σ·b Δz, with
+//! the covered arc b, to these nodes by the transpose of the same N, so that virtual work is exact. The arcs of a row add up to the width
+//! of the tip for any width of the cells, which only resolve the wear. Gaps are measured to the unworn surface; the hard casing is h₀
+//! behind it, g ≥ −h₀. [`CoatedProblem`] finds gaps, rod forces and hard contact forces of one step together; wear grows only in
+//! [`Coating::commit`].
 
 mod cutting;
 mod problem;
@@ -27,40 +27,40 @@ use crate::persist::{Persist, StateReader, StateWriter};
 use crate::settings::CoatingSettings;
 use crate::{Error, Result, shown};
 
-/// Contact nodes closer than this share of the axial extent are at the same place.
+/// Contact nodes closer than this fraction of the axial extent are at the same place.
 const SAME_PLACE: f64 = 1e-6;
 
 /// Cells of one axial position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct CellRow {
-    /// Contact nodes of the blade that see it.
+    /// Contact nodes of the blade that determine its penetration.
     nodes: [usize; 2],
-    /// Their weights, sum 1.
+    /// Weights of these nodes, sum 1.
     weights: [f64; 2],
     /// Area of one cell (m²).
     area: f64,
-    /// Centre (m).
+    /// Axial position of the centre (m).
     axial: f64,
     /// Radius, and width along the axis (m).
     radius: f64,
     width: f64,
-    /// Number of cells around that the tip is as wide as; 0 where the coating is cut.
+    /// Width of the tip as a number of cells; 0 for a coating that is cut.
     covers: f64,
 }
 
 impl CellRow {
-    /// Cells that a blade can press or cut at once.
+    /// Largest number of cells that a blade can press or cut simultaneously.
     fn most_cells(&self) -> usize {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ cells around")]
         let covered = self.covers as usize;
         covered + 2
     }
 
-    /// Where a blade with contact nodes at `angles` (rad) is.
+    /// Returns the angle of a blade with contact nodes at `angles` (rad).
     fn angle(&self, angles: &[f64]) -> f64 {
         let [a, b] = self.nodes;
         let apart = angles[b] - angles[a];
-        // Neighbouring nodes are less than half a turn apart, whichever turn their angles are given in.
+        // Neighbouring nodes are less than half a turn apart; their angles may differ by whole turns.
         angles[a] + self.weights[1] * (apart - TAU * (apart / TAU).round())
     }
 }
@@ -72,19 +72,19 @@ struct CellContact {
     /// Nodes within the group.
     nodes: [usize; 2],
     weights: [f64; 2],
-    /// That the blade presses or cuts (m²).
+    /// Area that the blade presses or cuts (m²).
     area: f64,
-    /// Plastic strain before the step; where it is cut, ahead of the blade.
+    /// Plastic strain before the step; if the coating is cut, ahead of the blade.
     plastic: f64,
     branch: Branch,
-    /// Whose it is.
+    /// Blade that presses or cuts the cell.
     blade: usize,
     row: usize,
-    /// It is the one that the blade faces, not one that it has left in this step; pressed in, one whose middle it covers.
+    /// True for the cell that the blade faces, not for one that it has left in this step; if pressed in, for a cell whose middle it covers.
     faced: bool,
 }
 
-/// The coating of one slave: material, cells, wear.
+/// Coating of one slave: material, cells, wear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coating {
     rod: RodMaterial,
@@ -93,23 +93,23 @@ pub struct Coating {
     /// Contact nodes per blade.
     nodes: usize,
     rows: Vec<CellRow>,
-    /// Plastic strain, `[row · around + place around]`: wear depth as a share of the thickness.
+    /// Plastic strain, `[row · around + place around]`: wear depth as a fraction of the thickness.
     plastic: Vec<f64>,
-    /// Where it is cut instead of pressed in.
+    /// State of cutting; `None` if the coating is pressed in.
     cutting: Option<CoatingCut>,
 }
 
 impl Coating {
-    /// Unworn coating that `blades` equal tips pass.
+    /// Creates an unworn coating for `blades` equal tips.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming what does not fit: no extent, two nodes at one axial position, too few cells or too wide a tip
-    /// to give every blade its own.
+    /// [`Error::Invalid`] with the invalid value: no extent; two nodes at one axial position; too few cells or too wide a tip for separate
+    /// cells of every blade.
     pub fn new(settings: &CoatingSettings, tip: &BladeTip, blades: usize) -> Result<Self> {
         let BladeTip { axial, radii, widths, extent } = tip;
         let order = sorted(tip)?;
         let (around, along) = (settings.cells_around, settings.cells_along);
-        // Two cells per pitch: deformed blades never share a cell.
+        // Two cells per pitch, so that deformed blades never share a cell.
         if around < 2 * blades || along == 0 {
             return Err(Error::invalid(
                 "contact.coating.cells_around, cells_along",
@@ -128,7 +128,7 @@ impl Coating {
             CellRow { nodes, weights, area: arc * width, axial: centre, radius, width, covers }
         };
         let rows: Vec<CellRow> = (0..along).map(row).collect();
-        // The cells of a band are up to one cell wider than it is.
+        // The cells of a band are up to one cell wider than the band.
         let pitch = number(around) / number(blades);
         if let Some(row) = rows.iter().find(|row| row.covers.is_nan() || row.covers + 1.0 > pitch) {
             return Err(Error::invalid(
@@ -151,19 +151,19 @@ impl Coating {
         })
     }
 
-    /// Scratch for groups of at most `blades` coupled blades.
+    /// Allocates scratch for groups of at most `blades` coupled blades.
     pub fn problem(&self, blades: usize) -> CoatedProblem {
         let cells = self.rows.iter().map(CellRow::most_cells).sum::<usize>();
         CoatedProblem::new(self.rod, self.thickness, blades * self.nodes, blades * cells)
     }
 
-    /// Append a blade to a group: its nodes follow those already there, and in each row the cells that it covers. `angles` are
-    /// those of its contact nodes in the fixed frame (rad), in the order of the positions given at construction.
+    /// Appends a blade to a group: its nodes follow the existing ones, with the cells that it covers in each row. `angles` are those of its
+    /// contact nodes in the fixed frame (rad), in the order of the positions given at construction.
     pub fn locate(&self, problem: &mut CoatedProblem, angles: &[f64]) {
         let first = problem.append_nodes(self.nodes);
         for (index, row) in self.rows.iter().enumerate() {
             let [a, b] = row.nodes;
-            // A cell wears with the depth in its middle; where cells are wider than the tip, with that in the middle of the tip.
+            // A cell wears with the depth in its middle; if cells are wider than the tip, with the depth in the middle of the tip.
             let half = 0.5 * row.covers.min(1.0);
             covered(row.angle(angles), row.covers, self.around, |place, share| {
                 let cell = index * self.around + place;
@@ -182,13 +182,13 @@ impl Coating {
         }
     }
 
-    /// Take over the wear of a solved problem; returns the work spent on it (J), plastic and hardening part.
+    /// Applies the wear of a solved problem; returns the work spent on it (J), plastic and hardening part.
     pub fn commit(&mut self, problem: &CoatedProblem) -> f64 {
         let mut work = 0.0;
         for (contact, after) in problem.worn() {
             let before = self.plastic[contact.cell];
             if after > before {
-                // The whole cell, of which an edge of the tip may cover a part only.
+                // The whole cell, even if an edge of the tip covers only a part.
                 work += self.rows[contact.row].area * self.thickness * self.rod.wear_work(before, after);
                 self.plastic[contact.cell] = after;
             }
@@ -196,7 +196,7 @@ impl Coating {
         work
     }
 
-    /// Contact nodes per blade.
+    /// Number of contact nodes per blade.
     pub fn nodes(&self) -> usize {
         self.nodes
     }
@@ -206,7 +206,7 @@ impl Coating {
         self.plastic.len()
     }
 
-    /// Angle (rad) that blades may turn by in a step without leaving out a cell: the width of a cell, or of the narrowest place of a tip.
+    /// Angle (rad) by which blades may turn in a step without skipping a cell: the width of a cell, or of the narrowest part of a tip.
     pub fn stride(&self) -> f64 {
         let narrowest = self.rows.iter().fold(f64::INFINITY, |narrowest, row| row.covers.min(narrowest));
         narrowest.max(1.0) * self.width()
@@ -228,7 +228,7 @@ impl Coating {
         self.plastic[cell] * self.thickness
     }
 
-    /// Normal forces of contact nodes per depth of cut of all of them (N/m), nodes²; `None` where the coating is pressed in.
+    /// Normal forces of contact nodes per depth of cut of all of them (N/m), nodes²; `None` if the coating is pressed in.
     pub fn cut_stiffness(&self) -> Option<DMatrix<f64>> {
         self.cutting.as_ref()?;
         let mut stiffness = DMatrix::zeros(self.nodes, self.nodes);
@@ -243,7 +243,7 @@ impl Coating {
         Some(stiffness)
     }
 
-    /// Mean wear depth (m) of every place around, over the area of the rows there, or of every row.
+    /// Computes the mean wear depth (m) at every place around, averaged over the area of the rows there, or of every row.
     pub fn wear_profile(&self, around: bool, out: &mut [f64]) {
         let area: f64 = self.rows.iter().map(|row| row.area).sum();
         if around {
@@ -264,7 +264,7 @@ impl Coating {
         self.plastic.iter().copied().fold(0.0, f64::max) * self.thickness
     }
 
-    /// Volume worn off (m³).
+    /// Worn volume (m³).
     pub fn worn_volume(&self) -> f64 {
         let cells = self.rows.iter().zip(self.plastic.chunks(self.around));
         cells.map(|(row, plastic)| row.area * plastic.iter().sum::<f64>()).sum::<f64>() * self.thickness
@@ -275,14 +275,14 @@ impl Coating {
         self.thickness
     }
 
-    /// Unworn again.
+    /// Removes all wear.
     pub fn reset(&mut self) {
         self.plastic.fill(0.0);
         self.cutting.iter_mut().for_each(CoatingCut::reset);
     }
 }
 
-/// The wear is the state; material and cells belong to the scene.
+/// The wear is the state; material and cells are part of the scene.
 impl Persist for Coating {
     fn save(&self, writer: &mut StateWriter) {
         self.plastic.save(writer);
@@ -306,7 +306,7 @@ impl Persist for Coating {
     }
 }
 
-/// Nodes in order of growing z, all at different places of a finite extent.
+/// Sorts the nodes by increasing z; all must be at different places of a finite extent.
 fn sorted(BladeTip { axial, radii, extent, .. }: &BladeTip) -> Result<Vec<usize>> {
     let length = extent[1] - extent[0];
     let refuse = |problem: String, remedy: &str| Err(Error::invalid("contact.coating", problem, remedy));
@@ -325,7 +325,7 @@ fn sorted(BladeTip { axial, radii, extent, .. }: &BladeTip) -> Result<Vec<usize>
     }
 }
 
-/// The two nodes around an axial position and their weights.
+/// Returns the two nodes around an axial position and their weights.
 fn neighbours(axial: &[f64], order: &[usize], position: f64) -> ([usize; 2], [f64; 2]) {
     let above = order.partition_point(|node| axial[*node] <= position);
     if above == 0 || above == order.len() {
@@ -337,8 +337,8 @@ fn neighbours(axial: &[f64], order: &[usize], position: f64) -> ([usize; 2], [f6
     ([a, b], [1.0 - share, share])
 }
 
-/// Which of `around` equal parts of the circumference holds an angle (rad), and how far within it the angle is (-, 0 to 1). Both come of
-/// one number: at a border, where rounding decides, they agree.
+/// Index of the one of `around` equal parts of the circumference that contains an angle (rad), and the position of the angle within it (-,
+/// 0 to 1). Both follow from one number, so that they agree at a border, where rounding decides.
 fn place(angle: f64, around: usize) -> (usize, f64) {
     let turns = angle / TAU;
     let places = (turns - turns.floor()) * number(around);
@@ -348,8 +348,8 @@ fn place(angle: f64, around: usize) -> (usize, f64) {
     (index, places - number(index))
 }
 
-/// Cells that a band covers which is as wide as so many of them, its middle at an angle (rad): the place of each around, and the share of
-/// it. Shares add up to the width.
+/// Calls `take` for the cells covered by a band of this width (in cells) with its middle at an angle (rad): with the place of each cell
+/// around, and the covered fraction of it. Fractions add up to the width.
 fn covered(angle: f64, width: f64, around: usize, mut take: impl FnMut(usize, f64)) {
     let (middle, within) = place(angle, around);
     let [low, high] = [within - 0.5 * width, within + 0.5 * width];
@@ -370,7 +370,7 @@ fn covered(angle: f64, width: f64, around: usize, mut take: impl FnMut(usize, f6
     }
 }
 
-/// A count as a factor.
+/// Converts a count to a factor.
 fn number(count: usize) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "counts of cells are far below 2^52")]
     let number = count as f64;

@@ -1,4 +1,4 @@
-//! Stick and slip on all contacts of a group, in De Saxcé's form.
+//! Law with stick and slip on all contacts of a group, in De Saxcé's form.
 
 use nalgebra::DMatrix;
 
@@ -17,7 +17,7 @@ pub struct Coulomb {
 }
 
 impl Coulomb {
-    /// Room for `contacts` contacts.
+    /// Allocates for `contacts` contacts.
     pub fn new(contacts: usize) -> Self {
         Self { solver: CoulombSolver::new(contacts), size: 0, corrected: vec![0.0; contacts] }
     }

@@ -1,5 +1,5 @@
-//! Contact with a coating that is cut, and the hard casing behind it. On a coating the tangential force is 1/κ of the normal
-//! one, on the hard casing µ of it, both against the slide.
+//! Contact with a coating that is cut, and the hard casing behind it. On a coating the tangential force is 1/κ of the normal force, on the
+//! hard casing µ of it, both against the slip.
 
 use nalgebra::DMatrix;
 
@@ -8,7 +8,7 @@ use crate::gaps::dot;
 use crate::laws::active_set::SolverOutcome;
 use crate::laws::coating::{BladePassage, CoatedProblem, Coating};
 
-/// A coating with what is cut of it, and the problem of the blades on it. Groups are whole blades, whose nodes share cells.
+/// A coating with its cuts, and the contact problem of its blades. Groups are whole blades, whose nodes share cells.
 #[derive(Debug, Clone)]
 pub struct CuttingLaw {
     coating: Coating,
@@ -18,26 +18,26 @@ pub struct CuttingLaw {
     matrix: DMatrix<f64>,
     contacts: Vec<CuttingContact>,
     angles: Vec<f64>,
-    /// Way of each contact over the step (m), positive along its first tangent.
+    /// Sliding distance of each contact over the step (m), positive along its first tangent.
     slid: Vec<f64>,
-    /// Along normals and tangents (N).
+    /// Multipliers along normals and tangents (N).
     multipliers: Vec<f64>,
 }
 
-/// A contact as it was posed.
+/// Data of one contact.
 #[derive(Debug, Clone, Copy, Default)]
 struct CuttingContact {
     gap: f64,
     closed: bool,
     /// Coulomb coefficient of the hard casing.
     friction: f64,
-    /// Component of the direction of sliding along the first tangent.
+    /// Component of the slip direction along the first tangent.
     sense: f64,
     sector: usize,
 }
 
 impl CuttingLaw {
-    /// Room for `contacts` contacts, all of whole blades.
+    /// Allocates for `contacts` contacts, all of whole blades.
     pub fn new(coating: Coating, contacts: usize) -> Self {
         let mut problem = coating.problem(contacts / coating.nodes());
         problem.cut = Some(DMatrix::zeros(contacts, contacts));
@@ -53,22 +53,22 @@ impl CuttingLaw {
         }
     }
 
-    /// The coating.
+    /// Returns the coating.
     pub fn coating(&self) -> &Coating {
         &self.coating
     }
 
-    /// The same, to change its wear.
+    /// Returns the coating for changes of its wear.
     pub fn coating_mut(&mut self) -> &mut Coating {
         &mut self.coating
     }
 
-    /// Take up what the last solution cuts; it is removed once the way is known ([`Coating::cut`]).
+    /// Records the cut of the last solution; the material is removed once the sliding distance is known ([`Coating::cut`]).
     pub fn commit(&mut self) {
         self.coating.take_chips(&self.problem, &self.slid);
     }
 
-    /// Gaps per normal force that comes with its tangential one: on the hard casing, and on the coating.
+    /// Fills in gaps per normal force with its tangential force: on the hard casing, and on the coating.
     fn fill(&mut self) {
         let tangential = self.coating.tangential_ratio();
         let Some(cut) = &mut self.problem.cut else { return };

@@ -5,15 +5,15 @@
 //!
 //! K* ∋ u + µ‖u_T‖ n ⟂ r ∈ K, K = {‖r_T‖ ≤ µ r_N},
 //!
-//! which is Signorini's law on u_N and Coulomb's law on u_T. Non-smooth Gauss-Seidel sweeps solve one contact after the
-//! other exactly, from the last step's reactions; they fix the status of the contacts soon, but the rest of the error
-//! falls only as fast as the coupling allows. When the rate seen so far makes further sweeps dearer than a
-//! few factorisations, a semismooth Newton method on the Alart-Curnier function finishes. When it fails it is led to the
-//! solution along proximal points, and failing that the sweeps go on, longer and under-relaxed. V. Acary, M. Brémond and
-//! O. Huber compare these and other methods (in Advanced Topics in Nonsmooth Dynamics, Springer 2018).
+//! which is Signorini's law on u_N and Coulomb's law on u_T. Non-smooth Gauss-Seidel sweeps solve one contact after the other exactly, from
+//! the reactions of the last step; they soon find the status of the contacts, but the remaining error falls only as fast as the coupling
+//! permits. When the observed rate makes further sweeps more expensive than a few factorisations, a semismooth Newton method on the
+//! Alart-Curnier function finishes. If it fails, it follows proximal points to the solution, and if that fails, the sweeps continue, longer
+//! and under-relaxed. V. Acary, M. Brémond and O. Huber compare these and other methods (in Advanced Topics in Nonsmooth Dynamics, Springer
+//! 2018).
 //!
-//! For W of full rank a solution exists for every µ; it need not be unique when µ is large. For singular W (coincident
-//! nodes) one exists when some motion opens all contacts at once with u_N > µ‖u_T‖; its reactions are not unique.
+//! For W of full rank a solution exists for every µ; it need not be unique for large µ. For singular W (coincident nodes) one exists if
+//! some motion opens all contacts simultaneously with u_N > µ‖u_T‖; its reactions are not unique.
 
 pub(crate) mod linear;
 mod newton;
@@ -27,40 +27,40 @@ use self::newton::Newton;
 use self::problem::ScaledProblem;
 use super::active_set::SolverOutcome;
 
-/// Residual at which a problem counts as solved, relative to the terms that displacements and forces are made of.
+/// Residual at which a problem counts as solved, relative to the terms of displacements and forces.
 const TOLERANCE: f64 = 1e-12;
-/// Changes between sweeps and Newton's method before giving up.
+/// Largest number of changes between sweeps and Newton's method.
 const ROUNDS: u32 = 6;
 /// Sweeps of the first round before Newton's method may take over; doubled every round.
 const SWEEPS: usize = 6;
-/// A round ends after this many times its least number of sweeps.
+/// A round ends after this multiple of its minimum number of sweeps.
 const PATIENCE: usize = 40;
 /// Sweeps over which the rate of convergence is measured.
 const RATE_SPAN: usize = 3;
 /// Factorisations a Newton attempt is expected to need.
 const EXPECTED_FACTORISATIONS: f64 = 5.0;
-/// Speed of the factorisation's arithmetic relative to that of the sweeps.
+/// Arithmetic speed of the factorisation relative to that of the sweeps.
 const FACTORISATION_SPEED: f64 = 4.0;
 /// Softening about the current reaction in Newton's systems, relative to the unit diagonal.
 const PROXIMAL: f64 = 1e-11;
 /// First softening of the proximal points, relative to the unit diagonal.
 const SOFTENING: f64 = 0.1;
-/// Ratio by which the softening falls from one proximal point to the next.
+/// Factor by which the softening falls from one proximal point to the next.
 const FALL: f64 = 0.1;
-/// Factor by which that ratio is moved towards 1 and beyond when Newton's method does not follow.
+/// Factor by which that factor is moved towards 1 and beyond if Newton's method does not follow.
 const GENTLER: f64 = 0.3;
-/// Flexibilities 1/ρ of Newton's function tried in turn, relative to each contact's own.
+/// Flexibilities 1/ρ of Newton's function, tried in turn, relative to the flexibility of each contact.
 const STRETCHES: [f64; 3] = [1.0, 0.01, 10.0];
-/// Proximal points tried in a row.
+/// Largest number of successive proximal points.
 const PROXIMAL_POINTS: usize = 40;
-/// Residual to which each of them is solved.
+/// Residual to which each proximal point is solved.
 const PROXIMAL_TOLERANCE: f64 = 1e-10;
-/// Share of each change taken in the sweeps of a round.
+/// Fraction of each change that the sweeps of a round apply.
 const RELAXATION: [f64; 3] = [1.0, 0.7, 0.4];
-/// Sweeps after which the displacements are added up anew.
+/// Number of sweeps after which the displacements are summed again.
 const REFRESH: usize = 10;
 
-/// Scratch of the solver for up to a number of contacts; allocates only when made.
+/// Scratch of the solver for up to a number of contacts; allocates only when created.
 #[derive(Debug, Clone)]
 pub struct CoulombSolver {
     capacity: usize,
@@ -71,7 +71,7 @@ pub struct CoulombSolver {
     pub free: Vec<f64>,
     /// Friction coefficient of each contact, filled by the caller.
     pub friction: Vec<f64>,
-    /// Reactions (N): warm start on entry (zeros when there is none), solution on return.
+    /// Reactions (N): warm start on entry (zeros without one), solution on return.
     pub reactions: Vec<f64>,
     /// Corrected gap and slips, free + W·reactions (m), set by the solver.
     pub relative: Vec<f64>,
@@ -81,7 +81,7 @@ pub struct CoulombSolver {
 }
 
 impl CoulombSolver {
-    /// Room for problems of up to `capacity` contacts.
+    /// Allocates for problems of up to `capacity` contacts.
     pub fn new(capacity: usize) -> Self {
         let order = 3 * capacity;
         Self {
@@ -102,11 +102,11 @@ impl CoulombSolver {
         self.capacity
     }
 
-    /// Solve for the first `size` contacts. When nothing works, or the input is not finite, `solved` is false and
-    /// the reactions are finite and admissible, but do not balance.
+    /// Solves for the first `size` contacts. If all methods fail, or the input is not finite, `solved` is false and the reactions are
+    /// finite and admissible, but not in equilibrium.
     ///
     /// # Panics
-    /// When `size` exceeds the capacity.
+    /// If `size` exceeds the capacity.
     pub fn solve(&mut self, size: usize) -> SolverOutcome {
         assert!(size <= self.capacity, "{size} contacts exceed the solver capacity of {}", self.capacity);
         self.problem.size = size;
@@ -130,7 +130,7 @@ impl CoulombSolver {
         }
     }
 
-    /// Sweeps and Newton attempts in turn; ends with the best reactions met.
+    /// Alternates sweeps and Newton attempts; ends with the best reactions found.
     fn iterate(&mut self, run: &mut SolverProgress) {
         self.problem.refresh();
         run.residual = self.problem.residual();
@@ -158,9 +158,9 @@ impl CoulombSolver {
         run.residual = self.problem.residual();
     }
 
-    /// Proximal points: each problem is softened by α about the reactions of the one before, which makes it well
-    /// conditioned; α falls while Newton's method follows, and where it does not, α rises and the method gets another ρ.
-    /// True when the problem itself is solved.
+    /// Solves by proximal points: each problem is softened by α about the reactions of the previous one, which makes it well conditioned; α
+    /// falls while Newton's method follows, and otherwise α rises and the method uses another ρ. Returns whether the original problem is
+    /// solved.
     fn proximal_points(&mut self) -> bool {
         let (mut softening, mut ratio, mut failures) = (SOFTENING, FALL, 0);
         for _ in 0..PROXIMAL_POINTS {
@@ -196,7 +196,7 @@ impl CoulombSolver {
         self.problem.refresh();
     }
 
-    /// Sweeps until solved, or until Newton's method is likely to be cheaper.
+    /// Sweeps until the problem is solved, or until Newton's method is likely to be cheaper.
     fn sweep_round(&mut self, round: u32, run: &mut SolverProgress) {
         let least = SWEEPS << round;
         let relaxation = RELAXATION[round as usize % RELAXATION.len()];
@@ -222,13 +222,13 @@ impl CoulombSolver {
         }
     }
 
-    /// Sweeps still needed at the rate of the last `RATE_SPAN`.
+    /// Estimates the number of remaining sweeps at the rate of the last `RATE_SPAN`.
     fn remaining_sweeps(&self, before: f64, now: f64) -> f64 {
         let rate = libm::log(before / now) / RATE_SPAN as f64;
         if rate > 0.0 { libm::log(now / TOLERANCE) / rate } else { f64::INFINITY }
     }
 
-    /// Cost of a Newton attempt measured in sweeps.
+    /// Cost of a Newton attempt as a number of sweeps.
     fn newton_in_sweeps(&self) -> f64 {
         let active = 3.0 * self.problem.count_carrying() as f64;
         let factorisation = active * active * active / 3.0 / FACTORISATION_SPEED + 3.0 * active * active;

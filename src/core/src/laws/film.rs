@@ -1,16 +1,16 @@
-//! Forward-increment Lagrange multipliers (eqs 10-11 of the paper): equality on what penetrates in the prediction.
+//! Forward-increment Lagrange multipliers (eqs 10-11 of the paper): equality on the nodes that penetrate in the prediction.
 
 use nalgebra::DMatrix;
 
 use super::{ContactLaw, ContactPrediction};
 use crate::laws::active_set::{ContactSolver, SolverOutcome};
 
-/// Penetration is detected once; neither a negative λ nor a penetration caused elsewhere is looked at again.
+/// Penetration is detected once; neither a negative λ nor a penetration caused elsewhere is checked again.
 #[derive(Debug, Clone)]
 pub struct Film(ContactSolver);
 
 impl Film {
-    /// Room for `contacts` contacts.
+    /// Allocates for `contacts` contacts.
     pub fn new(contacts: usize) -> Self {
         Self(ContactSolver::new(contacts))
     }

@@ -5,12 +5,12 @@ use nalgebra::DMatrix;
 use super::{ContactLaw, ContactPrediction};
 use crate::laws::active_set::{ContactSolver, SolverOutcome};
 
-/// Linear complementarity, started from what was closed one step before.
+/// Linear complementarity, started from the closed contacts of the previous step.
 #[derive(Debug, Clone)]
 pub struct Lcp(ContactSolver);
 
 impl Lcp {
-    /// Room for `contacts` contacts.
+    /// Allocates for `contacts` contacts.
     pub fn new(contacts: usize) -> Self {
         Self(ContactSolver::new(contacts))
     }
@@ -31,7 +31,7 @@ impl ContactLaw for Lcp {
 
     fn pose(&mut self, contact: usize, _: &[[f64; 3]], at: &impl ContactPrediction) {
         self.0.gaps[contact] = at.gap();
-        // Closed in the last step: the likeliest guess for this one.
+        // Contacts that were closed in the last step are the best guess for this one.
         self.0.active[contact] = at.gap_before() <= 0.0;
         self.0.monotone &= at.friction() == 0.0;
     }

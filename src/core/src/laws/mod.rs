@@ -1,8 +1,8 @@
-//! Contact laws: what the forces of one group of coupled contacts are, given predicted gaps and the Delassus matrix. A law is a
-//! file here, a variant of [`Law`], and where an importer may choose it a row of the enumeration of solvers.
+//! Contact laws: the forces of one group of coupled contacts for given predicted gaps and Delassus matrix. Each law has a file here, a
+//! variant of [`Law`], and, if an importer may choose it, a row of the enumeration of solvers.
 //!
-//! Each owns its matrix, its unknowns and its state. The group that asks fills the Delassus matrix W = C_Nᵀ A⁻¹ C_NT along the
-//! directions of the law, poses the contacts one after the other, and lets the law solve.
+//! Each law owns its matrix, its unknowns and its state. The group fills in the Delassus matrix W = C_Nᵀ A⁻¹ C_NT along the directions of
+//! the law, poses the contacts one after the other, and calls the law's solver.
 
 pub mod active_set;
 mod coated;
@@ -42,16 +42,16 @@ pub enum Solver {
 }
 
 impl Solver {
-    /// All of them, in the order of the FMU's enumeration.
+    /// All solvers, in the order of the FMU's enumeration.
     pub const ALL: [Self; 3] = [Self::Film, Self::Lcp, Self::Coulomb];
 
-    /// As in scene files and in the FMU's enumeration.
+    /// Name in scene files and in the FMU's enumeration.
     pub fn name(self) -> &'static str {
         SOLVERS.items[self as usize].0
     }
 }
 
-/// As importers see it.
+/// Enumeration of the solvers for importers.
 pub(crate) static SOLVERS: Enumeration = Enumeration {
     name: "Solver",
     description: "Contact solver",
@@ -70,15 +70,15 @@ pub trait ContactPrediction {
     fn gap_before(&self) -> f64;
     /// Coulomb coefficient µ (-).
     fn friction(&self) -> f64;
-    /// Predicted slip over the step, rigid motion included (m, own directions of the node).
+    /// Predicted slip over the step, including rigid motion (m, own directions of the node).
     fn slip(&self) -> [f64; 3];
     /// Contact force of the last step (N, own directions).
     fn last_force(&self) -> [f64; 3];
-    /// Unit direction of slip (own directions); 0 where nothing slides.
+    /// Unit direction of slip (own directions); 0 without slip.
     fn slip_direction(&self) -> [f64; 3];
     /// Sector of the node.
     fn sector(&self) -> usize;
-    /// Angle at which the node faces the casing (rad, fixed frame).
+    /// Angle of the node on the casing (rad, fixed frame).
     fn angle(&self) -> f64;
 }
 
@@ -86,23 +86,23 @@ pub trait ContactPrediction {
 pub trait ContactLaw {
     /// Directions per contact in the Delassus matrix: 1 (normal, with sliding friction in the columns) or 3 (normal and tangents).
     const DIRECTIONS: usize;
-    /// Whether a contact that the solution would open or press in is looked at again; the paper's rule detects once.
+    /// True if a contact that the solution would open or press in is checked again; the paper's rule detects once.
     const LOOKS_AGAIN: bool;
-    /// Whether it starts from the contact forces of the last step.
+    /// True if the law starts from the contact forces of the last step.
     const STARTS_FROM_FORCES: bool = false;
-    /// A group of `size` contacts follows.
+    /// Begins a group of `size` contacts.
     fn begin(&mut self, size: usize);
     /// Delassus matrix (m/N), to be filled.
     fn matrix(&mut self) -> &mut DMatrix<f64>;
-    /// Contact `contact` of the group, in order; `directions` are its rows of the matrix.
+    /// Poses contact `contact` of the group, in order; `directions` are its rows of the matrix.
     fn pose(&mut self, contact: usize, directions: &[[f64; 3]], at: &impl ContactPrediction);
-    /// Forces of all contacts posed.
+    /// Solves for the forces of all posed contacts.
     fn solve(&mut self) -> SolverOutcome;
     /// Multipliers along the columns (N).
     fn multipliers(&self) -> &[f64];
     /// Corrected gaps (m).
     fn gaps(&self) -> &[f64];
-    /// Parts of the normal forces that a coating carries (N); empty without one.
+    /// Parts of the normal forces that a coating carries (N); empty without a coating.
     fn coating_shares(&self) -> &[f64] {
         &[]
     }
@@ -119,11 +119,11 @@ pub enum Law {
     Coulomb(Coulomb),
     /// Complementarity on an abradable coating that is pressed in.
     Coated(Coated),
-    /// Complementarity on one that is cut.
+    /// Complementarity on an abradable coating that is cut.
     Cutting(CuttingLaw),
 }
 
-/// The same call on every law.
+/// Calls the same function of every law.
 macro_rules! each_law {
     ($self:expr, $law:ident => $call:expr) => {
         match $self {
@@ -136,7 +136,7 @@ macro_rules! each_law {
     };
 }
 
-/// One body of code for each law: all of them in their caller are too much for the instruction cache.
+/// Poses all contacts of one law. Each law has its own instance: all of them inlined in their caller would exceed the instruction cache.
 #[inline(never)]
 fn pose_all<L: ContactLaw, P: ContactPrediction>(law: &mut L, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
     for (contact, at) in contacts.enumerate() {
@@ -157,7 +157,7 @@ fn starts_from_forces<L: ContactLaw>(_: &L) -> bool {
 }
 
 impl Law {
-    /// Room for groups of up to `contacts` contacts; on a coating for whole blades.
+    /// Allocates for groups of up to `contacts` contacts; on a coating for whole blades.
     pub fn new(solver: Solver, coating: Option<Coating>, contacts: usize) -> Self {
         match (coating, solver) {
             (Some(coating), _) if coating.is_cut() => Self::Cutting(CuttingLaw::new(coating, contacts)),
@@ -168,7 +168,7 @@ impl Law {
         }
     }
 
-    /// Whether it is what [`Law::new`] would make for the solver; a coating has one law.
+    /// Returns whether [`Law::new`] would create this law for the solver; a coating has one law.
     pub fn matches_solver(&self, solver: Solver) -> bool {
         match self {
             Self::Film(_) => solver == Solver::Film,
@@ -178,60 +178,60 @@ impl Law {
         }
     }
 
-    /// [`ContactLaw::DIRECTIONS`].
+    /// Returns [`ContactLaw::DIRECTIONS`].
     #[inline(always)]
     pub fn directions(&self) -> usize {
         each_law!(self, law => directions(law))
     }
 
-    /// [`ContactLaw::LOOKS_AGAIN`].
+    /// Returns [`ContactLaw::LOOKS_AGAIN`].
     #[inline(always)]
     pub fn is_iterative(&self) -> bool {
         each_law!(self, law => is_iterative(law))
     }
 
-    /// [`ContactLaw::STARTS_FROM_FORCES`].
+    /// Returns [`ContactLaw::STARTS_FROM_FORCES`].
     pub fn starts_from_forces(&self) -> bool {
         each_law!(self, law => starts_from_forces(law))
     }
 
-    /// [`ContactLaw::begin`].
+    /// Calls [`ContactLaw::begin`].
     #[inline(always)]
     pub fn begin(&mut self, size: usize) {
         each_law!(self, law => law.begin(size));
     }
 
-    /// [`ContactLaw::matrix`].
+    /// Calls [`ContactLaw::matrix`].
     #[inline(always)]
     pub fn matrix(&mut self) -> &mut DMatrix<f64> {
         each_law!(self, law => law.matrix())
     }
 
-    /// [`ContactLaw::pose`] of all contacts; `rows` are all rows of the matrix.
+    /// Calls [`ContactLaw::pose`] for all contacts; `rows` are all rows of the matrix.
     #[inline(always)]
     pub fn pose_all<P: ContactPrediction>(&mut self, rows: &[[f64; 3]], contacts: impl Iterator<Item = P>) {
         each_law!(self, law => pose_all(law, rows, contacts));
     }
 
-    /// [`ContactLaw::solve`].
+    /// Calls [`ContactLaw::solve`].
     #[inline(always)]
     pub fn solve(&mut self) -> SolverOutcome {
         each_law!(self, law => law.solve())
     }
 
-    /// [`ContactLaw::multipliers`].
+    /// Calls [`ContactLaw::multipliers`].
     #[inline(always)]
     pub fn multipliers(&self) -> &[f64] {
         each_law!(self, law => law.multipliers())
     }
 
-    /// [`ContactLaw::gaps`].
+    /// Calls [`ContactLaw::gaps`].
     #[inline(always)]
     pub fn gaps(&self) -> &[f64] {
         each_law!(self, law => law.gaps())
     }
 
-    /// [`ContactLaw::coating_shares`].
+    /// Calls [`ContactLaw::coating_shares`].
     #[inline(always)]
     pub fn coating_shares(&self) -> &[f64] {
         each_law!(self, law => law.coating_shares())
@@ -246,7 +246,7 @@ impl Law {
         }
     }
 
-    /// The same, to change its wear.
+    /// Returns the coating of the law for changes of its wear.
     pub fn coating_mut(&mut self) -> Option<&mut Coating> {
         match self {
             Self::Coated(law) => Some(law.coating_mut()),
@@ -255,7 +255,7 @@ impl Law {
         }
     }
 
-    /// Take over the wear of the last solution; returns the energy it takes (J), of what is cut later.
+    /// Applies the wear of the last solution; returns the energy it consumes (J); for a coating that is cut this follows later.
     pub fn commit(&mut self) -> f64 {
         match self {
             Self::Coated(law) => law.commit(),
@@ -281,7 +281,7 @@ impl Persist for Law {
     }
 }
 
-/// Two unit tangents; the first as near to the direction of sliding (second component) as the normal allows.
+/// Returns two unit tangents; the first as near to the direction of sliding (second component) as the normal permits.
 pub fn tangents(normal: [f64; 3]) -> [[f64; 3]; 2] {
     let start = if normal[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
     let along = dot(start, normal);

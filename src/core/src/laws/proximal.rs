@@ -1,71 +1,72 @@
-//! Contact without friction always has a solution when some motion opens all contacts: W is positive semidefinite then.
+//! Iterative solution of contact without friction for positive semidefinite W. A solution exists if some motion opens all contacts
+//! simultaneously.
 //!
-//! With more contacts than modes W is singular, and no rule that exchanges contacts need end. So the solution is approached:
-//! every contact yields a little around its last force λ⁻, by ε of its own flexibility D,
+//! With more contacts than modes W is singular, and no rule that exchanges contacts is certain to end. The solution is therefore
+//! approximated: every contact yields slightly around its last force λ⁻, by ε of its own flexibility D,
 //!
 //! ```text
 //! 0 ≤ λ ⟂ g + Wλ + εD(λ − λ⁻) ≥ 0.
 //! ```
 //!
-//! Each of these problems is regular, so that exchanging ends. What is left, εD(λ − λ⁻), goes to zero where a solution exists,
-//! and λ to one of them (R. T. Rockafellar, SIAM J. Control Optim. 14, 1976). Where none exists λ grows for ever along
-//! forces that move nothing, Wv = 0, v ≥ 0, on gaps that are not open together, gᵀv < 0.
+//! Each of these problems is regular, so that exchanging ends. The remainder εD(λ − λ⁻) goes to zero if a solution exists, and λ converges
+//! to a solution (R. T. Rockafellar, SIAM J. Control Optim. 14, 1976). If none exists λ grows without limit along forces that cause no
+//! motion, Wv = 0, v ≥ 0, on gaps that are not open together, gᵀv < 0.
 
 use nalgebra::DMatrix;
 
-/// ε of the first problem: of two contacts that depend on each other, how much is beyond rounding.
+/// ε of the first problem: the part of two dependent contacts that exceeds rounding.
 const FIRST: f64 = 1e-6;
-/// ε of the last ones.
+/// ε of the last problems.
 const LAST: f64 = 1e-10;
-/// By how much it falls from one problem to the next.
+/// Factor by which ε falls from one problem to the next.
 const FALL: f64 = 0.1;
-/// By how much it rises where a problem is not solved.
+/// Factor by which ε rises if a problem is not solved.
 const RISE: f64 = 30.0;
-/// Problems at most.
+/// Largest number of problems.
 pub const ROUNDS: usize = 60;
-/// Share of the largest gap that may be left.
+/// Allowed remainder as a fraction of the largest gap.
 const LEFT: f64 = 1e-10;
-/// Share of its flexibility by which a contact is softened once where redundant contacts ask for different gaps: the deepest of
-/// them then carries the force, and the gap it is left with is this share of the predicted penetration.
+/// Fraction of its flexibility by which a contact is softened once if redundant contacts require different gaps: the deepest of them then
+/// carries the force, and its remaining gap is this fraction of the predicted penetration.
 const SOFTENING: f64 = 1e-10;
-/// Share of the largest gap from which on softened contacts that are left with it are not closed.
+/// Softened contacts whose remainder exceeds this fraction of the largest gap are not closed.
 const PINCHED: f64 = 1e-6;
-/// Golden ratio: multiples of it, without their whole part, are spread evenly.
+/// Golden ratio: the fractional parts of its multiples are evenly distributed.
 const GOLDEN: f64 = 1.618_033_988_749_895;
 
-/// Regularisation of contacts; allocates only when made.
+/// Regularisation of contacts; allocates only when created.
 #[derive(Debug, Clone)]
 pub struct Yielding {
     /// Predicted gaps (m).
     predicted: Vec<f64>,
-    /// D: own flexibilities of the contacts (m/N).
+    /// D: flexibilities of the contacts (m/N).
     own: Vec<f64>,
     /// λ⁻ (N).
     centre: Vec<f64>,
     /// ε.
     share: f64,
-    /// The matrix has another diagonal than D.
+    /// True if the diagonal of the matrix differs from D.
     softened: bool,
 }
 
 impl Yielding {
-    /// Room for so many contacts.
+    /// Allocates for this number of contacts.
     pub fn new(contacts: usize) -> Self {
         let zeros = || vec![0.0; contacts];
         Self { predicted: zeros(), own: zeros(), centre: zeros(), share: 0.0, softened: false }
     }
 
-    /// A problem with a new matrix follows.
+    /// Begins a problem with a new matrix.
     pub fn begin(&mut self) {
         self.softened = false;
     }
 
-    /// Whether contacts have been softened.
+    /// Returns whether contacts have been softened.
     pub fn is_softened(&self) -> bool {
         self.softened
     }
 
-    /// Every one of the first `size` contacts yields a little by itself.
+    /// Makes each of the first `size` contacts yield slightly by itself.
     pub fn soften(&mut self, matrix: &mut DMatrix<f64>, size: usize) {
         self.softened = true;
         for contact in 0..size {
@@ -74,13 +75,13 @@ impl Yielding {
         }
     }
 
-    /// Forces only look like a solution: contacts that no motion opens at once, held apart by their softness alone.
+    /// Returns whether forces are no solution: contacts that no motion opens simultaneously, held apart only by their softness.
     pub fn is_pinched(&self, size: usize, scale: f64, force: impl Fn(usize) -> f64) -> bool {
         self.softened && (0..size).any(|contact| SOFTENING * self.own[contact] * force(contact) > PINCHED * scale)
     }
 
-    /// The problem to be approached; the first forces to yield around are different for every contact, lest two reach their ends
-    /// at once.
+    /// Stores the problem to be solved; the first forces are different for every contact, so that no two contacts reach their limits
+    /// simultaneously.
     pub fn keep(&mut self, matrix: &DMatrix<f64>, gaps: &[f64], scale: f64) {
         let mut spread = 0.0;
         for (contact, gap) in gaps.iter().enumerate() {
@@ -95,7 +96,7 @@ impl Yielding {
         (self.softened, self.share) = (false, FIRST);
     }
 
-    /// Matrix and gaps of the next problem.
+    /// Fills in matrix and gaps of the next problem.
     pub fn pose(&self, matrix: &mut DMatrix<f64>, gaps: &mut [f64]) {
         for (contact, gap) in gaps.iter_mut().enumerate() {
             matrix[(contact, contact)] = self.own[contact] * (1.0 + self.share);
@@ -103,7 +104,7 @@ impl Yielding {
         }
     }
 
-    /// Go on from the forces of the last problem if it is solved; true when they solve the problem itself.
+    /// Continues from the forces of the last problem if it is solved; returns whether they solve the original problem.
     pub fn advance(&mut self, solved: bool, scale: f64, size: usize, force: impl Fn(usize) -> f64) -> bool {
         if !solved {
             self.share *= RISE;
@@ -117,7 +118,7 @@ impl Yielding {
         false
     }
 
-    /// Displacement (m) of a contact by its own yielding.
+    /// Displacement (m) of a contact by its own softness.
     pub fn yielded(&self, contact: usize, force: f64) -> f64 {
         self.share * self.own[contact] * (force - self.centre[contact])
     }

@@ -6,16 +6,16 @@
 //! u_s = w_n Re(C_n z_n e^(2πi n s / N)),   w_n = 1/√N for n = 0 and 2n = N (z real), else √(2/N) (z complex),
 //! ```
 //!
-//! with C_n the contact map and M_n, K_n the Hermitian matrices of one sector. The factors w_n make the transformation
-//! unitary: kinetic and strain energy of the whole disk are the sums of ½ żᴴM_nż and ½ zᴴK_nz (D. L. Thomas, Int. J. Num.
-//! Meth. Eng. 14, 1979). Sector s + 1 is sector s turned by +2π/N about z; n > 0 is a wave e^(i n 2π s/N).
+//! with the contact map C_n and the Hermitian matrices M_n, K_n of one sector. The factors w_n make the transformation unitary: kinetic and
+//! strain energy of the whole disk are the sums of ½ żᴴM_nż and ½ zᴴK_nz (D. L. Thomas, Int. J. Num. Meth. Eng. 14, 1979). Sector s + 1 is
+//! sector s turned by +2π/N about z; n > 0 is a wave e^(i n 2π s/N).
 
 use nalgebra::{Complex, DMatrix};
 
 use super::Rom;
 use crate::{Error, Result, ranges, shown};
 
-/// Reduced matrices of one nodal diameter above 0 (those of 0 are the ROM's own).
+/// Reduced matrices of one nodal diameter above 0 (those of diameter 0 are the ROM's own).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Harmonic {
     /// M_n, m × m, Hermitian positive definite (kg for physical coordinates).
@@ -27,7 +27,7 @@ pub struct Harmonic {
 }
 
 impl Rom {
-    /// Whether the sectors are coupled: a pencil per nodal diameter.
+    /// Returns whether the sectors are coupled, with a pencil per nodal diameter.
     pub fn is_cyclic(&self) -> bool {
         !self.extras.harmonics.is_empty()
     }
@@ -92,7 +92,7 @@ impl Rom {
             if largest > most {
                 return refuse(name, format!("an entry of magnitude {} exceeds {}", shown(largest), shown(most)));
             }
-            // With half a turn of phase from sector to sector nothing can travel.
+            // With half a turn of phase from sector to sector there is no travelling wave.
             let imaginary = matrix.iter().fold(0.0, |most: f64, value| most.max(value.im.abs()));
             if 2 * nodal_diameter == self.sectors && imaginary > 1e-8 * largest {
                 return refuse(
@@ -115,8 +115,8 @@ impl Rom {
     }
 }
 
-/// L of a Hermitian matrix L Lᴴ; `None` unless it is positive definite. (Of a complex number there is always a square root,
-/// so that the factorisation of a complex matrix alone does not tell.)
+/// Cholesky factor L of a Hermitian matrix L Lᴴ; `None` unless it is positive definite. (Every complex number has a square root, so that
+/// the factorisation of a complex matrix alone does not detect this.)
 pub(crate) fn cholesky(matrix: &DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> {
     let lower = matrix.clone().cholesky()?.l();
     let real = |index: usize| {

@@ -1,13 +1,13 @@
-//! Contact grids, what a surface can be laid through; rows of contact patches.
+//! Contact grids, through which surfaces are laid, and rows of contact patches.
 
 use super::{ContactGrid, ContactNode, DisplacementFrame, Rom};
 use crate::{Error, Result};
 
-/// Nodes this much nearer than the longest edge of an open grid are the same node.
+/// Nodes closer than this fraction of the longest edge of an open grid are the same node.
 const SAME_NODE: f64 = 1e-9;
 
 impl Rom {
-    /// Rows of contact patches across the thickness, one where nothing is said.
+    /// Number of rows of contact patches across the thickness; 1 if it is not given.
     pub fn rows(&self) -> usize {
         self.extras.rows.unwrap_or(1)
     }
@@ -25,7 +25,7 @@ impl Rom {
         Err(Error::invalid("ROM metadata `contact_rows`", problem, remedy))
     }
 
-    /// Check that the contact nodes are the grid that the ROM says they are.
+    /// Checks that the contact nodes form the grid that the ROM describes.
     pub(super) fn validate_grid(&self) -> Result<()> {
         let Some(grid) = self.extras.grid else { return Ok(()) };
         let (nodes, [least_around, least_along]) =
@@ -59,7 +59,7 @@ fn refuse(problem: String) -> Result<()> {
     Err(Error::invalid("ROM metadata `contact_grid`", problem, remedy))
 }
 
-/// Rings of growing z, their nodes equally spaced about z.
+/// Checks for rings in order of increasing z, with nodes equally spaced about z.
 fn closed_ring(grid: ContactGrid, nodes: &[ContactNode]) -> Result<()> {
     #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]
     let step = std::f64::consts::TAU / grid.around as f64;
@@ -80,7 +80,7 @@ fn closed_ring(grid: ContactGrid, nodes: &[ContactNode]) -> Result<()> {
     Ok(())
 }
 
-/// No edge between neighbours of a row or of a column may have shrunk to a point.
+/// Checks that no edge between neighbours of a row or of a column has zero length.
 fn open_grid(grid: ContactGrid, nodes: &[ContactNode]) -> Result<()> {
     let length = |a: usize, b: usize| {
         let apart: [f64; 3] = std::array::from_fn(|i| nodes[a].position[i] - nodes[b].position[i]);

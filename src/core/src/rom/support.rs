@@ -1,4 +1,4 @@
-//! What the held nodes of a structure feel: force and moment of its support.
+//! Force and moment of the support of a structure on its held nodes.
 
 use nalgebra::DMatrix;
 
@@ -8,18 +8,18 @@ use crate::{Error, Result, ranges};
 /// Forces along x, y, z (N) and moments about x, y, z through the origin (N·m).
 pub const SUPPORT_ROWS: usize = 6;
 
-/// Rows of the finite-element equations at the held nodes, which a reduction leaves out: R = S_K q + S_M q̈ − S_T T is force and
-/// moment of the support on the structure, in fixed directions and about the origin.
+/// Rows of the finite-element equations at the held nodes, which a reduction omits: R = S_K q + S_M q̈ − S_T T is force and moment of the
+/// support on the structure, in fixed directions and about the origin.
 ///
-/// With r the six rigid motions of the held nodes s and u = Vq the displacements of the others f, S_K = rᵀK_sf V, S_M =
-/// rᵀM_sf V, and S_T = rᵀf_s with the loads f per kelvin of each patch.
+/// With the six rigid motions r of the held nodes s and the displacements u = Vq of the others f, S_K = rᵀK_sf V, S_M = rᵀM_sf V, and S_T =
+/// rᵀf_s with the loads f per kelvin of each patch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SupportRows {
     /// S_K, 6 × n (N or N·m per unit coordinate).
     pub stiffness: DMatrix<f64>,
     /// S_M, 6 × n (kg or kg·m for coordinates that are displacements).
     pub mass: DMatrix<f64>,
-    /// S_T, 6 × patches (N/K or N·m/K); no column without thermal loads.
+    /// S_T, 6 × patches (N/K or N·m/K); no columns without thermal loads.
     pub thermal: DMatrix<f64>,
 }
 

@@ -1,21 +1,21 @@
-//! Points of a structure that are looked at, and that touch nothing: how they move, what stress is there.
+//! Watched points of a structure, at which no contact force acts: their displacements or stresses.
 
 use nalgebra::DMatrix;
 
 use super::{ContactNode, Rom, entries};
 use crate::{Error, Result, ranges};
 
-/// Points that are looked at, and that touch nothing.
+/// Points whose displacements or stresses are reported, but at which no contact force acts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WatchedPoints {
     /// Values per unit of each coordinate, rows (point, component) × n, directions as for contact nodes: three displacements, or six stresses σ₁₁,
     /// σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁ (Pa).
     pub map: DMatrix<f64>,
-    /// Names and places.
+    /// Names and positions.
     pub points: Vec<ContactNode>,
 }
 
-/// Components of stress at a point.
+/// Number of components of stress at a point.
 pub const STRESSES: usize = 6;
 
 /// Equivalent stress of von Mises (Pa) of σ₁₁, σ₂₂, σ₃₃, σ₁₂, σ₂₃, σ₃₁.
@@ -54,7 +54,7 @@ impl Rom {
         Ok(())
     }
 
-    /// Points whose arrays are named `of`, with so many components each, up to the largest.
+    /// Checks points whose arrays are named `of`, with a number of components each up to the largest.
     fn validate_points(
         &self,
         of: &str,

@@ -1,8 +1,8 @@
-//! Continuous Galerkin in time ([`crate::galerkin`]): what the bank of modes tells of its state.
+//! Continuous Galerkin in time ([`crate::galerkin`]): coefficients for the state in the bank of modes.
 
 use super::ModeCoefficients;
 
-/// State (q, d) with d = h q̇: energies are ½(d/h)² and ½ω²q². No force moves these modes but that of [`crate::galerkin`].
+/// State (q, d) with d = h q̇; the energies are ½(d/h)² and ½ω²q². Only [`crate::galerkin`] moves these modes by forces.
 pub(super) fn state(frequency: f64, step: f64) -> ModeCoefficients {
     ModeCoefficients {
         beta: 1.0,

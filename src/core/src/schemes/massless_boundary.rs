@@ -4,7 +4,7 @@
 
 use super::ModeCoefficients;
 
-/// A mode without inertia: q = f/ω² at once.
+/// A mode without inertia, q = f/ω².
 pub(super) fn quasi_static(frequency: f64) -> ModeCoefficients {
     let square = frequency * frequency;
     ModeCoefficients {
@@ -18,7 +18,7 @@ pub(super) fn quasi_static(frequency: f64) -> ModeCoefficients {
     }
 }
 
-/// Take contact forces one step after they were found.
+/// Delays the contact forces by one step.
 pub(super) fn delay(mode: ModeCoefficients) -> ModeCoefficients {
     ModeCoefficients { compliance: 0.0, delayed: mode.compliance, ..mode }
 }

@@ -11,15 +11,15 @@
 //! * central differences (eq. 9 of the paper): β = (1 − ξωh)/(1 + ξωh), κ = ω²h²/(1 + ξωh), c = h²/(1 + ξωh);
 //! * modal-exact: β = e^(−2ξωh), κ = 1 − 2e^(−ξωh) cos ω_d h + e^(−2ξωh), c = κ/ω².
 //!
-//! Either recurrence is m̃ (q⁺ − 2q + q⁻)/h² + d̃ (q⁺ − q⁻)/(2h) + ω² q = f with m̃ = h²(1 + β)/(2c) and
-//! d̃ = h(1 − β)/c, so that multiplying with (q⁺ − q⁻)/2 gives the balance that the ledger closes to rounding:
-//! E = ½ m̃ (d/h)² + ½ ω² q q⁻ changes by f (q⁺ − q⁻)/2 − d̃ h ((q⁺ − q⁻)/2h)². Modal-exact is thus central
-//! differences with the modal mass that makes the discrete frequency exact.
+//! Either recurrence is m̃ (q⁺ − 2q + q⁻)/h² + d̃ (q⁺ − q⁻)/(2h) + ω² q = f with m̃ = h²(1 + β)/(2c) and d̃ = h(1 − β)/c.
+//! Multiplication by (q⁺ − q⁻)/2 gives the energy balance, which closes to rounding: E = ½ m̃ (d/h)² + ½ ω² q q⁻ changes by f (q⁺
+//! − q⁻)/2 − d̃ h ((q⁺ − q⁻)/2h)². Modal-exact is thus central differences with the modal mass that makes the discrete frequency
+//! exact.
 //!
 //! * massless-boundary (A. Monjaraz-Tec, J. Gross, M. Krack, Computers & Structures 260, 2022, arXiv 2111.07693): the highest modes are
 //!   quasi-static, q = φᵀf/ω² (β = 0, κ = 1, c = 1/ω²), so that contact acts through their residual flexibility alone; the
-//!   other modes are stepped by modal-exact and take the contact force one step later, which makes them explicit. With
-//!   the force f of time n known when q(n+1) is, f (u⁺ − u⁻)/2 changes the same E: of a static mode only ½ ω² q q⁻ is left.
+//!   other modes are stepped by modal-exact and take the contact force one step later, which makes them explicit. The
+//!   force f of time n does the work f (u⁺ − u⁻)/2, known with q(n+1), which changes the same E; a static mode contributes only ½ ω² q q⁻.
 
 mod central_difference;
 mod galerkin;
@@ -42,19 +42,19 @@ pub enum Scheme {
     /// The highest modes, three per contact node, are quasi-static: contact acts through their residual flexibility
     /// (Monjaraz-Tec, Gross, Krack, Computers & Structures 260, 2022); the other modes take the contact force one step later.
     MasslessBoundary,
-    /// Continuous Galerkin in time with steps of each sector as long as a tolerance allows ([`crate::galerkin`]); contact acts through the
-    /// flexibility of the same quasi-static modes.
+    /// Continuous Galerkin in time; the steps of each sector are as long as a tolerance allows ([`crate::galerkin`]). Contact
+    /// acts through the flexibility of the same quasi-static modes.
     Galerkin,
 }
 
 impl Scheme {
-    /// All of them, in the order of the FMU's enumeration.
+    /// All schemes, in the order of the FMU's enumeration.
     pub const ALL: [Self; 4] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary, Self::Galerkin];
 
     /// Schemes whose modes follow recurrences, all with one step.
     pub const RECURRENCES: [Self; 3] = [Self::CentralDifference, Self::ModalExact, Self::MasslessBoundary];
 
-    /// Whether the highest modes, three per contact node, are quasi-static.
+    /// Returns whether the highest modes, three per contact node, are quasi-static.
     pub fn is_massless(self) -> bool {
         match self {
             Self::CentralDifference | Self::ModalExact => false,
@@ -62,13 +62,13 @@ impl Scheme {
         }
     }
 
-    /// As in scene files and in the FMU's enumeration.
+    /// Name in scene files and in the FMU's enumeration.
     pub fn name(self) -> &'static str {
         SCHEMES.items[self as usize].0
     }
 }
 
-/// As importers see it.
+/// The enumeration of the FMU.
 pub(crate) static SCHEMES: Enumeration = Enumeration {
     name: "Scheme",
     description: "Time-stepping scheme",
@@ -90,11 +90,11 @@ struct Recurrence {
 impl Scheme {
     /// Factor on the amplitude of a harmonic force that turns by x = `turn` (rad) per step: (x/2)/tan(x/2).
     ///
-    /// The modal-exact recurrence multiplies the force at the start of a step by c = 2(1 − cos ωh)/ω², as if it were constant. The exact
-    /// coefficient of a force cos Ωt is 2(cos Ωh − cos ωh)/(ω² − Ω²). Their ratio at resonance, ω = Ω, is this factor, about 1 − x²/12. Modes
-    /// far below Ω need sin²(x/2)/(x/2)², which differs from it by x⁴/240. The factor stays the same beyond one radian, where a step does
-    /// not resolve the force, and is 1 where it differs from that by less than 4e-7. Central differences get no factor: their error is one
-    /// of the recurrence.
+    /// The modal-exact recurrence multiplies the force at the start of a step by c = 2(1 − cos ωh)/ω², as if it were constant.
+    /// The exact coefficient of a force cos Ωt is 2(cos Ωh − cos ωh)/(ω² − Ω²). Their ratio at resonance, ω = Ω, is this factor,
+    /// about 1 − x²/12. Modes far below Ω need sin²(x/2)/(x/2)², which differs from it by x⁴/240. The factor is also used beyond
+    /// one radian, where a step does not resolve the force, and is set to 1 where it differs from 1 by less than 4e-7. Central
+    /// differences get no factor, because their error belongs to the recurrence.
     pub fn harmonic_factor(self, turn: f64) -> f64 {
         const SMALL: f64 = 2e-3;
         let turn = turn.abs().min(crate::ranges::EXCITED_ANGLE);
@@ -104,7 +104,7 @@ impl Scheme {
         }
     }
 
-    /// Whether contact forces act one step after they are found.
+    /// Returns whether contact forces act one step after they are found.
     pub fn acts_later(self) -> bool {
         match self {
             Self::CentralDifference | Self::ModalExact | Self::Galerkin => false,
@@ -120,9 +120,9 @@ pub struct ModeCoefficients {
     pub beta: f64,
     /// κ = 1 − a − b = c ω².
     pub kappa: f64,
-    /// c: displacement per unit modal force held for one step (s²); of contact forces of the same step.
+    /// c: displacement per unit modal force held for one step (s²), for contact forces of the same step.
     pub compliance: f64,
-    /// The same for contact forces that act one step after they were found (massless-boundary); else 0.
+    /// c for contact forces that act one step after they were found (massless-boundary), otherwise 0.
     pub delayed: f64,
     /// (1 − β)/(4c): damping loss per (d⁺ + d)².
     pub loss: f64,
@@ -133,12 +133,12 @@ pub struct ModeCoefficients {
 }
 
 impl ModeCoefficients {
-    /// Coefficients for angular frequency ω (rad/s, 0 for a rigid mode), damping ratio 0 ≤ ξ < 1, step h (s).
+    /// Coefficients for angular frequency ω (rad/s, 0 for a rigid-body mode), damping ratio 0 ≤ ξ < 1 and step h (s).
     pub fn new(scheme: Scheme, frequency: f64, damping_ratio: f64, step: f64) -> Self {
         let Recurrence { beta, kappa, compliance } = match scheme {
             Scheme::Galerkin => return galerkin::state(frequency, step),
             Scheme::CentralDifference => central_difference::recurrence(frequency, damping_ratio, step),
-            // Of its modes with inertia.
+            // Massless-boundary: its modes with inertia.
             Scheme::ModalExact | Scheme::MasslessBoundary => modal_exact::recurrence(frequency, damping_ratio, step),
         };
         Self {
@@ -152,7 +152,7 @@ impl ModeCoefficients {
         }
     }
 
-    /// Coefficients of a mode that has inertia under the scheme (`dynamic`), or is quasi-static.
+    /// Coefficients of a mode that has inertia under the scheme (`dynamic`) or is quasi-static.
     pub fn of_mode(scheme: Scheme, dynamic: bool, frequency: f64, damping_ratio: f64, step: f64) -> Self {
         match scheme {
             Scheme::CentralDifference | Scheme::ModalExact => Self::new(scheme, frequency, damping_ratio, step),
@@ -164,7 +164,7 @@ impl ModeCoefficients {
         }
     }
 
-    /// The same recurrence of a mode whose stiffness, inertia and damping are a share of these.
+    /// Coefficients of a mode whose stiffness, inertia and damping are multiplied by `share`.
     #[must_use]
     pub fn with_stiffness(self, share: f64) -> Self {
         Self {
@@ -177,7 +177,7 @@ impl ModeCoefficients {
         }
     }
 
-    /// Displacement per unit of a modal force that is known beforehand (s²).
+    /// Displacement per unit of a prescribed modal force (s²).
     pub fn load_compliance(&self) -> f64 {
         self.compliance + self.delayed
     }
@@ -191,9 +191,8 @@ pub fn damped_frequency(frequency: f64, damping_ratio: f64) -> f64 {
 /// Increment q(t) − q(t − h') at a new step size h' = `new_step` of the motion that passes through q(t) = `now` with
 /// `increment` = q(t) − q(t − h) under the constant modal force `force`.
 ///
-/// This is what carries the state (q, d) from one h to the next without losing order. Beyond ω_d h ≈ π two
-/// samples no longer determine the motion; the sine is then bounded away from zero, which loses energy of
-/// modes that the step does not resolve anyway.
+/// This converts the state (q, d) from one h to another without loss of order. Beyond ω_d h ≈ π two samples no longer determine
+/// the motion; the sine is then bounded away from zero, which reduces the energy of modes that the step does not resolve.
 pub fn resample(
     frequency: f64,
     damping_ratio: f64,
@@ -217,11 +216,11 @@ pub fn resample(
     increment_of(damped, rate, offset, numerator / sine_of(damped * step), new_step)
 }
 
-/// Velocity of a mode at the instant of its position: q̇ = `increment` d + `position` q + `force` f, of the motion that passes
+/// Velocity of a mode at the time of its position, q̇ = `increment` d + `position` q + `force` f, for the motion that passes
 /// through q and q − d under the constant modal force f.
 ///
-/// Exact where the motion is (modal-exact), and of second order in h with central differences, whose samples lie on such a
-/// motion up to that. Nothing can tell the velocity of a mode beyond ω_d h ≈ π; it is bounded as in [`resample`].
+/// It is exact where the recurrence is exact (modal-exact) and second-order accurate in h for central differences. Beyond ω_d h ≈
+/// π the samples do not determine the velocity; it is bounded as in [`resample`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Velocity {
     /// Per increment of the last step (1/s).
@@ -233,7 +232,7 @@ pub struct Velocity {
 }
 
 impl Velocity {
-    /// For angular frequency ω (rad/s, 0 for a rigid mode), damping ratio 0 ≤ ξ < 1, step h (s).
+    /// Coefficients for angular frequency ω (rad/s, 0 for a rigid-body mode), damping ratio 0 ≤ ξ < 1 and step h (s).
     pub fn new(frequency: f64, damping_ratio: f64, step: f64) -> Self {
         if frequency <= 0.0 {
             return Self { increment: 1.0 / step, position: 0.0, force: 0.5 * step };
@@ -245,24 +244,24 @@ impl Velocity {
         Self { increment: per_sine * libm::exp(-rate * step), position, force: -position / frequency / frequency }
     }
 
-    /// Makes the coefficients of states (q, hq̇).
+    /// Coefficients for states (q, hq̇).
     pub fn of_state(step: f64) -> Self {
         Self { increment: 1.0 / step, position: 0.0, force: 0.0 }
     }
 
-    /// q̇ of a mode at `now` = q that came by `increment` = d, under the modal force `force`.
+    /// Returns q̇ of a mode with position `now` = q and last increment `increment` = d under the modal force `force`.
     pub fn of(&self, now: f64, increment: f64, force: f64) -> f64 {
         self.increment * increment + self.position * now + self.force * force
     }
 }
 
-/// sin of the angle of a step, bounded away from zero where two samples no longer determine a motion.
+/// Sine of the phase angle of a step, bounded away from zero where two samples no longer determine the motion.
 fn sine_of(angle: f64) -> f64 {
     let sine = libm::sin(angle);
     if angle > 2.0 && sine.abs() < 0.3 { 0.3_f64.copysign(sine) } else { sine }
 }
 
-/// Increment q(0) − q(−h) of the free motion (no force) with position and velocity given at time 0.
+/// Increment q(0) − q(−h) of the free motion (without force) with the given position and velocity at time 0.
 pub fn free_increment(frequency: f64, damping_ratio: f64, position: f64, velocity: f64, step: f64) -> f64 {
     if frequency <= 0.0 {
         return velocity * step;
@@ -298,7 +297,7 @@ mod tests {
         rest + (-rate * t).exp() * (x * (damped * t).cos() + (v + rate * x) / damped * (damped * t).sin())
     }
 
-    /// A force whose static displacement does not drown the formula of [`exact`] in rounding.
+    /// A force whose static displacement does not cause large rounding errors in [`exact`].
     fn force_for(frequency: f64) -> f64 {
         if frequency == 0.0 { 5.0 } else { 1e-3 * frequency * frequency }
     }
@@ -344,7 +343,7 @@ mod tests {
                 // Rounding of q − q⁻ over h.
                 let bound = 1e-9 * v + 4.0 * f64::EPSILON * (q + before.abs()) / step;
                 assert!((found - v).abs() < bound, "ω {frequency}, ξ {ratio}, h {step}: {found} vs {v}");
-                // At rest under its force.
+                // At rest under a constant force.
                 if frequency == 0.0 {
                     continue;
                 }

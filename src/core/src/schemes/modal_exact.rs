@@ -1,4 +1,4 @@
-//! The recurrence that is exact in free flight and at rest under constant force: β = e^(−2ξωh), κ = 1 − 2e^(−ξωh) cos ω_d h +
+//! The recurrence that is exact in free flight and at rest under a constant force: β = e^(−2ξωh), κ = 1 − 2e^(−ξωh) cos ω_d h +
 //! e^(−2ξωh), c = κ/ω².
 
 use super::{Recurrence, damped_frequency};
@@ -13,7 +13,7 @@ pub(super) fn recurrence(frequency: f64, damping_ratio: f64, step: f64) -> Recur
     let fallen = libm::expm1(-decay);
     let sine = libm::sin(0.5 * damped_frequency(frequency, damping_ratio) * step);
     let kappa = fallen * fallen + 4.0 * libm::exp(-decay) * sine * sine;
-    // Written through (ωh)² so that neither tiny nor huge frequencies overflow.
+    // Written with (ωh)² so that neither tiny nor huge frequencies overflow.
     let angle = frequency * step;
     Recurrence { beta, kappa, compliance: step * step * (kappa / (angle * angle)) }
 }

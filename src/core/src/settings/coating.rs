@@ -1,4 +1,4 @@
-//! An abradable coating: material of what is pressed in, or of what is cut.
+//! An abradable coating that is pressed in or cut, with its material.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -7,21 +7,20 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CuttingSettings {
-    /// Specific cutting energy u (J/m³): tangential force per section of the cut.
+    /// Specific cutting energy u (J/m³): tangential force per cross-section of the cut.
     pub specific_energy: f64,
     /// Normal force per tangential force κ (-).
     pub normal_ratio: f64,
 }
 
-/// Abradable coating on a surface: cells of rods that yield and harden (Legrand, Batailly, Pierre, J. Comput.
-/// Nonlinear Dyn. 2012), or that are cut. Its unworn surface is where `gap` ends; the hard surface lies `thickness`
-/// behind it.
+/// Abradable coating on a surface: cells of rods that yield and harden (Legrand, Batailly, Pierre, J. Comput. Nonlinear Dyn. 2012), or that
+/// are cut. Its unworn surface is at the distance `gap`; the hard surface is `thickness` behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(into = "CoatingInFile")]
 pub struct CoatingSettings {
     /// Thickness h₀ (m), 1e-9 to 0.1.
     pub thickness: f64,
-    /// Modulus E (Pa), > 0; 0 where it is cut.
+    /// Modulus E (Pa), > 0; 0 if it is cut.
     pub modulus: f64,
     /// Yield stress Y (Pa), ≥ 0.
     pub yield_stress: f64,
@@ -34,11 +33,11 @@ pub struct CoatingSettings {
     /// Width around the circumference over which a tip presses the coating (m), 1e-6 to 1: its thickness over the cosine of its stagger
     /// angle. `None`: from areas and lengths of the contact patches in the ROM.
     pub contact_width: Option<f64>,
-    /// It is cut instead of pressed in; `modulus`, `yield_stress` and `hardening` are 0 then.
+    /// Cutting instead of pressing in; `modulus`, `yield_stress` and `hardening` are then 0.
     pub cutting: Option<CuttingSettings>,
 }
 
-/// As in a scene file: a coating that is cut has no modulus, yield stress and hardening, any other gives all of them.
+/// Coating as in a scene file: a coating that is cut has no modulus, yield stress and hardening, any other has all of them.
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "CoatingSettings", deny_unknown_fields)]
 struct CoatingInFile {

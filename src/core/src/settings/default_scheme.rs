@@ -1,10 +1,10 @@
-//! The scheme of a scene whose file names none.
+//! Scheme of a scene whose file does not give one.
 
 use super::{SceneSettings, Scheme};
 use crate::Rom;
 
 impl SceneSettings {
-    /// Returns the scheme of this validated scene if its file names none, and the reason in words.
+    /// Returns the scheme of this validated scene if its file gives none, and the reason in words.
     ///
     /// It is `galerkin` (adaptive steps) on rigid surfaces wherever no rule of [`rules`](super::rules) excludes it. It is `modal-exact`
     /// (fixed steps) otherwise: on elastic surfaces and with coupled sectors, where fixed steps are faster today.
@@ -17,7 +17,7 @@ impl SceneSettings {
         }
     }
 
-    /// Returns what makes fixed steps the faster choice.
+    /// Returns the reason why fixed steps are faster.
     fn fixed_step_reason(&self, roms: &[Rom]) -> Option<String> {
         let elastic = self.surfaces.iter().find(|surface| surface.structure.is_some() && !surface.rigid);
         let coupled = || self.structures.iter().zip(roms).find(|(_, rom)| rom.is_cyclic());

@@ -1,14 +1,14 @@
-//! Who takes part in which contact, found once from names: checks of many structures then take no longer than the scene is long.
+//! Structures and surfaces of each contact, resolved once from names, so that the time of checks is linear in the length of the scene.
 
 use std::collections::HashMap;
 
 use super::{SceneSettings, StructureSettings};
 
-/// Places of structures and surfaces that contacts name.
+/// Indices of structures and surfaces that contacts name.
 pub(crate) struct Relations {
-    /// Structure whose contact nodes touch, of each contact.
+    /// Master of each contact.
     pub(crate) masters: Vec<Option<usize>>,
-    /// Surface, of each contact.
+    /// Surface of each contact.
     pub(crate) surfaces: Vec<Option<usize>>,
     /// Structure under that surface, rigid or not, of each contact.
     pub(crate) carriers: Vec<Option<usize>>,
@@ -16,7 +16,7 @@ pub(crate) struct Relations {
     pub(crate) contacts: Vec<Vec<usize>>,
 }
 
-/// The first place of each name.
+/// Returns the first index of each name.
 fn places<'a>(names: impl Iterator<Item = &'a String>) -> HashMap<&'a str, usize> {
     let mut places = HashMap::new();
     for (place, name) in names.enumerate() {
@@ -46,25 +46,25 @@ impl Relations {
         Self { masters, surfaces, carriers, contacts: of_structures }
     }
 
-    /// Whether contact nodes of a structure touch something.
+    /// Returns whether a structure is the master of a contact.
     pub(crate) fn touches(&self, structure: usize) -> bool {
         self.contacts[structure].iter().any(|contact| self.masters[*contact] == Some(structure))
     }
 
-    /// The structure that a contact deforms.
+    /// Returns the structure that a contact deforms.
     fn flexible(&self, settings: &SceneSettings, contact: usize) -> Option<usize> {
         let surface = self.surfaces[contact]?;
         self.carriers[contact].filter(|_| !settings.surfaces[surface].rigid)
     }
 
-    /// Whether another pair has its surface on the same flexible structure.
+    /// Returns whether another pair has its surface on the same flexible structure.
     pub(crate) fn shares_carrier(&self, settings: &SceneSettings, contact: usize) -> bool {
         let Some(carrier) = self.flexible(settings, contact) else { return false };
         let mut others = self.contacts[carrier].iter().filter(|other| self.surfaces[**other] != self.surfaces[contact]);
         others.any(|other| self.flexible(settings, *other) == Some(carrier))
     }
 
-    /// Whether another pair has a structure in common, and is solved together with this one.
+    /// Returns whether another pair has a structure in common and is solved together with this one.
     pub(crate) fn is_coupled(&self, settings: &SceneSettings, contact: usize) -> bool {
         let Some(master) = self.masters[contact] else { return false };
         let same =
@@ -74,14 +74,14 @@ impl Relations {
 }
 
 impl SceneSettings {
-    /// The structures whose contact nodes touch, as places.
+    /// Returns the indices of the masters.
     pub(crate) fn touching(&self) -> Vec<usize> {
         let relations = Relations::of(self);
         (0..self.structures.len()).filter(|structure| relations.touches(*structure)).collect()
     }
 }
 
-/// A structure at a place, if any.
+/// Returns a structure by its index, if any.
 pub(crate) fn structure(settings: &SceneSettings, place: Option<usize>) -> Option<&StructureSettings> {
     place.map(|place| &settings.structures[place])
 }

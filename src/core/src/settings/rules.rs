@@ -1,4 +1,4 @@
-//! What features, schemes and solvers need and exclude: one table. Validation refuses by it, messages are made of its rows,
+//! Requirements and exclusions of features, schemes and solvers, in one table. Validation applies it, messages are composed of its rows,
 //! and the guide prints them.
 
 mod facts;
@@ -13,10 +13,10 @@ use crate::{Error, Result, Rom};
 use facts::*;
 use place::{ScenePlace, path};
 
-/// A feature that another feature needs or excludes, at the same place.
+/// A feature that another feature needs or excludes at the same place.
 type RelatedFeature = (&'static str, fn(&ScenePlace) -> bool);
 
-/// One row.
+/// One rule.
 pub struct FeatureRule {
     features: &'static [Fact],
     needed: bool,
@@ -204,7 +204,7 @@ static VARIABLES: &[FeatureRule] = &[
     excludes(&[INTERPOLATION], ALL_FREE, "such a scene has no inputs", "Remove the line"),
 ];
 
-/// Rules of schemes and solvers: those of the scene, and those chosen by parameters.
+/// Rules of schemes and solvers, for those of the scene and for those chosen by parameters.
 static METHODS: &[FeatureRule] = &[
     needs(
         &[COULOMB],
@@ -301,7 +301,7 @@ static METHODS: &[FeatureRule] = &[
     ),
 ];
 
-/// Rules of presets: settings that the scene file may have beside it. Parameters may be set to anything.
+/// Rules of presets: settings that the scene file may have in addition. Parameters may have any value.
 static PRESETS: &[FeatureRule] = &[excludes(
     &[OTHER_SCHEME, OTHER_SOLVER],
     ("`preset = \"paper\"`", |at| at.settings.preset == Preset::Paper),
@@ -450,7 +450,7 @@ impl FeatureRule {
         format!("{} {}", if self.needed { "needs" } else { "excludes" }, self.other.0)
     }
 
-    /// As the guide prints it: features, what they need or exclude, why, what to do.
+    /// Returns the columns in the guide: features, requirement or exclusion, reason, remedy.
     pub fn columns(&self) -> [String; 4] {
         let features: Vec<String> = self.features.iter().map(Fact::shown).collect();
         [features.join(", "), self.relation(), self.because.to_owned(), self.remedy.to_owned()]
@@ -458,18 +458,18 @@ impl FeatureRule {
 }
 
 impl SceneSettings {
-    /// Checks the needs and exclusions of structures, surfaces and contacts, whose names are checked.
+    /// Checks the rules of structures, surfaces and contacts, whose names are already checked.
     pub(super) fn check_parts(&self) -> Result<()> {
         check(PARTS, self.place(&Relations::of(self)), path)
     }
 
-    /// The same of outputs, inputs, scheme and solver.
+    /// Checks the rules of outputs, inputs, scheme and solver.
     pub(super) fn check_whole(&self) -> Result<()> {
         let relations = Relations::of(self);
         [PRESETS, VARIABLES, METHODS].into_iter().try_for_each(|rules| check(rules, self.place(&relations), path))
     }
 
-    /// Returns which rule excludes a scheme from this scene, and why; `roms` may be empty before they are known.
+    /// Returns the rule that excludes a scheme from this scene, with its reason; `roms` may be empty before they are known.
     pub(super) fn excluded_method(&self, roms: &[Rom], scheme: Scheme) -> Option<String> {
         let relations = Relations::of(self);
         let refusal = check(METHODS, ScenePlace { roms, scheme, ..self.place(&relations) }, path).err()?;
@@ -484,16 +484,16 @@ impl SceneSettings {
 }
 
 impl Scene {
-    /// Checks what a validated scene needs of its ROMs, and what they exclude.
+    /// Checks the rules of a validated scene for its ROMs.
     pub(crate) fn check_roms(&self) -> Result<()> {
         let relations = Relations::of(&self.settings);
         check(ROMS, ScenePlace { roms: &self.roms, ..self.settings.place(&relations) }, path)
     }
 
-    /// Whether a validated scene can be stepped with a scheme and a solver.
+    /// Checks that a validated scene can be stepped with a scheme and a solver.
     ///
     /// # Errors
-    /// Naming parameter and remedy.
+    /// A violated rule, with parameter and remedy.
     pub fn check_methods(&self, scheme: Scheme, solver: Solver) -> Result<()> {
         let parameter = |_: &ScenePlace, key: &str| format!("parameter `{}`", key.rsplit('.').next().unwrap_or(key));
         let relations = Relations::of(&self.settings);
@@ -501,7 +501,7 @@ impl Scene {
     }
 }
 
-/// Refuse what breaks a row; `name` tells of a key at a place what it is called.
+/// Rejects violations of a rule; `name` returns the name of a key at a place.
 fn check(rules: &[FeatureRule], scene: ScenePlace, name: impl Fn(&ScenePlace, &str) -> String) -> Result<()> {
     for (rule, feature) in rules.iter().flat_map(|rule| rule.features.iter().map(move |feature| (rule, feature))) {
         let breaks = |at: &ScenePlace| (feature.holds)(at) && (rule.other.1)(at) != rule.needed;

@@ -1,4 +1,4 @@
-//! The documented range of every setting, and the names of a scene. What goes together is in [`super::rules`].
+//! The documented range of every setting, and the names of a scene. Combinations are checked in [`super::rules`].
 
 mod pairs;
 
@@ -14,10 +14,10 @@ use crate::warning::Topic;
 use crate::{Error, Result, shown};
 
 impl SceneSettings {
-    /// Check every value against its documented range, and the names against each other.
+    /// Checks every value against its documented range, and the names for consistency.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the field as written in the scene file.
+    /// [`Error::Invalid`] with the field as written in the scene file.
     pub fn validate(&self) -> Result<()> {
         let word = |text: &str| {
             text.starts_with(|c: char| c.is_ascii_alphabetic())
@@ -162,7 +162,7 @@ impl StructureSettings {
     }
 }
 
-/// Modes and sectors count from 1.
+/// Checks a number of a mode or sector, which count from 1.
 fn counted(field: String, number: Option<usize>) -> Result<()> {
     if number == Some(0) { Err(Error::invalid(field, "0 is out of range", "Count from 1")) } else { Ok(()) }
 }
@@ -200,7 +200,7 @@ impl InitialSettings {
 }
 
 impl SurfaceSettings {
-    /// `known` are the scene and the names of its structures.
+    /// Checks a surface; `known` are the scene and the names of its structures.
     fn validate(&self, known: (&SceneSettings, &HashSet<&str>), at: &str) -> Result<()> {
         within(&format!("{at}.ramp_time"), self.ramp_time, 0.0, ranges::TIME)?;
         self.validate_carrier(known, at)?;
@@ -218,7 +218,7 @@ impl SurfaceSettings {
         self.validate_shape(at)
     }
 
-    /// The structure that carries the surface.
+    /// Checks the structure that carries the surface.
     fn validate_carrier(&self, (scene, names): (&SceneSettings, &HashSet<&str>), at: &str) -> Result<()> {
         let Some(name) = &self.structure else { return Ok(()) };
         if names.contains(name.as_str()) {
@@ -260,7 +260,7 @@ impl SurfaceSettings {
 }
 
 impl ContactSettings {
-    /// The numbers, of a scene that has what they need; there is no gap before a master that `flies`.
+    /// Checks the numbers of a contact; there is no gap before a master that `flies`.
     fn validate(&self, flies: bool, at: &str) -> Result<()> {
         if self.nodes.as_ref().is_some_and(String::is_empty) {
             let remedy = "Give the prefix of the node names, or remove the line to use all nodes";
@@ -311,7 +311,7 @@ impl CoatingSettings {
     }
 }
 
-/// A clearance. Smaller than an atom it is as good as none, and right.
+/// Checks a clearance. Values smaller than an atom are valid, though practically zero.
 fn gap(field: &str, value: f64) -> Result<()> {
     if !(value.is_finite() && value > 0.0) {
         return Err(Error::invalid(field, format!("{} m is out of range", shown(value)), "Give a finite value > 0"));

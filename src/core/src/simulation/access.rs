@@ -1,4 +1,4 @@
-//! Reading and setting variables: what is legal for which kind, causality and variability.
+//! Access to variables: checks of kind, causality and variability, reading and setting.
 
 use super::drive::Input;
 use super::{Simulation, SimulationPhase};
@@ -6,7 +6,7 @@ use crate::variables::{Causality, DataType, Quantity, StartValue, Variability, V
 use crate::{Error, Result, shown};
 
 impl Simulation {
-    /// Read one element of a real variable (inputs and parameters give back what was set).
+    /// Reads one element of a real variable (inputs and parameters return the value that was set).
     ///
     /// # Examples
     /// ```
@@ -20,13 +20,13 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Unknown reference, or not a real.
+    /// Unknown reference; not a real variable.
     pub fn real(&self, reference: u32) -> Result<f64> {
         self.expect_kind(reference, "real", |kind| kind == DataType::Real)?;
         Ok(self.values[reference as usize])
     }
 
-    /// Read an integer or enumeration variable.
+    /// Reads an integer or enumeration variable.
     ///
     /// # Examples
     /// ```
@@ -40,14 +40,14 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Unknown reference, or neither integer nor enumeration.
+    /// Unknown reference; neither an integer nor an enumeration variable.
     pub fn integer(&self, reference: u32) -> Result<i32> {
         self.expect_kind(reference, "integer", |kind| matches!(kind, DataType::Integer | DataType::Enumeration(_)))?;
         #[expect(clippy::cast_possible_truncation, reason = "integers are stored as the i32 they were set from")]
         Ok(self.values[reference as usize] as i32)
     }
 
-    /// Read a boolean variable.
+    /// Reads a boolean variable.
     ///
     /// # Examples
     /// ```
@@ -61,13 +61,13 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Unknown reference, or not a boolean.
+    /// Unknown reference; not a boolean variable.
     pub fn boolean(&self, reference: u32) -> Result<bool> {
         self.expect_kind(reference, "boolean", |kind| kind == DataType::Boolean)?;
         Ok(self.values[reference as usize] != 0.0)
     }
 
-    /// Read a string variable.
+    /// Reads a string variable.
     ///
     /// # Examples
     /// ```
@@ -83,7 +83,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Unknown reference, or not a string.
+    /// Unknown reference; not a string variable.
     pub fn string(&self, reference: u32) -> Result<&str> {
         self.expect_kind(reference, "string", |kind| kind == DataType::String)?;
         match &self.table.locate(reference)?.0.start {
@@ -124,9 +124,9 @@ impl Simulation {
         Ok((variable.quantity, variable.name.clone(), element))
     }
 
-    /// Set one element of a real input or parameter. Value must be finite and within min and max. Clears a
-    /// derivative given for the same input. What moves or loads something reaches the value at the end of the
-    /// communication step under way or next, from where it is; with `input_interpolation` = hold it is there at once.
+    /// Sets one element of a real input or parameter. The value must be finite and within min and max. Clears a derivative that was given
+    /// for the same input. Inputs that move or load a structure ramp from their current value to the new one until the end of the current
+    /// or next communication step; with `input_interpolation` = hold they take the value immediately.
     ///
     /// # Examples
     /// ```
@@ -141,7 +141,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Unknown reference, wrong kind, not settable, non-finite, out of range; nothing is changed then.
+    /// Unknown reference; wrong kind; variable that cannot be set; value not finite or out of range. Nothing is changed then.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<()> {
         self.check_real(reference, value)?;
         let (variable, _) = self.table.locate(reference)?;
@@ -161,7 +161,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Whether [`Simulation::set_real`] would accept the value, apart from stability limits.
+    /// Returns whether [`Simulation::set_real`] would accept the value, stability limits aside.
     ///
     /// # Examples
     /// ```
@@ -184,7 +184,7 @@ impl Simulation {
         check_range(variable, value)
     }
 
-    /// Set an integer or enumeration parameter. Another bound on the number of steps holds from the next communication step on.
+    /// Sets an integer or enumeration parameter. A new bound on the number of steps applies from the next communication step on.
     ///
     /// # Examples
     /// ```
@@ -205,7 +205,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Whether [`Simulation::set_integer`] would accept the value.
+    /// Returns whether [`Simulation::set_integer`] would accept the value.
     ///
     /// # Examples
     /// ```
@@ -237,7 +237,7 @@ impl Simulation {
         ))
     }
 
-    /// Set a boolean parameter.
+    /// Sets a boolean parameter.
     ///
     /// # Examples
     /// ```
@@ -260,7 +260,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Set a string parameter. The table has none, so this always explains why not.
+    /// Sets a string parameter. The table has none, so this always returns an error.
     ///
     /// # Examples
     /// ```
@@ -281,8 +281,8 @@ impl Simulation {
         Err(Error::invalid(format!("variable `{name}`"), "string variables cannot be set", "Remove the call"))
     }
 
-    /// First time derivative of a continuous real input, valid from now until the input is set again: with the value it
-    /// says where a ramp is at the end of the communication step.
+    /// Sets the first time derivative of a continuous real input, valid from now until the input is set again: value and derivative
+    /// together define the end of a ramp over the communication step.
     ///
     /// # Examples
     /// ```
@@ -299,15 +299,15 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Unknown reference, not a continuous real input, order other than 1, non-finite.
+    /// Unknown reference; not a continuous real input; order other than 1; value not finite.
     pub fn set_input_derivative(&mut self, reference: u32, order: i32, value: f64) -> Result<()> {
         self.check_input_derivative(reference, order, value)?;
         let offset = self.offset_now();
         self.change_input(reference, |input| input.ask_slope(value, offset))
     }
 
-    /// Change an input. Within a communication step it turns to its new aim at once, which must be one that it may reach
-    /// by the end and that the internal step can follow; nothing is changed otherwise.
+    /// Changes an input. Within a communication step the input turns towards its new target immediately. The target must be allowed at the
+    /// end of the step, and the internal step must be able to follow; nothing is changed otherwise.
     fn change_input(&mut self, reference: u32, change: impl FnOnce(&mut Input)) -> Result<()> {
         let (variable, element) = self.table.locate(reference)?;
         let (quantity, of) = (variable.quantity, variable.of);
@@ -342,7 +342,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Whether the internal step under way can follow a new course of the speed or of the shape's rotation.
+    /// Checks that the current internal step can follow a new course of the speed or of the rotation of the shape.
     fn check_motion(&self, quantity: Quantity, of: usize, input: &Input) -> Result<()> {
         let (step, length) = (self.system.step_size(), self.communication.length);
         match quantity {
@@ -361,7 +361,7 @@ impl Simulation {
         }
     }
 
-    /// Whether [`Simulation::set_input_derivative`] would accept the value.
+    /// Returns whether [`Simulation::set_input_derivative`] would accept the value.
     ///
     /// # Examples
     /// ```
@@ -376,7 +376,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// As there.
+    /// As [`Simulation::set_input_derivative`].
     pub fn check_input_derivative(&self, reference: u32, order: i32, value: f64) -> Result<()> {
         let (variable, _) = self.table.locate(reference)?;
         let what = format!("derivative of `{}`", variable.name);
@@ -397,10 +397,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// First time derivative of a continuous real output at the last communication point.
+    /// Returns the first time derivative of a continuous real output at the last communication point.
     ///
-    /// Clearances and the rotor angle give their own rate; the others the change since the communication point
-    /// before (for means: between the middles of the last two steps). 0 before there are two points.
+    /// Clearances and the rotor angle have a rate of their own; the rate of other outputs is their change since the previous communication
+    /// point (for means: between the middles of the last two steps), or 0 before there are two points.
     ///
     /// # Examples
     /// ```
@@ -415,7 +415,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Unknown reference, not a continuous real output, order other than 1.
+    /// Unknown reference; not a continuous real output; order other than 1.
     pub fn output_derivative(&self, reference: u32, order: i32) -> Result<f64> {
         let (variable, element) = self.table.locate(reference)?;
         let what = format!("derivative of `{}`", variable.name);

@@ -1,4 +1,4 @@
-//! Whether the energy of a run is there: at every communication point, and what is said where it is not.
+//! Check of the energy of a run at every communication point, and the messages if it is too large.
 
 use super::{Simulation, SimulationPhase};
 use crate::ledger::Ledger;
@@ -7,20 +7,21 @@ use crate::system::Loss;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, shown_time};
 
-/// Energy of the instant may be so many times what was put in: that of modal-exact is cos²(ωh/2) of it, a fourth at ωh = 2π/3, the end of
-/// what a step resolves; that of central differences at least 1 − (ωh/2)². What is beyond is in modes that the step passes over.
+/// The instantaneous energy may exceed the supplied energy by this factor. With modal-exact it is cos²(ωh/2) of the supplied energy, a
+/// quarter at ωh = 2π/3, the limit of resolution; with central differences at least 1 − (ωh/2)². Any larger energy is in modes that the
+/// step does not resolve.
 const ENERGY_FACTOR: f64 = 4.0;
-/// And a share of all work exchanged, for rounding.
+/// Additional fraction of all work exchanged, for rounding.
 const ENERGY_SLACK: f64 = 0.01;
 
-/// Curvature work is told once it is as large as the net work of inputs, or as that of the shaft alone: users read these, and not the magnitudes
-/// that were exchanged, and their sign is then unknown.
+/// Curvature work is reported once it is as large as the net work of inputs or of the shaft alone. Users read these net values and not the
+/// exchanged magnitudes, and the sign of the net values is then unknown.
 const CURVATURE_OF_NET: f64 = 1.0;
-/// And from this share of all that was exchanged on: where next to nothing is left of the net, any error is as large.
+/// Curvature work is reported only above this fraction of all exchanged energy: if the net is nearly zero, any error is as large.
 const CURVATURE_OF_ALL: f64 = 0.1;
 
 impl Simulation {
-    /// Tell of the first curvature work that is large beside the net work of inputs.
+    /// Warns of the first curvature work that is large compared with the net work of inputs.
     pub(super) fn note_curvature(&mut self, time: f64) {
         if self.warning_state.curvature {
             return;
@@ -39,8 +40,9 @@ impl Simulation {
         self.note(Warning::new(Topic::CurvatureWork, problem, "Use a smaller internal step"));
     }
 
-    /// Vibration has no more energy than forces times speeds put in: what the scheme conserves leaves out what modes beyond the step
-    /// hold. With massless-boundary quasi-static modes hold energy one step before its work is known; its own limit keeps it.
+    /// Checks that vibration has no more energy than forces times velocities have supplied: the energy that the scheme conserves omits the
+    /// energy of modes that the step does not resolve. With massless-boundary, quasi-static modes hold energy one step before its work is
+    /// known; that scheme has a step limit instead.
     pub(super) fn check_energy(&mut self, time: f64) -> Result<()> {
         let settings = self.system.settings();
         if !settings.ledger || settings.scheme == Scheme::MasslessBoundary {
@@ -65,7 +67,7 @@ impl Simulation {
         })
     }
 
-    /// Whether structures that can feel each other have no more energy than they can have.
+    /// Returns whether structures that influence each other have no more energy than was supplied to them.
     fn has_its_energy(&self, set: usize) -> bool {
         let step = self.system.step_size();
         let factor = match self.system.settings().scheme {
@@ -79,13 +81,13 @@ impl Simulation {
         self.energies[set].now <= bound
     }
 
-    /// Energy that forces times speeds have put into a set (J).
+    /// Returns the energy that forces times velocities have supplied to a set (J).
     fn supplied(&self, set: usize) -> f64 {
         let ledger = &self.system.ledgers()[set];
         ledger.supplied().max(self.energies[set].conserved - ledger.initial).max(0.0)
     }
 
-    /// Friction or impacts have given energy (J): what happened, and what helps.
+    /// Returns problem and remedy if friction or impacts have supplied energy (J).
     pub(super) fn gain_texts(&self, set: usize, loss: Loss, [given, exchanged]: [f64; 2]) -> (String, String) {
         let (of, settings) = (self.of_set(set), self.system.settings());
         match loss {
@@ -126,7 +128,7 @@ impl Simulation {
         }
     }
 
-    /// Returns the remedy for tips that do not only slide: the law with sticking, if this scene may have it.
+    /// Returns the remedy for tips that do not only slide: the law with sticking, if the scene supports it.
     fn against_sliding(&self, scheme: Scheme) -> String {
         let scene = &self.compiled.scene;
         let coulomb = match scene.check_methods(scheme, Solver::Coulomb) {
@@ -140,7 +142,7 @@ impl Simulation {
     }
 }
 
-/// Whose net work (J) users are misled about by curvature work that is large beside it.
+/// Returns the net work (J) that is misleading because curvature work is large compared with it.
 fn misled(ledger: &Ledger) -> Option<(&'static str, f64)> {
     let (all, shaft) = (ledger.external_work(), ledger.shaft_work.value());
     let net = if shaft != 0.0 && shaft.abs() < all.abs() { ("the shaft", shaft) } else { ("all inputs", all) };
@@ -162,10 +164,10 @@ mod tests {
             ledger.turnover.add(turnover);
             ledger
         };
-        // What goes in and comes back leaves a net whose sign curvature work decides, though it is a third of the exchange.
+        // Curvature work, though a third of the exchange, decides the sign of the net work.
         assert_eq!(misled(&ledger(-5.85, 0.0, 7.03, 20.0)), Some(("all inputs", -5.85)));
         assert_eq!(misled(&ledger(0.5, 90.0, 15.0, 100.0)), Some(("the shaft", 0.5)));
-        // A small error of a large net, and one that is small beside all that was exchanged.
+        // A small error of a large net, and an error that is small compared with the exchange.
         assert_eq!(misled(&ledger(90.0, 0.0, 2.0, 100.0)), None);
         assert_eq!(misled(&ledger(0.01, 0.0, 0.5, 100.0)), None);
     }

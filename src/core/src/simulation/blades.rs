@@ -1,4 +1,4 @@
-//! What a scene asks of blades beside contact: excitation by an engine order, heat, motion at the start.
+//! Effects on blades other than contact: excitation by an engine order, heat, initial motion.
 
 use nalgebra::DVector;
 
@@ -14,7 +14,7 @@ use crate::rom::WatchedPoints;
 use crate::settings::{InitialSettings, Scheme, StructureSettings};
 use crate::{Error, Result, Rom, shown, shown_time};
 
-/// Modal load per kelvin of coupled sectors, on nodal diameter 0; empty where a scene does not heat them.
+/// Modal load per kelvin of coupled sectors, on nodal diameter 0; empty if the scene does not heat them.
 pub fn disk_heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<f64> {
     let Some(load) = whole_load(structure, rom).filter(|_| rom.is_cyclic()) else { return Vec::new() };
     #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
@@ -22,17 +22,17 @@ pub fn disk_heat(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -
     model.modal_load(&load).into_iter().map(|load| all * load).collect()
 }
 
-/// Load on the reduced coordinates per kelvin of a structure that a scene heats, which has one temperature (N/K).
+/// Load on the reduced coordinates per kelvin of a heated structure with one uniform temperature (N/K).
 fn whole_load(structure: &StructureSettings, rom: &Rom) -> Option<Vec<f64>> {
     let thermal = rom.extras.thermal.as_ref().filter(|_| structure.thermal)?;
     Some(thermal.loads.row_iter().map(|row| row.iter().sum()).collect())
 }
 
-/// Free expansion K⁻¹f of uncoupled blades per kelvin, in coordinates of the modes of `model` at this temperature (K); empty where a scene
-/// does not heat them. Expansion strains nothing but what is held, so that it is the same at every speed and temperature.
+/// Free expansion K⁻¹f of uncoupled blades per kelvin, in coordinates of the modes of `model` at this temperature (K); empty if the scene
+/// does not heat them. Free expansion strains only constrained parts, so it is the same at every speed and temperature.
 ///
 /// # Errors
-/// Stiffening of a blade that nothing holds: it has no free expansion.
+/// Stiffening of an unconstrained blade, which has no free expansion.
 pub fn expansion(structure: &StructureSettings, rom: &Rom, model: &ModalModel, temperature: f64) -> Result<Vec<f64>> {
     let Some(load) = whole_load(structure, rom).filter(|_| !rom.is_cyclic()) else { return Ok(Vec::new()) };
     if !structure.spin.stiffening {
@@ -49,10 +49,11 @@ pub fn expansion(structure: &StructureSettings, rom: &Rom, model: &ModalModel, t
 }
 
 /// Static stress of the full model at the places of `stress` beyond that of the reduced coordinates, by heat (Pa/K) and by growth (Pa s²):
-/// 6·places values each, none where a scene has no such load. Modes leave a part of loads that act in the whole blade; this part is at rest.
+/// 6·places values each, none if the scene has no such load. The modes do not represent all of a load that acts in the whole blade; the
+/// remaining stress is static.
 ///
 /// # Errors
-/// A ROM without modes.
+/// ROM without modes.
 pub fn static_stress(
     structure: &StructureSettings,
     rom: &Rom,
@@ -64,7 +65,7 @@ pub fn static_stress(
     let heat = heat.map(|heat| beyond(heat.column_sum(), &body.stress * DVector::from_column_slice(&body.expansion)));
     let spin = rom.extras.spin.as_ref().filter(|_| structure.spin.growth);
     let growth = rom.extras.stress_centrifugal.as_ref().zip(spin).map(|(growth, spin)| {
-        // Of the structure at rest, as the static stress is.
+        // The modes at rest, to which the static stress refers.
         let modes = ModalModel::from_rom(rom, 0.0)?;
         let load = modes.modal_load(&spin.centrifugal_load).into_iter().zip(&modes.frequencies);
         let moved = load.map(|(load, w)| if *w > 0.0 { load / (w * w) } else { 0.0 });
@@ -74,13 +75,13 @@ pub fn static_stress(
     Ok((heat.unwrap_or_default(), growth.transpose()?.unwrap_or_default()))
 }
 
-/// Share of the elastic stiffness that is left at a temperature (K).
+/// Fraction of the elastic stiffness that remains at a temperature (K).
 pub fn softened(structure: &StructureSettings, temperature: f64) -> f64 {
     1.0 - structure.softening * temperature
 }
 
 impl Compiled {
-    /// Modal loads of blades by growth, and of coupled sectors by heat.
+    /// Fills in the modal loads of blades by growth, and of coupled sectors by heat.
     pub fn fill_loads(&self, body: usize, speed: f64, temperature: f64, loads: &mut [f64]) {
         let parts = &self.bodies[body];
         if parts.centrifugal.is_empty() {
@@ -91,7 +92,7 @@ impl Compiled {
         loads.iter_mut().zip(&parts.disk_heat).for_each(|(load, heat)| *load += temperature * heat);
     }
 
-    /// Put blades into equilibrium with growth and heat.
+    /// Puts blades into equilibrium with growth and heat.
     pub fn settle(&self, body: usize, speed: f64, temperature: f64, modes: &mut Sectors) {
         let mut load = vec![0.0; self.bodies[body].model.len()];
         self.fill_loads(body, speed, temperature, &mut load);
@@ -99,23 +100,23 @@ impl Compiled {
         modes.settle_expansion(temperature);
     }
 
-    /// Whether blades are loaded by growth or heat.
+    /// Returns whether blades are loaded by growth or heat.
     pub fn loads_blades(&self, body: usize) -> bool {
         let parts = &self.bodies[body];
         [parts.centrifugal.is_empty(), parts.disk_heat.is_empty(), parts.expansion.is_empty()].contains(&false)
     }
 
-    /// Factor on the elastic stiffness of a sector at a temperature (K): that of mistuning, squared, and what softening leaves.
+    /// Factor on the elastic stiffness of a sector at a temperature (K): the square of its mistuning factor times the softening factor.
     pub fn stiffness_factor(&self, body: usize, sector: usize, temperature: f64) -> f64 {
         let structure = self.body(body).0;
         let factor = structure.frequency_factors.get(sector).copied().unwrap_or(1.0);
         factor * factor * softened(structure, temperature)
     }
 
-    /// The excitation of a structure, which acts on its ROM.
+    /// Returns the excitation of a structure, applied to its ROM.
     ///
     /// # Errors
-    /// A mode or a contact node that it does not have.
+    /// Mode or contact node that the structure does not have.
     pub fn excitation(&self, body: usize) -> Result<Option<Excitation>> {
         let (structure, rom) = self.body(body);
         let Some(asked) = &structure.excitation else { return Ok(None) };
@@ -136,7 +137,7 @@ impl Compiled {
         Ok(Some(Excitation { order: asked.order, mode: asked.mode.map(|mode| mode - 1), row }))
     }
 
-    /// Modes of a structure, of the nodal diameter with the fewest; with inertia under a scheme where one is given.
+    /// Returns the number of modes of a structure, at the nodal diameter with the fewest; only modes with inertia if a scheme is given.
     fn fewest_modes(&self, body: usize, scheme: Option<Scheme>) -> usize {
         let parts = &self.bodies[body];
         let uncoupled = || scheme.map_or(parts.model.len(), |scheme| parts.model.dynamic_modes(scheme));
@@ -157,10 +158,10 @@ impl Compiled {
         Err(Error::invalid(field, problem, "Use a lower mode, or a ROM with more modes"))
     }
 
-    /// Checks lists of modes, sectors and nodal diameters, which need the ROM.
+    /// Checks lists of modes, sectors and nodal diameters against the ROM.
     ///
     /// # Errors
-    /// Naming the field.
+    /// An invalid list; the error names the field.
     pub fn check_blades(&self) -> Result<()> {
         for (number, (structure, rom)) in self.scene.settings.structures.iter().zip(&self.scene.roms).enumerate() {
             let (listed, most) = (structure.damping_ratios.len(), rom.order());
@@ -192,10 +193,10 @@ impl Compiled {
         })
     }
 
-    /// Refuse temperatures (K) that leave no structure.
+    /// Rejects temperatures (K) at which a structure has no stiffness.
     ///
     /// # Errors
-    /// Naming the variable.
+    /// A temperature out of range; the error names the variable.
     pub fn check_temperature(&self, body: usize, temperature: f64) -> Result<()> {
         let structure = self.body(body).0;
         let left = softened(structure, temperature);
@@ -216,7 +217,7 @@ impl Compiled {
         ))
     }
 
-    /// Returns the needs of the modes of a touching structure besides contact.
+    /// Returns the options of the modes of a master, contact aside.
     pub fn bank_options(&self, body: usize, excitation: Option<Excitation>) -> BankOptions {
         let ((structure, rom), parts) = (self.body(body), &self.bodies[body]);
         let coupled = structure.spin.stiffening || structure.spin.coriolis;
@@ -240,24 +241,24 @@ impl Compiled {
         }
     }
 
-    /// Speed (rad/s) and temperature (K) whose stiffness each structure that touches has.
+    /// Returns the speed (rad/s) and temperature (K) at which the stiffness of each master is taken.
     pub fn references(&self) -> Vec<[f64; 2]> {
         self.bodies.iter().map(|body| [body.reference_speed, body.reference_temperature]).collect()
     }
 
-    /// Whether modes or loads of a structure depend on speed or temperature.
+    /// Returns whether modes or loads of a structure depend on speed or temperature.
     pub fn varies(&self, body: usize) -> bool {
         self.spins(body) || self.softens(body)
     }
 
-    /// Whether heat softens a structure.
+    /// Returns whether heat softens a structure.
     pub fn softens(&self, body: usize) -> bool {
         self.body(body).0.softening != 0.0
     }
 }
 
 impl super::RotorInputs {
-    /// With the inputs that a structure has.
+    /// Returns the inputs that a structure has.
     pub fn of(structure: &StructureSettings) -> Self {
         let inputs = |count: usize| vec![super::Input::default(); count];
         Self {
@@ -269,27 +270,27 @@ impl super::RotorInputs {
 }
 
 impl Simulation {
-    /// Speed (rad/s) and temperature (K) of each structure that touches, as set.
+    /// Returns the speed (rad/s) and temperature (K) of each master, as set.
     pub(super) fn references(&self) -> Vec<[f64; 2]> {
         let of =
             |rotor: &super::RotorInputs| [rotor.speed.value, rotor.temperature.first().map_or(0.0, |one| one.value)];
         self.inputs.rotors.iter().map(of).collect()
     }
 
-    /// Damping ratios of the first modes of each structure that touches, then of those that carry surfaces.
+    /// Returns the damping ratios of the first modes of each master, then of the surface carriers.
     pub(super) fn mode_damping(&self) -> Vec<Vec<f64>> {
         let (bodies, carriers) = (self.compiled.bodies.len(), self.compiled.carriers.len());
         let bodies = (0..bodies).map(|body| self.values_of(Quantity::ModeDamping, body));
         bodies.chain((0..carriers).map(|carrier| self.values_of(Quantity::CarrierModeDamping, carrier))).collect()
     }
 
-    /// All elements of a variable; empty where there is none.
+    /// Returns all elements of a variable; empty if it does not exist.
     fn values_of(&self, quantity: Quantity, of: usize) -> Vec<f64> {
         let variable = self.table.with_quantity_of(quantity, of);
         variable.map_or(Vec::new(), |row| self.values[row.reference as usize..][..row.len()].to_vec())
     }
 
-    /// The engine orders of the parameters.
+    /// Applies the engine orders of the parameters.
     pub(super) fn follow_engine_orders(&mut self) {
         for body in 0..self.compiled.bodies.len() {
             if let Some(reference) = self.compiled.references.engine_orders[body] {
@@ -304,12 +305,12 @@ impl Simulation {
         }
     }
 
-    /// Engine order times angle of the rotor less phase at an offset (rad), and amplitude (N).
+    /// Returns engine order times rotor angle minus phase at an offset (rad), and the amplitude (N).
     pub(super) fn excitation_at(&self, body: usize, offset: f64) -> Option<[f64; 2]> {
         let rotor = &self.inputs.rotors[body];
         let [amplitude, phase] = rotor.excitation.first_chunk::<2>()?;
         let order = self.values[self.compiled.references.engine_orders[body]?];
-        // Whole turns, which the phase of the rotor leaves out, are whole turns of any order.
+        // The phase of the rotor omits whole turns; times the order these are whole turns, too.
         let angle = (order * self.rotors[body].phase(&rotor.speed, offset)) % std::f64::consts::TAU;
         Some([amplitude.at(offset), angle - phase.at(offset)])
     }
@@ -321,7 +322,7 @@ impl Simulation {
         order * rotor.speed.at(offset) - rotor.excitation.get(1).map_or(0.0, Input::rate)
     }
 
-    /// An excitation must not turn on too far within an internal step, by the speed and by its phase (rad/s) together.
+    /// Checks that the excitation does not turn too far within an internal step, by the speed and by its phase (rad/s) together.
     pub(super) fn check_excitation(&self, body: usize, step: f64, speeds: [f64; 2], phase: f64) -> Result<()> {
         let Some(reference) = self.compiled.references.engine_orders[body] else { return Ok(()) };
         let order = self.values[reference];
@@ -342,8 +343,7 @@ impl Simulation {
         ))
     }
 
-    /// Blades with a motion of their own at the start, on top of their static equilibrium; again for another length of the first
-    /// step.
+    /// Sets the initial motion of blades on top of their static equilibrium; called again for another length of the first step.
     pub(super) fn launch_blades(&mut self) {
         for body in 0..self.compiled.bodies.len() {
             let initial = &self.compiled.body(body).0.initial;
@@ -369,7 +369,7 @@ impl Simulation {
         }
     }
 
-    /// Modes that are to move at the start must have inertia under the scheme, and move a contact node.
+    /// Checks that modes with an initial motion have inertia under the scheme and move a contact node.
     pub(super) fn check_launch(&self, scheme: Scheme) -> Result<()> {
         (0..self.compiled.bodies.len()).try_for_each(|body| {
             let most = self.compiled.fewest_modes(body, Some(scheme));
@@ -382,7 +382,7 @@ impl Simulation {
     }
 }
 
-/// Add one motion to those of the modes.
+/// Adds an initial motion to the motion of the modes.
 fn launch(modes: &mut Sectors, one: &InitialSettings, displacement: f64, velocity: f64) {
     let mode = one.mode - 1;
     let n = one.nodal_diameter.unwrap_or(0);

@@ -1,4 +1,4 @@
-//! What a scene asks of its start, and of what it hands out.
+//! Checks of the start of a scene and of its outputs.
 
 use super::Simulation;
 use super::compile::Compiled;
@@ -8,14 +8,14 @@ use crate::variables::Causality;
 use crate::warning::{Topic, Warning};
 use crate::{Error, Result, shown_time};
 
-/// Extension of a surface around an axis ([`crate::gaps::surface_spline::REACH`]), and the remedy for a node further out.
+/// Extension of a surface around an axis ([`crate::gaps::surface_spline::REACH`]), and the remedy for a node beyond it.
 pub const OUT_OF_REACH: &str = "a quarter of the axial extent of the surface, the limit of its extrapolation along the \
                                 tangents";
 pub const OUT_OF_REACH_REMEDY: &str = "Use a casing whose contact grid covers the blade tips over their whole range of \
                                        motion, or check axial shift, loads and speed";
 
 impl Compiled {
-    /// Values of the ROMs and of the scene that are rarely meant.
+    /// Returns implausible values of the ROMs and of the scene.
     pub fn slips(&self) -> Vec<Slip> {
         let mut slips = Vec::new();
         for (index, body) in self.bodies.iter().enumerate() {
@@ -35,7 +35,7 @@ impl Compiled {
         slips
     }
 
-    /// Tips that are too fast at a speed (rad/s). Allocates only to say so.
+    /// Returns the implausible value if tips are too fast at a speed (rad/s). Allocates only in this case.
     pub fn slip_of_speed(&self, body: usize, speed: f64) -> Option<Slip> {
         plausibility::of_speed(self.body(body).1, speed, || {
             let structure = if self.bodies.len() > 1 { format!("{}.", self.body(body).0.name) } else { String::new() };
@@ -43,7 +43,7 @@ impl Compiled {
         })
     }
 
-    /// Refuse tips that are too fast at a speed (rad/s), unless the scene accepts them. Allocates only to refuse.
+    /// Rejects tips that are implausibly fast at a speed (rad/s), unless the scene accepts them. Allocates only to reject.
     pub fn check_tip_speed(&self, body: usize, speed: f64) -> Result<()> {
         if self.scene.settings.accept_implausible {
             return Ok(());
@@ -51,7 +51,7 @@ impl Compiled {
         self.slip_of_speed(body, speed).map_or(Ok(()), |slip| Err(slip.error()))
     }
 
-    /// Friction power of patches that no friction gives.
+    /// Warns of patches for friction power in a scene without friction.
     pub fn idle_patches(&self) -> Option<Warning> {
         let settings = &self.scene.settings;
         let rubs = settings.contacts.iter().any(|contact| contact.friction > 0.0);
@@ -65,10 +65,10 @@ impl Compiled {
 }
 
 impl Simulation {
-    /// Refuse values that are rarely meant, unless the scene accepts them.
+    /// Rejects implausible values, unless the scene accepts them.
     ///
     /// # Errors
-    /// The first of them, with the key that accepts it.
+    /// The first implausible value, with the key that accepts it.
     pub(super) fn check_slips(&self) -> Result<()> {
         if self.compiled.scene.settings.accept_implausible {
             return Ok(());
@@ -80,7 +80,7 @@ impl Simulation {
         speeds.try_for_each(|(body, speed)| self.compiled.check_tip_speed(body, speed))
     }
 
-    /// Loads and speed at the start have displaced the structures already: by what small displacements can describe?
+    /// Checks that the loads and the speed at the start displace the structures by amounts that small displacements can describe.
     pub(super) fn check_initial_state(&self) -> Result<()> {
         let Err(failure) = self.system.check_state() else { return Ok(()) };
         let blades = |structure: usize| match self.rotors.len() {
@@ -119,7 +119,7 @@ impl Simulation {
         Err(Error::invalid("initial state", what, remedy))
     }
 
-    /// No output is handed out that is no number: outputs at `time` (s).
+    /// Checks that no output is NaN; outputs belong to `time` (s).
     ///
     /// # Examples
     /// ```
@@ -135,7 +135,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Naming the output. The state is not to be gone on with.
+    /// An output that is not a number; the error names it. The state must not be used further.
     pub fn check_outputs(&self, time: f64) -> Result<()> {
         for variable in self.table.variables().iter().filter(|row| row.causality == Causality::Output) {
             let start = variable.reference as usize;
@@ -149,7 +149,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// A start in penetration would be an impact of arbitrary strength.
+    /// Rejects a start in penetration, which would be an impact of arbitrary strength.
     pub(super) fn check_initial_gaps(&self) -> Result<()> {
         (0..self.compiled.bodies.len()).try_for_each(|body| self.check_initial_gaps_of(body))
     }

@@ -1,4 +1,4 @@
-//! From settings to kernels: what is decided once, before anything moves.
+//! Compilation of settings into kernels: everything that is determined before the first step.
 
 use crate::dynamics::cyclic::CyclicModel;
 use crate::dynamics::modal::{ModalModel, ModalSpin};
@@ -25,61 +25,61 @@ use super::patches::HeatPatches;
 use super::plan::{PairPlan, SteppingOrder, prefix};
 use super::slave_surface::{CarrierModes, Lining, Share, spline_gap};
 
-/// Most contact nodes of all sectors together that a flexible slave or the disk couples: their Delassus matrix is dense.
+/// Largest number of contact nodes of all sectors that a flexible slave or the disk may couple: their Delassus matrix is dense.
 pub const MOST_COUPLED: usize = 2000;
 
-/// Places of values that the step reads.
+/// Indices of the values that the step reads.
 #[derive(Debug, Clone)]
 pub struct ValuePlaces {
     pub step_max: usize,
     pub input_interpolation: Option<usize>,
     /// Ramp time of each pair whose shape grows from zero.
     pub ramp_times: Vec<Option<usize>>,
-    /// Engine order of each structure that is excited.
+    /// Engine order of each excited structure.
     pub engine_orders: Vec<Option<usize>>,
 }
 
-/// A structure whose contact nodes touch.
+/// A master: a structure with contact nodes.
 #[derive(Debug, Clone)]
 pub struct CompiledBody {
-    /// Modes, at the reference speed where spin stiffens it; of coupled sectors those of nodal diameter 0.
+    /// Modes, at the reference speed if spin stiffens the structure; for coupled sectors those of nodal diameter 0.
     pub model: ModalModel,
     /// Modes of coupled sectors.
     pub disk: Option<CyclicModel>,
-    /// Translations of a structure that flies freely.
+    /// Translations of a free body.
     pub translations: Option<Translations>,
-    /// Speed whose stiffness `model` has (rad/s).
+    /// Speed at which `model` has its stiffness (rad/s).
     pub reference_speed: f64,
-    /// Temperature whose stiffness it has, where heat softens it (K).
+    /// Temperature at which `model` has its stiffness, if heat softens it (K).
     pub reference_temperature: f64,
-    /// Lowest and highest eigenvalue of the modal stiffness per Ω² and per Ω⁴, where spin stiffens it.
+    /// Lowest and highest eigenvalue of the modal stiffness per Ω² and per Ω⁴, if spin stiffens the structure.
     pub stiffness_range: Option<[[f64; 2]; 2]>,
-    /// Modal load by growth, per Ω² and, with stiffening, per Ω⁴; empty without.
+    /// Modal load by growth, per Ω² and, with stiffening, per Ω⁴; empty without growth.
     pub centrifugal: Vec<[f64; 2]>,
-    /// Modal load of coupled sectors per kelvin; empty without.
+    /// Modal load of coupled sectors per kelvin; empty without heat.
     pub disk_heat: Vec<f64>,
-    /// Free expansion of uncoupled blades per kelvin in modal coordinates; empty without.
+    /// Free expansion of uncoupled blades per kelvin in modal coordinates; empty without heat.
     pub expansion: Vec<f64>,
-    /// Displacement of watched points per unit of each mode, 3·points × modes; empty without.
+    /// Displacement of watched points per unit of each mode, 3·points × modes; empty without watched points.
     pub watched: DMatrix<f64>,
-    /// Stress at places per unit of each mode, 6·places × modes (Pa); empty where the scene does not ask for it.
+    /// Stress at places per unit of each mode, 6·places × modes (Pa); empty unless requested.
     pub stress: DMatrix<f64>,
-    /// Static stress there per kelvin beyond that of the expansion of the modes, 6·places (Pa/K); empty without.
+    /// Static stress at these places per kelvin beyond that of the expansion of the modes, 6·places (Pa/K); empty without heat.
     pub stress_heat: Vec<f64>,
-    /// The same per Ω² by growth (Pa s²); empty without.
+    /// Static stress at these places per Ω² by growth (Pa s²); empty without growth.
     pub stress_growth: Vec<f64>,
-    /// 1 or −1 per mode, so that the contact node it moves most goes along the positive direction; empty unless asked for.
+    /// 1 or −1 per mode, such that the contact node with the largest displacement moves in the positive direction; empty unless requested.
     pub senses: Vec<f64>,
 }
 
 /// A structure that carries surfaces.
 #[derive(Debug, Clone)]
 pub struct CarrierParts {
-    /// Place in the scene.
+    /// Index in the scene.
     pub structure: usize,
-    /// Modes, seen at the contact grid.
+    /// Modes, observed at the contact grid.
     pub model: ModalModel,
-    /// Nodal diameters of the load on it.
+    /// Number of nodal diameters of its load.
     pub load_order: u32,
     pub loads: CarrierLoads,
     /// Force on the support per unit of each mode, if requested.
@@ -91,15 +91,15 @@ pub struct CarrierParts {
 pub struct Compiled {
     pub scene: Scene,
     pub plan: SteppingOrder,
-    /// As in the plan.
+    /// Masters, in the order of [`SteppingOrder::bodies`].
     pub bodies: Vec<CompiledBody>,
-    /// As in the plan; in the system they follow the bodies.
+    /// Surface carriers, in the order of [`SteppingOrder::carriers`]; in the system they follow the masters.
     pub carriers: Vec<CarrierParts>,
-    /// Where friction heat is counted, per pair.
+    /// Patches that collect friction heat, per pair.
     pub patches: Vec<Option<HeatPatches>>,
-    /// Between surface and mesh, per pair; empty where no support is asked for.
+    /// Linings between surface and mesh, per pair; empty if no support output is requested.
     pub linings: Vec<Option<Lining>>,
-    /// Hash of settings and ROMs; saved states carry it.
+    /// Hash of settings and ROMs, stored in saved states.
     pub fingerprint: u64,
     pub references: ValuePlaces,
 }
@@ -135,12 +135,12 @@ impl CompiledBody {
         })
     }
 
-    /// Largest angular frequency (rad/s), of all nodal diameters where sectors are coupled.
+    /// Largest angular frequency (rad/s), over all nodal diameters if sectors are coupled.
     pub fn largest_frequency(&self) -> f64 {
         self.disk.as_ref().map_or_else(|| self.model.largest_frequency(), CyclicModel::largest_frequency)
     }
 
-    /// Lowest angular frequency of a mode that vibrates (rad/s); infinite without.
+    /// Lowest angular frequency of a vibrating mode (rad/s); infinite if there is none.
     pub fn lowest_frequency(&self) -> f64 {
         let frequencies = match &self.disk {
             Some(disk) => disk.diameters.iter().flat_map(|diameter| &diameter.frequencies).collect(),
@@ -151,10 +151,10 @@ impl CompiledBody {
 }
 
 impl Compiled {
-    /// Validate the scene and solve the reduced eigenproblems.
+    /// Validates the scene and solves the reduced eigenproblems.
     ///
     /// # Errors
-    /// Invalid settings or ROM; ROMs without what the scene asks of them.
+    /// Invalid settings or ROM; ROMs without data that the scene requires.
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.settings.validate()?;
         let plan = SteppingOrder::new(scene)?;
@@ -207,7 +207,7 @@ impl Compiled {
         Ok(compiled)
     }
 
-    /// Between the surface of a pair and the mesh of the structure whose support is asked for.
+    /// Returns the lining between the surface of a pair and the mesh of its carrier, if the support is requested.
     fn lining(&self, pair: usize) -> Result<Option<Lining>> {
         let plan = &self.plan.pairs[pair];
         let supported = |carrier: &usize| self.carriers[*carrier].support.is_some();
@@ -221,44 +221,44 @@ impl Compiled {
         if self.uses(carrier) > 1 { Share::Near } else { Share::Whole }
     }
 
-    /// Settings and ROM of a structure whose nodes touch.
+    /// Returns settings and ROM of a master.
     pub fn body(&self, body: usize) -> (&StructureSettings, &Rom) {
         self.plan.structure(&self.scene, body)
     }
 
-    /// Settings and ROM of a structure that carries surfaces.
+    /// Returns settings and ROM of a surface carrier.
     pub fn carrier(&self, carrier: usize) -> (&StructureSettings, &Rom) {
         let structure = self.carriers[carrier].structure;
         (&self.scene.settings.structures[structure], &self.scene.roms[structure])
     }
 
-    /// Settings of a contact pair.
+    /// Returns the settings of a contact pair.
     pub fn contact(&self, pair: usize) -> &ContactSettings {
         &self.scene.settings.contacts[pair]
     }
 
-    /// Name of a contact node, with that of its structure where several touch.
+    /// Returns the name of a contact node, with the name of its structure if there are several masters.
     pub fn node_name(&self, body: usize, node: usize) -> String {
         let prefix = self.plan.body_prefix(&self.scene, body);
         format!("{prefix}{}", self.body(body).1.contact_nodes[node].name)
     }
 
-    /// Returns the name of what turns, for messages: "the rotor", or its name if several structures touch.
+    /// Returns the name of the rotating structure for messages: "the rotor", or its name if there are several masters.
     pub fn rotor_name(&self, body: usize) -> String {
         if self.bodies.len() > 1 { self.body(body).0.name.clone() } else { "the rotor".to_owned() }
     }
 
-    /// A text about a structure that touches, with its name where several do.
+    /// Adds the name of a master to a text if there are several.
     pub fn named(&self, body: usize, text: String) -> String {
         if self.bodies.len() > 1 { format!("{}: {text}", self.body(body).0.name) } else { text }
     }
 
-    /// A warning about a structure that touches, with its name where several do.
+    /// Adds the name of a master to a warning if there are several.
     pub fn warning_of(&self, body: usize, warning: Warning) -> Warning {
         if self.bodies.len() > 1 { warning.named(&self.body(body).0.name) } else { warning }
     }
 
-    /// Name of a structure of the system.
+    /// Returns the name of a structure of the system.
     pub fn structure_name(&self, structure: usize) -> &str {
         match structure.checked_sub(self.bodies.len()) {
             Some(carrier) => &self.carrier(carrier).0.name,
@@ -266,7 +266,7 @@ impl Compiled {
         }
     }
 
-    /// Name of a structure of the system, for messages: that of a rotor or casing where there is one.
+    /// Returns the name of a structure of the system for messages: that of its rotor or casing, if there is one.
     pub fn carrier_name(&self, structure: usize) -> &str {
         match structure.checked_sub(self.bodies.len()) {
             Some(carrier) if self.carriers.len() > 1 => &self.carrier(carrier).0.name,
@@ -274,28 +274,28 @@ impl Compiled {
         }
     }
 
-    /// Returns the number of pairs with their surface on a carrier.
+    /// Returns the number of pairs whose surface is on a carrier.
     fn uses(&self, carrier: usize) -> usize {
         self.plan.pairs.iter().filter(|pair| pair.carrier == Some(carrier)).count()
     }
 
-    /// Whether tips of a structure cut a coating.
+    /// Returns whether tips of a structure cut a coating.
     pub fn cuts(&self, body: usize) -> bool {
         self.plan
             .pairs_of(body)
             .any(|(pair, _)| self.contact(pair).coating.is_some_and(|coating| coating.cutting.is_some()))
     }
 
-    /// Whether modes or loads of a structure depend on the speed.
+    /// Returns whether modes or loads of a structure depend on the speed.
     pub fn spins(&self, body: usize) -> bool {
         let spin = self.body(body).0.spin;
         spin.stiffening || spin.growth || spin.coriolis
     }
 
-    /// Take the modes of a structure at a steady speed (rad/s) and temperature (K).
+    /// Computes the modes of a structure at a steady speed (rad/s) and temperature (K).
     ///
     /// # Errors
-    /// A speed or a temperature at which the stiffness is lost, or beyond what the ROM was fitted for.
+    /// Speed or temperature at which the stiffness is lost, or outside the range for which the ROM was fitted.
     pub fn set_reference_speed(&mut self, body: usize, [speed, temperature]: [f64; 2]) -> Result<()> {
         self.check_speed(body, speed)?;
         self.check_temperature(body, temperature)?;
@@ -343,13 +343,13 @@ impl Compiled {
         self.carriers[carrier].loads = CarrierLoads::new(structure, parts.load_order, rom, &parts.model);
     }
 
-    /// Take another number of nodal diameters for the load on a carrier.
+    /// Sets the number of nodal diameters of the load on a carrier.
     ///
     /// # Errors
-    /// A number that its contact grid does not resolve.
+    /// Number that the contact grid does not resolve.
     pub fn set_load_order(&mut self, carrier: usize, order: f64) -> Result<()> {
         let (structure, rom) = self.carrier(carrier);
-        // Half as many as nodes would have one phase only, and count twice; more are aliases of fewer.
+        // Half the number of nodes would have a single phase and count twice; larger numbers are aliases of smaller ones.
         let most = u32::try_from(rom.extras.grid.map_or(0, |grid| (grid.around - 1) / 2)).unwrap_or(u32::MAX);
         if structure.load.is_some() && !(0.0..=f64::from(most)).contains(&order) {
             return Err(Error::invalid(
@@ -367,10 +367,10 @@ impl Compiled {
         Ok(())
     }
 
-    /// Refuse speeds that the spin matrices were not fitted for.
+    /// Rejects speeds for which the spin matrices were not fitted.
     ///
     /// # Errors
-    /// Beyond 1.05 times the largest fitted speed.
+    /// Speed above 1.05 times the largest fitted speed.
     pub fn check_speed(&self, body: usize, speed: f64) -> Result<()> {
         let (structure, rom) = self.body(body);
         let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin != Default::default()) else {
@@ -390,10 +390,10 @@ impl Compiled {
         ))
     }
 
-    /// Fresh kernels at rest: bodies, then carriers.
+    /// Creates kernels at rest: masters, then carriers.
     ///
     /// # Errors
-    /// Wrong number of sector gaps or frequency factors, bad shape table, surfaces that do not fit the nodes.
+    /// Wrong number of sector gaps or frequency factors; invalid shape table; surfaces that do not fit the nodes.
     pub fn system(&self) -> Result<System> {
         self.check_size()?;
         let gap = |pair| self.gap(pair).map_err(|error| self.of_pair(pair, error));
@@ -433,13 +433,14 @@ impl Compiled {
         Ok(System::of(structures, pairs, coatings, methods))
     }
 
-    /// An error of a contact or of its surface, with their numbers.
+    /// Adds the contact and the surface of a pair, with their numbers, to an error.
     pub fn of_pair(&self, pair: usize, error: Error) -> Error {
         let surface = self.plan.pairs[pair].surface + 1;
         error.placed("contact", &format!("contact[{}]", pair + 1)).placed("surface", &format!("surface[{surface}]"))
     }
 
-    /// Contacts that are solved together must not be too many: those of a structure, or of several that share what they touch.
+    /// Checks that the contacts that are solved together are not too many: those of a structure, or of several that share a surface
+    /// carrier.
     fn check_size(&self) -> Result<()> {
         let (count, pairs) = (self.bodies.len(), self.plan.pairs.iter());
         let links = pairs.filter_map(|pair| Some((pair.body, count + pair.carrier?)));
@@ -471,7 +472,7 @@ impl Compiled {
         Ok(())
     }
 
-    /// The gap function of a pair.
+    /// Creates the gap function of a pair.
     pub(super) fn gap(&self, pair: usize) -> Result<GapLaw> {
         let plan = &self.plan.pairs[pair];
         if self.bodies[plan.body].translations.is_some() {
@@ -509,7 +510,7 @@ impl Compiled {
         Ok(GapLaw::Open(Box::new(gap)))
     }
 
-    /// The undeformed surface through an open contact grid.
+    /// Creates the undeformed surface through an open contact grid.
     fn open_surface(&self, plan: &PairPlan) -> Result<OpenSurface> {
         let Some(rom) = plan.grid.map(|grid| &self.scene.roms[grid]) else { unreachable!("validated") };
         let Some(grid) = rom.extras.grid else { unreachable!("checked") };
@@ -518,7 +519,7 @@ impl Compiled {
         Ok(OpenSurface::new(SurfaceSpline::open(&data, grid.around, grid.along, spline.interpolation)?))
     }
 
-    /// Modes of each carrier at the control points of its surfaces, one surface after the other.
+    /// Returns the modes of each carrier at the control points of its surfaces, one surface after the other.
     fn control_modes(&self, gaps: &[GapLaw]) -> Vec<ModalModel> {
         let of = |index: usize| {
             let own = self.plan.pairs.iter().zip(gaps).filter(|(pair, _)| pair.carrier == Some(index));
@@ -528,7 +529,7 @@ impl Compiled {
         (0..self.carriers.len()).filter_map(of).collect()
     }
 
-    /// Modes of a carrier at the control points of one surface; `None` for a surface that has none.
+    /// Returns the modes of a carrier at the control points of one surface; `None` for a surface without control points.
     pub fn control_modes_of(&self, carrier: usize, gap: &GapLaw) -> Option<ModalModel> {
         let first = if let GapLaw::Spline(gap) = gap { gap.first_node } else { 0 };
         let modes = CarrierModes { rom: self.carrier(carrier).1, model: &self.carriers[carrier].model };

@@ -1,23 +1,23 @@
-//! The contour of the tip in the meridional plane: slopes that a ROM gives against those of its positions.
+//! Consistency of the tip contour in the meridional plane: slopes of the ROM against slopes between its positions.
 //!
-//! A surface of revolution takes its normals from the slopes, a surface spline from a curve through the positions. Both have to mean the
+//! A surface of revolution takes its normals from the slopes, a surface spline from a curve through the positions. Both must describe the
 //! same contour.
 
 use crate::{Error, Result, Rom, shown};
 
-/// Slopes may differ from those between positions by this much (-), which turns a normal by 14 degrees: means over patches, a tip that is
-/// not quite a surface of revolution, a fillet.
+/// Allowed difference between given slopes and slopes between positions (-), which turns a normal by 14 degrees. Reasons are means over
+/// patches, a tip that is not quite a surface of revolution, and fillets.
 const APART: f64 = 0.25;
-/// The same of a cylinder, which is also what a ROM file that leaves slopes out has.
+/// Allowed difference for a cylinder, which also results from a ROM file without slopes.
 const CYLINDER: f64 = 0.05;
-/// Contact nodes closer along the axis than this fraction of their extent are one place.
+/// Contact nodes closer along the axis than this fraction of their extent are one station.
 const SAME_PLACE: f64 = 1e-3;
-/// Contact nodes within this fraction of their radius along the axis have no contour.
+/// Contact nodes whose axial extent is below this fraction of their radius have no contour.
 const FLAT: f64 = 1e-6;
-/// Radii of one place may differ by this fraction: a tip may be cut flat.
+/// Radii of one station may differ by this fraction, since a tip may be cut flat.
 const UNEVEN: f64 = 1e-4;
 
-/// A place along the axis: its first node, and the means there.
+/// A station along the axis: its first node, and the mean values there.
 #[derive(Debug, Clone, Copy)]
 struct AxialStation {
     node: usize,
@@ -27,11 +27,11 @@ struct AxialStation {
     slope: f64,
 }
 
-/// Check the slopes of the contact nodes of one pair; `uses_slopes` for a surface whose normals follow them. Zeros are no slopes where
-/// nothing uses them.
+/// Checks the slopes of the contact nodes of one pair; `uses_slopes` for a surface whose normals follow them. Zeros count as missing slopes
+/// if they are unused.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the ROM, two nodes, their slopes and that of the positions between them.
+/// [`Error::Invalid`] with the ROM, two nodes, their slopes and the slope between their positions.
 pub fn check_contour(rom: &Rom, nodes: &[usize], uses_slopes: bool) -> Result<()> {
     let straight = nodes.iter().all(|node| rom.contact_nodes[*node].meridional_slope == 0.0);
     if straight && !uses_slopes {
@@ -43,7 +43,7 @@ pub fn check_contour(rom: &Rom, nodes: &[usize], uses_slopes: bool) -> Result<()
         let [low, high] = [pair[0], pair[1]];
         let length = high.axial - low.axial;
         let rise = (high.radius - low.radius) / length;
-        // Between slopes of a parabola rises what they are on average; of a kink, up to half their difference more.
+        // The mean slope of a parabola is the mean of the slopes at its ends; a kink may deviate from it by half their difference.
         let bent = 0.25 * (high.slope - low.slope).abs();
         let off = (rise - 0.5 * (low.slope + high.slope)).abs();
         if off > apart + bent + UNEVEN * low.radius / length {
@@ -74,7 +74,7 @@ fn contradicted(rom: &Rom, [low, high]: [AxialStation; 2], rise: f64, straight: 
     )
 }
 
-/// Places of some contact nodes by growing axial position; none without an extent along the axis.
+/// Returns the stations of some contact nodes in ascending axial order; empty if the nodes have no axial extent.
 fn places(rom: &Rom, nodes: &[usize]) -> Vec<AxialStation> {
     let mut order = nodes.to_vec();
     let axial = |node: &usize| rom.contact_nodes[*node].position[2];

@@ -2,25 +2,24 @@
 
 use crate::persist::persist_fields;
 
-/// One real input: the line that the importer asked for, and the line that acts.
+/// One real input: the line requested by the importer, and the acting line.
 ///
-/// Both are the same where a value acts at once. Else the one that acts goes from the value reached to where the one
-/// asked for is at the end of the communication step: it is continuous, whatever is asked for. Times are offsets from the
-/// start of the communication step (s).
+/// Both are the same if a value acts immediately. Otherwise the acting line goes from the value reached to the value of the requested line
+/// at the end of the communication step: it is always continuous. Times are offsets from the start of the communication step (s).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Input {
-    /// Value asked for at the time `since`.
+    /// Requested value at the time `since`.
     pub value: f64,
-    /// First time derivative asked for.
+    /// Requested first time derivative.
     pub slope: f64,
-    /// Time of the value asked for.
+    /// Time of the requested value.
     pub since: f64,
-    /// Value that acts at the time `from`.
+    /// Acting value at the time `from`.
     reached: f64,
-    /// First time derivative after the start.
+    /// First time derivative between `from` and `until`.
     rate: f64,
     from: f64,
-    /// Value that acts at the time `until`, to the last bit.
+    /// Acting value at the time `until`, to the last bit.
     end: f64,
     until: f64,
 }
@@ -28,33 +27,33 @@ pub struct Input {
 persist_fields!(Input { value, slope, since, reached, rate, from, end, until });
 
 impl Input {
-    /// Ask for a value at `offset`; a derivative asked for earlier ends.
+    /// Requests a value at `offset`; a derivative requested earlier ends.
     pub fn ask(&mut self, value: f64, offset: f64) {
         (self.value, self.slope, self.since) = (value, 0.0, offset);
     }
 
-    /// Ask for a derivative from `offset` on.
+    /// Requests a derivative from `offset` on.
     pub fn ask_slope(&mut self, slope: f64, offset: f64) {
         (self.value, self.slope, self.since) = (self.requested_value(offset), slope, offset);
     }
 
-    /// Ask for what another input asks for.
+    /// Copies the requested line of another input.
     pub fn follow(&mut self, other: &Self) {
         (self.value, self.slope, self.since) = (other.value, other.slope, other.since);
     }
 
-    /// Value asked for at `offset`.
+    /// Requested value at `offset`.
     pub fn requested_value(&self, offset: f64) -> f64 {
         if self.slope == 0.0 { self.value } else { self.value + self.slope * (offset - self.since) }
     }
 
-    /// Let the line asked for act at once.
+    /// Makes the requested line act immediately.
     pub fn take(&mut self) {
         (self.reached, self.rate, self.from) = (self.value, self.slope, self.since);
         self.until = f64::INFINITY;
     }
 
-    /// From `offset` on go from the value reached to where the line asked for is at `until`.
+    /// Ramps from the value reached at `offset` to the requested value at `until`.
     pub fn aim(&mut self, offset: f64, until: f64) {
         let (reached, end) = (self.at(offset), self.requested_value(until));
         (self.reached, self.from) = (reached, offset);
@@ -62,7 +61,7 @@ impl Input {
         self.rate = (end - reached) / (until - offset);
     }
 
-    /// Value that acts at `offset`.
+    /// Acting value at `offset`.
     pub fn at(&self, offset: f64) -> f64 {
         if offset >= self.until {
             self.end
@@ -73,12 +72,12 @@ impl Input {
         }
     }
 
-    /// First time derivative of what acts.
+    /// First time derivative of the acting line.
     pub fn rate(&self) -> f64 {
         self.rate
     }
 
-    /// The communication step of length `length` is over: times count from its end now, where an aim ends.
+    /// Ends the communication step of length `length`: times now count from its end, where a ramp ends.
     pub fn shift(&mut self, length: f64) {
         if self.until < f64::INFINITY {
             (self.reached, self.rate, self.from) = (self.at(length), 0.0, length);
@@ -89,7 +88,7 @@ impl Input {
     }
 }
 
-/// Rotor angle θ_r = ∫Ω dt, exact for piecewise linear Ω; whole turns are counted apart to keep the phase exact.
+/// Rotor angle θ_r = ∫Ω dt, exact for piecewise linear Ω; whole turns are counted separately to keep the phase exact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RotorAngle {
     /// Angle within one turn at `since` (rad).
@@ -103,14 +102,14 @@ pub struct RotorAngle {
 persist_fields!(RotorAngle { angle, turns, since });
 
 impl RotorAngle {
-    /// Start at `angle` (rad).
+    /// Starts at `angle` (rad).
     pub fn new(angle: f64) -> Self {
         let mut rotor = Self { angle, turns: 0.0, since: 0.0 };
         rotor.wrap();
         rotor
     }
 
-    /// The remainder of a division is exact, however many turns.
+    /// Moves whole turns to their counter. The remainder of a division is exact for any number of turns.
     fn wrap(&mut self) {
         let turn = std::f64::consts::TAU;
         let rest = self.angle % turn;
@@ -119,7 +118,7 @@ impl RotorAngle {
         self.angle = rest;
     }
 
-    /// Angle at `offset`, less whole turns at the last rebase (rad): the phase for trigonometry.
+    /// Angle at `offset` minus the whole turns at the last rebase (rad): the phase for trigonometry.
     pub fn phase(&self, speed: &Input, offset: f64) -> f64 {
         let elapsed = offset - self.since;
         self.angle + elapsed * (speed.at(self.since) + 0.5 * speed.rate() * elapsed)
@@ -130,14 +129,14 @@ impl RotorAngle {
         self.phase(speed, offset) + self.turns * std::f64::consts::TAU
     }
 
-    /// Make `offset` the new origin of integration (before the speed changes).
+    /// Makes `offset` the new origin of integration (before the speed changes).
     pub fn rebase(&mut self, speed: &Input, offset: f64) {
         self.angle = self.phase(speed, offset);
         self.since = offset;
         self.wrap();
     }
 
-    /// The communication step of length `length` is over.
+    /// Ends the communication step of length `length`.
     pub fn shift(&mut self, length: f64) {
         self.since -= length;
     }
@@ -154,7 +153,7 @@ mod tests {
         input
     }
 
-    /// The same numbers to the last bit.
+    /// Asserts that numbers agree to the last bit.
     #[track_caller]
     fn same<const N: usize>(found: [f64; N], expected: [f64; N]) {
         assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits), "{found:?} {expected:?}");
@@ -187,7 +186,7 @@ mod tests {
             same([input.at(0.0), input.at(0.0625), input.rate()], [start, start + slope * 0.0625, slope]);
             input.shift(length);
         }
-        // It goes on along that line until something else is asked for, also after a step that ended early.
+        // The input continues along that line until another value is requested, also after a step that ended early.
         input.aim(0.0, length);
         input.shift(0.0625);
         input.aim(0.0, 0.0625);
@@ -202,7 +201,7 @@ mod tests {
         input.ask(-1.0, 0.25);
         input.aim(0.25, 1.0);
         same([input.at(0.25), input.at(0.625), input.at(1.0)], [0.25, -0.375, -1.0]);
-        // Ended early: what is left to go takes the whole of the next step.
+        // Ended early: the remaining change is distributed over the whole next step.
         input.shift(0.625);
         same([input.at(0.0)], [-0.375]);
         input.aim(0.0, 2.0);
@@ -235,7 +234,7 @@ mod tests {
             assert!((0.0..=std::f64::consts::TAU).contains(&phase), "{angle:e}: {phase:e}");
             let expected = if rest < 0.0 { rest + std::f64::consts::TAU } else { rest };
             assert_eq!(phase.to_bits(), expected.to_bits(), "{angle:e}");
-            // It turns on from there.
+            // It continues to turn from there.
             assert!((rotor.phase(&speed, 0.1) - phase - 1.0).abs() < 1e-14, "{angle:e}");
         }
     }

@@ -1,4 +1,4 @@
-//! Why a step failed, in words: what, where, and what helps.
+//! Messages for failed steps: cause, place and remedy.
 
 use super::checks::{OUT_OF_REACH, OUT_OF_REACH_REMEDY};
 use super::{Simulation, SimulationPhase};
@@ -6,7 +6,7 @@ use crate::system::{ContactPair, Curved, StepFailure};
 use crate::{Error, shown_time};
 
 impl Simulation {
-    /// The error of a step that should have ended at `time`; the simulation is of no use until restored or reset.
+    /// Returns the error of a step that should have ended at `time`; the simulation must be restored or reset afterwards.
     pub(super) fn fail(&mut self, failure: StepFailure, time: f64) -> Error {
         self.phase = SimulationPhase::Failed;
         if failure == StepFailure::NonFinite {
@@ -39,7 +39,7 @@ impl Simulation {
                     "Use less friction, another internal step or the solver coulomb"
                 },
             ),
-            // Told otherwise.
+            // Reported elsewhere.
             StepFailure::NonFinite | StepFailure::Exhausted => (String::new(), String::new()),
             StepFailure::Implausible { structure, sector } => (
                 format!(
@@ -132,7 +132,8 @@ impl Simulation {
         )
     }
 
-    /// No forces fulfil the conditions of contact. Friction can do that; without it only contacts that no motion opens at once.
+    /// Returns the texts for a contact problem without a solution. Friction can cause this; without it only contacts that no motion opens
+    /// immediately.
     fn unsolved(&self, structure: usize, name: &str, with_friction: &str) -> (String, String) {
         let sets = self.system.sets();
         let felt = |pair: &ContactPair| sets.of(pair.structure()) == sets.of(structure);
@@ -185,7 +186,7 @@ impl Simulation {
         (problem, remedy.to_owned())
     }
 
-    /// A sector, with the name of its structure where several touch.
+    /// Returns the name of a sector, with the name of its structure if there are several masters.
     pub(super) fn sector_name(&self, structure: usize, sector: usize) -> String {
         let of = match self.compiled.bodies.len() {
             1 => String::new(),
@@ -194,7 +195,7 @@ impl Simulation {
         format!("sector {}{of}", sector + 1)
     }
 
-    /// Structures of a set by their names, where there are several sets.
+    /// Returns the names of the structures of a set if there are several sets.
     pub(super) fn of_set(&self, set: usize) -> String {
         let sets = self.system.sets();
         if sets.count() == 1 {
@@ -204,7 +205,7 @@ impl Simulation {
         format!(" of {}", names.join(", "))
     }
 
-    /// Growth of sliding contact of this structure, or of one that it feels, as the likely cause of a failure.
+    /// Describes growth of sliding contact of this structure, or of another one in its set, as the likely cause of a failure.
     fn instability(&self, structure: usize) -> String {
         let Some(limits) = &self.limits else { return String::new() };
         let sets = self.system.sets();
@@ -219,7 +220,7 @@ impl Simulation {
 const BESIDE_FLIGHT: &str =
     "Check positions and velocity; the model assumes small displacements relative to the rigid-body motion";
 
-/// Returns the problem and the remedy of a failure that means something else for a free body.
+/// Returns the problem and the remedy of a failure that has a different meaning for a free body.
 fn free_failure(name: &str) -> (String, String) {
     let problem = format!(
         "contact nodes of {name} have moved relative to each other, or into a surface, by more than a tenth of the \

@@ -1,4 +1,4 @@
-//! Rotors that turn fast for their first natural frequency and have the stiffness of rest: warned of at the start.
+//! Warning at the start of rotors that turn fast compared with their first natural frequency but have the stiffness at rest.
 
 use super::Simulation;
 use super::compile::Compiled;
@@ -7,12 +7,12 @@ use crate::settings::BodyMotion;
 use crate::warning::Topic;
 use crate::{Warning, shown};
 
-/// Largest Ω/ω₁ without a warning. The lowest frequency rises as ω₁(Ω)² ≈ ω₁² + BΩ² (Southwell). Rotor 37 has B = 5.7 (865 Hz at rest,
-/// 1102 Hz at 1800 rad/s), so 0.2 leaves out a fifth of its stiffness.
+/// Largest Ω/ω₁ without a warning. The lowest frequency rises as ω₁(Ω)² ≈ ω₁² + BΩ² (Southwell). Rotor 37 has B = 5.7 (865 Hz at rest, 1102
+/// Hz at 1800 rad/s), so at 0.2 a fifth of its stiffness is neglected.
 const SLOW: f64 = 0.2;
 
 impl Simulation {
-    /// Rotors whose stiffness at speed differs from that at rest, which the scene gives them.
+    /// Warns of rotors whose stiffness at speed differs from the stiffness at rest that the scene gives them.
     pub(super) fn warn_of_fast_rotation(&mut self) {
         let speeds = self.speeds().into_iter().enumerate();
         let warnings = speeds.filter_map(|(body, speed)| self.compiled.fast_rotation(body, speed));
@@ -21,7 +21,7 @@ impl Simulation {
 }
 
 impl Compiled {
-    /// The warning of a rotor that starts at `speed` (rad/s).
+    /// Returns the warning for a rotor that starts at `speed` (rad/s).
     fn fast_rotation(&self, body: usize, speed: f64) -> Option<Warning> {
         let (structure, rom) = self.body(body);
         let ratio = speed.abs() / self.bodies[body].lowest_frequency();

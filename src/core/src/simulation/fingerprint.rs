@@ -1,12 +1,12 @@
-//! Hash of settings and ROMs, which saved states carry.
+//! Hash of settings and ROMs, stored in saved states.
 
 use crate::Scene;
 use crate::persist::fingerprint;
 use crate::settings::SceneSettings;
 
-/// Hash of everything that decides how a scene runs.
+/// Hash of everything that determines the results of a scene.
 pub fn of_scene(scene: &Scene) -> u64 {
-    // What is only said, or accepted, decides nothing.
+    // Silenced warnings and accepted values do not change results.
     let settings = SceneSettings { silence: Vec::new(), accept_implausible: false, ..scene.settings.clone() };
     let mut hash = fingerprint(format!("{settings:?}").as_bytes(), 0);
     for rom in &scene.roms {

@@ -1,4 +1,4 @@
-//! All inputs of a scene over one communication step, and what is refused of them.
+//! All inputs of a scene over one communication step, and their checks.
 
 use super::drive::{Input, RotorAngle};
 use super::{SAME_STEP, Simulation};
@@ -6,21 +6,21 @@ use crate::persist::persist_fields;
 use crate::variables::{Causality, Quantity, Variable};
 use crate::{Error, Result, shown};
 
-/// Largest factor by which ramps may become faster because a step is shorter.
+/// Largest factor by which ramps may become steeper because a step is shorter.
 const QUICKER: f64 = 2.0;
 
 /// Prescribed inputs of a rotor.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RotorInputs {
-    /// Speed of the rotor: what is set acts at once, so that its integral is the angle that the importer expects.
+    /// Speed of the rotor: a new value acts immediately, so that its integral is the angle that the importer expects.
     pub speed: Input,
-    /// Speed that growth and stiffening follow (rad/s): that of the rotor, without its jumps.
+    /// Speed that growth and stiffening follow (rad/s): the rotor speed without its jumps.
     pub spin: Input,
     /// Whirl x, whirl y, axial shift.
     pub shaft: [Input; 3],
-    /// Amplitude and phase of the excitation; empty where there is none.
+    /// Amplitude and phase of the excitation; empty without excitation.
     pub excitation: Vec<Input>,
-    /// Temperature; empty where it is none of the inputs.
+    /// Temperature; empty if it is not an input.
     pub temperature: Vec<Input>,
 }
 
@@ -33,7 +33,7 @@ pub struct PairInputs {
     pub radius_change: Input,
 }
 
-/// Loads of a structure that carries surfaces.
+/// Loads of a surface carrier.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CarrierInputs {
     pub load_amplitude: Input,
@@ -45,15 +45,15 @@ pub struct CarrierInputs {
 /// The real inputs, each with its derivative.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Inputs {
-    /// One per structure that touches.
+    /// One per master.
     pub rotors: Vec<RotorInputs>,
     /// One per contact pair.
     pub pairs: Vec<PairInputs>,
-    /// One per structure that carries surfaces.
+    /// One per surface carrier.
     pub carriers: Vec<CarrierInputs>,
-    /// Shortest time that ramps take from here (s), see [`Inputs::reach`].
+    /// Shortest duration of ramps that begin now (s), see [`Inputs::extrapolation_time`].
     pub extrapolation: f64,
-    /// When ramps under way end: offset from the start of the communication step (s).
+    /// Offset at which current ramps end, from the start of the communication step (s).
     pub until: f64,
 }
 
@@ -71,12 +71,12 @@ impl RotorInputs {
         self.shaft.iter_mut().chain(&mut self.excitation).chain(&mut self.temperature)
     }
 
-    /// Temperature that acts at an offset (K).
+    /// Acting temperature at an offset (K).
     pub fn temperature_at(&self, offset: f64) -> f64 {
         self.temperature.first().map_or(0.0, |input| input.at(offset))
     }
 
-    /// From `offset` on, growth and stiffening go where the speed is at `until`.
+    /// From `offset` on, ramps growth and stiffening to the speed at `until`.
     pub fn lead_spin(&mut self, offset: f64, until: f64, hold: bool) {
         self.spin.follow(&self.speed);
         if hold { self.spin.take() } else { self.spin.aim(offset, until) }
@@ -104,7 +104,7 @@ impl CarrierInputs {
 }
 
 impl Inputs {
-    /// The input behind a variable: its quantity, which structure or pair it belongs to, and which element it is.
+    /// Returns the input of a variable: its quantity, the index of its structure or pair, and its element.
     pub fn get(&self, quantity: Quantity, of: usize, element: usize) -> Option<&Input> {
         match quantity {
             Quantity::Speed => Some(&self.rotors[of].speed),
@@ -122,7 +122,7 @@ impl Inputs {
         }
     }
 
-    /// The same, to change it.
+    /// Returns the input of a variable for a change.
     pub fn get_mut(&mut self, quantity: Quantity, of: usize, element: usize) -> Option<&mut Input> {
         match quantity {
             Quantity::Speed => Some(&mut self.rotors[of].speed),
@@ -140,7 +140,7 @@ impl Inputs {
         }
     }
 
-    /// All that move or load something, which a jump would hit or shake.
+    /// Returns all inputs that move or load a structure, which would shake it if they jumped.
     fn moving(&self) -> impl Iterator<Item = &Input> {
         let shafts = self.rotors.iter().flat_map(RotorInputs::moving);
         let pairs = self.pairs.iter().flat_map(PairInputs::moving);
@@ -153,20 +153,20 @@ impl Inputs {
         shafts.chain(pairs).chain(self.carriers.iter_mut().flat_map(CarrierInputs::moving_mut))
     }
 
-    /// Returns the duration of ramps that begin with a step of length `length` (s): that of the step. A change that accumulated over a step more than
-    /// twice as long is not applied within this one, where it would act as an impact. A step of a nanosecond after one of ten microseconds continues
-    /// with the rate of change it finds; the remaining delay shrinks by half of the time that passes.
+    /// Returns the duration of ramps that begin with a step of length `length` (s): the length of the step. A change that accumulated over
+    /// a step more than twice as long is not applied within this one, where it would act as an impact. A step of a nanosecond after one of
+    /// ten microseconds continues with the current rate of change; the remaining delay shrinks by half of the time that passes.
     pub fn extrapolation_time(&self, length: f64) -> f64 {
         if self.extrapolation <= QUICKER * length { length } else { self.extrapolation }
     }
 
-    /// A run starts: no step came before.
+    /// Starts a run, without a previous step.
     pub fn start(&mut self) {
         self.rotors.iter_mut().for_each(|rotor| rotor.spin = rotor.speed);
         (self.extrapolation, self.until) = (0.0, 0.0);
     }
 
-    /// A communication step of length `length` begins.
+    /// Begins a communication step of length `length`.
     pub fn begin(&mut self, length: f64, hold: bool) {
         let until = self.extrapolation_time(length);
         self.until = until;
@@ -176,7 +176,7 @@ impl Inputs {
         self.rotors.iter_mut().for_each(|rotor| rotor.lead_spin(0.0, until, hold));
     }
 
-    /// The communication step is over after `length`.
+    /// Ends the communication step after `length`.
     pub fn shift(&mut self, length: f64) {
         self.moving_mut().for_each(|input| input.shift(length));
         for rotor in &mut self.rotors {
@@ -186,14 +186,14 @@ impl Inputs {
         self.extrapolation = if self.until > length { self.until - 0.5 * length } else { length };
     }
 
-    /// Nothing will move in a step of length `length`.
+    /// Returns whether no input moves a structure in a step of length `length`.
     fn rest(&self, length: f64) -> bool {
         let rests =
             |input: &Input| input.slope == 0.0 && input.at(0.0).to_bits() == input.requested_value(length).to_bits();
         self.rotors.iter().all(|rotor| rotor.speed.slope == 0.0) && self.moving().all(rests)
     }
 
-    /// Start values everywhere.
+    /// Resets all inputs to their start values.
     pub fn clear(&mut self) {
         self.moving_mut().for_each(|input| *input = Input::default());
         self.rotors.iter_mut().for_each(|rotor| (rotor.speed, rotor.spin) = Default::default());
@@ -205,7 +205,7 @@ impl Inputs {
     }
 }
 
-/// All inputs over time at one instant, to go back to where a set of values is refused as a whole.
+/// All inputs over time at one instant, which are restored if a set of values is rejected as a whole.
 #[derive(Debug, Clone)]
 pub struct InputCourses {
     inputs: Inputs,
@@ -232,7 +232,7 @@ impl Simulation {
         InputCourses { inputs: self.inputs.clone(), rotors: self.rotors.clone() }
     }
 
-    /// Back to what the inputs did at the same instant; values as read are set back by [`Simulation::set_real`] before.
+    /// Restores the courses at the same instant; [`Simulation::set_real`] restores the values as read before.
     ///
     /// # Examples
     /// ```
@@ -250,17 +250,17 @@ impl Simulation {
         (self.inputs, self.rotors) = (courses.inputs, courses.rotors);
     }
 
-    /// Values set act at once instead of at the end of the step.
+    /// Returns whether new values act immediately instead of at the end of the step.
     pub(super) fn holds(&self) -> bool {
         self.compiled.references.input_interpolation.is_some_and(|reference| self.values[reference] > 1.5)
     }
 
-    /// Whether a value of this input acts at once.
+    /// Returns whether a new value of this input acts immediately.
     pub(super) fn acts_at_once(&self, quantity: Quantity) -> bool {
         quantity == Quantity::Speed || self.holds()
     }
 
-    /// Every input must be where it may be at the end of a step of length `step_size`. Allocates only to refuse.
+    /// Checks that every input is in its range at the end of a step of length `step_size`. Allocates only to reject.
     pub(super) fn check_courses(&self, step_size: f64) -> Result<()> {
         if self.inputs.rest(step_size) {
             return Ok(());
@@ -278,7 +278,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// One input between two offsets (s): its range at the end, and where it does not act at once its way there.
+    /// Checks one input between two offsets (s): its range at the end, and its slope unless it acts immediately.
     pub(super) fn check_course(
         &self,
         variable: &Variable,

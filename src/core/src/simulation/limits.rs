@@ -1,4 +1,4 @@
-//! Stability and solvability of a scene at the step sizes it can be stepped with.
+//! Stability and solvability of a scene for its possible step sizes.
 
 mod checking;
 mod closing;
@@ -20,24 +20,24 @@ use closing::Closing;
 use sliding::Sense;
 pub(super) use warning_state::WarningState;
 
-/// Parameters that decide stability.
+/// Parameters that determine stability.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     /// Friction coefficient of each contact pair.
     pub friction: Vec<f64>,
-    /// Damping ratios of the structures that touch, then of those that carry surfaces.
+    /// Damping ratios of the masters, then of the surface carriers.
     pub damping_ratios: Vec<f64>,
-    /// The same of their first modes, where they have their own.
+    /// Damping ratios of their first modes, if given.
     pub mode_damping: Vec<Vec<f64>>,
     /// Largest internal step (s).
     pub step: f64,
     pub scheme: Scheme,
-    /// Error of a step of `galerkin`, as a share of the smallest clearance.
+    /// Error of a step of `galerkin`, as a fraction of the smallest clearance.
     pub tolerance: f64,
     pub solver: Solver,
-    /// Speed of each structure that touches at the start (rad/s), whose sign is the sense of slip; both senses where it is 0.
+    /// Speed of each master at the start (rad/s), whose sign is the sense of slip; both senses if it is 0.
     pub speeds: Vec<f64>,
-    /// Velocities of structures that fly freely at the start (m/s).
+    /// Velocities of free bodies at the start (m/s).
     pub velocities: Vec<[f64; 3]>,
 }
 
@@ -48,46 +48,46 @@ impl Parameters {
     }
 }
 
-/// Limits with given parameters.
+/// Limits for given parameters.
 #[derive(Debug, Clone)]
 pub struct Limits {
-    /// Whatever the speeds.
+    /// Parameters, valid for any speeds.
     parameters: Parameters,
-    /// Limits of each structure that touches.
+    /// Limits of each master.
     bodies: Vec<BodyLimits>,
 }
 
-/// Limits of one structure and the surfaces it touches.
+/// Limits of one master and its surfaces.
 #[derive(Debug, Clone)]
 struct BodyLimits {
-    /// Warnings for the step expected, or why these parameters are refused, whatever the sense of slip.
+    /// Warnings for the expected step, or the reason why these parameters are rejected, for any sense of slip.
     outcome: Result<Vec<Warning>>,
-    /// Slip in +θ and in −θ; of a disk, for which it takes long, only what was asked for.
+    /// Slip in +θ and in −θ; for a disk, where the check is slow, only the requested senses.
     senses: [Option<Sense>; 2],
     /// Duration of closed contact.
     closing: Closing,
-    /// Steps of massless-boundary; infinite for other schemes.
+    /// Step limits of massless-boundary; infinite for other schemes.
     massless: MasslessLimit,
-    /// Largest step of each range of step sizes, descending, and what the casing does to solvability there.
+    /// Largest step of each range of step sizes, descending, and the warning if the casing spoils solvability there.
     casing: Vec<(f64, Option<Warning>)>,
-    /// Smallest step of modal-exact that passes over what contact acts on; infinite for other schemes.
+    /// Smallest step at which modal-exact does not resolve modes that contact excites; infinite for other schemes.
     unresolved: f64,
-    /// Growth while blades cut.
+    /// Warning of growth while blades cut.
     cutting: Option<Warning>,
 }
 
-/// Senses of slip of a speed or of its sign: both where it is 0.
+/// Senses of slip for a speed or its sign: both if it is 0.
 fn senses_of(sense: f64) -> impl Iterator<Item = usize> {
     [sense >= 0.0, sense <= 0.0].into_iter().enumerate().filter(|(_, slips)| *slips).map(|(index, _)| index)
 }
 
-/// Returns the result for a step from a list of ranges: that of the smallest entry not below it.
+/// Returns the result for a step from a list of ranges: that of the smallest entry that is not below it.
 fn in_range<T>(ranges: &[(f64, Option<T>)], step: f64) -> Option<&T> {
     let range = ranges.iter().rev().find(|(largest, _)| step <= largest * (1.0 + super::SAME_STEP));
     range.and_then(|(_, found)| found.as_ref())
 }
 
-/// The item of an enumeration, whose items count from 1.
+/// Returns the item of an enumeration, whose items count from 1.
 fn chosen<T: Copy>(all: &[T], value: f64) -> T {
     let found = all.iter().zip(1_u32..).find(|(_, number)| (value - f64::from(*number)).abs() < 0.5);
     found.map_or(all[0], |(item, _)| *item)
@@ -118,7 +118,8 @@ impl Simulation {
         }
     }
 
-    /// Check limits unless the same parameters were checked last; returns warnings. A refusal leaves what was known before.
+    /// Checks limits unless the same parameters were checked last; returns warnings. If the parameters are rejected, the previous limits
+    /// stay.
     pub(super) fn check_limits(&mut self, parameters: &Parameters) -> Result<Vec<Warning>> {
         if let Some(limits) = self.limits.as_ref().filter(|limits| limits.cover(parameters)) {
             return limits.warnings(&parameters.speeds).map_err(|error| self.compiled.of_preset(error));
@@ -129,8 +130,8 @@ impl Simulation {
         Ok(warnings)
     }
 
-    /// After a state of other parameters was restored: what holds for these. Before initialisation nothing has been
-    /// computed from parameters, and those that will be refused are not yet.
+    /// Updates the limits after a state with other parameters was restored. Before initialisation nothing has been computed from
+    /// parameters, and invalid ones are not rejected yet.
     pub(super) fn renew_limits(&mut self) {
         let parameters = self.parameters();
         let known = self.limits.as_ref().is_some_and(|limits| limits.are_of(&parameters));
@@ -139,8 +140,8 @@ impl Simulation {
         }
     }
 
-    /// Refuse a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` of a structure (rad/s) and
-    /// at its `coldest` temperature (K) forbids. Only looks up, so that a step does not allocate.
+    /// Rejects a step size (s) whose range was found unstable, or that stiffening at one of the `speeds` of a structure (rad/s) and at its
+    /// `coldest` temperature (K) forbids. This is a lookup, so that a step does not allocate.
     pub(super) fn check_step_size(&self, body: usize, step: f64, speeds: [f64; 3], coldest: f64) -> Result<()> {
         self.is_step_allowed(body, step, speeds, coldest).map_err(|error| match self.compiled.of_preset(error) {
             Error::Unstable { problem, remedy } => {
@@ -174,13 +175,13 @@ impl Simulation {
 }
 
 impl Compiled {
-    /// Internal step (s) to expect: what the proposed communication step is divided into.
+    /// Expected internal step (s): the proposed communication step divided by the number of its internal steps.
     pub(super) fn expected_step(&self, largest: f64) -> f64 {
         let length = self.scene.settings.experiment.communication_step;
         length / (length / largest * (1.0 - super::SAME_STEP)).ceil().max(1.0)
     }
 
-    /// A refusal whose remedy suits the scene: of a step it names adaptive steps first, where the scene allows them.
+    /// Adds a suitable remedy to an error: for a step limit adaptive steps come first, if the scene supports them.
     fn of_preset(&self, error: Error) -> Error {
         let Error::Unstable { problem, mut remedy } = error else { return error };
         let preset = self.scene.settings.preset == Preset::Paper;
@@ -204,7 +205,7 @@ impl Compiled {
         self.body(body).0.frequency_factors.iter().fold(1.0, |largest: f64, factor| largest.max(*factor))
     }
 
-    /// Bound on the factor by which spin and cold raise the largest frequency from that of the reference speed and temperature.
+    /// Upper bound on the factor by which spin and cold raise the largest frequency above that at the reference speed and temperature.
     fn stiffened(&self, body: usize, speed: f64, coldest: f64) -> f64 {
         let structure = self.body(body).0;
         let body = &self.bodies[body];
@@ -218,7 +219,7 @@ impl Compiled {
         (colder + added.max(0.0) / (largest * largest)).sqrt()
     }
 
-    /// Largest ω h of structures of the system, stiffening aside, below 2.
+    /// Largest ω h of structures of the system without stiffening, below 2.
     pub(super) fn largest_product(&self, structures: &[usize], step: f64) -> f64 {
         let frequency = |structure: &usize| match self.bodies.get(*structure) {
             Some(body) => body.largest_frequency() * self.stiffest(*structure),
@@ -228,11 +229,11 @@ impl Compiled {
         (largest * step).min(2.0 * (1.0 - 1e-9))
     }
 
-    /// Structures that carry the surfaces which a structure touches.
+    /// Returns the carriers of the surfaces that a structure can touch.
     fn carriers_of(&self, body: usize) -> impl Iterator<Item = usize> {
         let pairs = self.plan.pairs_of(body);
         let carriers = pairs.enumerate().filter_map(move |(index, (_, pair))| Some((index, pair.carrier?)));
-        // Each once.
+        // Each carrier counts once.
         carriers.filter_map(move |(index, carrier)| {
             let before = self.plan.pairs_of(body).take(index).any(|(_, pair)| pair.carrier == Some(carrier));
             (!before).then_some(carrier)
@@ -261,7 +262,7 @@ impl Compiled {
             Some(disk) if !disk.is_real(diameter) => 2,
             _ => 1,
         };
-        // Of mistuned blades the stiffest has the tightest limits.
+        // The stiffest of mistuned blades has the tightest limits.
         let stiffest = self.stiffest(body);
         for (diameter, model) in models.iter_mut().enumerate() {
             let (ratio, own) = (parameters.damping_ratios[body], &parameters.mode_damping[body]);
@@ -271,7 +272,8 @@ impl Compiled {
         let at = Checking::new(self, system, body, models, parameters);
         let expected = self.expected_step(parameters.step);
         if parameters.scheme == Scheme::Galerkin {
-            // Its steps are as short as its contact problems and its energy ask for: there is physics to tell, and nothing to refuse.
+            // `galerkin` chooses steps short enough for its contact problems and its energy: it only warns of physical effects and rejects
+            // nothing.
             return BodyLimits {
                 outcome: Ok(at.not_looked_at().into_iter().collect()),
                 senses: [Some(at.physics(0, expected)), Some(at.physics(1, expected))],
@@ -283,7 +285,7 @@ impl Compiled {
             };
         }
         let casing = at.casing(expected);
-        // Radially: along an inclined normal the bending of the blade would hide what the tip itself yields.
+        // Radially: along an inclined normal the bending of the blade would hide the compliance of the tip itself.
         let radial = |model: &ModalModel| vec![[-1.0, 0.0, 0.0]; model.contact_modes.nrows() / 3];
         let masters = at.models.iter().map(|model| stability::unresolved::limit(model, &radial(model)));
         let unresolved = self.unresolved(body, masters, parameters.scheme);
@@ -296,7 +298,7 @@ impl Compiled {
             Err(error) => (Err(error), MasslessLimit::NONE),
         };
         let mut senses = [None, None];
-        // Of a disk the other sense takes as long again; without friction nothing slides.
+        // For a disk the other sense takes as long again; without friction the sense does not matter.
         let both = parts.disk.is_none() || at.friction == 0.0;
         if outcome.is_ok() {
             for sense in senses_of(if both { 0.0 } else { parameters.speeds[body] }) {
@@ -307,7 +309,7 @@ impl Compiled {
         BodyLimits { outcome, senses, closing, massless, casing, unresolved, cutting }
     }
 
-    /// Smallest step of modal-exact that passes over what contact acts on: of what touches, and of carriers.
+    /// Smallest step at which modal-exact does not resolve modes that contact excites, of the master and of carriers.
     fn unresolved(&self, body: usize, touching: impl Iterator<Item = f64>, scheme: Scheme) -> f64 {
         if scheme != Scheme::ModalExact {
             return f64::INFINITY;
@@ -318,19 +320,19 @@ impl Compiled {
 }
 
 impl Limits {
-    /// Whether they are those of the parameters, whatever the senses.
+    /// Returns whether these limits belong to the parameters, for any senses.
     fn are_of(&self, parameters: &Parameters) -> bool {
         Parameters { speeds: self.parameters.speeds.clone(), ..parameters.clone() } == self.parameters
     }
 
-    /// Whether they are, and the senses were looked at.
+    /// Returns whether these limits belong to the parameters and the senses were checked.
     fn cover(&self, parameters: &Parameters) -> bool {
         let looked_at =
             |(body, speed): (&BodyLimits, &f64)| senses_of(*speed).all(|sense| body.senses[sense].is_some());
         self.are_of(parameters) && self.bodies.iter().zip(&parameters.speeds).all(looked_at)
     }
 
-    /// Warnings for the step expected at these speeds (rad/s).
+    /// Returns the warnings for the expected step at these speeds (rad/s).
     fn warnings(&self, speeds: &[f64]) -> Result<Vec<Warning>> {
         let mut warnings = Vec::new();
         for (body, speed) in self.bodies.iter().zip(speeds) {
@@ -342,21 +344,21 @@ impl Limits {
     /// Returns the warning of self-excited growth of a structure that turns at a speed of this sign.
     pub fn grows(&self, body: usize, speed: f64) -> Option<Warning> {
         let BodyLimits { cutting, senses, .. } = &self.bodies[body];
-        // Whatever is held to have stayed closed.
+        // Contact is assumed to have stayed closed for any time.
         let mut sliding = senses_of(speed).filter_map(|sense| senses[sense].as_ref()?.grows(f64::INFINITY).next());
         cutting.clone().or_else(|| sliding.next())
     }
 }
 
 impl BodyLimits {
-    /// Warnings for the step expected at this speed (rad/s).
+    /// Returns the warnings for the expected step at this speed (rad/s).
     fn warnings(&self, speed: f64) -> Result<Vec<Warning>> {
         let mut warnings = self.outcome.clone()?;
         warnings.extend(self.cutting.clone());
         let closed = self.closing.time(speed);
         let found =
             senses_of(speed).filter_map(|sense| self.senses[sense].as_ref()).map(|sense| sense.warnings(closed));
-        // Of a rotor that starts at rest both senses count; what grows in either is told once.
+        // Both senses count for a rotor that starts at rest; growth in either is reported once.
         for sense in found.collect::<Result<Vec<_>>>()? {
             for warning in sense {
                 if !warnings.iter().any(|known| known.topic() == warning.topic()) {
@@ -367,7 +369,7 @@ impl BodyLimits {
         Ok(warnings)
     }
 
-    /// Texts with the name of the structure.
+    /// Adds the name of the structure to the texts.
     fn named(mut self, name: &str) -> Self {
         let texts = |texts: Vec<Warning>| texts.into_iter().map(|text| text.named(name)).collect();
         let refusal = |error: Error| match error {

@@ -1,26 +1,26 @@
-//! Loads beside contact, in modal coordinates: centrifugal growth, heat, nodal-diameter loads.
+//! Loads other than contact, in modal coordinates: centrifugal growth, heat, nodal-diameter loads.
 
 use super::inputs::CarrierInputs;
 use crate::Rom;
 use crate::dynamics::modal::ModalModel;
 use crate::settings::StructureSettings;
 
-/// Modal load of a structure by growth, per Ω² and, with stiffening, per Ω⁴; of coupled sectors on nodal diameter 0. Empty
-/// where a scene does not ask for it.
+/// Modal load of a structure by growth, per Ω² and, with stiffening, per Ω⁴; for coupled sectors on nodal diameter 0. Empty if the scene
+/// has no growth.
 pub fn centrifugal(structure: &StructureSettings, rom: &Rom, model: &ModalModel) -> Vec<[f64; 2]> {
     let Some(spin) = rom.extras.spin.as_ref().filter(|_| structure.spin.growth) else { return Vec::new() };
     let second = model.modal_load(&spin.centrifugal_load);
-    // The fourth power belongs to the stiffness of small motions about the stretched shape; with the resting
-    // stiffness Ω²c alone is linear theory.
+    // The fourth power belongs to the stiffness of small motions about the stretched shape; Ω²c alone with the stiffness at rest is linear
+    // theory.
     let fourth = model.modal_load(&spin.centrifugal_load_speed4);
     let share = if structure.spin.stiffening { 1.0 } else { 0.0 };
-    // The load is that of one sector, the same on all N; an amplitude of nodal diameter 0 moves each by 1/√N.
+    // This is the load of one sector, equal on all N sectors; an amplitude of nodal diameter 0 moves each by 1/√N.
     #[expect(clippy::cast_precision_loss, reason = "sector counts are far below 2^52")]
     let all = if rom.is_cyclic() { libm::sqrt(rom.sectors as f64) } else { 1.0 };
     second.into_iter().zip(fourth).map(|(second, fourth)| [all * second, all * share * fourth]).collect()
 }
 
-/// Modal loads by growth at speed Ω (rad/s).
+/// Fills in the modal loads by growth at speed Ω (rad/s).
 pub fn fill_centrifugal(centrifugal: &[[f64; 2]], speed: f64, loads: &mut [f64]) {
     let square = speed * speed;
     for (load, [second, fourth]) in loads.iter_mut().zip(centrifugal) {
@@ -28,18 +28,17 @@ pub fn fill_centrifugal(centrifugal: &[[f64; 2]], speed: f64, loads: &mut [f64])
     }
 }
 
-/// Modal load vectors of a structure that carries surfaces, per unit of what drives them; empty where a scene does not ask for
-/// them.
+/// Modal load vectors of a surface carrier, per unit of the driving input; empty if the scene has no such load.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct CarrierLoads {
     /// Per kelvin of each patch.
     pub thermal: Vec<Vec<f64>>,
-    /// Nodal-diameter load with phase 0 and a quarter period, per unit amplitude.
+    /// Nodal-diameter load at phase 0 and a quarter period later, per unit amplitude.
     pub nodal: Option<[Vec<f64>; 2]>,
 }
 
 impl CarrierLoads {
-    /// The nodal-diameter load with `order` of them; `model` sees the contact grid of `rom`.
+    /// Creates the load vectors for a nodal-diameter load of `order`; `model` is observed at the contact grid of `rom`.
     pub fn new(structure: &StructureSettings, order: u32, rom: &Rom, model: &ModalModel) -> Self {
         let thermal = rom.extras.thermal.as_ref().filter(|_| structure.thermal);
         let load = |column: &[f64]| model.modal_load(column);
@@ -49,12 +48,12 @@ impl CarrierLoads {
         Self { thermal: thermal.unwrap_or_default(), nodal }
     }
 
-    /// Whether there are any.
+    /// Returns whether there are any loads.
     pub fn are_there(&self) -> bool {
         !self.thermal.is_empty() || self.nodal.is_some()
     }
 
-    /// Modal loads for the inputs at `offset`.
+    /// Fills in the modal loads for the inputs at `offset`.
     pub(super) fn fill(&self, inputs: &CarrierInputs, offset: f64, loads: &mut [f64]) {
         loads.fill(0.0);
         for (vector, input) in self.thermal.iter().zip(&inputs.temperatures) {
@@ -71,7 +70,7 @@ impl CarrierLoads {
     }
 }
 
-/// Modal load of the line load cos(nθ − φ) (N/m of circumference, outwards), shared by the rings of the contact grid.
+/// Modal load of the line load cos(nθ − φ) (N/m of circumference, outwards), distributed over the rings of the contact grid.
 fn nodal_load(rom: &Rom, model: &ModalModel, order: u32, phase: f64) -> Vec<f64> {
     let Some(grid) = rom.extras.grid else { return vec![0.0; model.len()] };
     #[expect(clippy::cast_precision_loss, reason = "grids are far smaller than 2^52")]

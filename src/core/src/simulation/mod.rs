@@ -1,4 +1,4 @@
-//! A compiled scene with its state: what an FMU instance, the native run and the tests all drive.
+//! A compiled scene with its state, which FMU instances, native runs and tests drive.
 
 mod access;
 mod balance;
@@ -40,20 +40,20 @@ use tangent::StepReplay;
 use watched::WatchedGaps;
 use window::StepWindow;
 
-/// Communication points may differ from the simulation's own time by this fraction of H (rounding in the importer).
+/// Allowed difference between communication points and the simulation's own time as a fraction of H (rounding in the importer).
 const TIME_TOLERANCE: f64 = 1e-3;
 /// Step sizes within this fraction of each other are the same step (1/60 computed in several ways).
 const SAME_STEP: f64 = 1e-9;
-/// Roundings of a time that may be in the difference of two.
+/// Rounding errors of a time that may be in the difference of two times, in units of its last place.
 const TIME_ROUNDINGS: f64 = 4.0;
 
-/// The same for internal steps of a communication step of length `length` (s) at `time` (s): late times leave a length no better
-/// known than they are themselves.
+/// Tolerance for equal internal steps of a communication step of length `length` (s) at `time` (s): a length is not known better than
+/// rounding of the times.
 fn same_step(time: f64, length: f64) -> f64 {
     SAME_STEP.max(TIME_ROUNDINGS * f64::EPSILON * time.abs() / length)
 }
 
-/// Most internal steps of one communication step.
+/// Largest number of internal steps of one communication step.
 const MOST_STEPS: f64 = 1e9;
 
 /// Result of one call of [`Simulation::advance`].
@@ -61,37 +61,37 @@ const MOST_STEPS: f64 = 1e9;
 pub struct StepProgress {
     /// Internal time reached (s).
     pub time: f64,
-    /// True when the communication point is reached (and outputs are up to date there).
+    /// True if the communication point is reached (and outputs are up to date there).
     pub finished: bool,
 }
 
-/// Where in its life the simulation is.
+/// Phase in the life cycle of the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum SimulationPhase {
-    /// Values can be set, nothing is computed.
+    /// Values can be set; nothing has been computed.
     Created,
     /// At a communication point.
     Ready,
     /// Between two communication points.
     Stepping,
-    /// A step failed; only reset and restore help.
+    /// A step failed; only reset and restore are possible.
     Failed,
 }
 
-/// The communication step under way (or the last one).
+/// The current communication step (or the last one).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Communication {
     /// Start (s).
     start: f64,
     /// Length H (s).
     length: f64,
-    /// Internal steps N it is divided into.
+    /// Number of internal steps N.
     count: u64,
-    /// Internal steps done.
+    /// Number of finished internal steps.
     done: u64,
-    /// Steps tried before ([`System::steps_tried`]).
+    /// Number of steps tried before ([`System::steps_tried`]).
     tried: u64,
-    /// Most to be tried, 0 for any number.
+    /// Largest number of steps to try, 0 for any number.
     most: u64,
 }
 
@@ -111,9 +111,8 @@ impl Communication {
 
 /// A scene compiled into kernels, and its state.
 ///
-/// Life: [`Simulation::new`] → set parameters and inputs → [`Simulation::initialise`] → any number of
-/// [`Simulation::do_step`] → ([`Simulation::reset`] and again). The caller (the FMU slave) keeps track of which
-/// calls are legal when; this type only refuses what would be meaningless.
+/// Life cycle: [`Simulation::new`] → set parameters and inputs → [`Simulation::initialise`] → any number of [`Simulation::do_step`] →
+/// ([`Simulation::reset`] and again). The caller (the FMU slave) enforces the order of calls; this type only rejects meaningless ones.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     table: VariableTable,
@@ -126,18 +125,18 @@ pub struct Simulation {
     /// Real outputs at the previous communication point, for derivatives.
     previous: Vec<f64>,
     inputs: Inputs,
-    /// Angles of the structures that touch.
+    /// Rotor angles of the masters.
     rotors: Vec<RotorAngle>,
-    /// Prescribed motion at the end of the internal step under way, per contact pair.
+    /// Prescribed motion at the end of the current internal step, per contact pair.
     drives: Vec<PrescribedMotion>,
-    /// By how much the rotor turns against the shape in free flight, per contact pair (rad).
+    /// Rotation of the rotor relative to the shape in free flight, per contact pair (rad).
     turns: Vec<f64>,
-    /// Share of the friction heat that goes into what carries the surface, per pair.
+    /// Fraction of the friction heat that flows into the surface carrier, per pair.
     slave_shares: Vec<f64>,
     window: StepWindow,
     watched_gaps: WatchedGaps,
     communication: Communication,
-    /// Length of the step before the last (s), 0 before there was one.
+    /// Length of the step before the last (s), 0 if there was none.
     previous_length: f64,
     time: f64,
     initial_time: f64,
@@ -145,39 +144,39 @@ pub struct Simulation {
     warnings: Vec<Warning>,
     /// Warnings since the last [`Simulation::take_notes`].
     notes: Vec<Warning>,
-    /// Warnings given since the start.
+    /// Warnings reported since the start.
     warning_state: limits::WarningState,
-    /// Parameters that the system was prepared for.
+    /// Parameters for which the system was prepared.
     prepared: Option<limits::Parameters>,
-    /// Limits found for the parameters checked last.
+    /// Limits for the parameters that were checked last.
     limits: Option<limits::Limits>,
     /// Length of every saved state (bytes).
     state_size: usize,
-    /// State to go back to where a communication step takes too many internal steps; empty where nothing bounds them.
+    /// State that is restored if a communication step takes too many internal steps; empty without such a bound.
     mark: Vec<u8>,
     /// Data for derivatives of the last communication step.
     tangent: StepReplay,
-    /// Whether the communication step under way may end early.
+    /// True if the current communication step may end early.
     partial: bool,
-    /// Most internal steps tried within a communication step since the start.
+    /// Largest number of internal steps tried within a communication step since the start.
     most_tried: u64,
-    /// Energies of each set of structures that can feel each other; where the ledger is kept.
+    /// Energies of each set of structures that influence each other, if the ledger is kept.
     energies: Vec<SetEnergy>,
     /// Kinetic plus strain energy of each set at the start (J).
     initial_energies: Vec<f64>,
 }
 
-/// Energies of structures that can feel each other (J).
+/// Energies of structures that influence each other (J).
 #[derive(Debug, Clone, Copy, Default)]
 struct SetEnergy {
-    /// Kinetic plus strain energy of the instant.
+    /// Instantaneous kinetic plus strain energy.
     now: f64,
     /// Energy that the scheme conserves.
     conserved: f64,
 }
 
 impl Simulation {
-    /// Compile a scene. Start values are in place, nothing is computed yet.
+    /// Compiles a scene. Start values are set; nothing is computed yet.
     ///
     /// # Examples
     /// ```
@@ -191,7 +190,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Invalid settings or ROM, refused combinations.
+    /// Invalid settings or ROM; combinations that are not supported.
     pub fn new(scene: &Scene) -> Result<Self> {
         let compiled = Compiled::new(scene)?;
         let (table, readers) = table::build(scene)?;
@@ -248,7 +247,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// The variable table.
+    /// Returns the variable table.
     ///
     /// # Examples
     /// ```
@@ -263,7 +262,7 @@ impl Simulation {
         &self.table
     }
 
-    /// The stepped system, for studies that look deeper than the outputs.
+    /// Returns the stepped system, for studies that need more than the outputs.
     ///
     /// # Examples
     /// ```
@@ -277,7 +276,7 @@ impl Simulation {
         &self.system
     }
 
-    /// Check parameters against stability and solvability limits and set the state to the start.
+    /// Checks parameters against stability and solvability limits and sets the initial state.
     ///
     /// # Examples
     /// ```
@@ -292,11 +291,11 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Refusals with numbers and remedy; the instance can be given other parameters and asked again.
+    /// Rejected parameters, with numbers and a remedy; the instance can be initialised again with other parameters.
     pub fn initialise(&mut self, start_time: f64) -> Result<()> {
         ranges::at_most("start time", start_time, ranges::TIME)?;
         let parameters = self.parameters();
-        // A refusal leaves an instance that has to be initialised.
+        // After an error the instance must be initialised again.
         self.phase = SimulationPhase::Created;
         self.warnings.clear();
         self.notes.clear();
@@ -343,7 +342,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Scheme, solver and friction of the parameters; damping is that of the structures by now.
+    /// Applies scheme, solver and friction of the parameters; the structures already have their damping.
     fn apply_methods(&mut self, parameters: &limits::Parameters) {
         self.system.set_methods(parameters.scheme, parameters.solver);
         self.system.prepare_spans(parameters.step, parameters.tolerance);
@@ -351,7 +350,7 @@ impl Simulation {
         self.apply_friction(parameters);
     }
 
-    /// Whether tables of spans are those of the parameters.
+    /// Returns whether the tables of spans belong to the parameters.
     fn is_prepared(&self, parameters: &limits::Parameters) -> bool {
         let deciding = |from: &limits::Parameters| {
             let numbers = [from.step, from.tolerance].map(f64::to_bits);
@@ -366,12 +365,12 @@ impl Simulation {
         }
     }
 
-    /// Speeds of all structures that touch (rad/s).
+    /// Returns the speeds of all masters (rad/s).
     fn speeds(&self) -> Vec<f64> {
         self.inputs.rotors.iter().map(|rotor| rotor.speed.value).collect()
     }
 
-    /// The numbers of nodal diameters that the parameters give to loads.
+    /// Applies the numbers of nodal diameters that the parameters give to loads.
     fn follow_load_orders(&mut self) -> Result<()> {
         (0..self.compiled.carriers.len()).try_for_each(|carrier| {
             let order = self.value_of(Quantity::LoadOrder, carrier);
@@ -379,8 +378,8 @@ impl Simulation {
         })
     }
 
-    /// With stiffening and softening, the modes are those at the speeds and temperatures of the start, one per structure that touches. A refusal of one leaves all
-    /// as they were.
+    /// Computes the modes at the initial speeds and temperatures, one state per master, if there is stiffening or softening. If one is
+    /// rejected, all stay unchanged.
     fn follow_reference_speeds(&mut self, states: &[[f64; 2]]) -> Result<()> {
         let before: Vec<[f64; 2]> = self.compiled.references();
         let differs = |body: &usize| {
@@ -393,14 +392,14 @@ impl Simulation {
         }
         let taken = changed.iter().try_for_each(|body| self.compiled.set_reference_speed(*body, states[*body]));
         self.system = taken.and_then(|()| self.compiled.system()).inspect_err(|_| {
-            // The speeds before were accepted before.
+            // The previous speeds were accepted before.
             changed.iter().for_each(|body| drop(self.compiled.set_reference_speed(*body, before[*body])));
         })?;
         (self.limits, self.prepared) = (None, None);
         Ok(())
     }
 
-    /// Undeformed and at rest, with the damping of the parameters.
+    /// Resets structures to rest, undeformed, with the damping of the parameters.
     fn rest(&mut self, parameters: &limits::Parameters) {
         let ratios = parameters.damping_ratios.iter().zip(&parameters.mode_damping);
         for (structure, (ratio, own)) in self.system.structures_mut().iter_mut().zip(ratios) {
@@ -418,13 +417,13 @@ impl Simulation {
             for (mode, velocity) in translations.modal(velocity).into_iter().enumerate() {
                 self.system.structures_mut()[body].modes_mut().set_modal_state(mode, 0, 0.0, velocity);
             }
-            // One step ago the contact nodes were where this velocity and the length of the first step put them.
+            // Sets the contact nodes of the previous step according to this velocity and the length of the first step.
             self.system.structures_mut()[body].modes_mut().recover();
         }
         self.launch_blades();
     }
 
-    /// Static equilibrium under the loads of the start.
+    /// Computes the static equilibrium under the initial loads.
     fn settle(&mut self) {
         let structures = self.system.structures_mut();
         for body in (0..self.compiled.bodies.len()).filter(|body| self.compiled.loads_blades(*body)) {
@@ -442,7 +441,7 @@ impl Simulation {
         }
     }
 
-    /// Warnings collected by the last [`Simulation::initialise`] (unresolved modes and the like).
+    /// Returns the warnings collected by the last [`Simulation::initialise`] (such as unresolved modes).
     ///
     /// # Examples
     /// ```
@@ -459,8 +458,8 @@ impl Simulation {
         &self.warnings
     }
 
-    /// Warnings that came up since the start or the last call, for the step taken: of another step size than the scene
-    /// proposes, of another sense of rotation, of tips too fast, of other friction. Each is told once.
+    /// Returns the warnings since the start or the last call, for the actual step: another step size than the scene proposes, another sense
+    /// of rotation, tips that are too fast, other friction. Each is reported once.
     ///
     /// # Examples
     /// ```
@@ -479,7 +478,7 @@ impl Simulation {
         std::mem::take(&mut self.notes)
     }
 
-    /// Current time (s): the end of the last finished (or early-returned) step.
+    /// Current time (s): the end of the last finished step, also of one that returned early.
     ///
     /// # Examples
     /// ```
@@ -507,7 +506,7 @@ impl Simulation {
         variable.map_or(0.0, |variable| self.values[variable.reference as usize])
     }
 
-    /// Prescribed motion at an offset from the start of the communication step, at the time `time`.
+    /// Computes the prescribed motion at an offset from the start of the communication step, at the time `time`.
     fn find_drives(&mut self, offset: f64, time: f64) {
         for pair in 0..self.drives.len() {
             self.drives[pair] = self.drive(pair, offset, time);
@@ -522,7 +521,7 @@ impl Simulation {
             speed: rotor.speed.at(offset),
             gap_offset: surface.gap_offset.at(offset),
             shape_factor: surface.shape_factor.at(offset) * self.ramp(pair, time),
-            // Exact, so that a rotation by many turns does not swallow the rotor's own.
+            // Exact, so that a rotation by many turns does not cancel the rotor's own.
             shape_rotation: surface.shape_rotation.at(offset) % std::f64::consts::TAU,
             radius_change: surface.radius_change.at(offset),
             shaft: rotor.shaft.map(|input| input.at(offset)),
@@ -530,7 +529,7 @@ impl Simulation {
         }
     }
 
-    /// Factor on the casing shape of the first pair at the internal time reached (-), ramp included.
+    /// Factor on the casing shape of the first pair at the internal time reached (-), with its ramp.
     ///
     /// # Examples
     /// ```
@@ -549,7 +548,7 @@ impl Simulation {
         self.inputs.pairs[0].shape_factor.at(offset) * self.ramp(0, self.communication.time(done))
     }
 
-    /// Share of the casing shape that has grown in: ½(1 − cos(πt/T)) until T.
+    /// Grown fraction of the casing shape: ½(1 − cos(πt/T)) until T.
     fn ramp(&self, pair: usize, time: f64) -> f64 {
         let Some(reference) = self.compiled.references.ramp_times[pair] else { return 1.0 };
         ShapeGrowth::share(time - self.initial_time, self.values[reference])
@@ -564,7 +563,7 @@ impl Simulation {
         }
     }
 
-    /// Back to the state after [`Simulation::new`]: start values everywhere.
+    /// Restores the state after [`Simulation::new`], with all start values.
     ///
     /// # Examples
     /// ```

@@ -1,4 +1,4 @@
-//! Outputs from state and window: what a row of the table fills itself from.
+//! Outputs from state and window: how the rows of the table are filled.
 
 use std::fmt;
 use std::sync::Arc;
@@ -41,21 +41,21 @@ pub fn each(read: impl Fn(&OutputView, usize) -> f64 + Send + Sync + 'static) ->
     }))
 }
 
-/// Makes the reader of an array as a whole.
+/// Makes the reader of a whole array.
 pub fn array_reader(read: impl Fn(&OutputView, &mut [f64]) + Send + Sync + 'static) -> OutputReader {
     OutputReader(Arc::new(read))
 }
 
-/// Data that outputs are read from, shared by all of them at one instant.
+/// Data that outputs are read from, for all outputs at one instant.
 pub struct OutputView<'a> {
     simulation: &'a Simulation,
     pub system: &'a System,
     pub window: &'a StepWindow,
-    /// 1/time since the communication step began, 0 if none has passed (1/s).
+    /// 1/elapsed time of the communication step, 0 at its start (1/s).
     pub mean: f64,
-    /// That time (s).
+    /// Elapsed time of the communication step (s).
     elapsed: f64,
-    /// Kinetic and strain energy of the instant (J), if the ledger is kept.
+    /// Instantaneous kinetic and strain energy (J), if the ledger is kept.
     pub energies: (f64, f64),
     /// Energy that the scheme conserves (J), if the ledger is kept.
     pub conserved: f64,
@@ -64,8 +64,8 @@ pub struct OutputView<'a> {
 }
 
 impl Simulation {
-    /// Bring the outputs up to the internal time reached (means cover the part of the step done), for an importer that
-    /// looks inside a communication step. At communication points they are up to date, and this does nothing.
+    /// Updates the outputs to the internal time reached (means cover the finished part of the step), for an importer that reads within a
+    /// communication step. At communication points they are up to date, and this does nothing.
     ///
     /// # Examples
     /// ```
@@ -86,7 +86,7 @@ impl Simulation {
         }
     }
 
-    /// Compute the outputs of the internal point reached.
+    /// Computes the outputs of the internal point reached.
     pub(super) fn compute_outputs(&mut self) {
         let elapsed = self.communication.offset(self.communication.done);
         let mean = if elapsed > 0.0 && self.communication.length > 0.0 { 1.0 / elapsed } else { 0.0 };
@@ -133,7 +133,7 @@ impl OutputView<'_> {
         self.simulation.rotors[body].total(&self.simulation.inputs.rotors[body].speed, self.elapsed)
     }
 
-    /// Share of the friction heat of a pair that goes into what carries the surface; all of it where the scene does not say.
+    /// Fraction of the friction heat of a pair that flows into the surface carrier; 1 if the scene does not specify it.
     pub fn slave_share(&self, pair: usize) -> f64 {
         self.simulation.slave_shares[pair]
     }
@@ -142,7 +142,7 @@ impl OutputView<'_> {
         &self.ledger
     }
 
-    /// Returns the largest relative residual of any set of structures that can feel each other.
+    /// Returns the largest relative residual of any set of structures that influence each other.
     pub fn relative_residual(&self) -> f64 {
         let ledgers = self.system.ledgers().iter().zip(&self.simulation.energies);
         let relative = ledgers.map(|(ledger, energy)| match ledger.scale() {
@@ -173,7 +173,7 @@ impl OutputView<'_> {
         self.system.effort().missed as f64
     }
 
-    /// Within one communication step.
+    /// Returns the largest number of internal steps tried within one communication step.
     #[expect(clippy::cast_precision_loss, reason = "counts are below 2^52")]
     pub fn most_tried(&self) -> f64 {
         self.simulation.most_tried as f64
@@ -184,7 +184,7 @@ impl OutputView<'_> {
         self.system.coating(pair).map_or(0.0, read)
     }
 
-    /// Mean wear depth of the coating of a pair around, or along (m).
+    /// Fills in the mean wear depth of the coating of a pair around the circumference, or along the axis (m).
     pub fn wear_profile(&self, pair: usize, around: bool, out: &mut [f64]) {
         if let Some(coating) = self.system.coating(pair) {
             coating.wear_profile(around, out);
@@ -204,18 +204,18 @@ impl OutputView<'_> {
         smallest(self.window.bodies.iter().flat_map(|body| &body.lowest))
     }
 
-    /// The same of a node over all sectors.
+    /// Smallest clearance of a node over all sectors within the communication step (m).
     pub fn lowest_of_node(&self, body: usize, node: usize) -> f64 {
         let modes = self.modes(body);
         smallest(self.window.bodies[body].lowest[node * modes.lanes()..][..modes.sectors()].iter())
     }
 
-    /// The same of a sector over all nodes.
+    /// Smallest clearance of a sector over all nodes within the communication step (m).
     pub fn lowest_of_sector(&self, body: usize, sector: usize) -> f64 {
         smallest(self.of_sector(body, &self.window.bodies[body].lowest, sector))
     }
 
-    /// The same of one node.
+    /// Smallest clearance of one node of one sector within the communication step (m).
     pub fn lowest_at(&self, body: usize, node: usize, sector: usize) -> f64 {
         self.window.bodies[body].lowest[self.index(body, node, sector)].min(NO_CLEARANCE)
     }
@@ -254,8 +254,7 @@ impl OutputView<'_> {
         event.map_or(0.0, |event| event.tangential)
     }
 
-    /// Value of the centre of mass of a structure that flies freely along an axis, from the modal (position, increment) of its
-    /// translations.
+    /// Returns a value of the centre of mass of a free body along an axis, from the modal (position, increment) of its translations.
     pub fn centre(&self, body: usize, axis: usize, value: impl Fn((f64, f64)) -> f64) -> f64 {
         let translations = self.simulation.compiled.bodies[body].translations.as_ref();
         let modal = || [0, 1, 2].map(|mode| value(self.modes(body).modal_state(mode, 0)));
@@ -307,8 +306,8 @@ impl OutputView<'_> {
         self.simulation.watched_row(body, 3 * point + axis, sector)
     }
 
-    /// Component of the stress at a place of a sector (Pa): that of the displacements, with static stress by heat and growth that is the
-    /// full model's. Stress of strains is in proportion to the stiffness of the sector; forces decide that of growth.
+    /// Component of the stress at a place of a sector (Pa): stress by displacements, and the static stress by heat and growth of the full
+    /// model. Stress by strain is proportional to the stiffness of the sector; stress by growth is determined by forces.
     pub fn stress(&self, body: usize, sector: usize, place: usize, component: usize) -> f64 {
         let (compiled, row) = (&self.simulation.compiled, STRESSES * place + component);
         let parts = &compiled.bodies[body];
@@ -330,7 +329,8 @@ impl OutputView<'_> {
         self.simulation.watched_gaps.clearance(body, point, sector)
     }
 
-    /// |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node, of rows of patches their mean.
+    /// Computes |(2/N) Σ_b u_b e^(−i n θ_b)| (1/N for n = 0 and n = N/2) of the radial displacement of the middle node, or of the mean over
+    /// rows of patches.
     pub fn nodal_diameters(&self, body: usize, rows: usize, out: &mut [f64]) {
         let modes = self.modes(body);
         let (sectors, along) = (modes.sectors(), modes.rows() / (3 * rows));
@@ -351,8 +351,8 @@ impl OutputView<'_> {
 }
 
 impl Simulation {
-    /// Displacements of the points that ROMs have beside their contact nodes (m): structure by structure, point by point, axis by
-    /// axis, sector by sector. They belong to the internal point reached.
+    /// Returns the displacements of the watched points of the ROMs (m): structure by structure, point by point, axis by axis, sector by
+    /// sector. They belong to the internal point reached.
     ///
     /// # Examples
     /// ```
@@ -375,7 +375,7 @@ impl Simulation {
         self.observed(body, &self.compiled.bodies[body].watched, row, sector)
     }
 
-    /// A row of what is seen per unit of each mode, at the displacements of a sector.
+    /// Value of one row of an observation matrix (per unit of each mode) at the displacements of a sector.
     fn observed(&self, body: usize, shapes: &DMatrix<f64>, row: usize, sector: usize) -> f64 {
         let modes = self.system.structures()[body].modes();
         shapes.row(row).iter().enumerate().map(|(mode, shape)| shape * modes.modal_state(mode, sector).0).sum()
@@ -386,7 +386,7 @@ impl Simulation {
         let length = self.communication.length;
         match (variable.quantity, variable.span) {
             _ if self.phase == SimulationPhase::Created || length == 0.0 => 0.0,
-            // From nothing to touch to a clearance, and back, there is no rate.
+            // A clearance that appears or disappears has no rate.
             _ if variable.unit == Some(&LENGTH) && now.max(before) >= NO_CLEARANCE => 0.0,
             (Quantity::Clearance(sector), _) => self.system.structures()[variable.of].gap_rate(element, sector),
             (Quantity::RotorAngle, _) => self.inputs.rotors[variable.of].speed.at(0.0),

@@ -1,26 +1,26 @@
-//! Patches of the slave surface that friction power is gathered for.
+//! Patches of the slave surface that collect friction power.
 
 use super::plan::{PairPlan, SteppingOrder};
 use crate::Scene;
 use crate::rom::ThermalPatch;
 use crate::settings::PatchSettings;
 
-/// Where heat is counted.
+/// Patches for which heat is counted.
 #[derive(Debug, Clone, PartialEq)]
 pub enum HeatPatches {
     /// Equal parts of the circumference and of an axial extent (m).
     Equal {
-        /// Parts.
+        /// Number of parts.
         parts: PatchSettings,
-        /// From and to (m).
+        /// Start and end (m).
         extent: [f64; 2],
     },
-    /// Patches of the structure that carries the surface.
+    /// Patches of the surface carrier.
     Listed(Vec<ThermalPatch>),
 }
 
 impl HeatPatches {
-    /// Makes the heat patches of a pair: patches of its surface, or those of a thermal structure that carries it.
+    /// Makes the heat patches of a pair: patches of its surface, or those of a thermal surface carrier.
     pub fn new(scene: &Scene, plan: &SteppingOrder, pair: &PairPlan) -> Option<Self> {
         if let Some(parts) = scene.settings.surfaces[pair.surface].patches {
             let nodes = &plan.structure(scene, pair.body).1.contact_nodes;
@@ -42,7 +42,7 @@ impl HeatPatches {
         }
     }
 
-    /// Patch at an angle (rad, fixed frame) and an axial position (m); the nearest in z beyond their extent.
+    /// Returns the patch at an angle (rad, fixed frame) and an axial position (m); the nearest in z beyond their extent.
     pub fn find(&self, angle: f64, axial: f64) -> usize {
         let turn = |angle: f64| angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).floor();
         match self {
@@ -62,7 +62,7 @@ impl HeatPatches {
     }
 }
 
-/// Which of `parts` equal parts of [0, 1] holds `share`.
+/// Returns the index of the one of `parts` equal parts of [0, 1] that contains `share`.
 fn part(share: f64, parts: usize) -> usize {
     #[expect(clippy::cast_precision_loss, reason = "part counts are far below 2^52")]
     let place = share * parts as f64;
@@ -75,7 +75,7 @@ fn part(share: f64, parts: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// Quarters in two rows, listed from −45° on, as a structure gives them: every place is in the one whose bounds hold it.
+    /// Quarters in two rows, listed from −45° on, as in the data of a structure: every place is in the patch whose bounds contain it.
     #[test]
     fn positions_map_to_the_patch_that_contains_them() {
         let quarter = std::f64::consts::FRAC_PI_2;

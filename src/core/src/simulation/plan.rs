@@ -1,4 +1,4 @@
-//! Which structures and surfaces of a scene meet: found once, from names.
+//! Structures, surfaces and contact pairs of a scene, resolved once from names.
 
 use crate::settings::relations::Relations;
 use crate::settings::{BodyMotion, ContactSettings, SceneSettings, StructureSettings, SurfaceSettings};
@@ -9,30 +9,30 @@ use crate::{Error, Result, Rom, Scene};
 pub struct PairPlan {
     /// Surface.
     pub surface: usize,
-    /// Structure whose contact nodes touch: place in [`SteppingOrder::bodies`].
+    /// Master: index in [`SteppingOrder::bodies`].
     pub body: usize,
-    /// Structure through whose contact grid an open surface is laid.
+    /// Structure whose contact grid defines an open surface.
     pub grid: Option<usize>,
-    /// Structure that deforms the surface: place in [`SteppingOrder::carriers`].
+    /// Structure that deforms the surface: index in [`SteppingOrder::carriers`].
     pub carrier: Option<usize>,
-    /// Contact nodes that take part.
+    /// Contact nodes of the pair.
     pub nodes: Vec<usize>,
 }
 
 /// Structures in the order in which they are stepped, and the pairs between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SteppingOrder {
-    /// Structures whose contact nodes touch, in the order of the scene.
+    /// Masters, in the order of the scene.
     pub bodies: Vec<usize>,
-    /// Structures that carry surfaces and deform them, in the order of the pairs.
+    /// Surface carriers that deform, in the order of the pairs.
     pub carriers: Vec<usize>,
-    /// In the order of the scene.
+    /// Contact pairs, in the order of the scene.
     pub pairs: Vec<PairPlan>,
-    /// Pairs of each body.
+    /// Pairs of each master.
     of_bodies: Vec<Vec<usize>>,
 }
 
-/// Names that a scene of one has no need of.
+/// Name prefix; empty if there is only one structure.
 pub fn prefix(count: usize, name: &str) -> String {
     if count > 1 { format!("{name}.") } else { String::new() }
 }
@@ -41,7 +41,7 @@ impl SteppingOrder {
     /// Orders the structures of a validated scene.
     ///
     /// # Errors
-    /// ROMs that do not fit what is asked of them; pairs without nodes, nodes of two pairs.
+    /// ROMs without data that the scene requires; pairs without nodes; nodes in two pairs.
     pub fn new(scene: &Scene) -> Result<Self> {
         let settings = &scene.settings;
         if scene.roms.len() != settings.structures.len() {
@@ -81,12 +81,12 @@ impl SteppingOrder {
         Ok(plan)
     }
 
-    /// Pairs of a body.
+    /// Returns the pairs of a master.
     pub fn pairs_of(&self, body: usize) -> impl Iterator<Item = (usize, &PairPlan)> {
         self.of_bodies[body].iter().map(|pair| (*pair, &self.pairs[*pair]))
     }
 
-    /// The structure of a body.
+    /// Returns settings and ROM of a master.
     pub fn structure<'a>(&self, scene: &'a Scene, body: usize) -> (&'a StructureSettings, &'a Rom) {
         (&scene.settings.structures[self.bodies[body]], &scene.roms[self.bodies[body]])
     }
@@ -101,18 +101,18 @@ impl SteppingOrder {
         prefix(self.pairs.len(), &self.surface(settings, pair).name)
     }
 
-    /// The surface of a pair.
+    /// Returns the surface of a pair.
     pub fn surface<'a>(&self, settings: &'a SceneSettings, pair: usize) -> &'a SurfaceSettings {
         &settings.surfaces[self.pairs[pair].surface]
     }
 
-    /// Whether a body meets surfaces that are open, described along x, y, z.
+    /// Returns whether the surfaces of a master are open, described along x, y, z.
     pub fn is_free(&self, scene: &Scene, body: usize) -> bool {
         self.structure(scene, body).0.motion == BodyMotion::Free
     }
 }
 
-/// Contact nodes of a pair.
+/// Returns the contact nodes of a pair.
 fn nodes_of(contact: &ContactSettings, rom: &Rom, index: usize) -> Result<Vec<usize>> {
     let start = contact.nodes.as_deref().unwrap_or_default();
     let names = rom.contact_nodes.iter().enumerate();
@@ -128,7 +128,7 @@ fn nodes_of(contact: &ContactSettings, rom: &Rom, index: usize) -> Result<Vec<us
     Err(Error::invalid(format!("contact[{}].nodes", index + 1), problem, remedy))
 }
 
-/// A node that a pair before has already: (pair, node).
+/// Returns a node that an earlier pair already uses: (pair, node).
 fn claimed<'a>(mut pairs: impl Iterator<Item = (usize, &'a PairPlan)>, nodes: &[usize]) -> Option<(usize, usize)> {
     let both = |pair: &PairPlan| nodes.iter().copied().find(|node| pair.nodes.contains(node));
     pairs.find_map(|(index, pair)| both(pair).map(|node| (index, node)))

@@ -1,19 +1,20 @@
-//! Film looks once for penetration: nodes that the others push away are held closed, and pulled at. That is told, and ends a run
-//! where it is too much.
+//! Tensile contact forces of `film`, which checks for penetration only once: nodes that other contacts push away are held closed and
+//! pulled. This is reported, and ends a run if it is too large.
 //!
-//! Measure is the impulse on the node most pulled at, as a share of that on the node most pushed, since the start. Blades of rotor 37
-//! with nine patches, in a round casing that closes and stays, and rubbing against two bumps that reach in by 0.2 and 3 clearances:
+//! The measure is the impulse on the node with the largest pull, as a fraction of that on the node with the largest push, since the start.
+//! Blades of rotor 37 with nine patches, in a round casing that closes and stays, and rubbing against two bumps with a height of 0.2 and 3
+//! clearances:
 //!
-//! | ω_max h | at rest, µ = 0 | 0.15 | rubbing by 0.2 | by 3 |
+//! | ω_max h | at rest, µ = 0 | at rest, µ = 0.15 | rubbing, height 0.2 | rubbing, height 3 |
 //! |---|---|---|---|---|
-//! | 1 | 0.001, right | 0.002, right | 0.004, 0.008 | 0.008 |
-//! | 3 | 0.001, right | 0.002, right | 0.007, 0.010 | 0.02 |
-//! | 6 | 0.22, off by 0.31 | 0.002, right | 0.02, 0.01 | 0.06, 0.07 |
-//! | 10 | 0.23, off by 0.31 | 0.003, right | 0.02, 0.01 | 0.17, 0.13 |
+//! | 1 | 0.001, correct | 0.002, correct | 0.004, 0.008 | 0.008 |
+//! | 3 | 0.001, correct | 0.002, correct | 0.007, 0.010 | 0.02 |
+//! | 6 | 0.22, off by 0.31 | 0.002, correct | 0.02, 0.01 | 0.06, 0.07 |
+//! | 10 | 0.23, off by 0.31 | 0.003, correct | 0.02, 0.01 | 0.17, 0.13 |
 //! | 20 | 0.24, off by 0.31 | 0.39, off by 0.49 | 0.02, 0.01 | 0.21, 0.17 |
 //!
-//! At rest forces are "off" by so much of the largest from the complementary ones. Which of several places film comes to rest in
-//! depends on how it got there, so that no start can tell.
+//! At rest, "off" is the difference from the complementary forces as a fraction of the largest. The place at which film comes to rest
+//! depends on its history, so that no check at the start can predict it.
 
 use super::Simulation;
 use crate::settings::{Preset, Scheme, Solver};
@@ -21,20 +22,21 @@ use crate::system::StepFailure;
 use crate::warning::Topic;
 use crate::{Result, Warning, shown_time};
 
-/// Shares from which pulling is told, and from which it ends a run that is not the paper's.
+/// Fractions from which pulling is reported, and from which it ends a run unless the preset is `paper`.
 const TOLD: f64 = 0.03;
 const REFUSED: f64 = 0.2;
-/// Share of its clearance by which a node may be inside at the end of a step. Forces of one step push a node in by what this step corrects,
-/// which is a small part of the clearance as long as steps are short: 4 % at most in random rubs that `lcp` agrees with.
+/// Fraction of its clearance by which a node may be inside a surface at the end of a step. Forces of one step push a node in by an amount
+/// that this step corrects, which is a small part of the clearance as long as steps are short: 4 % at most in random rubs in which `lcp`
+/// agrees.
 const INSIDE: f64 = 0.2;
-/// From this share on it is told, and again once it is so many times as much.
+/// From this fraction on it is reported, and again whenever it has grown by the factor `DEEPER`.
 const INSIDE_TOLD: f64 = 0.05;
 const DEEPER: f64 = 2.0;
-/// Internal steps that contact must have lasted for: what a few of them do is soon outweighed.
+/// Internal steps that contact must have lasted: the effect of a few of them is soon outweighed.
 const LASTED: u64 = 100;
 
 impl Simulation {
-    /// Tell of a node that is pulled at, or left deep inside, or end the run.
+    /// Warns of a node that is pulled or left deep inside a surface, or ends the run.
     pub(super) fn check_pulling(&mut self, time: f64) -> Result<()> {
         if self.system.settings().solver != Solver::Film {
             return Ok(());
@@ -98,7 +100,7 @@ impl Simulation {
         )
     }
 
-    /// Whether nothing holds a structure that touches.
+    /// Returns whether a master is a free body.
     fn is_free(&self, structure: usize) -> bool {
         self.compiled.bodies[structure].translations.is_some()
     }

@@ -1,4 +1,4 @@
-//! The slave surface of a scene, laid through data points, and the modes of the structure that carries it.
+//! Slave surface of a scene through data points, and the modes of its carrier.
 
 use crate::dynamics::modal::ModalModel;
 use crate::gaps::layout::Layout;
@@ -11,37 +11,37 @@ use crate::settings::{ContactSettings, SplineSettings, SurfaceSettings};
 use crate::{Error, Result, Rom};
 use nalgebra::DMatrix;
 
-/// Rings of a rigid spline reach beyond the contact nodes by this share of their axial extent, and at least by that
-/// share of the radius.
+/// Rings of a rigid spline extend beyond the contact nodes by this fraction of their axial extent, and at least by the second fraction of
+/// the radius.
 const MARGIN_OF_EXTENT: f64 = 0.25;
 const MARGIN_OF_RADIUS: f64 = 0.02;
-/// The surface and the contact grid of its structure may differ by this share of the radius.
+/// Allowed difference between the radii of the surface and of the contact grid of its carrier, as a fraction of the radius.
 const SAME_RADIUS: f64 = 0.1;
 
-/// Where the data points of a surface are.
+/// Positions of the data points of a surface.
 #[derive(Debug, Clone)]
 struct DataGrid {
     around: usize,
-    /// The first data point among the nodes of a contact grid.
+    /// Index of the first data point among the nodes of a contact grid.
     first_node: usize,
     first_angle: f64,
     rings: Vec<f64>,
 }
 
-/// A structure that carries a surface.
+/// A surface carrier.
 #[derive(Debug, Clone, Copy)]
 pub struct CarrierModes<'a> {
     /// ROM of the structure.
     pub rom: &'a Rom,
-    /// Modes, seen at the contact grid.
+    /// Modes, observed at the contact grid.
     pub model: &'a ModalModel,
 }
 
-/// The gap function of some contact nodes of a structure against a surface through data points, those of the contact grid of
-/// `carrier` where one carries it.
+/// Creates the gap function of some contact nodes of a structure against a surface through data points, which are those of the contact grid
+/// of `carrier` if there is one.
 ///
 /// # Errors
-/// A structure without contact grid, a grid that the contact nodes stand beyond or far from, too few points.
+/// Structure without contact grid; contact nodes beyond the grid or far from it; too few points.
 pub fn spline_gap(
     (master, nodes): (&Rom, &[usize]),
     layout: Layout,
@@ -74,8 +74,8 @@ pub fn spline_gap(
 }
 
 impl CarrierModes<'_> {
-    /// Returns the modes, seen at the control points of a surface along x, y, z; data points of the surface are nodes of the contact grid from
-    /// `first` on.
+    /// Returns the modes, observed at the control points of a surface along x, y, z; data points of the surface are nodes of the contact
+    /// grid from `first` on.
     pub fn at_control_points(&self, surface: &SurfaceSpline, first: usize) -> ModalModel {
         let nodes = surface.control_points().len();
         let mut model = self.model.clone();
@@ -94,13 +94,13 @@ impl CarrierModes<'_> {
                 }
             }
         }
-        // Contact acts on the residual flexibility of what touches; all modes of the carrier keep their inertia.
+        // Contact acts on the residual flexibility of the master; all modes of the carrier keep their inertia.
         model.quasi_static = 0;
         model
     }
 }
 
-/// A displacement of a contact node along x, y, z.
+/// Converts a displacement of a contact node to the axes x, y, z.
 fn along_axes(rom: &Rom, node: usize, own: [f64; 3]) -> [f64; 3] {
     if rom.frame == DisplacementFrame::Cartesian {
         return own;
@@ -113,9 +113,9 @@ fn along_axes(rom: &Rom, node: usize, own: [f64; 3]) -> [f64; 3] {
 /// Part of a contact grid that a surface uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Share {
-    /// All of it.
+    /// The whole grid.
     Whole,
-    /// The rings around the contact nodes that face it: other surfaces take others.
+    /// The rings near the contact nodes that face it, since other surfaces use other rings.
     Near,
 }
 
@@ -156,7 +156,7 @@ fn rigid_grid(settings: SplineSettings, contour: &TipContour) -> DataGrid {
     DataGrid { around: settings.around, first_node: 0, first_angle: 0.0, rings }
 }
 
-/// Points of all rings at the radius (m) given for (z, θ).
+/// Returns the points of all rings at the radius (m) given for (z, θ).
 fn data(grid: &DataGrid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
     let mut points = Vec::with_capacity(grid.rings.len() * grid.around);
     for z in &grid.rings {
@@ -171,18 +171,18 @@ fn data(grid: &DataGrid, radius: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
     points
 }
 
-/// Rings of a contact grid that carries a surface of another radius, as an inner lining of the casing that the mesh leaves out does: it
-/// passes forces on as a rigid body, so that the support feels them with the lever of the surface.
+/// Rings of a contact grid that carries a surface of another radius, such as the inner lining of a casing that the mesh omits. The lining
+/// transfers forces as a rigid body, so that the support feels them with the lever arm of the surface.
 #[derive(Debug, Clone)]
 pub struct Lining {
-    /// Index of the structure that carries the surface, among such structures.
+    /// Index among the surface carriers.
     pub carrier: usize,
-    /// Axial position, and radius of the surface less that of the mesh, ascending along z (m).
+    /// Axial position, and radius of the surface minus that of the mesh, ascending along z (m).
     rings: Vec<[f64; 2]>,
 }
 
 impl Lining {
-    /// Between the grid of `rom` and the surface around the contact nodes `nodes` of `master`.
+    /// Creates the lining between the grid of `rom` and the surface around the contact nodes `nodes` of `master`.
     ///
     /// # Errors
     /// Contact nodes beyond the grid.
@@ -201,14 +201,14 @@ impl Lining {
         Ok(Self { carrier, rings: rings.collect() })
     }
 
-    /// Radius of the surface less that of the mesh at an axial position (m).
+    /// Radius of the surface minus that of the mesh at an axial position (m).
     fn thickness(&self, z: f64) -> f64 {
         let upper = self.rings.iter().position(|ring| z <= ring[0]).unwrap_or(self.rings.len() - 1).max(1);
         let ([from, first], [to, last]) = (self.rings[upper - 1], self.rings[upper]);
         first + (last - first) * ((z - from) / (to - from)).clamp(0.0, 1.0)
     }
 
-    /// Moment (N·m) that a force (N) at a point of the surface has beyond that of the same force on the mesh.
+    /// Additional moment (N·m) of a force (N) at a point of the surface compared with the same force on the mesh.
     pub fn moment(&self, point: [f64; 3], force: [f64; 3]) -> [f64; 3] {
         let radius = libm::hypot(point[0], point[1]);
         let share = self.thickness(point[2]) / radius;
@@ -233,12 +233,11 @@ fn check_radii(rom: &Rom, first: usize, points: &[[f64; 3]]) -> Result<()> {
     Ok(())
 }
 
-/// Tip contour r(z) through the contact nodes: natural cubic spline through three or more, straight through fewer and
-/// beyond the ends.
+/// Tip contour r(z) through the contact nodes: natural cubic spline through three or more, straight line through fewer and beyond the ends.
 struct TipContour {
     /// (z, r, r''), ascending in z.
     points: Vec<(f64, f64, f64)>,
-    /// dr/dz where there is a single point.
+    /// dr/dz if there is a single point.
     slope: f64,
 }
 
@@ -257,7 +256,7 @@ impl TipContour {
         [self.points[0].0, self.points[self.points.len() - 1].0]
     }
 
-    /// By how much a surface reaches beyond the nodes (m).
+    /// Extent of a surface beyond the nodes (m).
     fn margin(&self) -> f64 {
         let [first, last] = self.extent();
         (MARGIN_OF_EXTENT * (last - first)).max(MARGIN_OF_RADIUS * self.points[0].1)
@@ -281,7 +280,7 @@ impl TipContour {
     }
 }
 
-/// Natural cubic spline by the tridiagonal (Thomas) recurrence.
+/// Computes the natural cubic spline by the tridiagonal (Thomas) recurrence.
 fn second_derivatives(points: &mut [(f64, f64, f64)]) {
     let count = points.len();
     let mut upper = vec![0.0; count];

@@ -1,4 +1,4 @@
-//! Tips that slide more slowly than they vibrate: warned of at the start, where the law knows no sticking.
+//! Warning at the start of tips that slide more slowly than they vibrate, if the law does not model sticking.
 
 use nalgebra::DMatrix;
 
@@ -11,11 +11,11 @@ use crate::settings::Solver;
 use crate::warning::Topic;
 use crate::{Warning, shown};
 
-/// Angles at which a shape is looked at.
+/// Angles at which a shape is sampled.
 const ANGLES: u32 = 720;
 
 impl Simulation {
-    /// Tips that slide more slowly than they vibrate stick at times, which the sliding law does not know.
+    /// Warns of tips that slide more slowly than they vibrate: they stick at times, which the sliding law does not model.
     pub(super) fn warn_of_sticking(&mut self, parameters: &Parameters) {
         for body in 0..self.compiled.bodies.len() {
             let (speed, friction) = (&self.inputs.rotors[body].speed, parameters.friction_of(&self.compiled, body));
@@ -46,8 +46,8 @@ impl Simulation {
 }
 
 impl Compiled {
-    /// Speed (rad/s) below which tips may vibrate faster than they slide: those that swing by their clearance, or by how far the shape of
-    /// the casing reaches in, in the lowest mode, or that are let go after they were pressed in as far with this friction coefficient.
+    /// Speed (rad/s) below which tips may vibrate faster than they slide. The vibration is that of the lowest mode with an amplitude of the
+    /// clearance or of the inward extent of the shape, or that after a release from the same depth with this friction coefficient.
     pub(super) fn slow_sliding(&self, body: usize, friction: f64) -> f64 {
         let parts = &self.bodies[body];
         let lowest = parts.lowest_frequency();
@@ -65,7 +65,7 @@ impl Compiled {
         reach * rate / radius
     }
 
-    /// Clearance of a pair, or how far the shape of its surface reaches in where that is more (m).
+    /// Clearance of a pair, or the inward extent of the shape of its surface if that is larger (m).
     fn depth_of_shape(&self, pair: usize) -> f64 {
         let gap = self.contact(pair).nominal_gap();
         let shape = &self.plan.surface(&self.scene.settings, pair).shape;
@@ -75,8 +75,9 @@ impl Compiled {
     }
 }
 
-/// Velocity around the axis per depth (1/s) of the node that is fastest when let go: a force λ along its normal and µλ around the axis presses
-/// it in by λΣφ_n²/ω², and every mode then swings with ω times its share. The phases of modes differ: their squares add up.
+/// Velocity around the axis per depth (1/s) of the node that is fastest after a release: a force λ along its normal and µλ around the axis
+/// presses it in by λΣφ_n²/ω², and every mode then vibrates with ω times its contribution. The phases of the modes differ, so that their
+/// squares are added.
 fn released(model: &ModalModel, friction: f64) -> f64 {
     let modes = || (0..model.len()).filter(|mode| model.frequencies[*mode] > 0.0);
     let row = |shapes: &DMatrix<f64>, row: usize, mode: usize| shapes[(row, mode)].abs();

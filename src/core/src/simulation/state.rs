@@ -1,7 +1,7 @@
-//! Saved states: a header that says whose state it is, the payload, and a checksum.
+//! Saved states: a header that identifies the scene, the payload, and a checksum.
 //!
-//! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, FNV-1a checksum of
-//! all before (u64).
+//! Layout, little-endian: magic (8 bytes), format version (u64), scene fingerprint (u64), payload, FNV-1a checksum of all preceding bytes
+//! (u64).
 
 use super::access::check_range;
 use super::drive::RotorAngle;
@@ -42,10 +42,10 @@ impl Persist for SimulationPhase {
     }
 }
 
-/// Nothing in a structure or in its ledger is as large, in any unit; squares and products stay far from overflow.
+/// Upper bound on all values of a structure and of its ledger, in any unit; squares and products stay far from overflow.
 const LARGEST: f64 = 1e50;
 
-/// First part of a state, from which the rest follows: read and checked before anything is changed.
+/// First part of a state, which determines the rest: read and checked before any change.
 struct Lead {
     phase: SimulationPhase,
     time: f64,
@@ -55,7 +55,7 @@ struct Lead {
     inputs: Inputs,
     rotors: Vec<RotorAngle>,
     values: Vec<f64>,
-    /// Reference speed of each structure that touches (rad/s), and their temperatures (K).
+    /// Reference speed of each master (rad/s), and its temperature (K).
     reference_speeds: Vec<f64>,
     reference_temperatures: Vec<f64>,
     /// Internal step (s).
@@ -89,7 +89,7 @@ impl Simulation {
         writer.written() + CHECKSUM_BYTES
     }
 
-    /// Write everything that determines the future into `buffer` (exactly [`Simulation::state_size`] bytes).
+    /// Writes everything that determines the future into `buffer` (exactly [`Simulation::state_size`] bytes).
     ///
     /// # Examples
     /// ```
@@ -113,7 +113,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Restore a saved state; on error nothing is changed.
+    /// Restores a saved state; nothing is changed in case of an error.
     ///
     /// # Examples
     /// ```
@@ -130,7 +130,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Wrong length, wrong scene, damaged: a checksum that does not match, or content that no state has.
+    /// Wrong length; wrong scene; damaged state: wrong checksum, or content that no valid state has.
     pub fn restore_state(&mut self, buffer: &[u8]) -> Result<()> {
         self.check_size(buffer.len())?;
         let (content, checksum) = buffer.split_at(buffer.len() - CHECKSUM_BYTES);
@@ -185,8 +185,8 @@ impl Simulation {
         self.system.save(writer);
     }
 
-    /// Look at all of a state. The checksum finds accidents; bytes with a right one may still hold what no simulation can
-    /// go on from. In the order of `write`.
+    /// Checks a whole state. The checksum finds accidental damage; bytes with a correct checksum may still be a state that no simulation
+    /// can continue from. The order is that of `write`.
     fn lead(&self, mut reader: StateReader) -> Result<Lead> {
         let reader = &mut reader;
         let mut lead = Lead {
@@ -202,7 +202,7 @@ impl Simulation {
             step: 0.0,
         };
         lead.phase.restore(reader);
-        // Before the start, and after a failure, a state may hold anything: nothing goes on from it.
+        // Before the start and after a failure a state may contain any values, since no step continues from it.
         let runs = matches!(lead.phase, SimulationPhase::Ready | SimulationPhase::Stepping);
         let largest = if runs { LARGEST } else { f64::INFINITY };
         take(&mut lead.time, reader);
@@ -211,7 +211,7 @@ impl Simulation {
         take(&mut lead.communication, reader);
         self.previous_length.check(reader);
         self.most_tried.check(reader);
-        // What inputs may hold is looked at where they are read.
+        // Values of inputs are checked where they are read.
         let others = reader.infinite();
         take(&mut lead.inputs, reader);
         let infinite = reader.infinite() - others;
@@ -230,7 +230,7 @@ impl Simulation {
         if let Some(fault) = reader.fault() {
             return damaged(fault);
         }
-        // Those of three kinds of gaps: now, a step earlier, and the lowest.
+        // There are three kinds of gaps: current, previous step, and lowest.
         let endless = self.system.infinite_gap_count(&window.all_lowest()).map(|lowest| lowest + endless);
         if runs && endless != Some(reader.infinite() - infinite) {
             return damaged("it contains a number that is not finite");
@@ -241,7 +241,7 @@ impl Simulation {
         Ok(lead)
     }
 
-    /// Times, step sizes and counts belong together.
+    /// Checks that times, step sizes and counts are consistent.
     fn check_counts(&self, lead: &Lead) -> Result<()> {
         if lead.phase == SimulationPhase::Created {
             return if lead.time.is_finite() { Ok(()) } else { damaged("its time is not finite") };
@@ -255,7 +255,7 @@ impl Simulation {
                 (done < count || phase == SimulationPhase::Failed, (lead.time - start).abs() <= TIME_TOLERANCE * length)
             }
         };
-        // A first step may begin that much before the start.
+        // A first step may begin before the start by this tolerance.
         let started = lead.initial_time.is_finite() && lead.initial_time <= lead.time + TIME_TOLERANCE * length;
         let counted = started && lead.time.is_finite() && (1.0..=MOST_STEPS).contains(&number) && done <= count && ends;
         let largest = lead.values[self.compiled.references.step_max];
@@ -267,7 +267,7 @@ impl Simulation {
         if counted && within && divided { Ok(()) } else { damaged("its times and step counters contradict each other") }
     }
 
-    /// Values that could have been set, and outputs that could have been read.
+    /// Checks that parameters and inputs could have been set, and outputs could have been read.
     fn check_values(&self, values: &[f64]) -> Result<()> {
         for variable in self.table.variables() {
             let values = &values[variable.reference as usize..][..variable.len()];
@@ -278,7 +278,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Inputs within their ranges, by more than rounding, now and at the end of the step under way.
+    /// Checks that inputs are within their ranges, with a margin for rounding, now and at the end of the current step.
     fn check_inputs(&self, lead: &mut Lead) -> Result<()> {
         let Communication { length, count, done, .. } = lead.communication;
         let stepping = lead.phase == SimulationPhase::Stepping && count > 0;
@@ -304,14 +304,14 @@ impl Simulation {
         Ok(())
     }
 
-    /// Make ready for a state what follows from its parameters and can be refused.
+    /// Prepares everything for a state that follows from its parameters and can be rejected.
     fn follow(&mut self, lead: Lead) -> Result<()> {
         let before = (
             std::mem::replace(&mut self.values, lead.values),
             std::mem::replace(&mut self.inputs, lead.inputs),
             std::mem::replace(&mut self.initial_time, lead.initial_time),
         );
-        // Before initialisation nothing has been computed from them, and what does not fit together is not refused yet.
+        // Before initialisation nothing has been computed from the parameters, and inconsistent ones are not rejected yet.
         let moves = self.is_moved_within_reason(lead.communication.length, lead.time);
         let references = lead.reference_speeds.iter().zip(&lead.reference_temperatures);
         let references: Vec<[f64; 2]> = references.map(|(speed, temperature)| [*speed, *temperature]).collect();
@@ -320,7 +320,7 @@ impl Simulation {
                 damaged("an input causes a motion that is out of range")
             }
             SimulationPhase::Created => Ok(()),
-            // Looked at when a step begins and when a speed is given, not at every internal step.
+            // Checked when a step begins and when a speed is set, not in every internal step.
             SimulationPhase::Stepping => {
                 self.check_turning_of_all(lead.step, lead.communication.length).and_then(|()| self.adopt(&references))
             }
@@ -339,7 +339,7 @@ impl Simulation {
         })
     }
 
-    /// Checks the motion that the inputs cause, also inputs that this scene does not list.
+    /// Checks the motion that the inputs cause, including inputs that this scene does not list.
     fn is_moved_within_reason(&self, length: f64, time: f64) -> bool {
         let moments = (0..self.drives.len()).flat_map(|pair| [(pair, 0.0), (pair, length)]);
         moments.into_iter().all(|(pair, offset)| {
@@ -354,7 +354,7 @@ impl Simulation {
         let parameters = self.parameters();
         self.compiled.scene.check_methods(parameters.scheme, parameters.solver)?;
         let orders: Vec<u32> = self.compiled.carriers.iter().map(|carrier| carrier.load_order).collect();
-        // The orders before were accepted before.
+        // The previous orders were accepted before.
         self.follow_load_orders().and_then(|()| self.follow_reference_speeds(references)).inspect_err(|_| {
             for (carrier, order) in orders.into_iter().enumerate() {
                 drop(self.compiled.set_load_order(carrier, f64::from(order)));
@@ -362,10 +362,10 @@ impl Simulation {
         })
     }
 
-    /// Take over a state that was looked at.
+    /// Reads a state that was checked before.
     fn read(&mut self, reader: &mut StateReader) {
         self.read_values(reader);
-        // What the step takes from parameters follows from the restored values.
+        // Step data that depends on parameters follows from the restored values.
         let parameters = self.parameters();
         self.rest(&parameters);
         if self.is_prepared(&parameters) {
@@ -384,7 +384,7 @@ impl Simulation {
         }
     }
 
-    /// Here is what [`Simulation::withdraw`] goes back to. Does not allocate.
+    /// Sets the mark to which [`Simulation::withdraw`] returns. Does not allocate.
     pub(super) fn set_mark(&mut self) {
         let mut mark = std::mem::take(&mut self.mark);
         if !mark.is_empty() {
@@ -393,7 +393,7 @@ impl Simulation {
         self.mark = mark;
     }
 
-    /// Back to the mark, with the same parameters. Does not allocate.
+    /// Returns to the mark, with the same parameters. Does not allocate.
     pub(super) fn withdraw(&mut self) {
         let mark = std::mem::take(&mut self.mark);
         self.restore_from(&mark);
@@ -401,7 +401,7 @@ impl Simulation {
         self.tangent.forget();
     }
 
-    /// Back to a state of this simulation, with the same parameters. Does not allocate.
+    /// Restores a state of this simulation with the same parameters. Does not allocate.
     pub(super) fn restore_from(&mut self, mark: &[u8]) {
         let reader = &mut StateReader::new(mark);
         // Magic, version, scene.
@@ -410,7 +410,7 @@ impl Simulation {
         self.system.restore(reader);
     }
 
-    /// All of a state but that of the system.
+    /// Reads a state without the part of the system.
     fn read_values(&mut self, reader: &mut StateReader) {
         self.phase.restore(reader);
         self.time.restore(reader);
@@ -424,30 +424,30 @@ impl Simulation {
         self.window.restore(reader);
         self.values.restore(reader);
         self.previous.restore(reader);
-        // Followed already.
+        // Already applied by `follow`.
         self.rotors.iter().for_each(|_| [0.0_f64; 2].restore(reader));
     }
 }
 
-/// Check the bytes of a value and read them.
+/// Checks the bytes of a value and reads them.
 fn take(value: &mut impl Persist, reader: &mut StateReader) {
     let mut bytes = reader.clone();
     value.check(reader);
     value.restore(&mut bytes);
 }
 
-/// The integer that a value is.
+/// Converts a value to the integer that it represents.
 fn as_integer(value: f64) -> Option<i32> {
     #[expect(clippy::cast_possible_truncation, reason = "compared with what it was")]
     let number = value as i32;
     ((f64::from(number) - value).abs() == 0.0).then_some(number)
 }
 
-/// Whether a variable can have the value.
+/// Returns whether a variable can have the value.
 fn is_possible(variable: &Variable, value: f64) -> bool {
     let settable = variable.is_settable();
     match variable.kind {
-        // The range of inputs is looked at where they are now.
+        // The range of inputs is checked for their current values.
         DataType::Real if settable && variable.causality != Causality::Input => check_range(variable, value).is_ok(),
         DataType::Real => value.is_finite(),
         DataType::Boolean => matches!(as_integer(value), Some(0 | 1)),

@@ -1,4 +1,4 @@
-//! What internal steps a communication step takes: a bound on their number, a tolerance that is missed, flight over many at once.
+//! Internal steps of a communication step: a bound on their number, missed tolerances, and free flight over many steps.
 
 use super::limits::Parameters;
 use super::{Communication, Simulation, SimulationPhase};
@@ -8,17 +8,17 @@ use crate::variables::Quantity;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, shown, shown_time};
 
-/// Error of the shortest steps as a fraction of the clearance per length (1/s), where errors stop following the tolerance. A rubbing blade with 18
-/// modes (`core/tests/galerkin/main.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
+/// Error of the shortest steps as a fraction of the clearance per length (1/s), below which errors stop following the tolerance. A rubbing
+/// blade with 18 modes (`core/tests/galerkin/main.rs`) stays at 7e-7, 1.5e-7 and 7e-8 with longest steps of 80, 40 and 20 µs.
 const LEFT: f64 = 4.0;
 
 impl Simulation {
-    /// Whether sectors take steps of their own.
+    /// Returns whether sectors take adaptive steps.
     pub(super) fn is_marched(&self) -> bool {
         self.system.settings().scheme == Scheme::Galerkin
     }
 
-    /// Whether a communication step is under way.
+    /// Returns whether a communication step has begun and not ended.
     ///
     /// # Examples
     /// ```
@@ -36,21 +36,21 @@ impl Simulation {
         self.phase == SimulationPhase::Stepping
     }
 
-    /// Most internal steps of a communication step, 0 for any number.
+    /// Largest number of internal steps of a communication step, 0 for any number.
     pub(super) fn max_internal_steps(&self) -> u64 {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ 1e9")]
         let most = self.value_of(Quantity::MaxInternalSteps, 0) as u64;
         most
     }
 
-    /// Room for the state to go back to, where it may be needed: how many steps the others take is known beforehand.
+    /// Allocates the state to return to, if it may be needed: the number of fixed steps is known beforehand.
     pub(super) fn make_room(&mut self) {
         if self.max_internal_steps() > 0 && self.is_marched() && self.mark.is_empty() {
             self.mark = vec![0; self.state_size];
         }
     }
 
-    /// Before an internal step.
+    /// Checks the number of steps before an internal step.
     pub(super) fn allow_steps(&mut self) -> Result<()> {
         let Communication { length, done, tried, most, .. } = self.communication;
         if most == 0 {
@@ -63,7 +63,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// A communication step of length `length` (s) takes too many internal steps.
+    /// Returns the error for a communication step of length `length` (s) that takes too many internal steps.
     pub(super) fn exhausted(&self, length: f64, most: u64) -> Error {
         let (of_whom, other) = if self.is_marched() {
             (" (trial steps of all blades together)", "a larger tolerance")
@@ -83,14 +83,14 @@ impl Simulation {
         }
     }
 
-    /// In the middle of an internal step no more are allowed: back to where it can be gone on from.
+    /// Returns to the last state from which the run can continue, if no more steps are allowed in the middle of an internal step.
     pub(super) fn abandon_step(&mut self) -> Error {
         let (length, most) = (self.communication.length, self.communication.most);
         self.withdraw();
         self.exhausted(length, most)
     }
 
-    /// A tolerance that shortest steps cannot keep where contacts open and close.
+    /// Warns of a tolerance that the shortest steps cannot keep when contacts open and close.
     pub(super) fn warn_of_tolerance(&mut self, parameters: &Parameters) {
         let step = self.compiled.expected_step(parameters.step);
         let left = LEFT * shortest(step);
@@ -106,7 +106,7 @@ impl Simulation {
         }
     }
 
-    /// Tell of the first communication step in which a shortest step missed the tolerance.
+    /// Warns of the first communication step in which a shortest step missed the tolerance.
     pub(super) fn note_missed(&mut self, time: f64) {
         let effort = self.system.effort();
         if effort.missed == 0 || std::mem::replace(&mut self.warning_state.missed, true) {
@@ -128,9 +128,9 @@ impl Simulation {
         self.note(Warning::new(Topic::ToleranceMissed, problem, remedy));
     }
 
-    /// After the start of a communication step, for who does not look at internal steps: fly over all of them but the last, where sectors
-    /// take steps of their own, rest, and nothing comes near. The last is taken as ever, so that rates at its end are those of an
-    /// internal step. Else this does nothing.
+    /// Skips all internal steps but the last after the start of a communication step, for callers that do not read internal steps, if
+    /// sectors take adaptive steps, inputs rest, and no contact can close. The last step is taken normally, so that rates at its end are
+    /// those of an internal step. Otherwise this does nothing.
     ///
     /// # Examples
     /// ```

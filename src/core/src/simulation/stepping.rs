@@ -1,4 +1,4 @@
-//! One communication step: begun, marched, ended.
+//! One communication step: begin, internal steps, end.
 
 use super::drive::Input;
 use super::{Communication, MOST_STEPS, Simulation, SimulationPhase, StepProgress, TIME_TOLERANCE, same_step};
@@ -7,10 +7,10 @@ use crate::system::StepFailure;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, ranges, shown, shown_time};
 
-/// A run is warned of once u_θ²/2r is this share of the clearance.
+/// A run is warned of once u_θ²/2r is this fraction of the clearance.
 const CURVED_SHARE: f64 = 0.05;
 impl Simulation {
-    /// Begin a communication step of length H from the current time, landing exactly on `current_time + step_size`.
+    /// Begins a communication step of length H from the current time, which ends exactly at `current_time + step_size`.
     ///
     /// # Examples
     /// ```
@@ -25,13 +25,14 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Step size not positive and finite, or `current_time` further than 1e-3·H from [`Simulation::time`];
-    /// [`Error::Exhausted`] where it takes more internal steps than are allowed.
+    /// Step size not positive and finite, or `current_time` further than 1e-3·H from [`Simulation::time`]; [`Error::Exhausted`] if it takes
+    /// more internal steps than allowed.
     pub fn begin_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin(current_time, step_size, false)
     }
 
-    /// The same, but the step may end where the internal steps allowed are used up ([`Simulation::end_step_early`]).
+    /// Begins a communication step like [`Simulation::begin_step`], but the step may end when the allowed internal steps are used up
+    /// ([`Simulation::end_step_early`]).
     ///
     /// # Examples
     /// ```
@@ -95,7 +96,7 @@ impl Simulation {
         if most > 0 {
             self.set_mark();
         }
-        // Nothing is refused from here on.
+        // No errors from here on.
         self.set_out_tangent();
         if !keeps {
             self.system.set_step(step);
@@ -120,7 +121,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Speeds and rotations of shapes that an internal step can follow over a communication step of length `step_size`.
+    /// Checks that an internal step can follow the speeds and rotations of shapes over a communication step of length `step_size`.
     fn check_motions(&self, step: f64, step_size: f64) -> Result<()> {
         for (index, pair) in self.compiled.plan.pairs.iter().enumerate() {
             let mut rotation = self.inputs.pairs[index].shape_rotation;
@@ -186,7 +187,7 @@ impl Simulation {
                 "Use a longer communication step; skip remainders that are caused by rounding in a sum of steps",
             ));
         }
-        // What rounding of the time leaves of the step.
+        // Length of the step after rounding of the time.
         let rounded = (current_time + step_size) - current_time;
         if (rounded - step_size).abs() > TIME_TOLERANCE * step_size {
             return Err(Error::invalid(
@@ -210,7 +211,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// The rotor must not skip over features of the casing shape or cells of the coating. Inputs are linear in time: the ends decide.
+    /// Checks that the rotor does not skip features of the casing shape or cells of the coating. Inputs are linear in time, so the ends
+    /// decide.
     pub(super) fn check_turning(
         &self,
         pair: usize,
@@ -258,7 +260,7 @@ impl Simulation {
         ))
     }
 
-    /// March one internal step of the communication step begun. Inputs may be set between calls.
+    /// Advances the current communication step by one internal step. Inputs may be set between calls.
     ///
     /// # Examples
     /// ```
@@ -276,9 +278,9 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Non-finite state; the simulation must then be reset or restored. [`Error::Exhausted`] where the internal steps allowed are used
-    /// up: the simulation is then as if the communication step had not begun, or, where it may end early, where the last internal step
-    /// done has left it ([`Simulation::is_stepping`]).
+    /// Non-finite state; the simulation must then be reset or restored. [`Error::Exhausted`] if the allowed internal steps are used up: the
+    /// simulation is then in the state before the communication step or, if it may end early, in the state after the last finished internal
+    /// step ([`Simulation::is_stepping`]).
     pub fn advance(&mut self) -> Result<StepProgress> {
         if self.phase != SimulationPhase::Stepping {
             let problem = "no communication step is in progress";
@@ -286,7 +288,7 @@ impl Simulation {
         }
         self.allow_steps()?;
         if self.partial && self.communication.done > 0 && self.communication.most > 0 {
-            // With the inputs set meanwhile.
+            // The mark includes the inputs set meanwhile.
             self.set_mark();
         }
         let next = self.communication.done + 1;
@@ -320,8 +322,8 @@ impl Simulation {
         Ok(StepProgress { time, finished })
     }
 
-    /// Loads beside contact and stiffening for the step that begins at `offset`: q⁺ = a q + b q⁻ + c f takes the force at the time
-    /// of q.
+    /// Applies loads other than contact, and stiffening, for the step that begins at `offset`: q⁺ = a q + b q⁻ + c f uses the force at the
+    /// time of q.
     fn load(&mut self, offset: f64) {
         let hold = self.holds();
         let (scheme, step) = (self.system.scheme(), self.system.step_size());
@@ -374,7 +376,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Tell of the first displacement of each structure that linear kinematics describes badly.
+    /// Warns of the first displacement of each structure that is too large for linear kinematics.
     fn note_curved(&mut self, time: f64) {
         for body in 0..self.rotors.len() {
             if self.warning_state.curved[body] {
@@ -400,7 +402,7 @@ impl Simulation {
         }
     }
 
-    /// End the communication step here, before its end (early return): outputs cover the part done.
+    /// Ends the communication step before its end (early return): outputs cover the finished part.
     ///
     /// # Examples
     /// ```
@@ -416,7 +418,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// No step under way, no internal step done yet, or a non-finite state.
+    /// No current step; no finished internal step; a non-finite state.
     pub fn end_step_early(&mut self) -> Result<()> {
         if self.phase != SimulationPhase::Stepping || self.communication.done == 0 {
             let problem = "no internal step has been completed";
@@ -429,7 +431,7 @@ impl Simulation {
         self.finish(offset, time)
     }
 
-    /// `begin_step`, [`Simulation::fly_ahead`], then `advance` to the end.
+    /// Calls `begin_step`, [`Simulation::fly_ahead`], then `advance` until the end.
     ///
     /// # Examples
     /// ```
@@ -446,7 +448,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// As those two.
+    /// As [`Simulation::begin_step`] and [`Simulation::advance`].
     pub fn do_step(&mut self, current_time: f64, step_size: f64) -> Result<()> {
         self.begin_step(current_time, step_size)?;
         self.fly_ahead();

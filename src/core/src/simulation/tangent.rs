@@ -1,65 +1,65 @@
-//! ∂y(t+H)/∂u: what outputs at the end of the last communication step owe to inputs over it, for importers that iterate.
+//! ∂y(t+H)/∂u: the dependence of outputs at the end of the last communication step on inputs over it, for importers that iterate.
 //!
-//! Outputs of a step are piecewise smooth in its inputs: pieces differ in which contacts are closed and, with galerkin, in which steps
-//! every sector takes. Inputs are moved by so little (gaps by a millionth of the clearance) that the step stays on its piece, and the step is
-//! marched again in a copy. With galerkin the steps that the copy took tell whether it stayed there. The other schemes count nothing that
-//! would: there the step is marched in both directions, and impulses and gaps that do not change alike tell of a kink between. Inputs are then moved
-//! less. The quotient is the derivative with contacts and steps as they were in the accepted step, up to rounding.
+//! Outputs of a step are piecewise smooth in its inputs: the pieces differ in the set of closed contacts and, with galerkin, in the steps
+//! of every sector. Inputs are changed by so little (gaps by a millionth of the clearance) that the step stays on its piece, and the step
+//! is repeated in a copy. With galerkin the steps of the copy show whether it stayed on the piece. The other schemes have no such count:
+//! there the step is repeated in both directions, and impulses and gaps that do not change equally indicate a kink between them. The change
+//! of inputs is then reduced. The quotient is the derivative with contacts and steps as they were in the accepted step, up to rounding.
 
 use super::{Simulation, SimulationPhase};
 use crate::settings::Scheme;
 use crate::variables::{Causality, DataType, Quantity, Variability};
 use crate::{Error, Result, shown, shown_time};
 
-/// By how much inputs are moved, as a share of what moves gaps by a clearance: 2⁻²⁰, so that sums with usual values are exact. Rounding in
+/// Change of inputs as a fraction of the change that moves gaps by a clearance: 2⁻²⁰, so that sums with usual values are exact. Rounding in
 /// gaps is some 1e-7 of it, more on splines.
 const SMALL: f64 = 1.0 / 1_048_576.0;
-/// Factor of reductions where the step does not stay on its smooth piece.
+/// Factor of reductions if the step does not stay on its smooth piece.
 const LESS: f64 = 0.125;
-/// Marches at most with galerkin, and pairs of marches with other schemes.
+/// Largest number of repetitions with galerkin, and of pairs of repetitions with other schemes.
 const TRIES: usize = 6;
-/// Most that impulses and gaps may change otherwise in one direction than in the other, as a share of what they change by.
+/// Largest difference between the changes of impulses and gaps in both directions, as a fraction of the change.
 const BENT: f64 = 1e-3;
-/// Inputs that move gaps by less than this share of what was meant are moved by more, by a factor up to [`MOST`].
+/// Inputs that move gaps by less than this fraction of the intended change are changed more, by a factor up to [`MOST`].
 const WEAK: f64 = 0.0625;
 const MOST: f64 = 4096.0;
-/// Part of a turn (rad) over which shapes and loads change by a clearance, by order of magnitude.
+/// Part of a turn (rad) over which shapes and loads change by about a clearance.
 const TURN: f64 = 0.1;
-/// Change of a temperature (K) that moves a casing by a clearance, by order of magnitude.
+/// Change of a temperature (K) that moves a casing by about a clearance.
 const HEATING: f64 = 100.0;
 
 /// Data for repeating the last communication step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct StepReplay {
-    /// State at its start; empty where nobody asks for derivatives.
+    /// State at its start; empty if derivatives are not requested.
     start: Vec<u8>,
-    /// Whether `start` and the inputs in it are all that the step came from.
+    /// True if `start` and its inputs determine the whole step.
     stands: bool,
     /// Copy of the simulation that repeats the step, made when first needed.
     twin: Option<Box<Simulation>>,
-    /// Whether parameters of the twin are those of now.
+    /// True if the parameters of the twin are the current ones.
     follows: bool,
 }
 
 impl StepReplay {
-    /// The step marched last cannot be marched again from its start.
+    /// Marks that the last step cannot be repeated from its start.
     pub(super) fn forget(&mut self) {
         self.stands = false;
     }
 
-    /// The twin must take its parameters from the state it starts from.
+    /// Makes the twin read its parameters from its start state again.
     pub(super) fn follow_anew(&mut self) {
         self.follows = false;
     }
 
-    /// Another run, or another state: nothing of before holds.
+    /// Discards all data after a new start or a restored state.
     pub(super) fn renew(&mut self) {
         (self.stands, self.follows) = (false, false);
     }
 }
 
 impl Simulation {
-    /// Whether derivatives over steps can be asked for: the parameter `step_derivatives`.
+    /// Returns whether derivatives over steps can be requested: the parameter `step_derivatives`.
     ///
     /// # Examples
     /// ```
@@ -76,25 +76,26 @@ impl Simulation {
         self.value_of(Quantity::StepDerivatives, 0) > 1.5
     }
 
-    /// Room for the state at the start of steps, where derivatives will be asked for.
+    /// Allocates the state at the start of steps, if derivatives will be requested.
     pub(super) fn make_room_for_tangent(&mut self) {
         let size = if self.is_differentiated() { self.state_size } else { 0 };
         self.tangent.start.resize(size, 0);
         self.tangent.renew();
     }
 
-    /// A communication step begins. Does not allocate.
+    /// Saves the state at the start of a communication step. Does not allocate.
     pub(super) fn set_out_tangent(&mut self) {
         let mut start = std::mem::take(&mut self.tangent.start);
         self.tangent.stands = !start.is_empty() && self.save_state(&mut start).is_ok();
         self.tangent.start = start;
     }
 
-    /// Derivatives of `outputs` at the end of the last communication step by `inputs` over it, times `seed`: Σ_j ∂y_i(t+H)/∂u_j s_j, written to
-    /// `sensitivity`. An input here is the value that was asked for before the step; contacts and internal steps stay as they were in it.
+    /// Computes the derivatives of `outputs` at the end of the last communication step by `inputs` over it, times `seed`: Σ_j
+    /// ∂y_i(t+H)/∂u_j s_j, written to `sensitivity`. An input here is the value that was requested before the step; contacts and internal
+    /// steps stay as they were in it.
     ///
-    /// It marches the step again in a copy of the simulation, as a rule once with galerkin and twice with other schemes; the simulation itself
-    /// stays as it is.
+    /// The step is repeated in a copy of the simulation, usually once with galerkin and twice with other schemes; the simulation itself is
+    /// unchanged.
     ///
     /// # Examples
     /// ```
@@ -114,8 +115,9 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// Derivatives not asked for before initialisation; no communication step done, or one that inputs were set in, ended early, or a state
-    /// restored since; references of other variables than continuous real outputs and real inputs; a seed that is not finite.
+    /// Derivatives not requested before initialisation; no finished communication step, or one in which inputs were set, which ended early,
+    /// or after which a state was restored; references of other variables than continuous real outputs and real inputs; a seed that is not
+    /// finite.
     ///
     /// # Panics
     /// Slices of different lengths.
@@ -186,7 +188,7 @@ impl Simulation {
                 let output = *output as usize;
                 *value = (twin.values[output] - self.values[output]) / moved;
             }
-            // The same steps: on the same piece. The last try stands in any case, it is on the piece beside.
+            // The same steps mean the same piece. The last try is accepted in any case; it is on a neighbouring piece.
             if twin.system.effort() == self.system.effort() {
                 break;
             }
@@ -204,21 +206,21 @@ impl Simulation {
         self.system.pairs().iter().map(|pair| pair.gap().clearance()).fold(f64::INFINITY, f64::min)
     }
 
-    /// Normal impulses over the communication step (N·s) and gaps at its end (m) of all structures.
+    /// Returns normal impulses over the communication step (N·s) and gaps at its end (m) of all structures.
     fn touched(&self) -> [Vec<f64>; 2] {
         let impulses = self.window.bodies.iter().flat_map(|body| &body.normal_impulse).copied();
         let gaps = self.system.structures().iter().flat_map(|structure| structure.gaps()).copied();
         [impulses.collect(), gaps.collect()]
     }
 
-    /// Largest difference between gaps of now and those of a twin (m).
+    /// Largest difference between the current gaps and those of a twin (m).
     fn gaps_moved(&self, twin: &Self) -> f64 {
         let both = self.system.structures().iter().zip(twin.system.structures());
         let gaps = both.flat_map(|(own, other)| own.gaps().iter().zip(other.gaps()));
         gaps.map(|(own, other)| (own - other).abs()).filter(|moved| moved.is_finite()).fold(0.0, f64::max)
     }
 
-    /// March the last communication step in `twin`, with inputs moved by `moved` times `seed`.
+    /// Repeats the last communication step in `twin`, with inputs changed by `moved` times `seed`.
     fn march_again(&mut self, twin: &mut Self, inputs: &[u32], seed: &[f64], moved: f64) -> Result<()> {
         let lost = |error: Error| Error::Unstable {
             problem: format!("the communication step to t = {} s cannot be repeated: {error}", shown_time(self.time)),
@@ -231,7 +233,7 @@ impl Simulation {
             twin.tangent = StepReplay::default();
         }
         self.tangent.follows = true;
-        // What was done once may be done again.
+        // A step that was allowed once is allowed again.
         if let Some(bound) = twin.table.with_quantity_of(Quantity::MaxInternalSteps, 0) {
             twin.values[bound.reference as usize] = 0.0;
         }
@@ -242,7 +244,7 @@ impl Simulation {
         twin.do_step(self.communication.start, self.communication.length).map_err(lost)
     }
 
-    /// Move the course that is asked for, its slope as it is.
+    /// Shifts the requested course of an input and keeps its slope.
     fn move_input(&mut self, reference: u32, by: f64) {
         let (hold, inputs) = (self.holds(), &mut self.inputs);
         let Ok((variable, element)) = self.table.locate(reference) else { return };
@@ -316,13 +318,13 @@ impl Simulation {
     }
 }
 
-/// Returns the deviation of impulses and gaps at three places in a row from a line, as a fraction of their change; the larger of both.
+/// Returns the deviation of impulses and gaps at three successive places from a line, as a fraction of their change; the larger of both.
 fn bend(behind: &[Vec<f64>; 2], now: &[Vec<f64>; 2], ahead: &[Vec<f64>; 2]) -> f64 {
     let one = |which: usize| {
         let (mut off, mut change) = (0.0, 0.0);
         for ((behind, now), ahead) in behind[which].iter().zip(&now[which]).zip(&ahead[which]) {
             let (before, after) = (now - behind, ahead - now);
-            // Nothing to touch, before or after, has no rate.
+            // A node with no surface to touch, before or after, has no rate.
             if before.is_finite() && after.is_finite() {
                 off += (after - before).abs();
                 change += before.abs() + after.abs();

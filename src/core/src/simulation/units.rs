@@ -28,7 +28,7 @@ pub static TIME: VariableUnit =
 /// Pa.
 pub static PRESSURE: VariableUnit =
     VariableUnit { name: "Pa", quantity: "Pressure", exponents: [1, -1, -2, 0, 0], display: &[("MPa", 1e-6)] };
-/// Pa, of stresses.
+/// Pa, for stresses.
 pub static STRESS: VariableUnit =
     VariableUnit { name: "Pa", quantity: "Stress", exponents: [1, -1, -2, 0, 0], display: &[("MPa", 1e-6)] };
 /// N.
@@ -66,7 +66,7 @@ pub static STEP_DERIVATIVES: Enumeration = Enumeration {
     ],
 };
 
-/// K; temperatures are differences from the reference, so that there is no degC.
+/// K; without degC, since temperatures are differences from the reference.
 pub static TEMPERATURE: VariableUnit =
     VariableUnit { name: "K", quantity: "TemperatureDifference", exponents: [0, 0, 0, 0, 1], display: &[] };
 /// N/m.

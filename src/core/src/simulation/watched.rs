@@ -1,8 +1,9 @@
-//! Clearance of watched points: the gap of a point that touches nothing to the surface that it faces, at communication points.
+//! Clearance of watched points: the gap between a point without contact and the surface that it faces, at communication points.
 //!
-//! A point faces the surface that the contact node nearest to it meets. Its gap is that of a contact node at its place, at the
-//! displacements of the instant. A surface of revolution runs parallel to the tip contour, which is known at the contact nodes: between
-//! two of them it is the cubic with their radii and slopes (straight where a ROM has no slopes), beyond them straight. A point off the contour is as much nearer or farther.
+//! A point faces the surface of the contact node that is nearest to it. Its gap is that of a contact node at its place, at the current
+//! displacements. A surface of revolution runs parallel to the tip contour, which is known at the contact nodes: between two of them it is
+//! the cubic with their radii and slopes (straight if a ROM has no slopes), beyond them it is straight. For a point off the contour the gap
+//! changes by its distance from the contour.
 
 use crate::gaps::layout::Layout;
 use crate::gaps::wrench::At;
@@ -15,7 +16,7 @@ use crate::{Result, Rom};
 use super::Simulation;
 use super::compile::Compiled;
 
-/// Distance of a point from the place where its gap function has it (m, outwards), and the factor of arcs there.
+/// Distance of a point from the place at which its gap function is evaluated (m, outwards), and the factor of arcs there.
 type Raised = (f64, f64);
 
 /// Watched points of a structure that face one surface.
@@ -23,9 +24,9 @@ type Raised = (f64, f64);
 struct WatchedPair {
     body: usize,
     pair: usize,
-    /// Which of the watched points these are.
+    /// Indices of these watched points.
     points: Vec<usize>,
-    /// The gap function, of all watched points of the structure.
+    /// Gap function of all watched points of the structure.
     law: GapLaw,
     /// Offsets of the watched points.
     raised: Vec<Raised>,
@@ -35,17 +36,17 @@ struct WatchedPair {
 #[derive(Debug, Clone, Default)]
 pub struct WatchedGaps {
     facing: Vec<WatchedPair>,
-    /// Sectors that are watched (0-based).
+    /// Watched sectors (0-based).
     sectors: Vec<usize>,
     /// Clearances of each structure (m), `[point · watched sectors + watched sector]`.
     clearances: Vec<Vec<f64>>,
 }
 
 impl WatchedGaps {
-    /// At rest nothing is known yet.
+    /// Creates the clearances at rest, which are not known yet.
     ///
     /// # Errors
-    /// The errors of the gap functions.
+    /// Errors of the gap functions.
     pub fn new(compiled: &Compiled) -> Result<Self> {
         let watched = &compiled.scene.settings.outputs.watched_sectors;
         let sectors: Vec<usize> = watched.iter().map(|sector| sector - 1).collect();
@@ -100,7 +101,7 @@ impl WatchedGaps {
 }
 
 impl WatchedPair {
-    /// Take the surface to where it is now.
+    /// Moves the surface to its current position.
     fn follow(&mut self, system: &System, pair: &ContactPair) {
         let GapLaw::Spline(law) = &mut self.law else { return };
         let carried = pair.carrier().map_or(&[][..], |carrier| {
@@ -124,7 +125,7 @@ impl WatchedPair {
 }
 
 impl Simulation {
-    /// Clearances of watched points at the instant reached.
+    /// Finds the clearances of watched points at the instant reached.
     pub(super) fn find_watched(&mut self) {
         if self.watched_gaps.facing.is_empty() {
             return;
@@ -135,7 +136,7 @@ impl Simulation {
     }
 }
 
-/// The gap function of watched points, and how they stand to it; `None` where there is no surface around an axis.
+/// Returns the gap function of watched points, and their offsets; `None` if there is no surface around an axis.
 fn of_points(law: GapLaw, rom: &Rom, watched: &WatchedPoints) -> Result<Option<(GapLaw, Vec<Raised>)>> {
     let mut places: Vec<[f64; 3]> = watched.points.iter().map(|point| point.position).collect();
     let on_contour = |law: &RevolutionGap| -> Vec<(f64, f64)> {
@@ -175,8 +176,8 @@ fn nearest(nodes: &[ContactNode], point: &ContactNode) -> usize {
     all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
 }
 
-/// Radius (m) of the tip contour at an axial position (m), from those of the contact nodes of a pair, and the slope that the surface has
-/// there, whose own at the nodes are `slopes`.
+/// Radius (m) of the tip contour at an axial position (m), from the contact nodes of a pair, and the slope of the surface there; `slopes`
+/// are those of the surface at the nodes.
 fn contour(nodes: &[ContactNode], slopes: &[f64], members: &[usize], z: f64) -> (f64, f64) {
     let axial = |node: usize| nodes[node].position[2];
     let below = members.iter().copied().filter(|node| axial(*node) <= z).max_by(|a, b| axial(*a).total_cmp(&axial(*b)));

@@ -1,4 +1,4 @@
-//! What is gathered over one communication step: impulses, extremes, friction heat.
+//! Sums over one communication step: impulses, extremes, friction heat.
 
 use super::patches::HeatPatches;
 use super::slave_surface::Lining;
@@ -8,7 +8,7 @@ use crate::persist::persist_fields;
 use crate::settings::OutputSettings;
 use crate::system::{Structure, System};
 
-/// Sums and extremes of a touching structure since the communication step began, `[node · lanes + lane]`.
+/// Sums and extremes of a master since the communication step began, `[node · lanes + lane]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodyWindow {
     /// Smallest gap of every node (m).
@@ -19,40 +19,40 @@ pub struct BodyWindow {
     pub tangential_impulse: Vec<f64>,
     /// ∫F dt along fixed x, y, z (N·s).
     pub force_impulse: [f64; 3],
-    /// ∫M dt about fixed x, y, z (N·m·s): through the shaft's centre, or about the origin where nothing turns.
+    /// ∫M dt about fixed x, y, z (N·m·s): through the centre of the shaft, or about the origin if there is no rotation.
     pub moment_impulse: [f64; 3],
 }
 
 /// Sums and extremes of a contact pair.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairWindow {
-    /// ∫F dt on what touches, along x, y, z (N·s).
+    /// ∫F dt on the master, along x, y, z (N·s).
     pub force_impulse: [f64; 3],
-    /// ∫M dt (N·m·s), about the same point as that of the structure.
+    /// ∫M dt (N·m·s), about the same point as for the structure.
     pub moment_impulse: [f64; 3],
     /// Friction heat (J).
     pub friction_heat: f64,
-    /// The same per patch; empty where the scene has none.
+    /// Friction heat per patch (J); empty if the scene has no patches.
     pub patch_heat: Vec<f64>,
-    /// ∫M dt on what touches about the origin (N·m·s); empty unless asked for.
+    /// ∫M dt on the master about the origin (N·m·s); empty unless requested.
     pub casing_moment: Vec<f64>,
 }
 
-/// Sums of a structure that carries surfaces, per mode.
+/// Sums of a surface carrier, per mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SupportWindow {
     /// ∫q dt.
     pub moved: Vec<f64>,
     /// Velocity when the communication step began.
     pub speeds: Vec<f64>,
-    /// ∫M dt of the contact forces on what touches, beyond that of the same forces on the mesh (N·m·s).
+    /// ∫M dt of the contact forces on the master, beyond that of the same forces on the mesh (N·m·s).
     pub lining: [f64; 3],
 }
 
 /// Sums and extremes since the communication step began.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepWindow {
-    /// Windows of the structures that touch.
+    /// Windows of the masters.
     pub bodies: Vec<BodyWindow>,
     /// Windows of the pairs.
     pub pairs: Vec<PairWindow>,
@@ -70,7 +70,7 @@ persist_fields!(SupportWindow { moved, speeds, lining });
 persist_fields!(StepWindow { bodies, pairs, supports, friction_heat, normal_peak });
 
 impl StepWindow {
-    /// Room for the contact nodes of all structures and the patches of all pairs.
+    /// Allocates sums for the contact nodes of all structures and the patches of all pairs.
     pub fn new(structures: &[Structure], patches: &[Option<HeatPatches>], outputs: &OutputSettings) -> Self {
         let body = |structure: &Structure| {
             let len = structure.gaps().len();
@@ -103,7 +103,7 @@ impl StepWindow {
         }
     }
 
-    /// Begin anew; the gaps at the beginning belong to the window.
+    /// Starts a new window, which includes the gaps at its beginning.
     pub fn open(&mut self, structures: &[Structure]) {
         for (body, structure) in self.bodies.iter_mut().zip(structures) {
             body.lowest.copy_from_slice(structure.gaps());
@@ -128,7 +128,7 @@ impl StepWindow {
         (self.friction_heat, self.normal_peak) = (0.0, 0.0);
     }
 
-    /// Add the internal step just done, of length `step` (s).
+    /// Adds the last internal step, of length `step` (s).
     pub fn add(&mut self, system: &System, (patches, linings): (&[Option<HeatPatches>], &[Option<Lining>]), step: f64) {
         for (body, structure) in self.bodies.iter_mut().zip(system.structures()) {
             for (lowest, gap) in body.lowest.iter_mut().zip(structure.lowest_gaps()) {
@@ -138,7 +138,7 @@ impl StepWindow {
         let carriers = system.structures().iter().filter(|structure| structure.nodes() == 0);
         for (support, structure) in self.supports.iter_mut().zip(carriers) {
             for (mode, moved) in support.moved.iter_mut().enumerate() {
-                // Forces of the step are those of its beginning.
+                // Forces of the step belong to its beginning.
                 let (now, increment) = structure.modes().modal_state(mode, 0);
                 *moved += step * (now - increment);
             }
@@ -183,7 +183,7 @@ impl StepWindow {
     }
 }
 
-/// Velocity of a mode of a structure under a surface.
+/// Velocity of a mode of a surface carrier.
 pub fn speed_of(structure: &Structure, mode: usize) -> f64 {
     let step = structure.modes().step();
     if step > 0.0 { structure.modes().modal_state(mode, 0).1 / step } else { 0.0 }

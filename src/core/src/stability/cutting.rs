@@ -1,5 +1,5 @@
-//! Growth of vibration while tips cut: the force of a cut follows its depth like a spring, but pulls along the way too, which is no
-//! spring. Waves that an earlier blade left, which a later one cuts (regenerative chatter), are not looked at.
+//! Growth of vibration while tips cut: the force of a cut increases with its depth like a spring force, but it also has a tangential part,
+//! which no spring has. Waves that an earlier blade left and a later one cuts (regenerative chatter) are not checked.
 
 use nalgebra::DMatrix;
 
@@ -8,8 +8,8 @@ use super::held::general_eigenvalues;
 use super::{ContactDirections, directional_modes};
 use crate::dynamics::modal::ModalModel;
 
-/// The motion that grows fastest with the contacts of `directions` cutting fresh coating: normal forces Sδ of the depths δ (S in
-/// N/m), and `tangential` times as much against the way. `None` for models too large for dense eigenvalues.
+/// Returns the motion that grows fastest with the contacts of `directions` cutting fresh coating: normal forces Sδ of the depths δ (S in
+/// N/m), and `tangential` times as much against the sliding direction. `None` for models too large for dense eigenvalues.
 pub fn growth(
     model: &ModalModel,
     directions: &ContactDirections,
@@ -22,7 +22,7 @@ pub fn growth(
     }
     let (normals, forces) = directional_modes(model, tangential, directions);
     let cut = forces.transpose() * (stiffness * &normals);
-    // In units of the fastest mode, held by the cut or not.
+    // In units of the fastest mode, including the stiffness of the cut.
     let unit = 1.0 / (model.largest_frequency().powi(2) + cut.norm()).sqrt();
     let mut flow = DMatrix::zeros(2 * size, 2 * size);
     flow.view_mut((0, size), (size, size)).fill_with_identity();
@@ -60,7 +60,7 @@ mod tests {
         }
     }
 
-    /// A radial and a tangential mode of one frequency do not couple back: nothing grows. Coupled by an oblique third they flutter.
+    /// A radial and a tangential mode of one frequency do not couple back, so nothing grows. Coupled by an oblique third mode they flutter.
     #[test]
     fn coupled_modes_of_similar_frequency_flutter_when_cutting() {
         let spring = DMatrix::from_element(1, 1, 1e6);

@@ -1,4 +1,4 @@
-//! Growth of contact that is closed and slides: of the equations, and of the scheme.
+//! Growth of closed sliding contact: by the differential equations, and by the scheme.
 
 use nalgebra::Complex;
 
@@ -18,7 +18,7 @@ pub const GROWTH_UP_TO: usize = 150;
 pub struct Fastest {
     /// Re s (1/s).
     pub rate: f64,
-    /// |Im s| (rad/s); 0: it grows without swinging.
+    /// |Im s| (rad/s); 0 for growth without oscillation.
     pub frequency: f64,
 }
 
@@ -27,31 +27,31 @@ pub struct Fastest {
 pub struct GrowthRates {
     /// Rate of the constrained differential equations (1/s); positive means flutter.
     pub continuous: f64,
-    /// Angular frequency of that motion (rad/s); 0: it grows without swinging.
+    /// Angular frequency of that motion (rad/s); 0 for growth without oscillation.
     pub frequency: f64,
     /// Rate of the constrained step map (1/s).
     pub stepped: f64,
-    /// Angular frequency of that motion (rad/s), as its samples have it: at most π/h.
+    /// Angular frequency of that motion (rad/s) as sampled: at most π/h.
     pub swing: f64,
     /// Rates below this are rounding of the eigenvalue solver (1/s).
     pub noise: f64,
 }
 
 impl GrowthRates {
-    /// Growth that the scheme adds to that of the equations (1/s), 0 where it adds none.
+    /// Growth that the scheme adds to that of the differential equations (1/s), 0 if it adds none.
     pub fn added(&self) -> f64 {
         let added = self.stepped - self.continuous.max(0.0);
         if added > self.noise { added } else { 0.0 }
     }
 
-    /// The equations themselves are unstable.
+    /// Returns whether the differential equations themselves are unstable.
     pub fn is_flutter(&self) -> bool {
         self.continuous > self.noise
     }
 }
 
-/// Growth with all contacts of `directions` closed and sliding; `None` without friction, for models too large for dense
-/// eigenvalues, and where the contacts are redundant.
+/// Computes the growth with all contacts of `directions` closed and sliding; `None` without friction, for models too large for dense
+/// eigenvalues, and if the contacts are redundant.
 pub fn growth(
     model: &ModalModel,
     scheme: Scheme,
@@ -63,8 +63,8 @@ pub fn growth(
     stepped(model, scheme, step, friction, directions, continuous)
 }
 
-/// Growth of the differential equations, exact to a small part of what counts as rounding at steps up to `step` (s); `None` as with
-/// [`growth`].
+/// Computes the growth of the differential equations, exact to a small part of what counts as rounding at steps up to `step` (s); `None` as
+/// with [`growth`].
 pub fn continuous(
     model: &ModalModel,
     scheme: Scheme,
@@ -72,7 +72,7 @@ pub fn continuous(
     friction: f64,
     directions: &ContactDirections,
 ) -> Option<Fastest> {
-    // Beyond ω_max h = 2 the matrix would lose its balance.
+    // Beyond ω_max h = 2 the matrix would be badly balanced.
     let unit = step.min(2.0 / model.largest_frequency());
     let held = || HeldContacts::continuous(model, scheme, unit, friction, directions);
     let eigenvalues = eigenvalues(&is_looked_at(model, friction).then(held)?)?;
@@ -80,9 +80,9 @@ pub fn continuous(
     Some(Fastest { rate: rate / unit, frequency: frequency / unit })
 }
 
-/// The same without the mass of the contact nodes, their highest modes quasi-static: the limit in which contact nodes are no lumps.
-/// `None` where the model leaves no mode with inertia, and where the flexibility that is left to the contacts is no P-matrix with this
-/// friction: there the limit has no solution, and what grows without bounds would not show.
+/// Computes the growth without the mass of the contact nodes, with their highest modes quasi-static: the limit of contact nodes without
+/// lumped mass. `None` if the model has no other mode with inertia, and if the remaining flexibility of the contacts is no P-matrix with
+/// this friction: then the limit has no solution, and unbounded growth would not be visible.
 pub fn without_node_mass(
     model: &ModalModel,
     step: f64,
@@ -97,7 +97,7 @@ pub fn without_node_mass(
     continuous(model, scheme, step, friction, directions).filter(|found| found.rate.is_finite())
 }
 
-/// [`growth`] where that of the differential equations is known.
+/// Computes [`growth`] for a known growth of the differential equations.
 pub fn stepped(
     model: &ModalModel,
     scheme: Scheme,
@@ -146,7 +146,7 @@ fn is_looked_at(model: &ModalModel, friction: f64) -> bool {
     friction != 0.0 && model.len() <= GROWTH_UP_TO
 }
 
-/// Steps at which growth is looked at, from `largest` down to where every mode is resolved well (at most 12 octaves).
+/// Steps at which growth is checked, from `largest` down to the step that resolves every mode well (at most 12 octaves).
 pub fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
     let resolved = 0.1 / frequency;
     std::iter::successors(Some(largest), |step| Some(step * std::f64::consts::FRAC_1_SQRT_2))
@@ -154,8 +154,8 @@ pub fn growth_steps(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
         .take(24)
 }
 
-/// Returns the eigenvalues: for few contacts by [`secular`], else, and where that proves nothing, from the dense matrix. At least one of each complex
-/// pair; `None` if the contacts are redundant.
+/// Returns the eigenvalues: for few contacts by [`secular`], and otherwise, or if that proves nothing, from the dense matrix. At least one
+/// of each complex pair; `None` if the contacts are redundant.
 fn eigenvalues(held: &HeldContacts) -> Option<Vec<Complex<f64>>> {
     secular::eigenvalues(held).or_else(|| held.dense_eigenvalues())
 }
@@ -168,8 +168,8 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
     use tiprub_test_models::SeededRandom;
 
-    /// A structure of at least two modes more than `contacts`, with what makes eigenvalues hard to find: equal and rigid modes,
-    /// modes that contact does not see or hardly, damping of all sizes.
+    /// Random structure with at least two modes more than `contacts`, and with properties that make eigenvalues hard to find: equal and
+    /// rigid modes, modes with little or no contact participation, damping of all sizes.
     fn anything(random: &mut SeededRandom, contacts: usize) -> ModalModel {
         let modes = 3 * contacts + 2 + random.below(20) + if random.unit() < 0.05 { 40 } else { 0 };
         let mut frequencies: Vec<f64> = (0..modes).map(|_| random.scale(1e3, 1e6)).collect();
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// Zeros of the small determinant against eigenvalues of the dense matrix: growth, and what is concluded from it.
+    /// Zeros of the small determinant against eigenvalues of the dense matrix: growth, and the conclusions from it.
     #[test]
     fn growth_from_determinant_zeros_matches_dense_matrix() {
         let mut random = SeededRandom(37);
@@ -242,7 +242,7 @@ mod tests {
         assert!(verdicts[..3].iter().all(|count| *count > 10), "{verdicts:?}");
     }
 
-    /// Growth per step of the recurrence itself with the contacts closed, over the second half of 4000 steps.
+    /// Growth per step of the recurrence with the contacts closed, over the second half of 4000 steps.
     fn stepped_through(model: &ModalModel, scheme: Scheme, step: f64, directions: &ContactDirections) -> f64 {
         let dynamic = model.dynamic_modes(scheme);
         let coefficients = model.coefficients(scheme, step);
@@ -293,7 +293,7 @@ mod tests {
         let shapes = [[1.0, 0.2, 0.0], [0.3, -0.8, 0.1], [0.7, 0.4, 0.0]];
         for scheme in [Scheme::CentralDifference, Scheme::ModalExact] {
             let model = model(&[900.0, 2300.0, 8000.0], &shapes, 0.0);
-            // Friction so small that it changes nothing but makes the question asked.
+            // Friction so small that it has no effect but enables the check.
             let found = growth(&model, scheme, 1e-4, 1e-12, &radial()).unwrap();
             assert!(found.continuous.abs() < 1e-6 && found.stepped.abs() < 1e-6, "{found:?}");
             assert!(found.added() < 1e-6 && !found.is_flutter());
@@ -314,7 +314,7 @@ mod tests {
         println!("growth rate {continuous} 1/s, stepped {} and {}: order {order}", coarse.stepped, fine.stepped);
         assert!(order > 3.7, "order {order}");
         assert!(fine.is_flutter() && fine.added() < 0.05 * continuous);
-        // Between the two modes that friction couples, and of the samples as of the motion.
+        // Between the two modes that friction couples, both as sampled and in the motion.
         assert!((1000.0..1400.0).contains(&fine.frequency), "{}", fine.frequency);
         assert!((fine.swing / fine.frequency - 1.0).abs() < 1e-4, "{} {}", fine.swing, fine.frequency);
     }
@@ -330,7 +330,7 @@ mod tests {
         }
     }
 
-    /// Without the mass of the node, the rest leans: with µ > 0.5 it yields to no force, and there is no such limit.
+    /// Without the mass of the node, the rest is inclined: with µ > 0.5 it yields to no force, and there is no such limit.
     #[test]
     fn massless_node_that_locks_up_has_no_growth_rate() {
         let leaning = ModalModel { quasi_static: 1, ..model(&[1e3, 1e5], &[[1.0, 0.2, 0.0], [0.5, -1.0, 0.0]], 0.01) };

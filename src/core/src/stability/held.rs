@@ -1,4 +1,4 @@
-//! Oscillators held by closed contacts: what a structure in closed, sliding contact comes to, with time continuous or stepped.
+//! Oscillators constrained by closed contacts: a structure in closed sliding contact, in continuous time or in steps.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -6,7 +6,7 @@ use super::{ContactDirections, directional_modes};
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
 
-/// (s² + a s + b) q = (1 + γs) c φ_fᵀF of each mode, where the contacts see no gap: Σ φ_n q + R F = 0.
+/// (s² + a s + b) q = (1 + γs) c φ_fᵀF of each mode, while the contacts have zero gap: Σ φ_n q + R F = 0.
 #[derive(Debug, Clone)]
 pub struct HeldContacts {
     /// φ_n and φ_f, contacts × modes.
@@ -14,14 +14,14 @@ pub struct HeldContacts {
     pub forces: DMatrix<f64>,
     /// a, b, c of each mode.
     pub modes: Vec<[f64; 3]>,
-    /// R of the modes without inertia, contacts²; where all have it none.
+    /// R of the modes without inertia, contacts²; `None` if there are none.
     pub residual: Option<DMatrix<f64>>,
-    /// γ: forces act a step after they are found.
+    /// γ: forces act one step after they are computed.
     pub late: f64,
 }
 
 impl HeldContacts {
-    /// The modes of a model under a scheme with all contacts of `directions` closed and sliding.
+    /// Creates the modes of a model under a scheme with all contacts of `directions` closed and sliding.
     fn new(
         model: &ModalModel,
         scheme: Scheme,
@@ -49,7 +49,7 @@ impl HeldContacts {
         }
     }
 
-    /// The differential equations, s per `step` (s).
+    /// Creates the problem of the differential equations, with s per `step` (s).
     pub fn continuous(
         model: &ModalModel,
         scheme: Scheme,
@@ -64,7 +64,7 @@ impl HeldContacts {
         Self::new(model, scheme, friction, directions, mode, 0.0)
     }
 
-    /// The recurrence q⁺ = q + d⁺, d⁺ = βd − κq + cφ_fᵀF, which multiplies a motion by 1 + s per step.
+    /// Creates the problem of the recurrence q⁺ = q + d⁺, d⁺ = βd − κq + cφ_fᵀF, which multiplies a motion by 1 + s per step.
     pub fn stepped(
         model: &ModalModel,
         scheme: Scheme,
@@ -130,9 +130,9 @@ impl HeldContacts {
     }
 }
 
-/// Eigenvalues of a general matrix; `None` where the iteration does not end (entries of extreme size).
+/// Eigenvalues of a general matrix; `None` if the iteration does not converge (entries of extreme size).
 pub(super) fn general_eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
-    // Of nothing there are none; the iteration would look for its last row.
+    // An empty matrix has none; the iteration would access its last row.
     if matrix.is_empty() {
         return Some(Vec::new());
     }

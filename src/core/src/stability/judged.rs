@@ -1,22 +1,22 @@
-//! What growth that the step adds does to a run.
+//! Effect on a run of the growth that the step adds.
 //!
-//! A motion that grows moves contact until contact opens: then its contact force is as large as what presses the contact, and it
-//! is displaced by no more than the share of the static flexibility that modes of its frequency and above have. Growth of a
-//! contact node on its own small mass at hundreds of kilohertz therefore displaces nothing to speak of, whatever its rate, and
-//! growth of bending moves the blade. What is smaller than [`TOLERANCE`] of the clearance does not matter: so growth at a rate σ
-//! is of interest for ln(1/tolerance)/σ, and shorter where contact opens sooner.
+//! A growing motion moves contact until contact opens: then its contact force is as large as the force that presses the contact, and its
+//! displacement is at most the fraction of the static flexibility that belongs to modes of its frequency and above. Growth of a contact
+//! node on its own small mass at hundreds of kilohertz therefore causes hardly any displacement, at any rate, and growth of bending moves
+//! the blade. Displacements below [`TOLERANCE`] of the clearance do not matter: so growth at a rate σ matters for ln(1/tolerance)/σ, and
+//! for a shorter time if contact opens sooner.
 
 use super::{ContactDirections, GrowthRates, directional_modes};
 use crate::dynamics::modal::ModalModel;
 use crate::settings::Scheme;
 
-/// Share of the clearance below which displacements do not matter.
+/// Fraction of the clearance below which displacements do not matter.
 pub const TOLERANCE: f64 = 1e-3;
-/// Errors beyond this share of what contact displaces are told.
+/// Errors above this fraction of the contact displacement are reported.
 pub const TOLD: f64 = 0.01;
-/// Errors beyond this share are refused where the step makes more of the growth than the equations.
+/// Errors above this fraction are rejected if the step increases the growth beyond that of the differential equations.
 pub const REFUSED: f64 = 0.05;
-/// Modes that take part in a motion may lie so much below its frequency: half an octave.
+/// Modes may contribute to a motion if their frequency is at least this fraction of its frequency: half an octave below.
 const BELOW: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Growth of one set of closed contacts at one step.
@@ -24,15 +24,15 @@ const BELOW: f64 = std::f64::consts::FRAC_1_SQRT_2;
 pub struct SetGrowth {
     /// Growth rates of the set.
     pub growth: GrowthRates,
-    /// Share of the static flexibility that modes of the stepped motion's frequency and above have.
+    /// Fraction of the static flexibility that belongs to modes of the stepped motion's frequency and above.
     pub share: f64,
 }
 
-/// Samples that turn by more than this per step (rad) are of no motion of the equations.
+/// Samples that turn by more than this per step (rad) do not represent a motion of the differential equations.
 const ALTERNATES: f64 = 0.9 * std::f64::consts::PI;
 
 impl SetGrowth {
-    /// The growth of a model under a scheme with a step (s), with all contacts of `directions` closed.
+    /// Computes the growth of a model under a scheme with a step (s), with all contacts of `directions` closed.
     pub fn new(
         model: &ModalModel,
         scheme: Scheme,
@@ -40,25 +40,26 @@ impl SetGrowth {
         directions: &ContactDirections,
         growth: GrowthRates,
     ) -> Self {
-        // Contact forces that act a step late make motions of their own, beyond the frequencies of all modes. So do those that
-        // change sign from step to step. Samples of central differences swing faster than what they are of.
+        // Contact forces that act a step late cause motions of their own, above the frequencies of all modes. So do motions that change
+        // sign from step to step. With central differences the sampled frequency is higher than the frequency of the motion.
         let is_of_step = scheme.acts_later() || growth.swing * step > ALTERNATES;
         let frequency = growth.swing.min(model.largest_frequency());
         let share = if is_of_step { 1.0 } else { share_of(model, directions, frequency) };
         Self { growth, share }
     }
 
-    /// Returns the largest error of the motion by the step, as a fraction of what contact displaces, while contact stays closed for a time (s).
+    /// Returns the largest error of the motion by the step, as a fraction of the contact displacement, while contact stays closed for a
+    /// time (s).
     pub fn error(&self, closed: f64) -> f64 {
         -self.share * libm::expm1(-self.growth.added() * closed.min(self.grown()))
     }
 
-    /// Time in which growth takes what does not matter to where contact opens (s).
+    /// Time in which a negligible motion grows until contact opens (s).
     fn grown(&self) -> f64 {
         -libm::log(TOLERANCE) / self.growth.stepped.max(f64::MIN_POSITIVE)
     }
 
-    /// Longest time (s) that contact may stay closed with this error at most; infinite where the error never exceeds it.
+    /// Longest time (s) for which contact may stay closed with at most this error; infinite if the error never exceeds it.
     pub fn within(&self, error: f64) -> f64 {
         if self.error(f64::INFINITY) <= error {
             return f64::INFINITY;
@@ -66,15 +67,15 @@ impl SetGrowth {
         -libm::log1p(-error / self.share) / self.growth.added()
     }
 
-    /// Longest time (s) that contact may stay closed without a refusal; infinite where nothing is refused.
+    /// Longest time (s) for which contact may stay closed without rejection; infinite if nothing is rejected.
     pub fn allowed(&self) -> f64 {
         let by_equations = self.growth.added() <= self.growth.continuous.max(0.0);
         if by_equations { f64::INFINITY } else { self.within(REFUSED) }
     }
 }
 
-/// Share of the static flexibility along the normals that modes of an angular frequency (rad/s) and above have, those half an octave
-/// below included: of the contact with most.
+/// Fraction of the static flexibility along the normals that belongs to modes of an angular frequency (rad/s) and above, including half an
+/// octave below: of the contact with the largest fraction.
 pub fn share_of(model: &ModalModel, directions: &ContactDirections, frequency: f64) -> f64 {
     let frequency = BELOW * frequency;
     if frequency <= 0.0 || model.frequencies.contains(&0.0) {
@@ -112,8 +113,8 @@ mod tests {
         }
     }
 
-    /// The contact pressed by 1 at rest, and disturbed by a tolerance: whether it ever opens, and how far the node goes from its place,
-    /// as a share of what contact displaces it, over so many steps. `None` where the contact problem has no solution.
+    /// Simulates the contact, pressed by 1 at rest and disturbed by a tolerance: whether it ever opens, and the largest deviation of the
+    /// node as a fraction of the contact displacement, over a number of steps. `None` if the contact problem has no solution.
     fn march(model: &ModalModel, scheme: Scheme, step: f64, friction: f64, steps: usize) -> Option<(bool, f64)> {
         let coefficients = model.coefficients(scheme, step);
         let (normals, forces) = directional_modes(model, friction, &radial());
@@ -145,7 +146,7 @@ mod tests {
         Some((opens, most))
     }
 
-    /// Contact that the equations bring to rest: steps that are accepted leave it there, and those that are refused let it go.
+    /// Contact that comes to rest by the differential equations: accepted steps leave it at rest, and rejected steps do not.
     #[test]
     fn accepted_steps_keep_contact_closed_and_rejected_open_it() {
         let mut random = SeededRandom(11);
@@ -188,7 +189,7 @@ mod tests {
         for (frequency, share) in [(1400.0, 1.0), (1430.0, 0.2), (2800.0, 0.2), (2850.0, 0.0)] {
             assert!((share_of(&model, &radial(), frequency) - share).abs() < 1e-15, "{frequency}");
         }
-        // A force that acts a step late makes motions of its own: no mode bounds them.
+        // A force that acts a step late causes motions of its own, which no mode bounds.
         let growth = GrowthRates { continuous: -1.0, frequency: 0.0, stepped: 1.0, swing: 1430.0, noise: 0.0 };
         let share = |scheme: Scheme| SetGrowth::new(&model, scheme, 1e-5, &radial(), growth).share;
         let [exact, massless] = [Scheme::ModalExact, Scheme::MasslessBoundary].map(share);
@@ -205,7 +206,7 @@ mod tests {
         assert!((of(-5.0, 10.0, 0.5).error(1e-4) / 5e-4 - 1.0).abs() < 1e-3);
         assert!(of(-5.0, 10.0, 1.0).allowed() < of(-5.0, 1.0, 1.0).allowed());
         assert!((of(-5.0, 10.0, 1.0).error(of(-5.0, 10.0, 1.0).allowed()) / REFUSED - 1.0).abs() < 1e-9);
-        // What has no flexibility displaces nothing, and what the equations make most of is told only.
+        // Contact without flexibility causes no displacement, and growth mainly by the differential equations is only reported.
         assert!(of(-5.0, 1e5, 0.9 * REFUSED).allowed().is_infinite());
         let flutter = of(1000.0, 1500.0, 1.0);
         assert!(flutter.allowed().is_infinite() && flutter.within(TOLD) < 1e-4);

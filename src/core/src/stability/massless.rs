@@ -1,15 +1,16 @@
-//! The step limit of massless-boundary: explicit, but without the inertia of the contact nodes.
+//! Step limit of massless-boundary, which is explicit but without the inertia of the contact nodes.
 //!
-//! Closed contact makes the residual flexibility G of the quasi-static modes a spring on the modes with inertia:
-//! K_c = Φ_nᵀ G_nn⁻¹ Φ_n. Their step q⁺ − (1 + β)q + βq⁻ = −C(Λ + K_c)q, C = diag(c), is that of the masses ½(1 + β) with
-//! dashpots, and stable while the largest eigenvalue µ of D + X½ K_c X½ is below 4, with X = 2(1 + β)⁻¹C and D = XΛ.
+//! Closed contact makes the residual flexibility G of the quasi-static modes a spring on the modes with inertia: K_c = Φ_nᵀ G_nn⁻¹ Φ_n.
+//! Their step q⁺ − (1 + β)q + βq⁻ = −C(Λ + K_c)q, C = diag(c), is that of the masses ½(1 + β) with dashpots, and is stable while the
+//! largest eigenvalue µ of D + X½ K_c X½ is below 4, with X = 2(1 + β)⁻¹C and D = XΛ.
 //!
-//! A flexible slave has its own D_s < 4 and X_s, several slaves under one blade have those of all their modes. With the modes of both, and U = L⁻¹[Φ_n X½, Ψ_n X_s½], G_nn = L Lᵀ, all
-//! eigenvalues are below 4 while those of the sum over modes U(4 − D)⁻¹Uᵀ are below 1. The part of the master has none above
-//! µ/4, so that the slave adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ, per blade in contact.
+//! A flexible slave has its own D_s < 4 and X_s; several slaves under one blade have those of all their modes. With the modes of both, and
+//! U = L⁻¹[Φ_n X½, Ψ_n X_s½], G_nn = L Lᵀ, all eigenvalues are below 4 while those of the sum over modes U(4 − D)⁻¹Uᵀ are below 1. The part
+//! of the master has no eigenvalue above µ/4, so that the slave adds the largest eigenvalue of G_nn⁻¹ Ψ_n X_s(1 − D_s/4)⁻¹ Ψ_nᵀ to µ, per
+//! blade in contact.
 //!
-//! Steps may be of any length up to the limit, and a mode comes closest to D = 4 at ω_d h = π: each counts with the worst it does
-//! at steps up to h. Of that alone 4 is not reached, since what contact does not see it does not drive.
+//! Steps may have any length up to the limit, and a mode comes closest to D = 4 at ω_d h = π: each mode counts with its worst case at steps
+//! up to h. By itself this does not reach 4, since contact does not excite modes in which it does not participate.
 
 use nalgebra::DMatrix;
 
@@ -21,29 +22,29 @@ use crate::stability::{OTHER_SCHEME, shorter};
 use crate::warning::Topic;
 use crate::{Error, Result, Warning};
 
-/// Margin under the limit.
+/// Margin below the limit.
 const MARGIN: f64 = 1e-6;
-/// Share of the limit up to which steps are accepted. Closed contact is stable up to the limit, but a node that opens and
-/// closes switches between two springs, which pumps energy in bands of step sizes. Twelve blades pressed on a round
-/// casing for 0.1 s with 1e-3 of damping gain no energy at 0.8 of the limit, hundreds of times their energy at 0.85.
+/// Fraction of the limit up to which steps are accepted. Closed contact is stable up to the limit, but a node that opens and closes
+/// switches between two springs, which pumps energy in bands of step sizes. Twelve blades pressed on a round casing for 0.1 s with 1e-3 of
+/// damping gain no energy at 0.8 of the limit, and hundreds of times their energy at 0.85.
 const USABLE: f64 = 0.8;
-/// The same where closed contact is much stiffer than the modes with inertia, whose damping then has too little hold on what
-/// bounces: nodes a hundred times as stiff as their base settle there with a damping ratio of 0.02, and not from 0.5 on.
+/// Fraction of the limit if closed contact is much stiffer than the modes with inertia, whose damping then has too little effect on
+/// bouncing nodes: nodes a hundred times as stiff as their base settle there with a damping ratio of 0.02, but not from 0.5 on.
 pub const USABLE_STIFF: f64 = 0.25;
-/// Ratio of the squares of the highest frequency with closed contact and without from which contact counts as stiff: at 10
-/// a damping ratio of 0.02 brings the same nodes to rest up to 0.8 of the limit.
+/// Ratio of the squares of the highest frequency with and without closed contact above which contact counts as stiff: at 10 a damping ratio
+/// of 0.02 brings the same nodes to rest up to 0.8 of the limit.
 const STIFF: f64 = 10.0;
-/// From here on nothing helps: at 1000 the same nodes keep bouncing at 0.2 of the limit, with forces that mean nothing.
+/// Ratio above which every step is rejected: at 1000 the same nodes keep bouncing at 0.2 of the limit, with meaningless forces.
 const TOO_STIFF: f64 = 300.0;
-/// Share of the limit up to which the same blades gain none without damping either: at 0.5 it is a fifth of theirs.
+/// Fraction of the limit up to which the same blades gain no energy without damping: at 0.5 they gain a fifth of their energy.
 pub const QUIET: f64 = 0.4;
 
-/// Steps (s) at which the scheme meets its limits.
+/// Step limits of the scheme (s).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MasslessLimit {
-    /// Closed contact is stable below.
+    /// Closed contact is stable below this step.
     pub closed: f64,
-    /// Contact that opens and closes gains no energy to speak of below.
+    /// Contact that opens and closes gains hardly any energy below this step.
     pub usable: f64,
 }
 
@@ -59,13 +60,13 @@ pub struct MasslessCheck<'a> {
     pub model: &'a ModalModel,
     /// Unit normal of every contact node.
     pub normals: Vec<[f64; 3]>,
-    /// Modes along those normals, nodes × modes, of every structure under the nodes, and the structure.
+    /// Modes of every structure under the nodes along those normals, nodes × modes, and the structure.
     pub slaves: Vec<(DMatrix<f64>, &'a ModalModel)>,
 }
 
 impl MasslessCheck<'_> {
-    /// Bound on the eigenvalues of the closed contact's step at all h up to `step` (s): (master, slave per blade); stable while
-    /// the sum is below 4. `None` where the residual flexibility is singular.
+    /// Bound on the eigenvalues of the step of closed contact at all h up to `step` (s): (master, slave per blade); stable while the sum is
+    /// below 4. `None` if the residual flexibility is singular.
     pub fn eigenvalues(&self, step: f64) -> Option<(f64, f64)> {
         let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
         let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
@@ -101,11 +102,11 @@ impl MasslessCheck<'_> {
         Some((master, slave))
     }
 
-    /// Steps (s) at which closed contact is unstable and up to which the scheme is used, sought up to `largest`; infinite
-    /// if closed contact is stable up to there.
+    /// Returns the steps (s) at which closed contact becomes unstable and up to which the scheme is used, searched up to `largest`;
+    /// infinite if closed contact is stable up to there.
     ///
     /// # Errors
-    /// A residual flexibility that is singular along the normals.
+    /// Residual flexibility that is singular along the normals.
     pub fn limit(&self, largest: f64) -> Result<MasslessLimit> {
         let stiffening = self.stiffening(1e-3 / self.model.largest_frequency());
         if stiffening > TOO_STIFF {
@@ -126,7 +127,7 @@ impl MasslessCheck<'_> {
         Ok(MasslessLimit { closed, usable: share * closed })
     }
 
-    /// By how much closed contact raises the square of the highest frequency of the modes with inertia, at a small step (s).
+    /// Factor by which closed contact raises the square of the highest frequency of the modes with inertia, at a small step (s).
     fn stiffening(&self, step: f64) -> f64 {
         let coefficients = self.model.coefficients(Scheme::MasslessBoundary, step);
         let dynamic = self.model.dynamic_modes(Scheme::MasslessBoundary);
@@ -162,19 +163,19 @@ impl MasslessCheck<'_> {
     }
 }
 
-/// D and X of a mode with inertia, as they are worst at steps up to `step` (s): at ω_d h = π beyond it.
+/// D and X of a mode with inertia in the worst case at steps up to `step` (s): at ω_d h = π if the step exceeds it.
 fn worst(model: &ModalModel, mode: usize, step: f64) -> [f64; 2] {
     let damped = damped_frequency(model.frequencies[mode], model.damping_ratios[mode]);
     let at = model.coefficient(mode, 1.0, Scheme::MasslessBoundary, step.min(std::f64::consts::PI / damped));
     [per_mass(&at, at.kappa).min(4.0 * (1.0 - 2.0 * MARGIN)), per_mass(&at, at.delayed)]
 }
 
-/// A coefficient of the recurrence over its mass ½(1 + β), which damping makes smaller than 1.
+/// A coefficient of the recurrence divided by its mass ½(1 + β), which damping makes smaller than 1.
 fn per_mass(mode: &ModeCoefficients, coefficient: f64) -> f64 {
     2.0 * coefficient / (1.0 + mode.beta)
 }
 
-/// Refusal of a step (s) at or beyond the usable one.
+/// Error for a step (s) at or beyond the usable one.
 pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
     let MasslessLimit { closed, usable } = limit;
     Error::Unstable {
@@ -187,7 +188,7 @@ pub fn refusal(step: f64, limit: MasslessLimit) -> Error {
     }
 }
 
-/// Warning for a step (s) at which contact that opens and closes gains energy unless damping takes it.
+/// Warning for a step (s) at which contact that opens and closes gains energy unless damping dissipates it.
 pub fn warning(step: f64, limit: MasslessLimit) -> Option<Warning> {
     (step >= QUIET * limit.closed).then(|| {
         Warning::new(

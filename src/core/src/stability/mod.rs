@@ -1,18 +1,18 @@
-//! Limits checked before a scene is stepped: refuse with numbers rather than return nonsense.
+//! Limits that are checked before a scene is stepped, so that it is rejected with numbers instead of returning wrong results.
 //!
 //! * Central differences need ω_max h < 2; frictionless closed contact never lowers that limit.
-//! * Modal-exact is stable for any step; its contact answers go wrong all the same: see [`unresolved`].
+//! * Modal-exact is stable for any step, but its contact results may still be wrong: see [`unresolved`].
 //! * The contact problem of a step has one solution for every gap exactly when the Delassus matrix
 //!   W = C_Nᵀ A⁻¹ C_NT is a P-matrix; a positive definite symmetric part is sufficient.
-//! * With contacts closed and sliding, the equations themselves may flutter. What must not happen is that the
-//!   scheme adds growth: the spectral radius of the constrained step map is compared with the growth of the
-//!   constrained differential equation.
+//! * With contacts closed and sliding, the equations themselves may flutter. The scheme must not add growth:
+//!   the spectral radius of the constrained step map is compared with the growth of the constrained
+//!   differential equation.
 
 pub mod cutting;
-pub mod lock_up;
 mod growing;
 mod held;
 pub mod judged;
+pub mod lock_up;
 pub mod massless;
 mod secular;
 pub mod unresolved;
@@ -27,14 +27,14 @@ use crate::settings::Scheme;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, shown};
 
-/// Margin under the limit ω_max h = 2 of central differences.
+/// Margin below the limit ω_max h = 2 of central differences.
 const CENTRAL_MARGIN: f64 = 1e-9;
 /// Largest number of contact nodes for which all principal minors are computed.
 const MINORS_UP_TO: usize = 12;
 /// Minors and eigenvalues of a matrix with unit diagonal below this are zero up to rounding.
 const SINGULAR: f64 = 1e-10;
 
-/// Less friction than this is not proposed: nothing slides with so little.
+/// Smallest friction coefficient that messages propose: no real contact has less.
 const LEAST_FRICTION: f64 = 1e-4;
 
 /// Directions of the closed contacts of one group: (normal, slip direction) per node.
@@ -45,7 +45,7 @@ pub fn central_difference_limit(model: &ModalModel) -> f64 {
     2.0 / model.largest_frequency()
 }
 
-/// W for one group, all nodes closed: rows normals, columns n − µ t.
+/// Returns W for one group with all nodes closed: rows normals, columns n − µ t.
 pub fn delassus(
     model: &ModalModel,
     scheme: Scheme,
@@ -59,7 +59,7 @@ pub fn delassus(
     normals * scaled.transpose()
 }
 
-/// Modes seen along the normals (n·Φ) and along the forces ((n − µt)·Φ), nodes × modes.
+/// Returns the modes along the normals (n·Φ) and along the forces ((n − µt)·Φ), nodes × modes.
 fn directional_modes(
     model: &ModalModel,
     friction: f64,
@@ -79,15 +79,15 @@ fn directional_modes(
     (normals, forces)
 }
 
-/// End of remedies that name another scheme, which a preset may not leave free.
+/// End of remedies that name another scheme, which a preset may not allow.
 pub const OTHER_SCHEME: &str = ", or use the scheme modal-exact";
 
-/// The remedy of a shorter step than this (s), by the names of the scene and of the FMU.
+/// Returns the remedy of a shorter step than this (s), with the names in the scene and in the FMU.
 pub fn shorter(step: f64) -> String {
     format!("Set `time.step` (in the FMU `internal_step_max`) below {step:.6e} s")
 }
 
-/// Refuse step sizes beyond the linear limit of the largest angular `frequency` (rad/s). Allocates only to refuse.
+/// Rejects step sizes beyond the linear limit of the largest angular `frequency` (rad/s). Allocates only to reject.
 ///
 /// # Errors
 /// [`Error::Unstable`] for central differences at or beyond ω_max h = 2.
@@ -105,10 +105,10 @@ pub fn check_step_allowed(frequency: f64, scheme: Scheme, step: f64) -> Result<(
     }
 }
 
-/// [`check_step_allowed`], and a warning for unresolved modes.
+/// Calls [`check_step_allowed`], and returns a warning for unresolved modes.
 ///
 /// # Errors
-/// As there.
+/// As [`check_step_allowed`].
 pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<Warning>> {
     check_step_allowed(frequency, scheme, step)?;
     let product = frequency * step;
@@ -126,8 +126,8 @@ pub fn check_step(frequency: f64, scheme: Scheme, step: f64) -> Result<Option<Wa
     }
 }
 
-/// Steps from the largest down at which solvability is looked at: a communication step may be shorter than the
-/// internal step, and W keeps its shape only once ω_max h ≪ 1.
+/// Steps from the largest down at which solvability is checked: a communication step may be shorter than the internal step, and W keeps its
+/// shape only for ω_max h ≪ 1.
 fn steps_to_check(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
     let resolved = 0.1 / frequency;
     std::iter::successors(Some(largest), |step| Some(0.5 * step)).take(24).scan(true, move |unresolved, step| {
@@ -137,10 +137,10 @@ fn steps_to_check(frequency: f64, largest: f64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Refuse a contact problem without a unique solution at `step` or at any smaller step, in any of the `senses` of slip.
+/// Rejects a contact problem without a unique solution at `step` or at any smaller step, in any of the `senses` of slip.
 ///
 /// # Errors
-/// [`Error::Unstable`] naming µ and h.
+/// [`Error::Unstable`] with µ and h.
 pub fn check_solvable(
     model: &ModalModel,
     scheme: Scheme,
@@ -158,15 +158,14 @@ pub fn check_solvable(
     refuse_unsolvable(solvable, by_minors, step, friction)
 }
 
-/// The same for coupled sectors: `diameters` are all nodal diameters as real structures (see
+/// Rejects such a contact problem of coupled sectors: `diameters` are all nodal diameters as real structures (see
 /// [`CyclicModel::paired`](crate::dynamics::cyclic::CyclicModel::paired)), with the `senses` of slip of each.
 ///
-/// On a round casing W of all nodes of all sectors is block-circulant, and its Fourier blocks are the Delassus matrices of
-/// the nodal diameters: when their symmetric parts are positive definite so is that of W, and hence of every subset of the
-/// contacts.
+/// On a round casing W of all nodes of all sectors is block-circulant, and its Fourier blocks are the Delassus matrices of the nodal
+/// diameters: if their symmetric parts are positive definite so is that of W, and hence that of every subset of the contacts.
 ///
 /// # Errors
-/// [`Error::Unstable`] naming µ and h.
+/// [`Error::Unstable`] with µ and h.
 pub fn check_solvable_together(
     diameters: &[ModalModel],
     scheme: Scheme,
@@ -186,12 +185,12 @@ pub fn check_solvable_together(
     refuse_unsolvable(solvable, false, step, friction)
 }
 
-/// Refusal naming the least friction at which solvability is lost; `exact` tells whether it is really lost there.
+/// Returns the error with the smallest friction coefficient at which solvability is lost; `exact` if it is certainly lost there.
 fn refuse_unsolvable(solvable: impl Fn(f64) -> bool, exact: bool, step: f64, friction: f64) -> Result<()> {
     if friction == 0.0 || solvable(friction) {
         return Ok(());
     }
-    // Solvability is not monotonic in µ: the first µ from 0 on at which it is lost is what helps.
+    // Solvability is not monotonic in µ: the remedy is the first µ from 0 on at which it is lost.
     let part = |index: u32| friction * f64::from(index) / 64.0;
     let first = (1..=64).find(|index| !solvable(part(*index))).unwrap_or(64);
     let (mut low, mut high) = (part(first - 1), part(first));
@@ -223,15 +222,15 @@ fn refuse_unsolvable(solvable: impl Fn(f64) -> bool, exact: bool, step: f64, fri
     })
 }
 
-/// P-matrix test: a positive definite symmetric part suffices, and where few contacts have none all principal minors decide.
-/// Redundant contacts (zero minors up to rounding) are accepted.
+/// P-matrix test: a positive definite symmetric part suffices; otherwise all principal minors decide if there are few contacts. Redundant
+/// contacts (zero minors up to rounding) are accepted.
 fn is_solvable(delassus: &DMatrix<f64>) -> bool {
     let Some(scaled) = scaled(delassus) else { return false };
     let lowest = lowest_of_symmetric_part(&scaled);
     if delassus.nrows() > MINORS_UP_TO { lowest > -SINGULAR } else { lowest > SINGULAR || has_minors(&scaled) }
 }
 
-/// Whether all principal minors are positive, those of redundant contacts apart; takes 2ⁿ determinants.
+/// Returns whether all principal minors are positive, except those of redundant contacts; computes 2ⁿ determinants.
 fn has_minors(scaled: &DMatrix<f64>) -> bool {
     let nodes = scaled.nrows();
     (1..1_usize << nodes).all(|set| {
@@ -241,7 +240,7 @@ fn has_minors(scaled: &DMatrix<f64>) -> bool {
     })
 }
 
-/// W with unit diagonal; `None` where a diagonal entry is not positive, or another one not finite.
+/// W with unit diagonal; `None` if a diagonal entry is not positive, or another one not finite.
 fn scaled(delassus: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let diagonal = delassus.diagonal();
     let entry = |i: usize, j: usize| delassus[(i, j)] / (diagonal[i] * diagonal[j]).sqrt();
@@ -250,7 +249,7 @@ fn scaled(delassus: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     scaled.iter().all(|value| value.is_finite()).then_some(scaled)
 }
 
-/// Whether the symmetric part is positive definite, redundant contacts apart.
+/// Returns whether the symmetric part is positive definite, except for redundant contacts.
 fn is_definite(scaled: &DMatrix<f64>) -> bool {
     lowest_of_symmetric_part(scaled) > -SINGULAR
 }
@@ -305,9 +304,9 @@ mod tests {
         assert!(refusal.to_string().contains("µ below 0.5000"), "{refusal}");
     }
 
-    /// Pressing node 1 pushes the tip of node 2 along its slip: W = c(I + µτ e₂e₁ᵀ), whose symmetric part is definite for
-    /// µτ < 2. Few contacts are solvable beyond, as the minors of a triangular matrix are those of its diagonal; of many that is
-    /// not shown, nor of the nodal diameters of a disk.
+    /// Pressing node 1 pushes the tip of node 2 along its slip: W = c(I + µτ e₂e₁ᵀ), whose symmetric part is definite for µτ < 2. Few
+    /// contacts are solvable beyond this, since the minors of a triangular matrix are those of its diagonal; for many contacts this is not
+    /// proven, nor for the nodal diameters of a disk.
     #[test]
     fn many_contacts_require_a_definite_symmetric_part() {
         let (turned, step) = (2.5, 1e-5);
@@ -340,14 +339,14 @@ mod tests {
         for friction in [0.0, 0.99 * bound] {
             assert!(alone(MINORS_UP_TO + 1, friction).is_ok() && disk(2, friction).is_ok());
         }
-        // Redundant contacts, two nodes that move as one, are no loss: W is singular.
+        // Redundant contacts, such as two nodes that move together, are acceptable: W is singular.
         let mut twice = pressed(MINORS_UP_TO + 1);
         twice.contact_modes.fill_row(0, -1.0);
         twice.contact_modes.fill_row(3, -1.0);
         assert!(check_solvable(&twice, Scheme::ModalExact, step, 0.0, &closed(MINORS_UP_TO + 1)).is_ok());
     }
 
-    /// Two nodes on one mode, of which one leans: the symmetric part of W, 1 − (µτ)²/8 at most, is definite without friction alone.
+    /// Two nodes on one mode, of which one is inclined: the symmetric part of W, 1 − (µτ)²/8 at most, is definite only without friction.
     #[test]
     fn reports_when_no_friction_coefficient_is_safe() {
         let model = ModalModel {
@@ -360,7 +359,7 @@ mod tests {
         assert!(reported.contains("no friction coefficient is safe"), "{reported}");
     }
 
-    /// A definite symmetric part spares the minors: what it lets pass they do, and they alone decide on the rest.
+    /// A definite symmetric part makes the minors unnecessary: they accept every such matrix, and they alone decide on the others.
     #[test]
     fn positive_definite_matrices_have_positive_minors() {
         let mut random = SeededRandom(5);

@@ -1,32 +1,31 @@
-//! Eigenvalues of many oscillators that a few closed contacts hold, as zeros of a small determinant.
+//! Eigenvalues of many oscillators that a few closed contacts constrain, as zeros of a small determinant.
 //!
-//! E(s) = R + (1 + γs) Σ c φ_n φ_fᵀ/(s² + a s + b) maps the forces of k contacts to their gaps, and s is an eigenvalue where E is
-//! singular. With the poles p of the oscillators, P(s) = det E(s) Π (s − p) is a polynomial. Its zeros are found together by the
-//! iteration of Ehrlich and Aberth (O. Aberth, Mathematics of Computation 27, 1973), each sweep over N modes at a cost of N²k²
-//! where a dense eigenvalue problem costs N³ many times over.
+//! E(s) = R + (1 + γs) Σ c φ_n φ_fᵀ/(s² + a s + b) maps the forces of k contacts to their gaps, and s is an eigenvalue if E is singular.
+//! With the poles p of the oscillators, P(s) = det E(s) Π (s − p) is a polynomial. Its zeros are found together by the iteration of Ehrlich
+//! and Aberth (O. Aberth, Mathematics of Computation 27, 1973). Each sweep over N modes costs N²k², whereas a dense eigenvalue problem
+//! costs many times N³.
 //!
-//! What was found is then proven: the discs about all zeros z_i with the radii N |P(z_i)|/|P_N Π (z_i − z_j)| hold all zeros of
-//! P (B. T. Smith, Journal of the ACM 17, 1970). Rounding of E counts as part of |P|. Where a disc is too large nothing is
-//! returned.
+//! The result is then proven: the discs about all zeros z_i with the radii N |P(z_i)|/|P_N Π (z_i − z_j)| contain all zeros of P (B. T.
+//! Smith, Journal of the ACM 17, 1970). Rounding of E counts as part of |P|. If a disc is too large nothing is returned.
 
 use super::held::HeldContacts;
 use nalgebra::Complex;
 
 type Number = Complex<f64>;
 
-/// Largest radius of a disc that holds an eigenvalue, of an accepted result; far below what growth per step is told from rounding.
+/// Largest radius of a disc that contains an eigenvalue, of an accepted result; far below the growth per step that counts as rounding.
 const RADIUS: f64 = 1e-9;
-/// Sweeps until the zeros stand still, and after which a pair that does not is taken for real.
+/// Largest number of sweeps until the zeros converge; a pair that does not converge is then assumed to be real.
 const SWEEPS: usize = 60;
 const REAL_AFTER: usize = 15;
-/// A zero that moves by less is found: the iteration is of third order.
+/// A zero that moves by less has converged: the iteration is of third order.
 const STILL: f64 = 1e-11;
-/// Modes of which contact sees less than this share of the largest are apart from it.
+/// Modes whose contact participation is below this fraction of the largest are treated as decoupled.
 const UNSEEN: f64 = 1e-18;
-/// A leading coefficient that cancels to less than this share of its terms is not trusted.
+/// A leading coefficient that cancels to less than this fraction of its terms is not trusted.
 const CANCELLED: f64 = 1e-6;
 
-/// Eigenvalues, of complex pairs one; `None` where they are not proven, or there are more than three contacts.
+/// Returns the eigenvalues, one of each complex pair; `None` if they are not proven, or there are more than three contacts.
 pub fn eigenvalues(held: &HeldContacts) -> Option<Vec<Number>> {
     match held.contacts() {
         1 => Secular::<1>::new(held)?.eigenvalues(),
@@ -60,14 +59,14 @@ fn roots(a: f64, b: f64) -> ZeroPair {
     [far, if far == 0.0 { 0.0 } else { b / far }].map(|real| Complex::new(real, 0.0))
 }
 
-/// 1/(s − y) + 1/(s − z), and 1/((s − y)(s − z)).
+/// Returns 1/(s − y) + 1/(s − z), and 1/((s − y)(s − z)).
 fn of_pair(s: Number, [y, z]: ZeroPair) -> (Number, Number) {
     let (down, up) = (s - y, s - z);
     let both = inverse(down * up);
     ((down + up) * both, both)
 }
 
-/// Determinant by expansion along rows from `row` on, without the columns of the set `taken`; with `sign` 1 the permanent.
+/// Determinant by expansion along rows from `row` on, without the columns of the set `taken`; the permanent if `sign` is 1.
 fn expand<const K: usize>(matrix: &[[Number; K]; K], sign: f64, row: usize, taken: usize) -> Number {
     let mut sum = Complex::new(if row == K { 1.0 } else { 0.0 }, 0.0);
     let mut next = 1.0;
@@ -88,16 +87,16 @@ fn permanent<const K: usize>(matrix: &[[f64; K]; K]) -> f64 {
 
 /// The contact problem of K contacts.
 struct Secular<const K: usize> {
-    /// Poles of the modes that contact sees, with c φ_n φ_fᵀ.
+    /// Poles of the modes with contact participation, with c φ_n φ_fᵀ.
     modes: Vec<(ZeroPair, [[f64; K]; K])>,
-    /// Poles of the others, which are eigenvalues.
+    /// Poles of the decoupled modes, which are eigenvalues.
     apart: Vec<Number>,
     residual: [[f64; K]; K],
     /// γ.
     late: f64,
     /// Leading coefficient of P.
     lead: f64,
-    /// Pairs of zeros of P.
+    /// Number of pairs of zeros of P.
     pairs: usize,
 }
 
@@ -127,7 +126,7 @@ impl<const K: usize> Secular<K> {
         (lead.abs() > CANCELLED * size).then_some(problem)
     }
 
-    /// Σ c φ_n φ_fᵀ, and of the absolute values.
+    /// Σ c φ_n φ_fᵀ, and the sum of its absolute values.
     fn summed(&self) -> ([[f64; K]; K], [[f64; K]; K]) {
         let sum = |of: &dyn Fn(f64) -> f64| {
             std::array::from_fn(|i| std::array::from_fn(|j| self.modes.iter().map(|(_, seen)| of(seen[i][j])).sum()))
@@ -146,7 +145,7 @@ impl<const K: usize> Secular<K> {
         Some(self.apart)
     }
 
-    /// Between the poles, that of zero i so many apart as contacts take modes away; none alike.
+    /// Start values between the poles, that of zero i offset by the number of modes that contacts remove; all distinct.
     fn guesses(&self) -> Vec<ZeroPair> {
         let last = self.modes.len().saturating_sub(1);
         let beyond = self.modes.len().saturating_sub(self.pairs).max(1);
@@ -160,7 +159,7 @@ impl<const K: usize> Secular<K> {
         (0..self.pairs).map(guess).collect()
     }
 
-    /// 1/(P'/P − `others`), the step of Newton's iteration away from the other zeros.
+    /// 1/(P'/P − `others`), the step of Newton's iteration that avoids the other zeros.
     fn step(&self, s: Number, others: Number) -> Number {
         let zero = Complex::new(0.0, 0.0);
         let (mut value, mut rate) = ([[zero; K]; K], [[zero; K]; K]);
@@ -193,7 +192,7 @@ impl<const K: usize> Secular<K> {
         found * inverse(turned + found * (poles - others))
     }
 
-    /// Ehrlich's and Aberth's iteration.
+    /// Iterates by the method of Ehrlich and Aberth.
     fn refine(&self, zeros: &mut [ZeroPair]) {
         let mut moving = vec![true; zeros.len()];
         for sweep in 0..SWEEPS {
@@ -231,7 +230,7 @@ impl<const K: usize> Secular<K> {
         if step.re.is_finite() && step.im.is_finite() { step } else { zero * 1e-6 }
     }
 
-    /// Radius of the disc about a zero; not a number where there is none.
+    /// Radius of the disc about a zero; NaN if there is none.
     fn radius(&self, zeros: &[ZeroPair], index: usize, member: usize) -> f64 {
         let s = zeros[index][member];
         let (mut value, mut sizes) = ([[Complex::new(0.0, 0.0); K]; K], [[0.0; K]; K]);

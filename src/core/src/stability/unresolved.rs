@@ -1,14 +1,14 @@
-//! Steps of modal-exact that pass over the modes which contact acts on.
+//! Steps of modal-exact that do not resolve the modes which contact excites.
 //!
-//! Modal-exact is stable for any step, and exact in free motion. A contact force, however, is held for a step: it gives a mode
-//! tan(ωh/2)/(ωh/2) times its impulse, and bends it by (sin(ωh/2)/(ωh/2))² of what it should within a step. Beyond ωh = 2 neither
-//! is near 1. What that does to a run depends on what such modes carry: a stiff contact node may be passed over at leisure, the
-//! bending of a blade may not. Measure of it is their share of the static flexibility that a contact sees, Σ φ²/ω².
+//! Modal-exact is stable for any step, and exact in free motion. A contact force, however, is constant over a step: it gives a mode
+//! tan(ωh/2)/(ωh/2) times its impulse, and (sin(ωh/2)/(ωh/2))² of its correct displacement within a step. Beyond ωh = 2 neither factor is
+//! near 1. The effect on a run depends on the importance of such modes: a stiff contact node may stay unresolved, the bending of a blade
+//! may not. The measure is their fraction of the static flexibility of a contact, Σ φ²/ω².
 //!
-//! Without friction, blades of rotor 37 rubbing hard against four lobes, and in a flexible casing closing in on them, against
+//! Without friction, blades of rotor 37 in hard rub against four lobes, and in a flexible casing that closes in on them, compared with
 //! steps of ω_max h ≈ 0.6:
 //!
-//! | ω_max h | share of the flexibility | impulse | largest energy |
+//! | ω_max h | fraction of the flexibility | impulse | largest energy |
 //! |---|---|---|---|
 //! | 2.3 | 4 % | −0.1 % | −0.2 % |
 //! | 4.6, 7.0 | 28 % | −0.2, −1.2 % | −0.7, −3.0 % |
@@ -17,26 +17,26 @@
 //! | 23 | 82 % | −1.8 % | −25 % (casing: −21 %) |
 //! | 46 | 90 % | −22 % | −59 % (casing: +100 %) |
 //!
-//! Steps are refused where both ω_max h ≥ [`HIGHEST`] and the share exceeds [`SHARE`].
+//! Steps are rejected if both ω_max h ≥ [`HIGHEST`] and the fraction exceeds [`SHARE`].
 
 use crate::dynamics::modal::ModalModel;
 use crate::stability::shorter;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning};
 
-/// Steps below this ω_max h are not refused.
+/// Steps below this ω_max h are not rejected.
 pub const HIGHEST: f64 = 10.0;
-/// Nor are steps where modes beyond ωh = 2 have less than this share of the flexibility that contact sees, on average over
-/// the contact nodes.
+/// Steps are not rejected if modes beyond ωh = 2 have less than this fraction of the flexibility of contact, on average over the contact
+/// nodes.
 pub const SHARE: f64 = 0.5;
-/// Share of the limit from which errors of some per cent are told. Rotor 37 with nine patches and 80 modes, µ = 0.15, has 5.8 % of the
-/// clearance in its displacements at 0.68 of the limit, 4.0 % at 0.34, 0.5 % at 0.14 and 0.1 % at 0.07.
+/// Fraction of the limit above which errors of some per cent are reported. For rotor 37 with nine patches and 80 modes, µ = 0.15, the error
+/// of displacements is 5.8 % of the clearance at 0.68 of the limit, 4.0 % at 0.34, 0.5 % at 0.14 and 0.1 % at 0.07.
 const NEAR: f64 = 0.2;
-/// Modes beyond this ωh are passed over.
+/// Modes beyond this ωh are not resolved.
 const PASSED_OVER: f64 = 2.0;
 
-/// Smallest step (s) that passes over too much of a structure whose contacts act along `directions` (per row of three of its
-/// contact modes); infinite where nothing vibrates.
+/// Smallest step (s) that leaves too much unresolved of a structure whose contacts act along `directions` (per row of three of its contact
+/// modes); infinite if no mode vibrates.
 pub fn limit(model: &ModalModel, directions: &[[f64; 3]]) -> f64 {
     let seen = |mode: usize, node: usize| {
         let shape: f64 = (0..3).map(|i| directions[node][i] * model.contact_modes[(3 * node + i, mode)]).sum();
@@ -61,7 +61,7 @@ pub fn limit(model: &ModalModel, directions: &[[f64; 3]]) -> f64 {
     f64::INFINITY
 }
 
-/// The same for contacts that may act along any axis of the rows: the tightest.
+/// Smallest such step (s) for contacts that may act along any axis of the rows: the tightest.
 pub fn limit_along_axes(model: &ModalModel) -> f64 {
     let nodes = model.contact_modes.nrows() / 3;
     let along = |axis: usize| {
@@ -72,7 +72,7 @@ pub fn limit_along_axes(model: &ModalModel) -> f64 {
     (0..3).map(along).fold(f64::INFINITY, f64::min)
 }
 
-/// A warning for a step (s) near the `limit` (s): errors grow with its square, some four per cent at the limit.
+/// Warning for a step (s) near the `limit` (s): errors grow with its square, to some four per cent at the limit.
 pub fn warning(step: f64, limit: f64) -> Option<Warning> {
     (step >= NEAR * limit).then(|| {
         Warning::new(
@@ -86,8 +86,8 @@ pub fn warning(step: f64, limit: f64) -> Option<Warning> {
     })
 }
 
-/// Refuse a step (s) at or beyond the `limit` (s) of a structure whose largest angular frequency (rad/s) is `frequency`.
-/// Allocates only to refuse.
+/// Rejects a step (s) at or beyond the `limit` (s) of a structure whose largest angular frequency (rad/s) is `frequency`. Allocates only to
+/// reject.
 ///
 /// # Errors
 /// [`Error::Unstable`] with numbers.
@@ -130,17 +130,17 @@ mod tests {
     #[test]
     fn step_limit_ignores_modes_that_carry_little_contact() {
         let radial = [[-1.0, 0.0, 0.0]];
-        // One oscillator: ωh = 10. A rigid mode carries no flexibility.
+        // One oscillator: ωh = 10. A rigid-body mode adds no flexibility.
         let near =
             |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-12, "{found:e}, {expected:e}");
         near(limit(&model(&[(1e3, 2.0)]), &radial), 1e-2);
         near(limit(&model(&[(0.0, 1.0), (1e3, 2.0)]), &radial), 1e-2);
         assert!(limit(&model(&[(0.0, 1.0)]), &radial).is_infinite());
-        // A stiff node on top may be passed over: its own mode has 1 % of the flexibility.
+        // A stiff node on top may stay unresolved: its own mode has 1 % of the flexibility.
         near(limit(&model(&[(1e3, 1.0), (1e6, 100.0)]), &radial), 2e-3);
-        // Not one that has most of it.
+        // But not a node with most of the flexibility.
         near(limit(&model(&[(1e3, 1.0), (1e6, 2000.0)]), &radial), 1e-5);
-        // Nothing is seen along other directions.
+        // No flexibility along other directions.
         assert!(limit(&model(&[(1e3, 1.0)]), &[[0.0, 1.0, 0.0]]).is_infinite());
         near(limit_along_axes(&model(&[(1e3, 1.0)])), 1e-2);
         // Any axis counts.
@@ -151,7 +151,7 @@ mod tests {
         }
     }
 
-    /// Errors go with the square of the step: some four per cent at the limit, a tenth of that is not worth telling.
+    /// Errors are proportional to the square of the step: some four per cent at the limit; a tenth of that is not reported.
     #[test]
     fn warns_above_a_fifth_of_the_limit() {
         let near = |share: f64| warning(share * 1e-5, 1e-5).is_some();

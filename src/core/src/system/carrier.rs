@@ -1,4 +1,4 @@
-//! What a group of contacts does to a structure that carries their surfaces: through its modes, contact by contact.
+//! Effect of a group of contacts on the structure that carries their surfaces, computed with its modes contact by contact.
 
 use super::Structure;
 use super::pair::{SurfaceCarrier, at_place};
@@ -8,42 +8,42 @@ use crate::gaps::frame::PolarFrame;
 use crate::gaps::surface_spline::{ClosestPoint, SurfaceSpline};
 use nalgebra::DMatrix;
 
-/// Where a contact acts on a structure.
+/// Location at which a contact acts on a structure.
 #[derive(Debug, Clone, Copy)]
 pub struct Spot<'a> {
-    /// The surface, and where it is carried.
+    /// The surface, and the structure that carries it.
     pub surface: (&'a SurfaceSpline, SurfaceCarrier),
-    /// The place on it.
+    /// Place on the surface.
     pub place: ClosestPoint,
-    /// Directions of the node that touches.
+    /// Directions of the contact node.
     pub frame: PolarFrame,
 }
 
-/// Scratch of a group for one structure under it.
+/// Scratch memory of a group for one structure that carries surfaces.
 #[derive(Debug, Clone)]
 pub struct Reaction {
     /// The structure.
     pub structure: usize,
-    /// Contacts of the group that act on it.
+    /// Contacts of the group that act on the structure.
     members: Vec<usize>,
-    /// Modes seen at the contacts along the rows and columns of the Delassus matrix.
+    /// Modal components at the contacts along the rows and columns of the Delassus matrix.
     rows: Vec<f64>,
     columns: Vec<f64>,
-    /// Modes seen at one place along x, y, z.
+    /// Modal components at one place along x, y, z.
     seen: [Vec<f64>; 3],
     /// Modal forces, or modal displacements per unit force.
     force: Vec<f64>,
-    /// Displacement of its rows by the forces of a solution (m).
+    /// Displacement of the rows of the structure by the forces of a solution (m).
     response: Vec<f64>,
 }
 
-/// Structures that carry surfaces are single.
+/// A structure that carries surfaces has a single sector.
 fn bank(structure: &Structure) -> &ModalBank {
     structure.bank().unwrap_or_else(|| unreachable!("a structure that carries surfaces has one sector"))
 }
 
 impl Reaction {
-    /// For up to `contacts` contacts at once with `directions` directions each.
+    /// Allocates memory for up to `contacts` simultaneous contacts with `directions` directions each.
     pub fn new(structure: usize, of: &Structure, contacts: usize, directions: usize) -> Self {
         let (modes, rows) = (bank(of).modes(), bank(of).rows());
         Self {
@@ -57,12 +57,12 @@ impl Reaction {
         }
     }
 
-    /// Forget the group.
+    /// Removes all contacts.
     pub fn clear(&mut self) {
         self.members.clear();
     }
 
-    /// Project the modes on the directions of contact `member` of the group, which acts on this structure.
+    /// Projects the modes on the directions of contact `member` of the group, which acts on this structure.
     pub fn see(&mut self, of: &Structure, member: usize, spot: Spot, rows: &[[f64; 3]], columns: &[[f64; 3]]) {
         self.members.push(member);
         let (bank, (surface, carrier)) = (bank(of), spot.surface);
@@ -86,7 +86,7 @@ impl Reaction {
         }
     }
 
-    /// Add this structure's part to the Delassus matrix (m/N) of a group with `per` directions per contact.
+    /// Adds the part of this structure to the Delassus matrix (m/N) of a group with `per` directions per contact.
     pub fn add_delassus(&mut self, of: &Structure, matrix: &mut DMatrix<f64>, per: usize) {
         for at in 0..self.members.len() {
             for column in per * self.members[at]..per * (self.members[at] + 1) {
@@ -100,13 +100,13 @@ impl Reaction {
         }
     }
 
-    /// Entry of the Delassus matrix (m/N) in this row and the column prepared.
+    /// Entry of the Delassus matrix (m/N) in this row and the prepared column.
     fn delassus(&self, row: usize) -> f64 {
         let modes = self.force.len();
         self.rows[row * modes..][..modes].iter().zip(&self.force).map(|(shape, moved)| shape * moved).sum()
     }
 
-    /// Modal displacement per unit force along a column of the Delassus matrix.
+    /// Computes the modal displacement per unit force along a column of the Delassus matrix.
     fn prepare_column(&mut self, of: &Structure, column: usize) {
         let modes = self.force.len();
         let shapes = &self.columns[column * modes..][..modes];
@@ -115,7 +115,7 @@ impl Reaction {
         }
     }
 
-    /// Modal force −Σ F_j λ_j of a solution with `per` directions per contact into the scratch.
+    /// Computes the modal force −Σ F_j λ_j of a solution with `per` directions per contact.
     fn gather(&mut self, multipliers: &[f64], per: usize) {
         let modes = self.force.len();
         self.force.fill(0.0);
@@ -138,12 +138,12 @@ impl Reaction {
         }
     }
 
-    /// Displacement of a place by the last [`Reaction::respond`], in the directions of the node there (m).
+    /// Displacement of a place caused by the last [`Reaction::respond`], in the directions of the node (m).
     pub fn responded(&self, spot: Spot) -> [f64; 3] {
         at_place(spot.surface, spot.place, spot.frame, |row| self.response[row])
     }
 
-    /// Let the forces of the solution act that [`Reaction::respond`] was asked about last.
+    /// Applies the forces of the solution passed to the last [`Reaction::respond`].
     pub fn apply(&self, of: &mut Structure, ledger: bool) {
         of.delayed.copy_from_slice(&self.force);
         if let (false, Sectors::Uncoupled(bank)) = (self.members.is_empty(), of.modes_mut()) {

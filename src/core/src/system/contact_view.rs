@@ -1,4 +1,4 @@
-//! A contact about to be solved, with what it belongs to: what is known of it before its force is.
+//! A contact before its force is known, together with its structure and its pair.
 
 use super::carrier::Spot;
 use super::pair::When;
@@ -27,13 +27,13 @@ pub struct Bodies<'a> {
     pub structures: &'a mut [Structure],
     /// All pairs.
     pub pairs: &'a [ContactPair],
-    /// Contact forces act one step after they are found.
+    /// True if contact forces act one step after they are found.
     pub acts_later: bool,
-    /// Losses are gathered.
+    /// True if losses are collected.
     pub ledger: bool,
 }
 
-/// A member with what it belongs to, as its law sees it.
+/// A contact member with its structure and pair, as its law sees it.
 pub struct ContactView<'a> {
     bodies: &'a Bodies<'a>,
     structure: &'a Structure,
@@ -42,7 +42,7 @@ pub struct ContactView<'a> {
 }
 
 impl Bodies<'_> {
-    /// A member with what it belongs to.
+    /// Returns a member with its structure and pair.
     #[inline(always)]
     pub fn pose(&self, member: ContactMember) -> ContactView<'_> {
         ContactView {
@@ -55,21 +55,21 @@ impl Bodies<'_> {
 }
 
 impl ContactView<'_> {
-    /// Displacement as predicted (m), in its own directions.
+    /// Predicted displacement of the node (m), in its own directions.
     #[inline(always)]
     fn displacement(&self) -> [f64; 3] {
         self.structure.vector3(self.structure.modes().displacement(), self.member.node, self.member.sector)
     }
 
-    /// Displacement relative to its surface over the step, prediction included (m), without rigid motion.
+    /// Displacement relative to the surface over the step including the prediction (m), without rigid motion.
     #[inline(always)]
     pub fn slip_of_deformation(&self) -> [f64; 3] {
         let modes = self.structure.modes();
         self.slip_between(modes.displacement(), modes.displacement_before())
     }
 
-    /// The same of the modes with inertia alone. A prediction whose contact forces act later is without the forces that deform
-    /// quasi-static modes, however short the step is: taken for a slip over h it would grow without bounds.
+    /// Relative displacement by the modes with inertia only. If contact forces act later, a prediction lacks the forces that
+    /// deform quasi-static modes, however short the step is; its slip divided by h would grow without bounds.
     fn slip_of_inertia(&self) -> [f64; 3] {
         let predicted = &self.structure.history.predicted;
         self.slip_between(&predicted.now, &predicted.before)
@@ -83,7 +83,7 @@ impl ContactView<'_> {
         if self.pair.carrier().is_none() { moved } else { self.less_of_carrier(moved) }
     }
 
-    /// Out of line: on rigid surfaces contacts never get here.
+    /// Not inlined, because contacts on rigid surfaces never call it.
     #[inline(never)]
     fn less_of_carrier(&self, moved: [f64; 3]) -> [f64; 3] {
         let Some(spot) = self.spot() else { return moved };
@@ -93,7 +93,7 @@ impl ContactView<'_> {
         std::array::from_fn(|i| moved[i] - carried[i])
     }
 
-    /// Where it acts on the structure that carries its surface, if one does.
+    /// Location at which the contact acts on the structure that carries its surface, if any.
     #[inline(always)]
     pub fn spot(&self) -> Option<Spot<'_>> {
         let surface = self.pair.carried()?;
@@ -108,13 +108,13 @@ impl ContactView<'_> {
         self.pair.gap().sliding_velocity(node, index, self.pair.drive(When::Now), self.displacement())
     }
 
-    /// Unit normal.
+    /// Unit normal of the contact.
     #[inline(always)]
     pub fn normal(&self) -> [f64; 3] {
         self.structure.history.geometry.now.normal_at(self.member.index)
     }
 
-    /// Unit direction of slip from the predicted relative velocity; 0 where nothing slides.
+    /// Unit direction of slip from the predicted relative velocity; 0 without sliding.
     #[inline(always)]
     pub fn slip_direction(&self, normal: [f64; 3]) -> [f64; 3] {
         let (mut velocity, step) = (self.sliding(), self.structure.modes().step());
@@ -125,7 +125,7 @@ impl ContactView<'_> {
         self.pair.gap().slip_direction(velocity, normal)
     }
 
-    /// It must be one that small displacements can describe.
+    /// Checks that small displacements can describe the contact.
     #[inline(always)]
     pub fn check(&self) -> Result<(), StepFailure> {
         let ContactMember { structure, node, sector, .. } = self.member;

@@ -1,4 +1,4 @@
-//! What carries a running state on: another step size, saving and restoring, and ways over an edge.
+//! Continues a running state: another step size, saving and restoring, and nodes that pass an edge.
 
 use super::contact_view::ContactMember;
 use super::pair::When;
@@ -9,20 +9,20 @@ use crate::gaps::wrench::At;
 use crate::history::ContactHistory;
 use crate::persist::{Persist, StateReader, StateWriter};
 
-/// A contact force is continued over steps at most this many times as long as the one it was found in.
+/// A contact force is continued over steps up to this many times as long as the step in which it was found.
 const FORCE_REACH: f64 = 4.0;
-/// Gaps are closed up to this share of what says nothing ([`GapLaw::indifferent`]).
+/// Gaps below this fraction of the negligible gap ([`GapLaw::indifferent`]) count as closed.
 const CLOSED: f64 = 1e-9;
-/// Curvature work beyond this share of all energy exchanged is more than an error of truncation.
+/// Curvature work above this fraction of all exchanged energy is not a mere truncation error.
 const MOST_CURVATURE: f64 = 0.5;
 
 impl System {
-    /// Use step size `step` (s) from here. A running state is carried over by resampling the modal motion under
-    /// the last contact force; the energy this adds is booked in the ledger.
+    /// Sets the step size `step` (s) from now on. A running state is converted by resampling the modal motion under the last
+    /// contact force; the energy ledger records the change of energy.
     ///
-    /// Only a force that lasts is continued: that of a contact closed at both ends of the last step. The multiplier of
-    /// an impact is p/h, an impulse that is over, and means nothing over a step of another length. A much longer
-    /// step reaches back to times of which the last force knows nothing; there it fades out.
+    /// Only a persistent force is continued, that of a contact closed at both ends of the last step. The multiplier of an impact
+    /// is p/h of a past impulse and has no meaning for a step of another length. A much longer step reaches back to times before
+    /// the last force, which is therefore reduced.
     pub fn set_step(&mut self, step: f64) {
         let (old, scheme) = (self.step_size(), self.settings.scheme);
         if old > 0.0 && self.counted.steps > 0 {
@@ -31,7 +31,7 @@ impl System {
             }
             self.find_lasting(old, step);
             self.structures.iter_mut().for_each(|structure| structure.carry_over(scheme, step));
-            // The gap of the step before is continued along its own slope, not along the motion of the modes.
+            // The gap of the previous step is extrapolated along its own slope, not along the motion of the modes.
             self.counted.witnessed = self.counted.steps + 2;
             let ratio = step / old;
             self.pairs.iter_mut().for_each(|pair| pair.stretch(ratio));
@@ -54,15 +54,15 @@ impl System {
         }
     }
 
-    /// Use step size `step` (s) from here without regard to the state, before the first step.
+    /// Sets the step size `step` (s) without conversion of the state, before the first step.
     pub fn set_first_step(&mut self, step: f64) {
         let scheme = self.settings.scheme;
         self.structures.iter_mut().for_each(|structure| structure.set_step(scheme, step));
         self.coupled_sets.iter_mut().for_each(|coupled_sets| coupled_sets.set_span(step));
     }
 
-    /// Kinetic and strain energy of all structures at this instant (J): ½q̇ᵀMq̇ with the velocity of the instant, ½qᵀKq. Between
-    /// steps only. `each` is told those of every set.
+    /// Instantaneous kinetic and strain energy of all structures (J), ½q̇ᵀMq̇ and ½qᵀKq, between steps only. `each` is called
+    /// with the energies of every set.
     pub fn energies_now(&mut self, mut each: impl FnMut(usize, (f64, f64))) -> (f64, f64) {
         let step = self.step_size();
         self.find_lasting(step, step);
@@ -74,15 +74,15 @@ impl System {
         }))
     }
 
-    /// The contact forces without those of impacts, on all structures where the last step found them. The force of a contact that
-    /// was not closed at both ends of the last step does not last.
+    /// Finds the persistent contact forces on all structures. The force of a contact that was not closed at both ends of the last
+    /// step, such as an impact, does not persist.
     fn find_lasting(&mut self, old: f64, new: f64) {
         let reach = (FORCE_REACH * old / new).min(1.0);
         self.structures.iter_mut().for_each(|structure| structure.history.passing.lasting.fill(0.0));
         for event in &self.events.now {
             let structure = &mut self.structures[event.structure];
             let (index, lanes) = (structure.index(event.node, event.sector), structure.lanes());
-            // `film` closes gaps up to rounding.
+            // `film` closes gaps to rounding.
             let closed = CLOSED * self.pairs[event.pair].gap().indifferent(event.node);
             let ContactHistory { gap, force, passing, .. } = &mut structure.history;
             if gap.before[index] <= closed && gap.now[index] <= closed {
@@ -97,7 +97,7 @@ impl System {
         }
     }
 
-    /// A node that meets an open surface and moves far in one step could pass it, or its edge, between two looks.
+    /// Checks that no node that can touch an open surface moves so far in one step that it could pass the surface or its edge unnoticed.
     pub(crate) fn check_travel(&self) -> Result<(), StepFailure> {
         for pair in &self.pairs {
             let GapLaw::Open(gap) = pair.gap() else { continue };
@@ -111,10 +111,10 @@ impl System {
         Ok(())
     }
 
-    /// A node that comes over a free edge was in front of the surface, continued beyond the edge; else it is a start in
-    /// penetration, an impact of arbitrary strength.
+    /// Checks that a node that passes a free edge was in front of the surface, extrapolated beyond the edge. Otherwise contact
+    /// would begin in penetration, with an impact of arbitrary strength.
     ///
-    /// A surface around an axis goes on beyond its edge, and a node further out ends the run.
+    /// A surface around an axis is extrapolated beyond its edge, and a node outside the extrapolation ends the run.
     pub(crate) fn check_edges(&mut self) -> Result<(), StepFailure> {
         let bodies = Bodies { structures: &mut self.structures, pairs: &self.pairs, acts_later: false, ledger: false };
         for (number, pair) in bodies.pairs.iter().enumerate() {
@@ -139,8 +139,8 @@ impl System {
         Ok(())
     }
 
-    /// Whether friction and impacts only took energy, and curvature work, which no input does, is still small beside what was exchanged,
-    /// set by set; at the end of a communication step.
+    /// Checks for each set, at the end of a communication step, that friction and impacts have only dissipated energy and that
+    /// curvature work, which no input supplies, is small compared with the exchanged energy.
     ///
     /// # Errors
     /// [`StepFailure::Gives`], [`StepFailure::Unbalanced`].
@@ -155,7 +155,7 @@ impl System {
         Ok(())
     }
 
-    /// Write everything that determines the future, the step size included.
+    /// Writes everything that determines the future, including the step size.
     pub fn save(&self, writer: &mut StateWriter) {
         self.step_size().save(writer);
         self.structures.iter().for_each(|structure| structure.save(writer));
@@ -164,8 +164,8 @@ impl System {
         self.counted.save(writer);
     }
 
-    /// Pass over a saved state and refuse what is none; returns its step size (s) and how many of its gaps are infinite. Before
-    /// the start, gaps are not known.
+    /// Reads over a saved state and rejects invalid values. Returns its step size (s) and the number of its infinite gaps. Gaps
+    /// are unknown before the start.
     pub fn check(&self, reader: &mut StateReader, started: bool) -> (f64, usize) {
         let mut step = 0.0_f64;
         step.restore(reader);
@@ -200,8 +200,9 @@ impl System {
         places.iter().enumerate().all(|(index, place)| surface(index).is_none_or(|surface| surface.has_place(*place)))
     }
 
-    /// Returns the number of infinite gaps among the gaps of all structures, one after the other as [`Structure::gaps`]: those of padding lanes, of
-    /// nodes without a pair, and of nodes beyond a free edge; `None` if another gap is infinite, or one is negative.
+    /// Returns the number of infinite gaps among the gaps of all structures, in the order of [`Structure::gaps`]: those of
+    /// padding lanes, of nodes without a pair, and of nodes beyond a free edge. Returns `None` if any other gap is infinite, or
+    /// if one is −∞.
     pub fn infinite_gap_count(&self, gaps: &[f64]) -> Option<usize> {
         let (mut rest, mut sum) = (gaps, 0);
         for structure in &self.structures {
@@ -223,7 +224,7 @@ impl System {
         all.then(|| gaps.iter().filter(|gap| gap.is_infinite()).count())
     }
 
-    /// Restore a saved state; coefficients are recomputed from the saved step size.
+    /// Restores a saved state; coefficients are recomputed from the saved step size.
     pub fn restore(&mut self, reader: &mut StateReader) {
         let mut step = 0.0_f64;
         step.restore(reader);
@@ -242,7 +243,7 @@ impl System {
         self.rebuild_events();
     }
 
-    /// The events of the last step follow from the saved multipliers and forces (heat is not part of the future).
+    /// Reconstructs the events of the last step from the saved multipliers and forces (heat does not affect the future).
     fn rebuild_events(&mut self) {
         self.events.now.clear();
         for (number, structure) in self.structures.iter().enumerate() {
@@ -266,7 +267,7 @@ impl System {
 }
 
 impl ContactPair {
-    /// Contact forces that last act on the structure under their nodes, too.
+    /// Also applies persistent contact forces to the structure that carries the surface.
     fn spread_lasting(&self, structures: &mut [Structure]) {
         let Some((surface, carrier)) = self.carried() else { return };
         let Ok([touching, under]) = structures.get_disjoint_mut([self.structure(), carrier.structure]) else { return };

@@ -1,4 +1,4 @@
-//! The Delassus matrix W = C_Nᵀ A⁻¹ C_NT of the contact nodes of one structure, by its flexibility over one step.
+//! The Delassus matrix W = C_Nᵀ A⁻¹ C_NT of the contact nodes of one structure, from its flexibility over one step.
 
 use super::contact_view::ContactMember;
 use crate::dynamics::bank::ModalBank;
@@ -8,21 +8,21 @@ use crate::dynamics::sectors::Sectors;
 use crate::gaps::dot;
 use nalgebra::DMatrix;
 
-/// Contacts of a structure within a group, with their directions: from which row and column on they stand in the matrix.
+/// Contacts of a structure within a group, with their directions and the position of their block in the matrix.
 pub struct DelassusBlock<'a> {
     /// The contacts.
     pub members: &'a [ContactMember],
-    /// Directions along rows and columns, `per` each.
+    /// Directions of the rows, `per` for each contact.
     pub rows: &'a [[f64; 3]],
-    /// As `rows`.
+    /// Directions of the columns, `per` for each contact.
     pub columns: &'a [[f64; 3]],
     /// Directions per contact.
     pub per: usize,
-    /// The first contact of the block within the group.
+    /// Index of the first contact of the block within the group.
     pub first: usize,
 }
 
-/// Fill the block of contacts of a structure (m/N).
+/// Fills the block of contacts of a structure (m/N).
 pub fn fill(matrix: &mut DMatrix<f64>, modes: &Sectors, nodes: usize, block: &DelassusBlock) {
     match modes {
         // One sector with all of its nodes.
@@ -38,7 +38,7 @@ pub fn fill(matrix: &mut DMatrix<f64>, modes: &Sectors, nodes: usize, block: &De
     }
 }
 
-/// W of nodes of a disk of coupled sectors.
+/// Fills W of nodes of a disk of coupled sectors.
 #[inline(never)]
 fn fill_disk(matrix: &mut DMatrix<f64>, disk: &CyclicBank, block: &DelassusBlock) {
     match block.per {
@@ -52,7 +52,7 @@ fn is_whole_sector(block: &DelassusBlock, nodes: usize) -> bool {
     block.first == 0 && members.len() == nodes && members[members.len() - 1].sector == first.sector
 }
 
-/// W of nodes of uncoupled sectors.
+/// Fills W of nodes of uncoupled sectors.
 #[inline(never)]
 fn fill_sectors(matrix: &mut DMatrix<f64>, bank: &ModalBank, block: &DelassusBlock) {
     let (height, per, start) = (bank.rows(), block.per, block.per * block.first);
@@ -112,7 +112,7 @@ impl<const PER: usize> Kernel for FillDisk<'_, PER> {
     }
 }
 
-/// W of all nodes of one sector with `PER` directions each; `flexibility` is G column by column.
+/// Fills W of all nodes of one sector with `PER` directions each; `flexibility` is G column by column.
 fn fill_sector<const PER: usize>(
     matrix: &mut DMatrix<f64>,
     flexibility: &[f64],

@@ -1,4 +1,4 @@
-//! What a contact did in a step.
+//! Forces and work of a contact in a step.
 
 use super::contact_view::ContactMember;
 use crate::gaps::dot;
@@ -17,22 +17,21 @@ pub struct ContactEvent {
     pub node: usize,
     /// Multiplier λ: normal force (N).
     pub normal: f64,
-    /// Largest λ within the step (N): a scheme may find it at several instants.
+    /// Largest λ within the step (N); a scheme may compute it at several times.
     pub peak: f64,
-    /// Magnitude of the friction force (N): µλ against slip, less where the contact sticks; 0 without slip. With that of
-    /// what is cut.
+    /// Magnitude of the tangential force (N): friction µλ against slip, less if the contact sticks, 0 without slip; cutting force included.
     pub tangential: f64,
     /// Force on the structure (N) in the coordinates of its displacements.
     pub force: [f64; 3],
     /// Data of the contact point, see [`GapLaw::contact_point`](crate::gaps::GapLaw::contact_point).
     pub point: [f64; 3],
-    /// The force in fixed directions, its moment, and where it acts.
+    /// Force in fixed directions, its moment, and its point of application.
     pub wrench: Wrench,
     /// Part of λ that a coating carries (N).
     pub coating: f64,
     /// Friction heat of the step (J).
     pub friction_heat: f64,
-    /// Way against the tangential force in the step (m).
+    /// Sliding distance against the tangential force in the step (m).
     pub slid: f64,
 }
 
@@ -46,7 +45,7 @@ impl ContactEvent {
     ) -> Self {
         let ContactMember { structure, pair, node, sector, .. } = at;
         let square = dot(force, force) - normal * normal;
-        // What rounding leaves of a frictionless contact is no friction.
+        // Rounding errors of a frictionless contact do not count as friction.
         let tangential = if square > 1e-14 * normal * normal { square.sqrt() } else { 0.0 };
         Self {
             structure,

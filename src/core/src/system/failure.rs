@@ -1,9 +1,9 @@
-//! Why a step fails.
+//! Reasons why a step fails.
 
 use super::Curved;
 use super::losses::Loss;
 
-/// Why a step failed. Structures, sectors and nodes count from 0.
+/// Reason why a step failed. Structures, sectors and nodes count from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepFailure {
     /// A displacement or gap became infinite or NaN.
@@ -21,41 +21,41 @@ pub enum StepFailure {
         /// Structure.
         structure: usize,
     },
-    /// A contact node moves by more than a tenth of the extent of an open surface in one step: it could pass it unseen.
+    /// A contact node moves by more than a tenth of the extent of an open surface in one step, so it could pass the surface unnoticed.
     TooFast {
         /// Structure.
         structure: usize,
     },
-    /// A node comes over a free edge and is behind the surface already.
+    /// A node passes a free edge and is already behind the surface.
     BehindEdge {
         /// Structure.
         structure: usize,
         /// Contact node.
         node: usize,
     },
-    /// Normals turn and surfaces curve so far within steps that this adds energy which no input brings.
+    /// Normals turn and surfaces curve so much within steps that this adds energy that no input supplies.
     Unbalanced {
-        /// Set of structures that can feel each other.
+        /// Set of structures that influence each other.
         set: usize,
         /// Energy that was added (J).
         work: f64,
         /// All energy exchanged (J).
         exchanged: f64,
     },
-    /// Friction or impacts, which can only take energy, have given some.
+    /// Friction, impacts or cutting, which can only dissipate energy, have supplied energy.
     Gives {
-        /// Set of structures that can feel each other.
+        /// Set of structures that influence each other.
         set: usize,
-        /// Which of the two.
+        /// Kind of the loss.
         loss: Loss,
-        /// Energy that was given back since the largest loss (J).
+        /// Energy supplied since the largest loss (J).
         given: f64,
-        /// Energy that it is compared with (J).
+        /// Reference energy for the comparison (J).
         exchanged: f64,
     },
-    /// A node moves so far around the axis that what linear kinematics misses is as large as its clearance.
+    /// A node moves so far around the axis that the error of linear kinematics is as large as its clearance.
     Curved(Curved),
-    /// A node has left a surface around an axis over its edge, further than the surface goes on.
+    /// A node has left a surface around an axis beyond the extrapolated part of its edge.
     OutOfReach {
         /// Structure.
         structure: usize,
@@ -64,7 +64,7 @@ pub enum StepFailure {
         /// Sector.
         sector: usize,
     },
-    /// A gap has changed by more than the motion of node and surface explains: it is not a distance.
+    /// A gap has changed by more than the motion of node and surface explains, so it is not a distance.
     Unexplained {
         /// Structure.
         structure: usize,
@@ -74,19 +74,19 @@ pub enum StepFailure {
         sector: usize,
         /// Change of the gap over two steps (m).
         jump: f64,
-        /// Part that motion explains (m).
+        /// Change that the motion explains (m).
         explained: f64,
     },
-    /// A law that looks once for penetration holds nodes closed that the others push away.
+    /// A law that checks for penetration only once holds nodes closed that the other nodes push away.
     Pulls {
         /// Structure.
         structure: usize,
-        /// Contact node most pulled at.
+        /// Contact node with the largest pulling impulse.
         node: usize,
-        /// Impulse as a fraction of that of the node with the largest.
+        /// Pulling impulse as a fraction of the largest impulse of a node.
         share: f64,
     },
-    /// A law that looks once for penetration leaves a node deep inside the surface.
+    /// A law that checks for penetration only once leaves a node deep inside the surface.
     LeftInside {
         /// Structure.
         structure: usize,
@@ -95,7 +95,7 @@ pub enum StepFailure {
         /// Depth as a fraction of the clearance.
         share: f64,
     },
-    /// More steps would have to be tried than are allowed.
+    /// The limit of attempted steps is exceeded.
     Exhausted,
     /// The contact problem of a sector has no solution within the pivoting limit.
     Unsolved {

@@ -1,4 +1,4 @@
-//! Groups of contacts that can push each other: their Delassus matrix, their forces, and what these do to the structures.
+//! Groups of contacts that influence each other: their Delassus matrix, their forces, and the effects on the structures.
 
 use super::carrier::Reaction;
 use super::contact_view::{Bodies, ContactMember, ContactView};
@@ -15,13 +15,13 @@ use crate::settings::Solver;
 /// Nodes outside a group count as penetrating beyond this fraction of the largest gap of the group.
 const VIOLATED_FRACTION: f64 = 1e-13;
 
-/// Forces that a group has found in a step.
+/// Outputs of the solution of a group in a step.
 pub struct GroupSolution<'a> {
-    /// Active contacts, appended.
+    /// Active contacts; new ones are appended.
     pub events: &'a mut Vec<ContactEvent>,
-    /// Small linear systems factorised, added to.
+    /// Number of factorised small linear systems; it is increased.
     pub factorisations: &'a mut u64,
-    /// Energy that wear takes (J), added to.
+    /// Energy consumed by wear (J); it is increased.
     pub wear_energy: &'a mut crate::Sum,
 }
 
@@ -29,32 +29,32 @@ pub struct GroupSolution<'a> {
 #[derive(Debug, Clone)]
 struct GroupSide {
     structure: usize,
-    /// Which of its nodes are in the group that is being solved, `[node · lanes + lane]`.
+    /// True for nodes in the group that is being solved, `[node · lanes + lane]`.
     chosen: Vec<bool>,
-    /// Change of all of its gaps by the solution (m), same layout.
+    /// Change of all gaps of the structure by the solution (m), `[node · lanes + lane]`.
     response: Vec<f64>,
-    /// Range of the members among those of the group.
+    /// Index range of the members among those of the group.
     span: std::ops::Range<usize>,
 }
 
 /// Coupling of the contacts of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
-    /// Each sector by itself: uncoupled sectors of one structure against what does not move.
+    /// Each sector separately: uncoupled sectors of one structure against a rigid surface.
     Sector,
-    /// All sectors of all structures of the group: through a disk, or what they touch together.
+    /// All sectors of all structures of the group, coupled by a disk or by a common surface.
     All,
 }
 
-/// Contacts that can push each other, at any time of a run.
+/// Contacts that can influence each other at any time of a run.
 #[derive(Debug, Clone)]
 pub struct ContactGroup {
     reach: Reach,
     sides: Vec<GroupSide>,
-    /// Structures under the contacts.
+    /// Structures that carry the surfaces of the contacts.
     reactions: Vec<Reaction>,
     law: Law,
-    /// The contacts being solved, structure by structure and sector by sector.
+    /// The current contacts, structure by structure and sector by sector.
     members: Vec<ContactMember>,
     rows: Vec<[f64; 3]>,
     columns: Vec<[f64; 3]>,
@@ -65,7 +65,7 @@ pub struct ContactGroup {
 }
 
 impl ContactGroup {
-    /// Contacts of the structures `touching`, under which those of `carriers` move.
+    /// Creates a group of the contacts of the structures `touching`, whose surfaces the structures `carriers` carry.
     pub fn new(
         (reach, touching, carriers): (Reach, &[usize], &[usize]),
         structures: &[Structure],
@@ -100,7 +100,7 @@ impl ContactGroup {
         }
     }
 
-    /// Structures whose nodes touch.
+    /// Structures whose nodes are in contact.
     pub fn structures(&self) -> impl Iterator<Item = usize> {
         self.sides.iter().map(|side| side.structure)
     }
@@ -110,12 +110,12 @@ impl ContactGroup {
         &self.law
     }
 
-    /// The same, to restore its state.
+    /// The contact law, to restore its state.
     pub fn law_mut(&mut self) -> &mut Law {
         &mut self.law
     }
 
-    /// Use another solver, if it is another.
+    /// Selects a solver, if it is different from the current one.
     pub fn set_solver(&mut self, solver: Solver, structures: &[Structure]) {
         if !self.law.matches_solver(solver) {
             let touching: Vec<usize> = self.structures().collect();
@@ -124,10 +124,10 @@ impl ContactGroup {
         }
     }
 
-    /// Forces of all contacts of the step, and what they do.
+    /// Solves the contact forces of the step and applies them.
     ///
     /// # Errors
-    /// Contacts that are no longer described; a problem without solution.
+    /// A contact exceeds the small-displacement limits, or a problem has no solution.
     pub fn solve(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         match self.reach {
             Reach::Sector => self.solve_sectors(bodies, found),
@@ -135,7 +135,7 @@ impl ContactGroup {
         }
     }
 
-    /// All nodes of the sectors that touch, each sector by itself.
+    /// Solves all nodes of the sectors in contact, each sector separately.
     fn solve_sectors(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         let (structure, mut next) = (self.sides[0].structure, 0);
         while let Some(sector) = bodies.structures[structure].touching_from(next) {
@@ -153,8 +153,8 @@ impl ContactGroup {
         Ok(())
     }
 
-    /// Contacts that reach each other: the nodes that penetrate or touched last, then those that their solution makes
-    /// penetrate, until there are none.
+    /// Solves contacts that influence each other: first the nodes that penetrate or were in contact, then also those that the
+    /// solution makes penetrate, until there are no more.
     fn solve_together(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         let rests = |side: &GroupSide| bodies.structures[side.structure].touching_from(0).is_none();
         if self.sides.iter().all(rests) {
@@ -179,7 +179,7 @@ impl ContactGroup {
             let history = &bodies.structures[self.sides[side].structure].history;
             for index in 0..self.sides[side].chosen.len() {
                 let gap = history.gap.now[index];
-                // What touched and is beyond an edge now has nothing to touch.
+                // A node that was in contact and is now beyond an edge has nothing to touch.
                 let touched = history.gap.before[index] <= 0.0 && gap.is_finite() && self.law.is_iterative();
                 if gap < 0.0 || gap.is_nan() || touched {
                     self.choose(side, index, bodies);
@@ -188,7 +188,7 @@ impl ContactGroup {
         }
     }
 
-    /// Take a node into the group; on a coating the whole blade, whose nodes share cells.
+    /// Adds a node to the group; with a coating, all nodes of the blade, because they share cells.
     fn choose(&mut self, side: usize, index: usize, bodies: &Bodies) {
         let (side, coated) = (&mut self.sides[side], self.law.coating().is_some());
         side.chosen[index] = true;
@@ -235,7 +235,7 @@ impl ContactGroup {
         found
     }
 
-    /// Fill and solve the problem of the members.
+    /// Fills and solves the problem of the members.
     fn find_forces(&mut self, bodies: &Bodies, found: &mut GroupSolution) -> Result<(), StepFailure> {
         let per = self.law.directions();
         for (contact, &member) in self.members.iter().enumerate() {
@@ -260,7 +260,7 @@ impl ContactGroup {
         Ok(())
     }
 
-    /// W of the group: every structure that touches by its flexibility, those under the contacts through their modes.
+    /// Fills W of the group: structures with contact nodes by their flexibility, surface carriers by their modes.
     fn fill_delassus(&mut self, bodies: &Bodies, per: usize) {
         let matrix = self.law.matrix();
         if self.sides.len() > 1 {
@@ -280,7 +280,7 @@ impl ContactGroup {
         }
     }
 
-    /// The part of the structures under the contacts.
+    /// Adds the part of the surface carriers.
     #[inline(never)]
     fn add_reactions(&mut self, bodies: &Bodies, per: usize) {
         for reaction in &mut self.reactions {
@@ -298,7 +298,7 @@ impl ContactGroup {
         }
     }
 
-    /// Force on each member (N), in its own directions.
+    /// Computes the force on each member (N), in its own directions.
     #[inline(always)]
     fn find_force_vectors(&mut self, per: usize) {
         let values = self.law.multipliers();
@@ -311,7 +311,7 @@ impl ContactGroup {
         }
     }
 
-    /// Change of every gap by the solution (m), members and others.
+    /// Computes the change of every gap by the solution (m), for members and other nodes.
     fn respond(&mut self, bodies: &mut Bodies) {
         for side in &mut self.sides {
             let (members, forces) = (&self.members[side.span.clone()], &self.forces[side.span.clone()]);
@@ -329,7 +329,7 @@ impl ContactGroup {
         }
     }
 
-    /// Gaps change by what moves under the nodes.
+    /// Adds the changes of the gaps by the motion of the surface carriers.
     #[inline(never)]
     fn respond_of_carriers(&mut self, bodies: &Bodies) {
         for side in &mut self.sides {
@@ -350,7 +350,7 @@ impl ContactGroup {
         }
     }
 
-    /// Let the solution act on all structures, and record it.
+    /// Applies the solution to all structures and records it.
     #[inline(always)]
     fn apply(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) {
         for side in &self.sides {
@@ -372,12 +372,12 @@ impl ContactGroup {
         }
     }
 
-    /// Let the solution act on a structure that touches.
+    /// Applies the solution to a structure with contact nodes.
     #[inline(always)]
     fn act(&mut self, structure: &mut Structure, span: std::ops::Range<usize>, ledger: bool) {
         let bank = match structure.modes_mut() {
             Sectors::Uncoupled(bank) => bank,
-            // It was asked about them before.
+            // The disk already has the forces of the request.
             Sectors::Coupled(_) if span.is_empty() => return,
             Sectors::Coupled(disk) => return disk.act(),
         };
@@ -395,7 +395,7 @@ impl ContactGroup {
         }
     }
 
-    /// Write corrected gaps and forces into the history, and one event per contact that carries a force.
+    /// Writes corrected gaps and forces to the history, and one event per contact with a force.
     #[inline(always)]
     fn record(&mut self, bodies: &mut Bodies, found: &mut GroupSolution) {
         let (per, values) = (self.law.directions(), self.law.multipliers());
@@ -413,7 +413,7 @@ impl ContactGroup {
             of.history.coating_force[index] = share;
             let gap = bodies.pairs[pair].gap();
             let at = At { node, index, drive: bodies.pairs[pair].drive(When::Now) };
-            // Where the gap was evaluated, whose normal has no moment about the axis of a round casing.
+            // The point at which the gap was evaluated, whose normal has no moment about the axis of a round casing.
             let point = gap.contact_point(at, moved, of.history.geometry.now.place_at(index));
             let wrench = gap.wrench(at, point, force);
             let lanes = of.lanes();
@@ -426,7 +426,7 @@ impl ContactGroup {
     }
 }
 
-/// Row n and column n − µt of a contact; n, t₁, t₂ for both where it may stick.
+/// Sets row n and column n − µt of a contact, or n, t₁, t₂ for both if it may stick.
 #[inline(always)]
 fn fill_directions(at: &ContactView, rows: &mut [[f64; 3]], columns: &mut [[f64; 3]]) {
     let normal = at.normal();
@@ -443,7 +443,7 @@ fn fill_directions(at: &ContactView, rows: &mut [[f64; 3]], columns: &mut [[f64;
 }
 
 impl GroupSide {
-    /// Change of the gaps of this structure by forces on its own members.
+    /// Computes the change of the gaps of this structure by forces on its own members.
     #[inline(never)]
     fn respond(&mut self, structure: &mut Structure, members: &[ContactMember], forces: &[[f64; 3]]) {
         let nodes = structure.nodes();

@@ -1,4 +1,4 @@
-//! One span of time by continuous Galerkin: each sector by itself, in steps of its own.
+//! One span by continuous Galerkin: each sector separately, with its own steps.
 
 pub(super) mod casing;
 pub(super) mod coupled_set;
@@ -24,10 +24,10 @@ use crate::settings::{Scheme, Solver};
 use coupled_set::CoupledSet;
 use nalgebra::DMatrix;
 
-/// Contacts count as closed within this share of the tolerance.
+/// Contacts count as closed within this fraction of the tolerance.
 const PRECISION: f64 = 1e-4;
 
-/// Tables and scratch of one structure whose sectors are marched.
+/// Tables and scratch memory of one structure whose sectors are integrated with adaptive steps.
 #[derive(Debug, Clone)]
 pub struct Galerkin {
     tables: Vec<Tables>,
@@ -40,8 +40,8 @@ pub struct Galerkin {
 }
 
 impl Galerkin {
-    /// Makes the tables of a structure whose modes are `bank`, for spans up to `longest` (s) and errors of `tolerance` (m), with gaps rounded by
-    /// `rounding` (m).
+    /// Creates the tables of a structure with the modes `bank`, for spans up to `longest` (s), errors of `tolerance` (m) and gaps
+    /// rounded by `rounding` (m).
     fn new(
         bank: &ModalBank,
         (nodes, pairs): (usize, usize),
@@ -69,7 +69,7 @@ impl Galerkin {
         }
     }
 
-    /// Tables for spans of length `span` (s).
+    /// Fills the tables for spans of length `span` (s).
     pub(super) fn set_span(&mut self, span: f64) {
         self.tables.iter_mut().for_each(|tables| tables.set_span(span));
     }
@@ -93,8 +93,8 @@ fn modes_of(bank: &ModalBank, sector: usize, count: usize) -> ContactModes {
 }
 
 impl System {
-    /// Make room for marching spans up to `longest` (s) within `tolerance` of the smallest clearance of each structure; only before
-    /// [`System::start`]. Allocates.
+    /// Allocates memory for spans up to `longest` (s) with errors within the fraction `tolerance` of the smallest clearance of
+    /// each structure. Call it only before [`System::start`].
     pub fn prepare_spans(&mut self, longest: f64, tolerance: f64) {
         self.coupled_sets.clear();
         for structure in &mut self.structures {
@@ -132,12 +132,12 @@ impl System {
         }
     }
 
-    /// Prescribed motion of a pair in the middle of the span to come, and how its shape grows.
+    /// Sets the prescribed motion of a pair in the middle of the next span, and the growth of its shape.
     pub fn set_middle(&mut self, pair: usize, drive: &PrescribedMotion, growth: ShapeGrowth) {
         self.pairs[pair].middle = (*drive, growth);
     }
 
-    /// Modal loads of now are those at the start of the span to come.
+    /// Makes the current modal loads those at the start of the next span.
     pub fn begin_loads(&mut self) {
         for structure in &mut self.structures {
             if let Sectors::Uncoupled(bank) = structure.modes_mut() {
@@ -146,7 +146,7 @@ impl System {
         }
     }
 
-    /// One span to the instant described by `drives`, one per pair.
+    /// Integrates over one span to the time described by `drives`, one per pair.
     pub(crate) fn march(&mut self, drives: &[PrescribedMotion]) -> Result<(), StepFailure> {
         let span = self.step_size();
         for (pair, drive) in self.pairs.iter_mut().zip(drives) {
@@ -198,7 +198,7 @@ impl System {
         Ok(())
     }
 
-    /// Sectors that step together.
+    /// Integrates sectors that step together.
     fn march_together(&mut self, coupled_sets: &mut CoupledSet, span: f64) -> Result<(), StepFailure> {
         let Self { structures, pairs, events, counted, sets, .. } = self;
         sets.members(coupled_sets.set).iter().for_each(|one| structures[*one].begin_span());
@@ -223,7 +223,8 @@ impl System {
     }
 }
 
-/// Why a sector is not marched to the end; `entered`: a node that had nothing to touch before, and is inside an open surface.
+/// Converts the reason why a sector was not integrated to the end; `entered` is a node that had nothing to touch before and is
+/// now inside an open surface.
 fn failure(stopped: Stopped, (structure, sector): (usize, usize), entered: Option<usize>) -> StepFailure {
     match (stopped, entered) {
         (Stopped::Unsolved, Some(node)) => StepFailure::BehindEdge { structure, node },
@@ -267,7 +268,7 @@ fn enter_events(
     }
 }
 
-/// A contact of a span by its means over it.
+/// Creates the event of a contact from its means over the span.
 fn event(at: ContactMember, tally: &NodeTally, span: f64) -> ContactEvent {
     let mean = |values: [f64; 3]| values.map(|value| value / span);
     let wrench = Wrench {
@@ -280,14 +281,14 @@ fn event(at: ContactMember, tally: &NodeTally, span: f64) -> ContactEvent {
 }
 
 impl Structure {
-    /// Past and present change places before a span.
+    /// Makes the current values the previous ones, before a span.
     fn begin_span(&mut self) {
         self.history.gap.shift();
         self.history.geometry.shift();
         self.modes.begin_span();
     }
 
-    /// March one sector, and write its state.
+    /// Integrates one sector and writes its state.
     fn march_sector(
         &mut self,
         (number, sector): (usize, usize),

@@ -1,4 +1,4 @@
-//! Structures and contact pairs put together: everything that moves in a scene. `step.rs` has what one step does with it.
+//! Structures and contact pairs of a scene, which make up everything that moves. One step is in `step.rs`.
 
 mod carrier;
 mod contact_view;
@@ -46,12 +46,13 @@ pub(crate) use sets::joined;
 pub use small::Curved;
 pub use structure::Structure;
 
-/// A structure about to be put into a system.
+/// A structure that is to become part of a system.
 #[derive(Debug, Clone)]
 pub enum StructureParts<'a> {
     /// A structure with contact nodes that touch surfaces.
     Touching(SectorModel<'a>, Box<BankOptions>),
-    /// It carries surfaces, whose control points have three contact rows each; whether it is loaded beside contact.
+    /// A structure that carries surfaces, whose control points have three contact rows each; and whether it has loads in addition
+    /// to contact forces.
     Carrying(&'a ModalModel, bool),
 }
 
@@ -62,61 +63,61 @@ pub struct SystemSettings {
     pub scheme: Scheme,
     /// Contact solver.
     pub solver: Solver,
-    /// Gather the damping loss, without which the ledger does not close.
+    /// True if the damping loss is collected, without which the energy balance does not close.
     pub ledger: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct RunTotals {
-    /// Internal steps done.
+    /// Number of internal steps.
     pub steps: u64,
     /// Work of adaptive steps.
     pub effort: Effort,
     pub factorisations: u64,
-    /// Steps done when the gap two steps back was first one of steps of this size.
+    /// Number of steps after which the gap two steps back belongs to steps of the current size.
     pub witnessed: u64,
     /// Energy balance of each set.
     pub ledgers: Vec<Ledger>,
-    /// Most that contact of each set has taken so far.
+    /// Largest losses of the contacts of each set so far.
     taken: Vec<LargestLosses>,
 }
 
 persist_fields!(RunTotals { steps, effort, factorisations, witnessed, ledgers, taken });
 
 impl RunTotals {
-    /// Nothing has been done yet.
+    /// Initial totals of a run.
     fn new(ledgers: Vec<Ledger>) -> Self {
         Self { taken: vec![LargestLosses::default(); ledgers.len()], ledgers, ..Self::default() }
     }
 }
 
-/// Structures, the contact pairs between them, and which of the contacts can push each other.
+/// Structures, the contact pairs between them, and the groups of contacts that can influence each other.
 #[derive(Debug, Clone)]
 pub struct System {
     pub(crate) structures: Vec<Structure>,
     pub(crate) pairs: Vec<ContactPair>,
-    /// Contact groups of the first sets, in their order.
+    /// Contact groups of the first sets, in the order of the sets.
     pub(crate) groups: Vec<ContactGroup>,
     sets: StructureSets,
-    /// Sets whose sectors are marched together.
+    /// Sets whose sectors are integrated together.
     coupled_sets: Vec<CoupledSet>,
     pub(crate) settings: SystemSettings,
     pub(crate) events: Two<Vec<ContactEvent>>,
     pub(crate) counted: RunTotals,
-    /// Energy of each set before a change of the step (J).
+    /// Energy of each set before a change of the step size (J).
     mechanical: Vec<f64>,
-    /// No sector begins a step once so many have been tried.
+    /// Limit of attempted steps, beyond which no sector begins a step.
     most_tried: u64,
 }
 
 impl System {
-    /// All sectors of one structure at rest against something rigid, with Coulomb coefficient µ. [`System::set_step`] and
-    /// [`System::start`] come before the first step.
+    /// Creates a system of one structure, with all sectors at rest, and a rigid surface with friction coefficient µ. Call
+    /// [`System::set_step`] and [`System::start`] before the first step.
     pub fn new(model: &ModalModel, sectors: usize, gap: GapLaw, friction: f64, settings: SystemSettings) -> Self {
         Self::alone(SectorModel::Uncoupled(model, sectors), BankOptions::default(), gap, friction, settings)
     }
 
-    /// The same with coupled sectors, or with options of its modes.
+    /// Creates a system of one structure with coupled sectors, or with options of its modes.
     pub fn alone(
         model: SectorModel,
         options: BankOptions,
@@ -128,7 +129,7 @@ impl System {
         Self::of(vec![StructureParts::Touching(model, Box::new(options))], vec![pair], Vec::new(), settings)
     }
 
-    /// Any number of structures and pairs; `coatings` are those of pairs.
+    /// Creates a system of any number of structures and pairs; `coatings` are those of the pairs.
     pub fn of(
         parts: Vec<StructureParts>,
         pairs: Vec<PairParts>,
@@ -195,8 +196,8 @@ impl System {
         group.law().coating()
     }
 
-    /// Contacts whose forces acted over the last step, and whose work was entered for it: those of that step, or of schemes whose
-    /// contact forces act later those of the step before.
+    /// Contacts whose forces acted over the last step and whose work was recorded for it: those of that step or, for schemes
+    /// whose contact forces act later, those of the previous step.
     pub fn acted(&self) -> &[ContactEvent] {
         if self.settings.scheme.acts_later() { &self.events.before } else { &self.events.now }
     }
@@ -206,12 +207,12 @@ impl System {
         &self.events.now
     }
 
-    /// The modes of the first structure.
+    /// Modes of the first structure.
     pub fn bank(&self) -> &Sectors {
         self.structures[0].modes()
     }
 
-    /// The modes of the first structure, to set initial conditions before [`System::start`].
+    /// Modes of the first structure, to set initial conditions before [`System::start`].
     pub fn bank_mut(&mut self) -> &mut Sectors {
         self.structures[0].modes_mut()
     }
@@ -241,32 +242,32 @@ impl System {
         self.structures[0].modes().step()
     }
 
-    /// Internal steps done; spans where sectors are marched one by one.
+    /// Number of internal steps, or of spans if sectors are integrated with adaptive steps.
     pub fn steps(&self) -> u64 {
         self.counted.steps
     }
 
-    /// Returns the work of adaptive steps of all sectors together.
+    /// Returns the work of adaptive steps, summed over all sectors.
     pub fn effort(&self) -> &Effort {
         &self.counted.effort
     }
 
-    /// Steps taken, of all sectors together where each takes its own.
+    /// Number of accepted steps, summed over all sectors for adaptive steps.
     pub fn steps_taken(&self) -> u64 {
         if self.settings.scheme == Scheme::Galerkin { self.counted.effort.steps } else { self.counted.steps }
     }
 
-    /// Steps tried, those taken included.
+    /// Number of attempted steps, including accepted ones.
     pub fn steps_tried(&self) -> u64 {
         if self.settings.scheme == Scheme::Galerkin { self.counted.effort.tried() } else { self.counted.steps }
     }
 
-    /// Let no sector begin a step once so many have been tried ([`System::steps_tried`]).
+    /// Sets the limit of attempted steps ([`System::steps_tried`]), beyond which no sector begins a step.
     pub(crate) fn allow(&mut self, most_tried: u64) {
         self.most_tried = most_tried;
     }
 
-    /// Small linear systems factorised by the contact solver.
+    /// Number of small linear systems that the contact solver has factorised.
     pub fn factorisations(&self) -> u64 {
         self.counted.factorisations
     }
@@ -278,35 +279,35 @@ impl System {
         ledgers.fold(first, |sum, one| sum.with(&one))
     }
 
-    /// The same of each set of structures that can feel each other.
+    /// Work and losses so far, of each set of structures that influence each other.
     pub fn ledgers(&self) -> &[Ledger] {
         &self.counted.ledgers
     }
 
-    /// Which structures can feel each other.
+    /// Sets of structures that influence each other.
     pub fn sets(&self) -> &StructureSets {
         &self.sets
     }
 
-    /// Settings in use.
+    /// Current settings.
     pub fn settings(&self) -> &SystemSettings {
         &self.settings
     }
 
-    /// Change the friction of a pair (takes effect with the next step).
+    /// Sets the friction coefficient of a pair (takes effect with the next step).
     pub fn set_friction(&mut self, pair: usize, friction: f64) {
         self.pairs[pair].parts.friction = friction;
     }
 
-    /// Choose scheme and solver; only before [`System::start`]. Allocates where the solver is another.
+    /// Selects scheme and solver; only before [`System::start`]. Allocates if the solver changes.
     pub fn set_methods(&mut self, scheme: Scheme, solver: Solver) {
         self.settings.scheme = scheme;
         self.settings.solver = solver;
         self.groups.iter_mut().for_each(|group| group.set_solver(solver, &self.structures));
     }
 
-    /// Clear history and ledger, take the present modal state as initial, and evaluate the gaps with the prescribed motion
-    /// `drives`, one per pair.
+    /// Clears history and ledger, uses the current modal state as initial state, and evaluates the gaps with the prescribed
+    /// motion `drives`, one per pair.
     pub fn start(&mut self, drives: &[PrescribedMotion]) {
         self.structures.iter_mut().for_each(Structure::start);
         self.groups.iter_mut().filter_map(|group| group.law_mut().coating_mut()).for_each(Coating::reset);
@@ -321,29 +322,29 @@ impl System {
         self.counted = RunTotals::new((0..self.sets.count()).map(initial).collect());
     }
 
-    /// Kinetic plus strain energy of a set (J), in the quantity the scheme conserves.
+    /// Kinetic plus strain energy of a set (J), in the form that the scheme conserves.
     pub(crate) fn mechanical_energy(&self, set: usize) -> f64 {
         let members = self.sets.members(set).iter();
         let (kinetic, strain) = sum_of(members.map(|member| self.structures[*member].modes().energies()));
         kinetic + strain
     }
 
-    /// Kinetic and strain energy of all structures (J), in the quantity the scheme conserves and the ledger closes with.
+    /// Kinetic and strain energy of all structures (J), in the form that the scheme conserves and the energy balance uses.
     pub fn energies(&self) -> (f64, f64) {
         sum_of(self.structures.iter().map(|structure| structure.modes().energies()))
     }
 
-    /// The modal state there is the first, of another length of the first step.
+    /// Makes the current modal state the initial state again, for a first step of another length.
     pub(crate) fn renew_start(&mut self) {
         for set in 0..self.sets.count() {
             self.counted.ledgers[set].initial = self.mechanical_energy(set);
         }
-        // Gaps of two steps back are not known yet.
+        // Gaps two steps back are not known yet.
         self.counted.witnessed = 2;
     }
 
-    /// Follow speed (rad/s) and temperature (K) of a rotor where its modes depend on them; the strain energy this adds is work of
-    /// the shaft and of heat.
+    /// Sets speed (rad/s) and temperature (K) of a rotor whose modes depend on them; the change of strain energy is work of the
+    /// shaft and of heat.
     pub fn set_speed(&mut self, structure: usize, speed: f64, temperature: f64) {
         let work = self.structures[structure].modes_mut().set_speed(speed, temperature);
         let ledger = &mut self.counted.ledgers[self.sets.of(structure)];
@@ -351,7 +352,7 @@ impl System {
         ledger.turnover.add(work.abs());
     }
 
-    /// Move the damping loss gathered in the step kernel to the ledger.
+    /// Moves the damping loss collected in the step kernel to the ledger.
     pub fn close_ledger(&mut self) {
         for (index, structure) in self.structures.iter_mut().enumerate() {
             let ledger = &mut self.counted.ledgers[self.sets.of(index)];
@@ -381,7 +382,7 @@ fn made(part: StructureParts, index: usize, pairs: &[PairParts]) -> Structure {
     Structure::touching(model, options, pair_of, has_places)
 }
 
-/// Which structures push each other with their contact nodes, set by set, and how far their contacts reach.
+/// Finds the structures with contact nodes of each set, and how far their contacts are coupled.
 fn contact_reaches(structures: &[Structure], pairs: &[ContactPair], sets: &StructureSets) -> Vec<(Reach, Vec<usize>)> {
     let touching = |set: usize| -> Vec<usize> {
         let members = sets.members(set).iter().copied();
@@ -390,7 +391,7 @@ fn contact_reaches(structures: &[Structure], pairs: &[ContactPair], sets: &Struc
     let reach = |members: Vec<usize>| {
         let first = *members.first()?;
         let carried = pairs.iter().any(|pair| members.contains(&pair.structure()) && pair.carrier().is_some());
-        // Sectors turn against what stands still; a single structure is one sector with all of its contacts at once.
+        // Sectors turn relative to a stationary surface; a single structure is one sector with all of its contacts.
         let open = pairs.iter().any(|pair| pair.structure() == first && matches!(pair.gap(), GapLaw::Open(_)));
         let coupled_sets = carried || structures[first].modes().coupled().is_some() || open;
         Some((if coupled_sets { Reach::All } else { Reach::Sector }, members))

@@ -1,4 +1,4 @@
-//! One sector facing its surfaces over a span of time: gaps at any instant, and what contacts did.
+//! One sector and its surfaces over a span: gaps at any time, and a record of the contacts.
 
 use super::carrier::Spot;
 use super::march::casing::CarrierIntegrator;
@@ -14,28 +14,28 @@ use crate::gaps::GapLaw;
 use crate::gaps::wrench::{At, MotionIncrement};
 use crate::gaps::{PrescribedMotion, dot};
 
-/// Contacts of a trial are solved this often before their directions of sliding stay as they are: a node that next to does not slide would
-/// turn them from one time to the next.
+/// Number of contact solutions in a trial after which the sliding directions are frozen, because a node that hardly slides would
+/// change its direction in every solution.
 const SOLUTIONS: usize = 3;
 
-/// Structures that carry the surfaces a sector faces, over a step of a level.
+/// Structures that carry the surfaces of a sector, in a step of a level.
 pub struct CarriersInStep<'a> {
     pub casings: &'a mut [CarrierIntegrator],
-    /// Which of them carries the surface of each pair.
+    /// Index of the structure in `casings` that carries the surface of each pair.
     pub casing_of: &'a [Option<usize>],
     pub level: usize,
     pub kind: ForceInterpolation,
     pub lanes: Lanes,
 }
 
-/// A sector of a structure facing its surfaces.
+/// A sector of a structure and the surfaces that it can touch.
 pub struct ObstacleView<'a> {
     /// Structures that carry the surfaces, if any.
     pub carriers: Option<CarriersInStep<'a>>,
     pub pairs: &'a mut [ContactPair],
     /// Pair of each node.
     pub pair_of: &'a [Option<usize>],
-    /// Lanes of a row, and that of the sector.
+    /// Number of lanes of a row, and lane of the sector.
     pub lanes: usize,
     pub sector: usize,
     pub record: &'a mut SpanRecord,
@@ -57,7 +57,7 @@ impl ObstacleView<'_> {
         Some(read(&carriers.casings[casing], spot))
     }
 
-    /// The same, of what is told to it.
+    /// Calls `read` with the structure that carries the surface of a node, at a point of the step.
     pub fn with_carrier_mut(&mut self, node: usize, point: usize, read: impl FnOnce(&mut CarrierIntegrator, Spot)) {
         let (Some(carriers), Some(pair)) = (&mut self.carriers, self.pair_of[node]) else { return };
         let Some(casing) = carriers.casing_of[pair] else { return };
@@ -67,7 +67,7 @@ impl ObstacleView<'_> {
         }
     }
 
-    /// Returns the carrier that a lane faces, and the step that is solved.
+    /// Returns the surface carrier of a lane, and the current step.
     fn under(&mut self, lane: usize) -> Option<(&mut CarrierIntegrator, (usize, ForceInterpolation), Lanes)> {
         let CarriersInStep { casings, casing_of, level, kind, lanes } = self.carriers.as_mut()?;
         let casing = self.pair_of[lanes.place(lane).1].and_then(|pair| casing_of[pair])?;
@@ -80,7 +80,7 @@ impl ObstacleView<'_> {
 }
 
 impl ObstacleView<'_> {
-    /// All nodes at all points as lanes, where they face one surface of revolution and the shaft stays.
+    /// Enters all nodes at all points as lanes, if they face one surface of revolution and the shaft does not move.
     fn enter_lanes(&mut self, lanes: Lanes) -> Option<usize> {
         let pair = (*self.pair_of.first()?)?;
         let GapLaw::Revolution(law) = self.pairs[pair].gap() else { return None };
@@ -286,13 +286,13 @@ impl Witness for ObstacleView<'_> {
     }
 }
 
-/// Times that the smallest gap between points is sought by a parabola through three gaps.
+/// Number of iterations of the search for the smallest gap between points by a parabola through three gaps.
 const PARABOLAS: usize = 4;
-/// Factor by which the points move closer each time.
+/// Factor by which the points move closer in each iteration.
 const CLOSER: f64 = 0.25;
 
 impl ObstacleView<'_> {
-    /// Smallest gap of a node (m) up to now and at the points of a step, and between them where it stays open.
+    /// Smallest gap of a node (m) so far, at the points of a step, and between them if it stays open.
     fn lowest(&self, (trial, basis): (&Trial, &TimeBasis), node: usize) -> f64 {
         let gaps = (1..=trial.points()).map(|point| trial.gap(point, node));
         let lowest = gaps.fold(self.record.tallies[node].lowest, f64::min);
@@ -310,7 +310,8 @@ impl ObstacleView<'_> {
 
     /// Smallest gap of a node (m) within a step, near `theta` if its motion is not known in parts.
     ///
-    /// A surface of revolution and the displacements are not polynomials of time: gaps are evaluated. Those to other surfaces are a polynomial.
+    /// A surface of revolution and the displacements are not polynomials of time, so gaps are evaluated. Gaps to other surfaces
+    /// are a polynomial.
     fn lowest_near(&self, (trial, basis): (&Trial, &TimeBasis), node: usize, theta: f64) -> f64 {
         let mut lowest = f64::INFINITY;
         let mut look = |theta: f64| {
@@ -341,7 +342,7 @@ impl ObstacleView<'_> {
         lowest
     }
 
-    /// Whether a node that touches at point `i` had nothing to touch before, and was behind the surface, continued beyond its edge.
+    /// Returns whether a node that touches at point `i` had nothing to touch before and was behind the surface, extrapolated beyond its edge.
     fn was_behind(&self, trial: &Trial, node: usize, pair: usize, i: usize) -> bool {
         let GapLaw::Open(open) = self.pairs[pair].gap() else { return false };
         if trial.gap(i - 1, node).is_finite() {
@@ -360,7 +361,7 @@ impl ObstacleView<'_> {
         )
     }
 
-    /// Σ_k S_ik of the prescribed motion of a pair at the points, for each point i of the step.
+    /// Computes Σ_k S_ik of the prescribed motion of a pair at the points, for each point i of the step.
     fn weigh_motions(&mut self, step: &AcceptedStep) {
         let points = 0..=step.trial.points();
         for (motions, drives) in self.record.motions.iter_mut().zip(&self.record.drives) {
@@ -372,7 +373,7 @@ impl ObstacleView<'_> {
         }
     }
 
-    /// Enter what a node that pushes did over a step. All work is linear in displacements and motion, which are weighted first.
+    /// Records forces and work of an active node over a step. All work is linear in displacements and motion, which are weighted first.
     fn enter(&mut self, step: &AcceptedStep, node: usize, pair: usize) {
         let (trial, basis) = (step.trial, &step.level.basis);
         let (mut tally, mut work) = (self.record.tallies[node], self.record.work);
@@ -387,7 +388,7 @@ impl ObstacleView<'_> {
             let (place, motion) = (self.record.places[i][node], &motions[i]);
             let point = gap.contact_point(at, moved, place);
             self.record.implausible |= !gap.is_plausible(node, trial.gap(i, node), normal);
-            // By the normal for which the force was found: what it turned since then is work of curvature, not heat.
+            // With the normal for which the force was found: the effect of its rotation since then is curvature work, not heat.
             let tangential = if slides { trial.friction_force(i, node) } else { [0.0; 3] };
             let wrench = gap.wrench(at, point, force);
             let length = step.level.step
@@ -430,7 +431,7 @@ impl ObstacleView<'_> {
             work.moved += dot(force, there).abs();
         }
         if heats < 0.0 && trial.sticks() {
-            // The force at the start is not that of the slip to come: what it puts in is paid by what impacts have left.
+            // The force at the start does not belong to the slip of the step; the energy it supplies comes from earlier impact losses.
             work.heat -= heats;
             tally.heat -= heats;
             work.closing += heats;

@@ -9,10 +9,10 @@ use crate::gaps::{GapLaw, PrescribedMotion};
 use crate::history::Two;
 use crate::persist::persist_fields;
 
-/// Where the surface of a pair is carried.
+/// The structure that carries the surface of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SurfaceCarrier {
-    /// The structure.
+    /// Index of the structure.
     pub structure: usize,
     /// First row of the carrier that moves a control point of this surface.
     pub first_row: usize,
@@ -25,34 +25,34 @@ pub struct PairParts {
     pub structure: usize,
     /// The gap function of these nodes.
     pub gap: GapLaw,
-    /// Which structure deforms the surface; `None` for a rigid one.
+    /// Structure that deforms the surface; `None` for a rigid surface.
     pub carrier: Option<SurfaceCarrier>,
-    /// Coulomb coefficient µ.
+    /// Friction coefficient µ.
     pub friction: f64,
-    /// Tangential per normal force of a coating that is cut (-); 0 without one.
+    /// Tangential per normal force when a coating is cut (-); 0 without a coating.
     pub cutting: f64,
 }
 
 /// Prescribed motion over the last steps.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Prescribed {
-    /// At the last step, and before.
+    /// At the last step, and at the previous step.
     drive: Two<PrescribedMotion>,
-    /// Over the last step, and over the one before.
+    /// Change over the last step, and over the previous step.
     motion: Two<MotionIncrement>,
 }
 
 persist_fields!(Prescribed { drive, motion });
 
-/// A pair with the prescribed motion of what touches.
+/// A contact pair with its prescribed motion.
 #[derive(Debug, Clone)]
 pub struct ContactPair {
     /// Parts of the pair.
     pub(super) parts: PairParts,
-    /// Contact nodes that belong to it.
+    /// Contact nodes of the pair.
     nodes: Vec<usize>,
     prescribed: Prescribed,
-    /// Prescribed motion in the middle of the span under way, and how the shape grows, where a scheme asks for it.
+    /// Prescribed motion in the middle of the current span, and the growth of the shape, if a scheme needs them.
     pub(super) middle: (PrescribedMotion, ShapeGrowth),
 }
 
@@ -66,7 +66,7 @@ impl ContactPair {
         self.parts.structure
     }
 
-    /// Contact nodes that belong to it.
+    /// Contact nodes of the pair.
     pub fn nodes(&self) -> &[usize] {
         &self.nodes
     }
@@ -76,27 +76,27 @@ impl ContactPair {
         &self.parts.gap
     }
 
-    /// Which structure deforms the surface.
+    /// Structure that deforms the surface.
     pub fn carrier(&self) -> Option<SurfaceCarrier> {
         self.parts.carrier
     }
 
-    /// Coulomb coefficient µ.
+    /// Friction coefficient µ.
     pub fn friction(&self) -> f64 {
         self.parts.friction
     }
 
-    /// Tangential per normal force of a coating that is cut (-); 0 without one.
+    /// Tangential per normal force when a coating is cut (-); 0 without a coating.
     pub fn cutting(&self) -> f64 {
         self.parts.cutting
     }
 
-    /// The gap function, to evaluate it.
+    /// The gap function, for evaluation.
     pub(super) fn gap_mut(&mut self) -> &mut GapLaw {
         &mut self.parts.gap
     }
 
-    /// Prescribed motion one step before the last.
+    /// Prescribed motion at the step before the last.
     pub fn drive_before(&self) -> &PrescribedMotion {
         self.drive(When::Before)
     }
@@ -120,17 +120,17 @@ impl ContactPair {
         &self.prescribed.motion.now
     }
 
-    /// Over the step before.
+    /// Prescribed motion over the step before the last.
     pub(super) fn motion_before(&self) -> &MotionIncrement {
         &self.prescribed.motion.before
     }
 
-    /// Nothing has moved before `drive`.
+    /// Starts with the prescribed motion `drive`, without earlier motion.
     pub(super) fn start(&mut self, drive: &PrescribedMotion) {
         self.prescribed = Prescribed { drive: Two::new(*drive), motion: Two::default() };
     }
 
-    /// A step (s) to `drive` is under way.
+    /// Starts a step of length `step` (s) to the prescribed motion `drive`.
     pub(crate) fn move_to(&mut self, drive: &PrescribedMotion, step: f64) {
         let Prescribed { drive: drives, motion } = &mut self.prescribed;
         (drives.before, motion.before) = (drives.now, motion.now);
@@ -139,42 +139,43 @@ impl ContactPair {
         self.parts.gap.turn(motion.now.turn);
     }
 
-    /// The step before was `ratio` times as long.
+    /// Scales the last change of prescribed motion by `ratio`, for another step size.
     pub(super) fn stretch(&mut self, ratio: f64) {
         self.prescribed.motion.now = self.prescribed.motion.now.over(ratio);
     }
 
-    /// Prescribed motion as a part of a state.
+    /// Prescribed motion, as a part of the saved state.
     pub(super) fn state(&self) -> &impl crate::persist::Persist {
         &self.prescribed
     }
 
-    /// The same, to restore it.
+    /// Prescribed motion, to restore it.
     pub(super) fn state_mut(&mut self) -> &mut impl crate::persist::Persist {
         &mut self.prescribed
     }
 
-    /// Directions of a node's own frame at a rotor angle (rad); the fixed ones where nothing turns.
+    /// Directions of the frame of a node at a rotor angle (rad); fixed directions if nothing rotates.
     #[inline(always)]
     pub(super) fn frame(&self, index: usize, rotor_angle: f64) -> PolarFrame {
         self.parts.gap.layout().map_or(PolarFrame::FIXED, |layout| PolarFrame::new(layout.angles[index] + rotor_angle))
     }
 
-    /// The surface and what carries it; `None` for one that nothing deforms.
+    /// Returns the surface and its carrier; `None` for a rigid surface.
     #[inline(always)]
     pub(super) fn carried(&self) -> Option<(&SurfaceSpline, SurfaceCarrier)> {
         let carrier = self.parts.carrier?;
         Some((self.parts.gap.spline()?, carrier))
     }
 
-    /// The surface is as with this factor of its shape and rows of its carrier displaced so (m).
+    /// Deforms the surface with this factor of its shape and these displacements of the rows of its carrier (m).
     pub(super) fn bend(&mut self, factor: f64, rows: &[f64]) {
         let Some(carrier) = self.parts.carrier else { return };
         let points = self.parts.gap.spline().map_or(0, |surface| surface.control_points().len());
         self.parts.gap.bend(factor, &rows[carrier.first_row..][..3 * points]);
     }
 
-    /// Gaps of its nodes at the displacements of now; `warm`: closest points are sought from those of the step before.
+    /// Finds the gaps of the nodes at the current displacements. If `warm`, the search for closest points starts from those of
+    /// the previous step.
     pub(crate) fn find_gaps(&mut self, structures: &mut [Structure], warm: bool) {
         let Self { parts: PairParts { structure, gap, carrier, .. }, prescribed, .. } = self;
         let drive = &prescribed.drive.now;
@@ -188,7 +189,7 @@ impl ContactPair {
     }
 }
 
-/// Which of two instants.
+/// Selects one of two times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum When {
     /// The last step.
@@ -197,7 +198,7 @@ pub enum When {
     Before,
 }
 
-/// Value of a place on a surface, of values per row of its carrier, in the directions of `frame`.
+/// Interpolates values per row of a carrier at a place on its surface, in the directions of `frame`.
 pub(super) fn at_place(
     (surface, carrier): (&SurfaceSpline, SurfaceCarrier),
     place: ClosestPoint,

@@ -1,15 +1,14 @@
-//! How much contact nodes are pulled at, and how deep they are left inside: what a law that looks once for penetration makes of nodes that
-//! push each other.
+//! Pulling forces and penetration at contact nodes, which occur if a law checks for penetration only once and nodes push each other.
 
 use super::System;
 use crate::persist::persist_fields;
 
-/// Impulses on the contact nodes of one structure since the start, of all its sectors together.
+/// Impulses on the contact nodes of one structure since the start, summed over all its sectors.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pulling {
-    /// Internal steps in which a node touched.
+    /// Number of internal steps with contact.
     touched: u64,
-    /// Impulses of pushing forces, and of pulling forces, of each node (N s).
+    /// Impulses of pushing and of pulling forces on each node (N s).
     pushed: Vec<f64>,
     pulled: Vec<f64>,
     /// Largest depth of each node inside a surface at the end of a step, as a fraction of its clearance.
@@ -19,12 +18,12 @@ pub struct Pulling {
 persist_fields!(Pulling { touched, pushed, pulled, inside });
 
 impl Pulling {
-    /// Makes room for `nodes` nodes.
+    /// Allocates data for `nodes` nodes.
     pub(super) fn new(nodes: usize) -> Self {
         Self { touched: 0, pushed: vec![0.0; nodes], pulled: vec![0.0; nodes], inside: vec![0.0; nodes] }
     }
 
-    /// Nothing has touched yet.
+    /// Resets the record.
     pub(super) fn clear(&mut self) {
         self.touched = 0;
         self.pushed.fill(0.0);
@@ -37,8 +36,8 @@ impl Pulling {
         side[node] += impulse.abs();
     }
 
-    /// The node most pulled at, and its impulse as a share of that of the node most pushed, once contact lasted for so many internal
-    /// steps; a single touch of two nodes tells nothing.
+    /// Returns the node with the largest pulling impulse, as a fraction of the largest pushing impulse, once contact has lasted
+    /// for `steps` internal steps; a single contact of two nodes is not representative.
     fn most(&self, steps: u64) -> Option<(usize, f64)> {
         let pushed = self.pushed.iter().copied().fold(0.0, f64::max);
         let (node, pulled) = self.pulled.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -47,7 +46,7 @@ impl Pulling {
 }
 
 impl System {
-    /// Enter the forces found in the step just done, where a law leaves some that pull.
+    /// Records the forces of the last step, if a law allows pulling forces.
     pub(crate) fn count_pulling(&mut self) {
         if self.groups.iter().all(|group| group.law().is_iterative()) {
             return;
@@ -77,7 +76,7 @@ impl System {
         self.structures[structure].pulling.inside.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Clearance of a contact node (m); 0 where it has nothing to touch.
+    /// Clearance of a contact node (m); 0 if it has nothing to touch.
     pub(crate) fn clearance_of(&self, structure: usize, node: usize) -> f64 {
         let pair = self.structures[structure].pair_of[node];
         pair.map_or(0.0, |pair| self.pairs[pair].gap().clearance())

@@ -1,4 +1,4 @@
-//! What is kept of one sector over a span of time: how prescribed motion goes on, where nodes are, what contacts did.
+//! Record of one sector over a span: prescribed motion, places of nodes, and results of contacts.
 
 use super::StepFailure;
 use super::carrier::Spot;
@@ -11,18 +11,18 @@ use crate::gaps::revolution::Instants;
 use crate::gaps::surface_spline::ClosestPoint;
 use crate::gaps::wrench::{MotionIncrement, Wrench};
 
-/// Prescribed motion of a pair over a span: from its start, quadratic in time through the middle and the end. Inputs are linear in time and the angle
-/// of the rotor is quadratic, so that this is exact; the shape may grow in another way.
+/// Prescribed motion of a pair over a span: from its start, quadratic in time through the middle and the end. This is exact
+/// because inputs are linear in time and the rotor angle is quadratic; only the shape may grow differently.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MotionCourse {
     before: PrescribedMotion,
-    /// Linear and quadratic part over the whole span.
+    /// Linear and quadratic part of the motion over the whole span.
     parts: [MotionIncrement; 2],
     growth: ShapeGrowth,
 }
 
 impl MotionCourse {
-    /// From `before` through `middle` to `end`, a span of length `span` (s).
+    /// Creates the course from `before` through `middle` to `end`, over a span of length `span` (s).
     pub fn new(
         before: &PrescribedMotion,
         (middle, growth): (&PrescribedMotion, ShapeGrowth),
@@ -36,18 +36,18 @@ impl MotionCourse {
         Self { before: *before, parts: [linear, quadratic], growth }
     }
 
-    /// Whether nothing but the rotor moves.
+    /// Returns whether only the rotor moves.
     pub fn only_turns(&self) -> bool {
         self.parts.iter().all(|part| part.casing_rests() && part.shaft.iter().all(|along| *along == 0.0))
     }
 
-    /// Motion from the start of the span to `theta` of it.
+    /// Motion from the start of the span to its fraction `theta`.
     fn motion(&self, theta: f64) -> MotionIncrement {
         let motion = self.parts[0].over(theta).since(&self.parts[1].over(theta * theta));
         MotionIncrement { shape_factor: self.growth.at(theta) - self.before.shape_factor, ..motion }
     }
 
-    /// Prescribed motion at `theta` of the span.
+    /// Prescribed motion at the fraction `theta` of the span.
     pub fn at(&self, theta: f64) -> (PrescribedMotion, MotionIncrement) {
         let motion = self.motion(theta);
         let rate = |part: fn(&MotionIncrement) -> f64| {
@@ -68,7 +68,7 @@ impl MotionCourse {
     }
 }
 
-/// Contact of a node over a span.
+/// Contact of one node over a span.
 #[derive(Debug, Clone, Copy)]
 pub struct NodeTally {
     /// ∫λ dt (N·s).
@@ -83,7 +83,7 @@ pub struct NodeTally {
     pub peak: f64,
     /// Friction heat (J).
     pub heat: f64,
-    /// Smallest gap (m): at the start of the span, at points, and between points of nodes that stay open.
+    /// Smallest gap (m): at the start of the span, at the points, and between the points for nodes that stay open.
     pub lowest: f64,
 }
 
@@ -110,64 +110,64 @@ pub struct Worked {
     pub shift: f64,
     /// Work of the casing (J).
     pub casing: f64,
-    /// Friction heat.
+    /// Friction heat (J).
     pub heat: f64,
     /// Energy lost by gaps that close (J).
     pub closing: f64,
-    /// On the structure, and its magnitudes.
+    /// Work on the structure, and the sum of its magnitudes (J).
     pub exact: f64,
     pub moved: f64,
-    /// Damping loss.
+    /// Damping loss (J).
     pub damping: f64,
-    /// Energy lost by constant forces compared with those before (J).
+    /// Energy lost by changes to a constant force (J).
     pub dropped: f64,
 }
 
-/// Which place of a node on a surface that is carried.
+/// Selects a place of a node on the surface of a carrier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SurfacePlace {
-    /// That at the start of the step.
+    /// The place at the start of the step.
     Begun,
-    /// The closest point of now.
+    /// The current closest point.
     Now,
-    /// Where its force has been handed over.
+    /// The place at which the force of the node was applied.
     Acted,
 }
 
-/// Data that is kept from span to span, and scratch; allocates only when made.
+/// Data that is kept from span to span, and scratch memory; allocates only on creation.
 #[derive(Debug, Clone)]
 pub struct SpanRecord {
-    /// Contact of each node.
+    /// Contact of each node over the span.
     pub tallies: Vec<NodeTally>,
-    /// Work of all nodes.
+    /// Work of all nodes over the span.
     pub work: Worked,
     /// Motion of each pair over the span.
     pub courses: Vec<MotionCourse>,
-    /// Start and length of the step being tried, as shares of the span.
+    /// Start and length of the tried step, as fractions of the span.
     pub step: [f64; 2],
-    /// Gaps within free flight are looked for where they may be smaller than at its ends by more than this (m).
+    /// Gaps within free flight are searched if they may be smaller than at its ends by more than this (m).
     pub tolerance: f64,
-    /// At the points of the step being tried, pair by pair.
+    /// Prescribed motion at the points of the tried step, for each pair.
     pub drives: Vec<[(PrescribedMotion, MotionIncrement); POINTS]>,
-    /// Motion that forces at each point of the step taken work on, pair by pair.
+    /// Weighted motion over which forces at each point of the accepted step do work, for each pair.
     pub motions: Vec<[MotionIncrement; POINTS]>,
     pub places: [Vec<ClosestPoint>; POINTS],
-    /// Where forces have been handed to structures that carry surfaces: places of the pass before that in which gaps hold.
+    /// Places at which forces were applied to surface carriers: those of the pass before the one in which the gaps converged.
     pub acted: [Vec<ClosestPoint>; POINTS],
     /// Sliding of nodes along open surfaces at the points (m), where it was requested in this trial; and the number of requests.
     pub slips: [Vec<Option<[f64; 3]>>; POINTS],
     pub solutions: usize,
     pub instants: Instants,
-    /// All nodes at all points are in `instants`, before the surface of this pair.
+    /// Pair to whose surface all nodes at all points are entered in `instants`.
     pub lanes_of: Option<usize>,
-    /// A contact that small displacements cannot describe.
+    /// True if a contact exceeds the limits of small displacements.
     pub implausible: bool,
-    /// A node that has come over a free edge and was behind the surface already.
+    /// A node that has passed a free edge and was already behind the surface.
     pub behind_edge: Option<usize>,
 }
 
 impl SpanRecord {
-    /// Room for so many nodes and pairs, with errors of `tolerance` (m).
+    /// Allocates data for `nodes` nodes and `pairs` pairs, with errors of `tolerance` (m).
     pub fn new(nodes: usize, pairs: usize, tolerance: f64) -> Self {
         Self {
             step: [0.0; 2],
@@ -188,7 +188,7 @@ impl SpanRecord {
         }
     }
 
-    /// Where a node is on a surface that is carried, at a point of the step.
+    /// Returns the location of a node on the surface of a carrier, at a point of the step.
     pub fn spot<'a>(
         &self,
         (node, point): (usize, usize),
@@ -205,7 +205,7 @@ impl SpanRecord {
         Some(Spot { surface: of.carried()?, place, frame })
     }
 
-    /// The force on a node at a point of the step is handed over where the node is now.
+    /// Stores that the force on a node at a point of the step was applied at the node's current place.
     pub fn act(&mut self, node: usize, point: usize) {
         self.acted[point][node] = self.places[point][node];
     }
@@ -218,21 +218,21 @@ impl SpanRecord {
         self.behind_edge.map_or(Ok(()), |node| Err(StepFailure::BehindEdge { structure, node }))
     }
 
-    /// Prescribed motion of a span (s) that the pairs are at the end of.
+    /// Sets the prescribed motion of a span (s); the pairs are at its end.
     pub fn begin_courses(&mut self, pairs: &[ContactPair], span: f64) {
         for (course, pair) in self.courses.iter_mut().zip(pairs) {
             *course = MotionCourse::new(pair.drive_before(), (&pair.middle.0, pair.middle.1), pair.drive_now(), span);
         }
     }
 
-    /// Nodes are guessed to be where they were at the start of the step.
+    /// Uses the places at the start of the step as initial guess.
     pub fn guess_start_places(&mut self) {
         let [first, rest @ ..] = &mut self.places;
         rest.iter_mut().for_each(|places| places.copy_from_slice(first));
     }
 
-    /// A sector begins its span with its nodes at these places and gaps (m). The search for the closest points of the first step starts there
-    /// too: where trials of the span before have left off is no part of a saved state.
+    /// Starts the span of a sector with these places and gaps (m) of its nodes. The search for the closest points of the first
+    /// step also starts there, because the places of earlier trials are not part of a saved state.
     pub fn begin(&mut self, place_of: impl Fn(usize) -> ClosestPoint, gap_of: impl Fn(usize) -> f64) {
         for (node, place) in self.places[0].iter_mut().enumerate() {
             *place = place_of(node);
@@ -249,7 +249,7 @@ impl SpanRecord {
 mod tests {
     use super::*;
 
-    /// A rotor that is run up on a shaft that is accelerated: places are those of the motion at any time, velocities its rates.
+    /// A rotor that accelerates on an accelerated shaft: places follow the motion at any time, velocities are its rates.
     #[test]
     fn prescribed_motion_is_consistent_with_its_rates() {
         let span = 4e-5;

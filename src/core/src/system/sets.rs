@@ -1,10 +1,10 @@
-//! Which structures can feel each other.
+//! Sets of structures that influence each other.
 
 use super::pair::ContactPair;
 use super::structure::Structure;
 
-/// Structures that feel each other through the surfaces they touch and carry, directly or through others. Nothing passes between
-/// two sets: each keeps a ledger of its own, so that what one exchanges does not hide what another gets out of nothing.
+/// Structures that influence each other through the surfaces they touch and carry, directly or indirectly. No energy passes
+/// between two sets: each has its own ledger, so that the energy exchange of one set cannot hide a spurious gain of another.
 #[derive(Debug, Clone)]
 pub struct StructureSets {
     /// Structures of each set, ascending.
@@ -45,7 +45,7 @@ impl StructureSets {
     }
 }
 
-/// The same number for all of `count` things that `links` join, directly or through others.
+/// Returns one number per item; items connected by `links`, directly or indirectly, have the same number.
 pub fn joined(count: usize, links: impl Iterator<Item = (usize, usize)>) -> Vec<usize> {
     let mut number: Vec<usize> = (0..count).collect();
     for (one, other) in links {

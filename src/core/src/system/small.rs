@@ -1,9 +1,9 @@
-//! Whether the state is still what small displacements describe.
+//! Checks that the state is within the limits of small displacements.
 
 use super::{ContactPair, StepFailure, System};
 use crate::gaps::GapLaw;
 
-/// Clearances below this share of the radius are those of a press fit, in which errors as small do not matter.
+/// Clearances below this fraction of the radius belong to a press fit, in which errors of this size do not matter.
 pub const LEAST_CLEARANCE: f64 = 1e-4;
 
 /// Error of linear kinematics at a node that moves far around the axis.
@@ -17,25 +17,25 @@ pub struct Curved {
     pub node: usize,
     /// Displacement around the axis u_θ (m).
     pub moved: f64,
-    /// Outward displacement that linear kinematics misses, u_θ²/2r (m).
+    /// Outward displacement that linear kinematics neglects, u_θ²/2r (m).
     pub error: f64,
-    /// Clearance that the sector was given, or 1e-4 of the radius if that is more (m).
+    /// Initial clearance of the sector, or 1e-4 of the radius if that is larger (m).
     pub clearance: f64,
 }
 
 impl Curved {
-    /// The error, as a share of the clearance.
+    /// Error as a fraction of the clearance.
     pub fn share(&self) -> f64 {
         self.error / self.clearance
     }
 }
 
 impl System {
-    /// Whether the state is still what the model describes.
+    /// Checks that the model can describe the state.
     ///
     /// # Errors
-    /// Coordinates that are not finite; displacements beyond a tenth of the radius, or those of nodes that meet open surfaces
-    /// against each other beyond a tenth of their extent; displacements around the axis whose u_θ²/2r is the clearance
+    /// Coordinates that are not finite; displacements beyond a tenth of the radius; relative displacements of nodes on open
+    /// surfaces beyond a tenth of their extent; displacements around the axis for which u_θ²/2r reaches the clearance
     /// ([`System::most_curved`]).
     pub fn check_state(&self) -> Result<(), StepFailure> {
         if self.structures.iter().any(|structure| !structure.modes().is_finite()) {
@@ -68,16 +68,16 @@ impl System {
         beyond.map_or(Ok(()), |index| Err(StepFailure::Implausible { structure, sector: index % modes.lanes() }))
     }
 
-    /// The node whose displacement around the axis misleads most: a node that moves by u_θ along its tangent is u_θ²/2r further
-    /// from the axis, which a gap linear in the displacements does not see. On a spline positions are taken as they are,
-    /// yet what turns is a blade, which draws its tip in by as much and more, and modes are straight lines: the same
-    /// measure. `None` where nothing turns around an axis.
+    /// Returns the node with the largest error of linear kinematics. A node that moves by u_θ along its tangent is u_θ²/2r
+    /// further from the axis, which a gap linear in the displacements neglects. On a spline the positions are exact, but a
+    /// bending blade shortens by at least this amount, which its modes, being straight lines, neglect: the measure applies there
+    /// too. `None` if nothing turns around an axis.
     pub fn most_curved(&self) -> Option<Curved> {
         let more = |most: Curved, one: Curved| if one.share() > most.share() { one } else { most };
         (0..self.structures.len()).filter_map(|structure| self.most_curved_of(structure)).reduce(more)
     }
 
-    /// The same of the nodes of one structure.
+    /// Returns the node of one structure with the largest error of linear kinematics.
     pub fn most_curved_of(&self, structure: usize) -> Option<Curved> {
         let mut most: Option<Curved> = None;
         for pair in self.pairs.iter().filter(|pair| pair.structure() == structure) {

@@ -1,4 +1,4 @@
-//! One structure: its modes, its contact nodes and their past, and the forces on surfaces that it carries.
+//! One structure: its modes, its contact nodes and their history, and the forces on surfaces that it carries.
 
 use crate::dynamics::bank::{BankOptions, LANES, ModalBank};
 use crate::dynamics::modal::ModalModel;
@@ -12,8 +12,8 @@ use crate::settings::Scheme;
 use crate::system::march::Galerkin;
 use crate::system::pulling::Pulling;
 
-/// Penetrations below this are none (m): squares of what they lead to leave the range of double precision, and modes as small
-/// are flushed to rest.
+/// Penetrations below this count as zero (m): the squares of the resulting values leave the range of double precision, and such
+/// small modes are set to rest.
 const LEAST_PENETRATION: f64 = 1e-150;
 
 /// A structure of a scene. Rows of its modes are three per contact node, or three per control point of the surfaces it carries.
@@ -22,32 +22,32 @@ pub struct Structure {
     pub(super) modes: Sectors,
     /// Lanes of a row of the sectors.
     lanes: usize,
-    /// Pair that each contact node belongs to.
+    /// Pair of each contact node.
     pub(super) pair_of: Vec<Option<usize>>,
-    /// Past of the contact nodes.
+    /// History of the contact nodes.
     pub(crate) history: ContactHistory,
-    /// Impulses on the contact nodes, where forces may pull.
+    /// Impulses on the contact nodes, if forces may pull.
     pub(super) pulling: Pulling,
     /// Smallest gap of each lane (m).
     pub(super) lowest: Vec<f64>,
-    /// Modal contact force on its surfaces found in the last step (N·√kg⁻¹); empty where it carries none.
+    /// Modal contact force on its surfaces found in the last step (N·√kg⁻¹); empty if it carries none.
     pub(super) delayed: Vec<f64>,
     /// Step control of each sector, for adaptive steps of single sectors.
     pub(super) step_control: StepControl,
-    /// Tables and scratch of that scheme.
+    /// Tables and scratch memory for adaptive steps.
     pub(super) galerkin: Option<Box<Galerkin>>,
-    /// Smallest gaps within the last span where a scheme looks within it (m), `[node · lanes + lane]`; else empty.
+    /// Smallest gaps within the last span (m), `[node · lanes + lane]`, if the scheme evaluates them; otherwise empty.
     pub(super) lowest_in_span: Vec<f64>,
 }
 
-/// State of adaptive steps of all sectors.
+/// State of adaptive steps for all sectors.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepControl {
-    /// Energy left by contacts that opened and closed (J).
+    /// Energy bank of contacts that opened and closed (J).
     pub bank: Vec<f64>,
-    /// Largest energy that this has been compared with (J).
+    /// Largest energy so far, the reference for the bank (J).
     pub largest: Vec<f64>,
-    /// Number of times that the span is halved, for each sector.
+    /// Number of halvings of the span, for each sector.
     pub level: Vec<u64>,
     /// Slopes of contact forces over the last step (N/s), `[row · lanes + lane]`.
     pub slopes: Vec<f64>,
@@ -68,14 +68,14 @@ impl StepControl {
         }
     }
 
-    /// Returns how often the span of a sector is halved.
+    /// Returns the number of halvings of the span of a sector.
     pub fn level_of(&self, sector: usize) -> usize {
         usize::try_from(self.level[sector]).unwrap_or(HALVINGS).min(HALVINGS)
     }
 }
 
 impl Structure {
-    /// With contact nodes, each of the pair given, and whether one of these pairs tells places on a surface.
+    /// Creates a structure with contact nodes, the pair of each node, and whether one of these pairs finds places on a surface.
     pub(super) fn touching(
         model: SectorModel,
         options: BankOptions,
@@ -99,7 +99,8 @@ impl Structure {
         }
     }
 
-    /// Carrying surfaces, whose control points the rows of `model` move; `loads`: loaded beside contact.
+    /// Creates a structure that carries surfaces, whose control points the rows of `model` move; `loads`: with loads in addition
+    /// to contact forces.
     pub(super) fn carrying(model: &ModalModel, loads: bool) -> Self {
         let options = BankOptions { loads, flexibility: false, ..BankOptions::default() };
         let modes = Sectors::Uncoupled(ModalBank::with_options(model, 1, options));
@@ -118,22 +119,22 @@ impl Structure {
         }
     }
 
-    /// The modes.
+    /// Modes of the structure.
     pub fn modes(&self) -> &Sectors {
         &self.modes
     }
 
-    /// The modes, to set loads and initial conditions.
+    /// Modes of the structure, to set loads and initial conditions.
     pub fn modes_mut(&mut self) -> &mut Sectors {
         &mut self.modes
     }
 
-    /// Number of contact nodes per sector; 0 where it carries surfaces only.
+    /// Number of contact nodes per sector; 0 if it only carries surfaces.
     pub fn nodes(&self) -> usize {
         self.pair_of.len()
     }
 
-    /// Whether it carries a surface.
+    /// Returns whether the structure carries a surface.
     pub fn carries(&self) -> bool {
         !self.delayed.is_empty()
     }
@@ -149,7 +150,7 @@ impl Structure {
         self.lanes
     }
 
-    /// Place of a node of a sector in arrays over all of them.
+    /// Index of a node of a sector in arrays over all nodes and sectors.
     #[inline(always)]
     pub fn index(&self, node: usize, sector: usize) -> usize {
         node * self.lanes + sector
@@ -160,7 +161,7 @@ impl Structure {
         &self.history.gap.now
     }
 
-    /// Smallest gaps within the last step (m), as far as its scheme looked, `[node · lanes + lane]`.
+    /// Smallest gaps within the last step (m), as far as the scheme evaluates them, `[node · lanes + lane]`.
     pub fn lowest_gaps(&self) -> &[f64] {
         if self.lowest_in_span.is_empty() { &self.history.gap.now } else { &self.lowest_in_span }
     }
@@ -170,7 +171,7 @@ impl Structure {
         self.history.gap.now[self.index(node, sector)]
     }
 
-    /// Rate of that gap over the last step (m/s); 0 where there was or is nothing to touch.
+    /// Rate of the gap of one node of one sector over the last step (m/s); 0 if there was or is nothing to touch.
     pub fn gap_rate(&self, node: usize, sector: usize) -> f64 {
         let index = self.index(node, sector);
         let change = self.history.gap.now[index] - self.history.gap.before[index];
@@ -187,12 +188,12 @@ impl Structure {
         &self.history.geometry.now
     }
 
-    /// Modal forces on its surfaces found in the last step; empty where it carries none.
+    /// Modal forces on its surfaces found in the last step; empty if it carries none.
     pub fn contact_force(&self) -> &[f64] {
         &self.delayed
     }
 
-    /// Contacts of a sector as they are, before a span.
+    /// Reads the contacts of a sector before a span.
     pub(super) fn read_contacts(&self, sector: usize, state: &mut SectorState) {
         for node in 0..self.nodes() {
             let index = self.index(node, sector);
@@ -211,7 +212,7 @@ impl Structure {
         state.gaps_known = true;
     }
 
-    /// Contacts of a sector as they are after it, and the smallest gap of each node on the way (m).
+    /// Writes the contacts of a sector after a span, and the smallest gap of each node during the span (m).
     pub(super) fn write_contacts(&mut self, sector: usize, state: &SectorState, lowest: impl Fn(usize) -> f64) {
         for (row, slope) in state.slopes.iter().enumerate() {
             self.step_control.slopes[row * self.lanes + sector] = *slope;
@@ -235,7 +236,7 @@ impl Structure {
         std::array::from_fn(|component| rows[(3 * node + component) * lanes + sector])
     }
 
-    /// Nothing has touched yet; the modal state there is the first.
+    /// Starts without earlier contact, from the current modal state.
     pub(super) fn start(&mut self) {
         self.modes.recover();
         self.modes.collect_loss();
@@ -249,7 +250,7 @@ impl Structure {
         self.step_control.normals.fill(0.0);
     }
 
-    /// There was no step before: gaps and predictions are those of the start.
+    /// Uses gaps and predictions at the start as those of the previous steps.
     pub(super) fn remember_start(&mut self) {
         let ContactHistory { gap, predicted, .. } = &mut self.history;
         gap.before.copy_from_slice(&gap.now);
@@ -257,7 +258,7 @@ impl Structure {
         predicted.now.copy_from_slice(&self.modes.displacement()[..rows]);
     }
 
-    /// Predict one step (eq. 9 of the paper). Where contact forces act one step later, those of the last step act now.
+    /// Predicts one step (eq. 9 of the paper). If contact forces act one step later, those of the last step act now.
     pub(crate) fn predict(&mut self, acts_later: bool, ledger: bool) {
         self.history.shift(self.modes.displacement_before());
         self.modes.predict(ledger);
@@ -270,7 +271,7 @@ impl Structure {
         self.delayed.fill(0.0);
     }
 
-    /// Contact forces of the last step act on the modes with inertia.
+    /// Applies the contact forces of the last step to the modes with inertia.
     fn act_later(&mut self, ledger: bool) {
         // A disk of coupled sectors keeps its forces until it predicts.
         let Sectors::Uncoupled(bank) = &mut self.modes else { return };
@@ -282,7 +283,7 @@ impl Structure {
         }
     }
 
-    /// Gaps of the nodes of a pair whose surface has moved.
+    /// Finds the gaps of the nodes of a pair whose surface has moved.
     #[inline(always)]
     pub(super) fn find_gaps(&mut self, gap: &mut GapLaw, drive: &PrescribedMotion, moved: &[f64], warm: bool) {
         let ContactHistory { gap: gaps, geometry, .. } = &mut self.history;
@@ -290,7 +291,7 @@ impl Structure {
         gap.evaluate(drive, self.modes.displacement(), moved, before, &mut geometry.now, &mut gaps.now);
     }
 
-    /// No force acts on a node any more.
+    /// Sets the contact force on a node to zero.
     pub(crate) fn forget_force(&mut self, node: usize, sector: usize) {
         let (index, lanes) = (self.index(node, sector), self.lanes);
         self.history.multiplier[index] = 0.0;
@@ -300,7 +301,7 @@ impl Structure {
         }
     }
 
-    /// Smallest gap of each lane; one that is no number stays.
+    /// Finds the smallest gap of each lane; NaN is kept.
     pub(crate) fn find_lowest(&mut self) {
         self.lowest.fill(f64::INFINITY);
         for row in self.history.gap.now.chunks(self.lanes) {
@@ -310,10 +311,10 @@ impl Structure {
         }
     }
 
-    /// The first sector from `first` on of which a node penetrates. What is no number counts, and is found out then.
+    /// Returns the first sector from `first` on in which a node penetrates. NaN counts as penetrating, so that the solver reports it.
     #[inline(always)]
     pub(super) fn touching_from(&self, first: usize) -> Option<usize> {
-        // Eight at a time, most of which are open.
+        // Eight sectors per iteration, most of which are open.
         let open = |gap: &f64| *gap >= -LEAST_PENETRATION;
         let mut start = first;
         for chunk in self.lowest.get(first..)?.chunks(LANES) {
@@ -325,7 +326,7 @@ impl Structure {
         None
     }
 
-    /// Use a step size (s) from here, at rest or without regard to the state.
+    /// Sets the step size (s), at rest or without conversion of the state.
     pub(crate) fn set_step(&mut self, scheme: Scheme, step: f64) {
         self.modes.set_step(scheme, step);
         self.set_span(step);
@@ -337,13 +338,13 @@ impl Structure {
         }
     }
 
-    /// Carry the state to another step size under the forces that last.
+    /// Converts the state to another step size under the persistent contact forces.
     pub(super) fn carry_over(&mut self, scheme: Scheme, step: f64) {
         self.modes.resample(scheme, step, &self.history.passing.lasting);
         self.set_span(step);
     }
 
-    /// Kinetic and strain energy at this instant under the forces that last (J).
+    /// Instantaneous kinetic and strain energy under the persistent contact forces (J).
     pub(super) fn energies_now(&mut self) -> (f64, f64) {
         self.modes.energies_now(&self.history.passing.lasting)
     }
@@ -354,7 +355,7 @@ impl Structure {
         moved.fold(0.0, |most: f64, moved| most.max(dot(*moved, *moved))).sqrt()
     }
 
-    /// Write everything that determines the future, but the step size.
+    /// Writes everything that determines the future, except the step size.
     pub(super) fn save(&self, writer: &mut StateWriter) {
         self.modes.save(writer);
         self.delayed.save(writer);
@@ -363,7 +364,7 @@ impl Structure {
         self.history.save(writer);
     }
 
-    /// Pass over a saved state and refuse what is none; its history is left in `saved`.
+    /// Reads over a saved state and rejects invalid values; stores its history in `saved`.
     pub(super) fn check(&self, reader: &mut StateReader, saved: &mut ContactHistory) {
         self.modes.check(reader);
         self.delayed.check(reader);
@@ -373,7 +374,7 @@ impl Structure {
         self.history.check(reader);
     }
 
-    /// Restore a saved state, after the step size is set.
+    /// Restores a saved state, after the step size has been set.
     pub(super) fn restore(&mut self, reader: &mut StateReader) {
         self.modes.restore(reader);
         self.delayed.restore(reader);

@@ -1,21 +1,21 @@
-//! An independent look at the gaps that the ledger books.
+//! An independent check of the gaps that the energy ledger uses.
 //!
-//! The ledger splits the work of a contact into approach and the rest, and closes whatever the gaps are. Yet a gap is a
-//! signed distance: it changes by no more than what the node moves, the surface moves under it, and the prescribed motion
-//! of either adds. A change beyond that is no distance, and the step fails.
+//! The ledger splits the work of a contact into approach and the rest, and the balance closes for any gaps. But a gap is a signed
+//! distance: it changes by no more than the motion of the node and of the surface, plus the prescribed motion of both. If a gap
+//! changes by more, it is not a distance, and the step fails.
 
 use super::pair::When;
 use super::{ContactEvent, StepFailure, System};
 use crate::gaps::dot;
 
-/// Changes below this are rounding, whatever the model (m): no length that means anything is as short.
+/// Changes below this count as rounding in any model (m), because no meaningful length is as short.
 const ROUNDING: f64 = 1e-15;
-/// Gaps may change by this factor on what motion explains: they are linear in the correction of a step, along one normal.
+/// Gaps may change by this factor more than the motion explains, because they are linear in the correction of a step, along one normal.
 const FACTOR: f64 = 2.0;
 
 impl System {
-    /// The gap of a contact about to be entered, which has `moved` by so much (m), has changed over the two steps that are entered by
-    /// no more than that and `rigid` (m), prescribed motion, explain.
+    /// Checks that the gap of a contact has changed over the two recorded steps by no more than its motion `moved` (m) and the
+    /// prescribed motion `rigid` (m) explain.
     ///
     /// # Errors
     /// [`StepFailure::Unexplained`].
@@ -25,7 +25,7 @@ impl System {
         let of = &self.structures[structure];
         let (index, gaps) = (of.index(node, sector), &of.history.gap);
         let (gap, oldest) = (gaps.now[index], gaps.oldest[index]);
-        // A node that comes over a free edge was looked at before (`check_edges`).
+        // A node that passes a free edge has been checked before (`check_edges`).
         if oldest.is_infinite() || self.counted.steps < self.counted.witnessed {
             return Ok(());
         }
@@ -39,12 +39,12 @@ impl System {
         Ok(())
     }
 
-    /// Returns the change of the gaps of a pair over two steps that prescribed motion explains (m): inputs that move, and turning under the shape of
-    /// the casing.
+    /// Returns the change of the gaps of a pair over two steps that prescribed motion explains (m): moving inputs, and rotation
+    /// under the shape of the casing.
     pub(super) fn explained_by_drive(&self, pair: usize) -> f64 {
         let pair = &self.pairs[pair];
         let (drive, motion) = (pair.drive(When::Now), pair.motion().since(pair.motion_before()));
-        // Against the casing or its shape, whichever is more.
+        // The larger of the rotations relative to the casing and to its shape.
         let turned = motion.turn.abs().max((motion.turn - motion.shape_rotation).abs());
         let off_centre = libm::hypot(drive.shaft[0], drive.shaft[1]);
         let factor = drive.shape_factor.abs().max((drive.shape_factor - motion.shape_factor).abs());
@@ -66,7 +66,7 @@ mod tests {
     use crate::system::SystemSettings;
     use nalgebra::DMatrix;
 
-    /// A mass on a soft spring that flies at 1 m/s towards a wall 0.1 mm away.
+    /// A mass on a soft spring that moves at 1 m/s towards a wall 0.1 mm away.
     fn flying() -> System {
         let model = ModalModel {
             frequencies: vec![10.0],
@@ -93,7 +93,7 @@ mod tests {
             honest = system.clone();
             system.step(&[PrescribedMotion::default()]).unwrap();
         }
-        // It came a micrometre closer; a metre, or ten micrometres, is not what it came.
+        // The mass came 1 µm closer; errors of 10 µm and of 1 m are rejected, one of 0.1 µm is not.
         for (off, passes) in [(0.0, true), (1e-7, true), (1e-5, false), (1.0, false), (f64::NAN, false)] {
             let mut spoilt = honest.clone();
             spoilt.structures[0].history.gap.before[0] += off;

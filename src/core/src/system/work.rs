@@ -1,4 +1,4 @@
-//! The energy ledger's entries of a step.
+//! Entries of a step in the energy ledger.
 
 use super::pair::{When, at_place};
 use super::{ContactEvent, StepFailure, System};
@@ -14,18 +14,18 @@ struct ContactWork {
     shift: f64,
     casing: f64,
     heat: f64,
-    /// Friction that gives, of contacts that may stick, and cutting that gives (≤ 0): the tip turns round between the two steps whose mean
-    /// is booked.
+    /// Energy supplied by friction of contacts that may stick, and by cutting (≤ 0), when the tip reverses between the two steps
+    /// that are averaged.
     turned: f64,
-    /// Against what is cut off.
+    /// Work of cutting the coating.
     cut: f64,
-    /// Part of `turned` that is cutting (≤ 0): a tip that goes back cuts nothing.
+    /// Part of `turned` that is cutting (≤ 0), because a tip that moves backwards cuts nothing.
     uncut: f64,
     /// Energy lost by the node that stops at the surface (J).
     closing: f64,
-    /// The part of it that a coating takes.
+    /// Part of `closing` that a coating absorbs.
     worn: f64,
-    /// By the scheme, on both structures.
+    /// Work in the scheme, on both structures.
     exact: f64,
     /// Magnitudes of the work of all inputs.
     turnover: f64,
@@ -34,7 +34,7 @@ struct ContactWork {
 }
 
 impl ContactWork {
-    /// Sums over the contacts of one set in one step need no compensation: those over all steps have it.
+    /// Sums over the contacts of one set in one step need no compensation, unlike the sums over all steps.
     #[inline(always)]
     fn add(&mut self, other: &Self) {
         self.shaft += other.shaft;
@@ -52,13 +52,13 @@ impl ContactWork {
         self.moved += other.moved;
     }
 
-    /// Returns the rest of the work, which is curvature work.
+    /// Returns the remaining work, which is curvature work.
     fn curvature(&self) -> f64 {
         self.exact + self.heat + self.cut + self.closing - (self.shaft + self.whirl + self.shift + self.casing)
     }
 
-    /// A tip that an impact turns round within a step takes what friction gives from what the impact costs. The rest, of tips that turn
-    /// round while they stay closed, vanishes with the step and is left to what has no other name.
+    /// Deducts the energy that friction supplies to a tip reversed by an impact from the impact loss. The rest, of tips that
+    /// reverse while they stay closed, vanishes with the step and is part of the curvature work.
     fn settle(&mut self) {
         if self.turned != 0.0 {
             self.closing = self.worn + (self.closing - self.worn + self.turned).max(0.0);
@@ -67,11 +67,10 @@ impl ContactWork {
 }
 
 impl System {
-    /// Enter the work of all contacts that acted over the step just done, each after a look at whether its gap is a distance, and of
-    /// loads beside contact.
+    /// Records the work of all contacts that acted over the last step, after checking that each gap is a distance, and the work of loads.
     ///
     /// # Errors
-    /// [`StepFailure::Unexplained`] for the first whose gap is not.
+    /// [`StepFailure::Unexplained`] for the first contact whose gap is not a distance.
     pub(crate) fn enter_work(&mut self) -> Result<(), StepFailure> {
         let when = self.when_acted();
         let mut events = std::mem::take(self.acted_mut(when));
@@ -84,7 +83,7 @@ impl System {
         outcome
     }
 
-    /// The contacts of the only set, or set by set of `SEVERAL`.
+    /// Records the contacts of the only set, or of several sets (`SEVERAL`).
     fn enter_contacts<const SEVERAL: bool>(
         &mut self,
         events: &mut [ContactEvent],
@@ -112,7 +111,7 @@ impl System {
             let work = self.work_of(event, moved, &motion, when);
             event.friction_heat = work.heat;
             if event.tangential > 0.0 {
-                // What goes back cuts nothing, and is not paid for.
+                // A tip that moves backwards cuts nothing, so no distance is counted.
                 event.slid = ((work.heat + work.cut + work.turned) / event.tangential).max(0.0);
             }
             total.add(&work);
@@ -130,12 +129,12 @@ impl System {
         }
     }
 
-    /// When the contacts that acted over the last step were found.
+    /// Returns the step in which the contacts that acted over the last step were found.
     pub(super) fn when_acted(&self) -> When {
         if self.settings.scheme.acts_later() { When::Before } else { When::Now }
     }
 
-    /// Remove what blades have cut on their way over the step just done.
+    /// Removes the coating that blades have cut over the last step.
     pub(crate) fn remove_cut(&mut self) {
         for (group, ledger) in self.groups.iter_mut().zip(&mut self.counted.ledgers) {
             let Some(structure) = group.structures().next() else { continue };
@@ -171,7 +170,7 @@ impl System {
         }
     }
 
-    /// Enter the work of all contacts of a set in a step into its ledger.
+    /// Adds the work of all contacts of a set in a step to its ledger.
     fn enter(&mut self, set: usize, mut work: ContactWork) {
         work.settle();
         let ledger = &mut self.counted.ledgers[set];
@@ -189,10 +188,9 @@ impl System {
         self.counted.taken[set].uncut -= work.uncut;
     }
 
-    /// The work on both structures is f·(u⁺ − u⁻)/2 with u the relative displacement. It is what inputs do, force times
-    /// prescribed motion, less the friction heat, friction force times slip, and what the approach of the node costs, λ
-    /// times half the change of gap, but for what turns and curves within the step. On a coating the approach is what its
-    /// rods absorb.
+    /// The work on both structures is f·(u⁺ − u⁻)/2 with the relative displacement u. It equals the work of inputs (force times
+    /// prescribed motion) less the friction heat (friction force times slip) and the loss of the approach (λ times half the
+    /// change of gap), except for curvature work within the step. With a coating, its rods absorb the loss of the approach.
     fn work_of(&self, event: &ContactEvent, moved: [f64; 3], motion: &MotionIncrement, when: When) -> ContactWork {
         let (structure, pair) = (&self.structures[event.structure], &self.pairs[event.pair]);
         let (node, index) = (event.node, structure.index(event.node, event.sector));
@@ -203,7 +201,7 @@ impl System {
         let shaft = pair.gap().shaft_motion(at, event.point, motion);
         let surface = pair.gap().surface_motion(at, event.point, normal, geometry.place_at(index), motion);
         let slip: [f64; 3] = std::array::from_fn(|i| moved[i] + spin[i] + shaft[i]);
-        // A node that comes over a free edge had no gap to close: its motion is the approach.
+        // A node that passes a free edge had no gap to close, so its motion is the approach.
         let (now, oldest) = (gaps.now[index], gaps.oldest[index]);
         let approach = if oldest.is_finite() { -0.5 * (now - oldest) } else { -dot(normal, moved) };
         let ([x, y, z], across) = (event.wrench.force, motion.shaft);
@@ -231,7 +229,7 @@ impl System {
         }
     }
 
-    /// Normals and places that a contact was found with.
+    /// Normals and places for which a contact was found.
     fn geometry_of(&self, event: &ContactEvent, when: When) -> &Geometry {
         let geometry = &self.structures[event.structure].history.geometry;
         match when {
@@ -240,7 +238,7 @@ impl System {
         }
     }
 
-    /// Half the displacement of a node relative to its surface over the last two steps (m), in its own directions.
+    /// Half the displacement of a node relative to its surface over the last two steps (m), in the directions of the node.
     #[inline(always)]
     pub(super) fn relative_motion(&self, event: &ContactEvent, when: When) -> [f64; 3] {
         let structure = &self.structures[event.structure];
@@ -251,7 +249,7 @@ impl System {
         if pair.carrier().is_none() { moved } else { self.less_of_carrier(event, when, moved) }
     }
 
-    /// Out of line: on rigid surfaces contacts never get here.
+    /// Not inlined, because contacts on rigid surfaces never call it.
     #[inline(never)]
     fn less_of_carrier(&self, event: &ContactEvent, when: When, moved: [f64; 3]) -> [f64; 3] {
         let (pair, index) = (&self.pairs[event.pair], self.structures[event.structure].index(event.node, event.sector));
@@ -265,7 +263,7 @@ impl System {
     }
 }
 
-/// Part of the tangential force of a contact that cuts.
+/// Fraction of the tangential force of a contact that cuts.
 fn share_cut(event: &ContactEvent, tangential: f64) -> f64 {
     if event.tangential > 0.0 { (tangential * event.coating / event.tangential).min(1.0) } else { 0.0 }
 }

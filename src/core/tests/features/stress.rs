@@ -185,7 +185,9 @@ fn statically_determinate_stress_ignores_stiffness() {
     scene.roms[0].extras.stress_centrifugal = None;
     let refused = Simulation::new(&scene).map(|_| ()).unwrap_err().to_string();
     assert!(
-        refused.starts_with("outputs.stress: stress of a rotor with `structure.spin.growth` needs static centrifugal stress"),
+        refused.starts_with(
+            "outputs.stress: stress of a rotor with `structure.spin.growth` needs static centrifugal stress"
+        ),
         "{refused}"
     );
     assert!(refused.contains("`stress_centrifugal`"), "{refused}");

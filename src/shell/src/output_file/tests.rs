@@ -1,4 +1,4 @@
-//! Names, permissions, links, devices.
+//! Tests of names, permissions, links and devices.
 
 use super::*;
 
@@ -61,7 +61,7 @@ fn mode(path: &Path) -> u32 {
     fs::metadata(path).unwrap().permissions().mode() & 0o7777
 }
 
-/// The umask belongs to the whole process; a file that the system makes shows what it is.
+/// The umask belongs to the whole process; a file that the system creates shows its value.
 #[test]
 #[cfg(unix)]
 fn files_follow_the_umask_or_keep_permissions() {
@@ -78,7 +78,7 @@ fn files_follow_the_umask_or_keep_permissions() {
     }
 }
 
-/// Where files without a name are not to be had, hidden ones do.
+/// If the file system does not support unnamed files, hidden ones are used.
 #[test]
 #[cfg(unix)]
 fn hidden_temporary_file_gives_the_same_result() {
@@ -98,7 +98,7 @@ fn hidden_temporary_file_gives_the_same_result() {
 fn unfinished_file_is_not_visible_in_the_directory() {
     let root = tempfile::tempdir().unwrap();
     let draft = begin(&root.path().join("x")).unwrap();
-    // Where the file system knows such files.
+    // If the file system supports unnamed files.
     assert!(draft.named.is_some() || names(root.path()).is_empty());
 }
 
@@ -113,7 +113,7 @@ fn rejects_invalid_names_before_any_work() {
     assert_eq!(names(root.path()).len(), 0);
 }
 
-/// Links stand for the devices here: replacing a real one would damage the machine that runs the tests.
+/// Links replace the devices here, since replacing a real device would damage the machine that runs the tests.
 #[test]
 #[cfg(target_os = "linux")]
 fn devices_are_written_to_and_never_replaced() {
@@ -163,7 +163,7 @@ fn write_check_of_a_directory_leaves_no_files() {
         let failure = try_directory(&root.path().join(bad)).unwrap_err();
         assert!(failure.problem.contains("cannot create the directory"), "{failure}");
     }
-    // Made, but not to be written into: no file system takes files there.
+    // The directory exists, but no files can be created in it.
     #[cfg(target_os = "linux")]
     assert!(try_directory(Path::new("/proc/self")).unwrap_err().problem.contains("cannot write to this directory"));
 }

@@ -1,5 +1,5 @@
-//! A ROM with about half of its contact patches: hat functions over twice the length are sums of those over one, so that a ROM
-//! tells what coarser patches would do.
+//! Derives a ROM with about half of its contact patches: a hat function over twice the length is a sum of hat functions over the single length. Runs
+//! with such a ROM show the effect of coarser patches.
 
 use nalgebra::{ComplexField, DMatrix};
 use tiprub_core::{
@@ -7,10 +7,10 @@ use tiprub_core::{
     rom::{ContactNode, DisplacementFrame, Harmonic},
 };
 
-/// The ROM with every other patch along the chord, each with half of its two neighbours.
+/// Returns the ROM with every other patch along the chord, each extended by half of both neighbours.
 ///
 /// # Errors
-/// Why there is none: contact nodes, or a number of patches that is not 3, 5, 7, ...
+/// The ROM has contact nodes, or its number of patches is not 3, 5, 7, ...
 pub fn coarsened(rom: &Rom) -> Result<Rom, String> {
     let along = along(rom)?;
     if along < 3 || along.is_multiple_of(2) {
@@ -21,11 +21,11 @@ pub fn coarsened(rom: &Rom) -> Result<Rom, String> {
     made(rom, &shares, rom.rows(), |row| (row / kept) * along + 2 * (row % kept), "")
 }
 
-/// The ROM with fewer rows of patches across the thickness, one of any or two of three: duals of hat functions that are sums of more are sums
-/// of the duals of these.
+/// Returns the ROM with fewer rows of patches across the thickness: one from any number, or two from three. If hat functions are sums of finer ones,
+/// their duals are sums of the finer duals.
 ///
 /// # Errors
-/// Why there is none: contact nodes, one row, or rows that these are no sums of.
+/// The ROM has contact nodes or one row, or the requested rows are not sums of its rows.
 pub fn fewer_rows(rom: &Rom, rows: usize) -> Result<Rom, String> {
     let along = along(rom)?;
     let shares = row_shares(rom.rows(), rows)
@@ -34,7 +34,7 @@ pub fn fewer_rows(rom: &Rom, rows: usize) -> Result<Rom, String> {
     made(rom, &shares, rows, |row| row, &format!(", {rows} across the thickness"))
 }
 
-/// Patches along the chord.
+/// Returns the number of patches along the chord.
 fn along(rom: &Rom) -> Result<usize, String> {
     if rom.contact_nodes.iter().any(|patch| patch.area <= 0.0) {
         return Err("the ROM has contact nodes, which cannot be merged like contact patches".into());
@@ -42,17 +42,17 @@ fn along(rom: &Rom) -> Result<usize, String> {
     Ok(rom.contact_nodes.len() / rom.rows())
 }
 
-/// Shares of rows, as integrals over them, in fewer rows.
+/// Returns the weights of the rows in fewer rows, as integrals over the rows.
 fn row_shares(own: usize, fewer: usize) -> Option<DMatrix<f64>> {
     match (own, fewer) {
         (2.., 1) => Some(DMatrix::from_element(1, own, 1.0)),
-        // χ_k = Σ c_kl χ_l of three, c_kl being ∫ χ_k h_l over ∫ h_l: the duals of two are 2 − 3s and 3s − 1.
+        // χ_k = Σ c_kl χ_l of three rows with c_kl = ∫ χ_k h_l / ∫ h_l; the duals of two rows are 2 − 3s and 3s − 1.
         (3, 2) => Some(DMatrix::from_row_slice(2, 3, &[1.5, 0.5, -0.5, -0.5, 0.5, 1.5])),
         _ => None,
     }
 }
 
-/// The ROM with `rows` rows of sums of its patches; `middle` is the old patch that gives a new one its name and place.
+/// Builds the ROM with `rows` rows of merged patches; `middle` is the old patch from which a new one takes its name and place.
 fn made(
     rom: &Rom,
     shares: &DMatrix<f64>,
@@ -82,7 +82,7 @@ fn made(
     Ok(found)
 }
 
-/// Shares of patches in every other one, which has half of its two neighbours.
+/// Returns the weights of the patches in every other patch, which includes half of its two neighbours.
 fn shares(patches: usize) -> DMatrix<f64> {
     DMatrix::from_fn(patches.div_ceil(2), patches, |row, column| match column.abs_diff(2 * row) {
         0 => 1.0,
@@ -91,7 +91,7 @@ fn shares(patches: usize) -> DMatrix<f64> {
     })
 }
 
-/// Displacements of sums of patches with these areas (m²).
+/// Returns the matrix that averages displacements over merged patches, weighted with these areas (m²).
 fn weighted(shares: &DMatrix<f64>, areas: &[f64]) -> DMatrix<f64> {
     let mut weights = shares.clone();
     for mut row in weights.row_iter_mut() {
@@ -101,11 +101,11 @@ fn weighted(shares: &DMatrix<f64>, areas: &[f64]) -> DMatrix<f64> {
     weights
 }
 
-/// Patches that models with 3, 5, 9, 17, ... of them have in common.
+/// Number of patches that models with 3, 5, 9, 17, ... patches have in common.
 pub(super) const COMMON: usize = 3;
 
-/// Displacements of the [`COMMON`] patches over the whole thickness from those of a tip; `None` of contact nodes and of other numbers of
-/// patches.
+/// Returns the map from the displacements of a tip to those of the [`COMMON`] patches over the whole thickness; `None` for contact nodes and for
+/// other numbers of patches.
 pub(super) fn common(patches: &[ContactNode], rows: usize) -> Option<DMatrix<f64>> {
     let mut areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
     if areas.iter().any(|area| *area <= 0.0) {
@@ -126,7 +126,7 @@ pub(super) fn common(patches: &[ContactNode], rows: usize) -> Option<DMatrix<f64
     (areas.len() == COMMON).then_some(map)
 }
 
-/// Rows (patch, component) of the map of coarser patches.
+/// Returns the rows (patch, component) of the contact map for merged patches.
 fn mapped<T: ComplexField<RealField = f64>>(weights: &DMatrix<f64>, map: &DMatrix<T>) -> DMatrix<T> {
     DMatrix::from_fn(3 * weights.nrows(), map.ncols(), |row, column| {
         let of = |patch: usize| map[(3 * patch + row % 3, column)].clone().scale(weights[(row / 3, patch)]);
@@ -134,7 +134,7 @@ fn mapped<T: ComplexField<RealField = f64>>(weights: &DMatrix<f64>, map: &DMatri
     })
 }
 
-/// Where a coarser patch is: the mean of its parts.
+/// Returns a merged patch at the mean position of its parts.
 fn patch(rom: &Rom, (row, middle): (usize, usize), weights: &DMatrix<f64>, shares: &DMatrix<f64>) -> ContactNode {
     let patches = &rom.contact_nodes;
     let middle = &patches[middle];
@@ -143,7 +143,7 @@ fn patch(rom: &Rom, (row, middle): (usize, usize), weights: &DMatrix<f64>, share
     };
     let around = |patch: &ContactNode, axis: usize| {
         let off = patch.position[axis] - middle.position[axis];
-        // Angles from the middle do not jump.
+        // Angles relative to the middle do not jump.
         if axis == 1 && rom.frame == DisplacementFrame::Cylindrical { off.sin().atan2(off.cos()) } else { off }
     };
     ContactNode {
@@ -166,7 +166,7 @@ mod tests {
 
     use super::*;
 
-    /// Hat functions are nested: patches of patches are the patches of half as many, where the mesh integrates both alike.
+    /// Hat functions are nested: merged patches equal a reduction with half as many patches, if the mesh integrates both equally.
     #[test]
     fn merged_patches_equal_a_reduction_with_half_the_patches() {
         let of = |patches: usize| {
@@ -193,7 +193,7 @@ mod tests {
         let off = (flexibility(&found) - flexibility(&coarse)).amax() / flexibility(&coarse).amax();
         assert!(off < 5e-3, "{off:e}");
         assert!(coarsened(&of(2)).unwrap_err().contains("2 patches"));
-        // What patches have in common is the same by one step or by two.
+        // Merging in one step and in two steps gives the same common patches.
         let [of_fine, of_coarse] = [&fine, &found].map(|rom| common(&rom.contact_nodes, 1).unwrap());
         let areas: Vec<f64> = fine.contact_nodes.iter().map(|patch| patch.area).collect();
         assert_eq!(of_fine.shape(), (COMMON, 9));
@@ -202,7 +202,7 @@ mod tests {
         assert!(common(&fine.contact_nodes[..8], 1).is_none() && common(&fine.contact_nodes[..7], 1).is_none());
     }
 
-    /// Duals of hat functions are nested across the thickness, and hats along the chord within each row.
+    /// Duals of hat functions are nested across the thickness, and so are the hat functions along the chord within each row.
     #[test]
     fn merged_rows_equal_a_reduction_with_fewer_rows() {
         let of = |counts: [usize; 2]| {

@@ -1,4 +1,4 @@
-//! In which directions a scene can be refined; `refiner` makes the scenes at every level of each.
+//! Directions in which a scene can be refined; `refiner` creates the scenes of every level.
 
 use tiprub_core::Scene;
 use tiprub_shell::Result;
@@ -8,10 +8,10 @@ use super::{
     refiner::Refiner,
 };
 
-/// All directions of a scene; steps are in multiples of `own` per communication step.
+/// Returns all directions of a scene; `own` is the number of internal steps per communication step, of which the levels take multiples.
 ///
 /// # Errors
-/// A source that does not give the ROM of the scene, and what its reduction refuses.
+/// The source does not reproduce the ROM of the scene, or a reduction fails.
 pub fn directions(scene: &Scene, own: u32, again: &Again) -> Result<Vec<RefinementDirection>> {
     let refiner = Refiner::checked(scene, own, again)?;
     let asked = |name: &str| again.only.is_empty() || again.only.iter().any(|only| only == name);

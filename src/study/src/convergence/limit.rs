@@ -1,34 +1,34 @@
-//! Where a sequence of refinements goes: Richardson's extrapolation with the order that the sequence shows.
+//! Limit of a sequence of refinements by Richardson extrapolation with the observed order.
 //!
-//! What is left at a size h (a step, the length of an edge or a patch, one over a number of modes) goes as C hᵖ. Three levels give C, p
-//! and the limit. The order is read from the levels, and never as more than [`MOST`]: a sequence that falls faster for once
-//! says nothing of the next level. Where it is less than [`LEAST`], or values go up and down, there is nothing to read.
+//! The remaining error at a size h (a step, the length of an edge or a patch, the inverse of a number of modes) is C hᵖ. Three levels determine C, p
+//! and the limit. The order is limited to [`MOST`], because a sequence that once falls faster does not predict the next level. If the order is below
+//! [`LEAST`], or the values oscillate, there is no extrapolation.
 
-/// Largest order that is read: more is taken as this.
+/// Largest order; larger observed orders are reduced to it.
 pub const MOST: f64 = 2.0;
-/// Least order that is read.
+/// Smallest order that is accepted.
 pub const LEAST: f64 = 0.5;
-/// Least order that three meshes are read with. Displacements of rubs of rotor 37 go to their limit with orders from 1.7 to 2 on meshes that
-/// are fine enough to tell; changes between coarse ones fall slower at first, and would say too much (`lab estimates`).
+/// Smallest order for three meshes. Displacements of rubs of rotor 37 converge with orders from 1.7 to 2 on sufficiently fine meshes; changes
+/// between coarse meshes decrease more slowly at first, so that they would overestimate the error (`lab estimates`).
 pub const LEAST_OF_MESHES: f64 = 1.5;
-/// Order that two meshes alone are read with.
+/// Order that is assumed if there are only two meshes.
 const OF_TWO_MESHES: f64 = 1.75;
-/// Sizes of levels that are read together are so far apart, or less where there are no such three.
+/// Ratios between the sizes of levels that are extrapolated together, in order of preference.
 const SPREAD: [f64; 3] = [1.9, 1.35, 1.0];
-/// Changes below this share of a value are rounding.
+/// Changes below this fraction of a value are rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// Extrapolation from three levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConvergedLimit {
-    /// Order that was read, from [`LEAST`] to [`MOST`].
+    /// Observed order, from [`LEAST`] to [`MOST`].
     pub order: f64,
-    /// Remaining change of the value by further refinement, as seen from the finest level.
+    /// Remaining change of the value by further refinement, estimated at the finest level.
     pub rest: f64,
 }
 
-/// Order, `least` or more, and rest of a value whose changes from the first of three levels to the second and from that to the third are
-/// `changes`; `sizes` fall from level to level. `None` where it is not to be read.
+/// Extrapolates a value from its two `changes` between three levels with decreasing `sizes`; the order is at least `least`. Returns `None` if the
+/// changes show no convergence.
 pub fn of_changes(sizes: [f64; 3], changes: [f64; 2], least: f64) -> Option<ConvergedLimit> {
     let [before, last] = changes;
     if before == 0.0 && last == 0.0 {
@@ -43,7 +43,7 @@ pub fn of_changes(sizes: [f64; 3], changes: [f64; 2], least: f64) -> Option<Conv
     Some(ConvergedLimit { order, rest: last * fine / (middle - fine) })
 }
 
-/// The same of values themselves; changes that are rounding are none.
+/// Extrapolates from the values of three levels; changes within rounding count as zero.
 pub fn of_values(sizes: [f64; 3], values: [f64; 3]) -> Option<ConvergedLimit> {
     let least = ROUNDING * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     let change = |from: f64, to: f64| if (to - from).abs() <= least { 0.0 } else { to - from };
@@ -56,7 +56,8 @@ pub fn of_two_meshes([coarse, fine]: [f64; 2], change: f64) -> ConvergedLimit {
     ConvergedLimit { order: OF_TWO_MESHES, rest: change * fine / (coarse - fine) }
 }
 
-/// The finest of levels with these falling sizes, and two before it that are far enough away to tell an order; fewer where there are fewer.
+/// Chooses the finest of levels with decreasing sizes, and two coarser ones far enough apart to determine an order; fewer if there are not enough
+/// levels.
 pub fn chosen(sizes: &[f64]) -> Vec<usize> {
     let far = |spread: f64| {
         let mut found: Vec<usize> = Vec::new();
@@ -73,13 +74,13 @@ pub fn chosen(sizes: &[f64]) -> Vec<usize> {
     all.iter().find(|found| found.len() == 3).or(all.last()).cloned().unwrap_or_default()
 }
 
-/// By how much changes fall from one pair of levels to the next at an order.
+/// Returns the ratio of consecutive changes for an order of convergence.
 fn falls([coarse, middle, fine]: [f64; 3], order: f64) -> f64 {
     let [coarse, middle, fine] = [coarse, middle, fine].map(|size| size.powf(order));
     (coarse - middle) / (middle - fine)
 }
 
-/// The order at which changes fall so much; it grows with that.
+/// Returns the order for a ratio of consecutive changes; it increases with the ratio.
 fn order(sizes: [f64; 3], ratio: f64) -> f64 {
     let (mut low, mut high) = (LEAST, MOST);
     if ratio >= falls(sizes, high) {
@@ -96,7 +97,7 @@ fn order(sizes: [f64; 3], ratio: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// 7 + 3 hᵖ at sizes that do not fall evenly: the limit is 7.
+    /// Extrapolates 7 + 3 hᵖ at unevenly decreasing sizes to 7.
     #[test]
     fn convergence_order_is_found_from_any_three_sizes() {
         for power in [0.6, 1.0, 1.7, 2.0_f64] {
@@ -117,7 +118,7 @@ mod tests {
         assert_eq!(chosen(&[2.0, 1.41, 1.0, 0.71]), [1, 2, 3]);
         assert_eq!(chosen(&[2.0, 1.0]), [0, 1]);
         assert!(chosen(&[]).is_empty());
-        // Orders from one to two are not missed by more than a factor of three by two meshes, nor by three.
+        // For orders from one to two, the error is within a factor of three, with two meshes and with three.
         for order in [1.0, 2.0_f64] {
             for coarse in [1.414, 2.0_f64] {
                 let truth = 1.0 / (coarse.powf(order) - 1.0);

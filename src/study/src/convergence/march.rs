@@ -1,4 +1,4 @@
-//! One run of a refined scene: what is reported, and how far it is from that of the next refinement.
+//! Runs a refined scene, and compares its results with those of the next refinement.
 
 use std::iter::zip;
 
@@ -15,10 +15,10 @@ use crate::error::{
 /// Results of a run that are compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
-    /// Displacements of all watched points, of all sectors, sample by sample: point by point, axis by axis, sector by sector (m). Where
-    /// there are no watched points, those of the patches that other numbers of patches have in common, or of contact nodes, without flight.
+    /// Displacements of all watched points, sample by sample: point by point, axis by axis, sector by sector (m). Without watched points: those of
+    /// the patches that models with other numbers of patches have in common, or of contact nodes, without the rigid motion of free flight.
     pub displacements: Vec<Vec<f64>>,
-    /// These points, as the ROM has them.
+    /// These points, as the ROM defines them.
     pub points: Vec<ContactNode>,
     /// Normal impulse over the window (N·s).
     pub impulse: f64,
@@ -35,19 +35,19 @@ pub const QUANTITIES: [(&str, &str); 4] =
     [("impulse", "N·s"), ("friction work", "J"), ("peak force", "N"), ("strain energy", "J")];
 
 impl RunSummary {
-    /// A run of which nothing else is known.
+    /// Creates a summary that contains only displacements.
     pub(crate) fn of_displacements(points: Vec<ContactNode>, displacements: Vec<Vec<f64>>) -> Self {
         let (impulse, friction_work, peak_force, strain_energy) = (0.0, 0.0, 0.0, 0.0);
         Self { displacements, points, impulse, friction_work, peak_force, strain_energy }
     }
 
-    /// In the order of [`QUANTITIES`].
+    /// Returns the quantities in the order of [`QUANTITIES`].
     pub fn quantities(&self) -> [f64; 4] {
         [self.impulse, self.friction_work, self.peak_force, self.strain_energy]
     }
 
-    /// Relative change to the next refinement: of the displacements of the nodes that both have (L2; `None` where there are none), and
-    /// of every quantity; `None` of one that is zero in both.
+    /// Returns the relative changes to the next refinement: of the displacements of common nodes (L2; `None` if there are none), and of every
+    /// quantity (`None` if it is zero in both runs).
     pub fn changes(&self, next: &Self) -> [Option<f64>; 5] {
         let mut found = [self.displacement_change(next), None, None, None, None];
         for ((found, own), next) in zip(found.iter_mut().skip(1), self.quantities()).zip(next.quantities()) {
@@ -75,7 +75,8 @@ impl RunSummary {
         Some(parts_apart(&own, &next, &[length]))
     }
 
-    /// Points that both have. The same names are the same points, which another mesh has nearly where they were; else the place tells.
+    /// Returns the pairs of common points. Equal names are the same point, which another mesh has at nearly the same place; otherwise the position
+    /// decides.
     fn pairs(&self, next: &Self) -> Vec<(usize, usize)> {
         if self.points.iter().map(|point| &point.name).eq(next.points.iter().map(|point| &point.name)) {
             return (0..self.points.len()).map(|index| (index, index)).collect();
@@ -89,11 +90,11 @@ impl RunSummary {
     }
 }
 
-/// Displacements of a run that are compared.
+/// Displacements of a run that are compared with those of other runs.
 pub(crate) enum Observed {
     /// Watched points.
     Watched,
-    /// Displacements of common patches from those of the ROM's own.
+    /// Common patches, with the map from the patches of the ROM.
     Patches(DMatrix<f64>),
     /// All contact nodes.
     Nodes,
@@ -115,7 +116,7 @@ impl Observed {
         }
     }
 
-    /// Displacements now (m): point by point, axis by axis, sector by sector.
+    /// Returns the current displacements (m): point by point, axis by axis, sector by sector.
     pub(crate) fn displacements(&self, run: &SceneRun) -> Vec<f64> {
         match self {
             Self::Watched => run.watched_displacements(),
@@ -130,10 +131,10 @@ impl Observed {
     }
 }
 
-/// March a scene over `samples` communication steps with `division` internal steps each.
+/// Runs a scene over `samples` communication steps with `division` internal steps each.
 ///
 /// # Errors
-/// Why it is refused or fails.
+/// The scene is rejected or the run fails.
 pub fn march(
     scene: &Scene,
     settings: &[(String, String)],
@@ -186,7 +187,7 @@ mod tests {
         assert!((moved.unwrap() - 0.2).abs() < 1e-12, "{moved:?}");
         assert_eq!([impulse, friction, peak, strain], [Some(0.5), None, Some(0.0), Some(0.0)]);
         assert_eq!(few.changes(&marched(&[0.5], 1.0, 2.0))[0], None);
-        // Another mesh has its nodes nearly there.
+        // Another mesh has its nodes at nearly the same places.
         let mut moved = marched(&[0.1, 0.3], 2.0, 2.0);
         moved.points[1].position[2] += 1e-4;
         assert_eq!(few.changes(&moved)[0], Some(0.5));

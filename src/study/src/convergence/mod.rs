@@ -1,9 +1,9 @@
-//! What refining a scene changes: its internal step, the modes of its structures, the contact nodes and the mesh of its blades, one at a
-//! time; where each sequence goes, and with it the error of the scene as it stands.
+//! Convergence study: refines the internal step, the modes of the structures, the contact nodes and the mesh of the blades, one at a time, and
+//! estimates the limit of each sequence and the discretisation errors of the scene.
 //!
-//! [`mod@directions`] finds the directions ([`refine`] says what one is), `refiner` the scenes at every level, `rows` those of rows across
-//! the thickness, `nodes` which of a refined model's nodes touch, [`truncate`] takes modes
-//! away from any ROM, [`mod@march`] runs and compares, [`limit`] extrapolates, [`page`] draws and tells.
+//! [`mod@directions`] finds the directions ([`refine`] defines them), `refiner` creates the scenes of every level, `rows` varies the rows of patches
+//! across the thickness, `nodes` assigns the nodes of a refined model to contact pairs, [`truncate`] removes modes from any ROM, [`mod@march`] runs
+//! and compares, [`limit`] extrapolates, [`page`] draws plots and writes the results.
 
 pub mod coarsen;
 pub mod directions;
@@ -48,38 +48,38 @@ use crate::{
 pub struct Refined {
     /// Direction of refinement.
     pub direction: RefinementDirection,
-    /// A run per level, or why it is refused.
+    /// Result of the run of every level, or the reason of its rejection.
     pub runs: Vec<std::result::Result<RunSummary, String>>,
-    /// Per level: friction coefficient beyond which the closed tip digs in; `None` where there is none, and without friction.
+    /// Lock-up friction of the closed tip for every level; `None` if there is none, and without friction.
     pub lock_up: Vec<Option<f64>>,
 }
 
-/// Everything that was found of a scene.
+/// Results of the convergence study of a scene.
 #[derive(Debug)]
 pub struct ConvergenceResult {
-    /// Name of the scene on the command line, and in the scene.
+    /// Name of the scene on the command line, and name in the scene file.
     pub names: [String; 2],
-    /// Time compared (s), and its communication steps.
+    /// Compared time (s) and its number of communication steps.
     pub window: (f64, usize),
     /// Scheme and solver.
     pub method: String,
     /// All directions.
     pub refined: Vec<Refined>,
-    /// Errors that the ROM of the master carried before; empty if it had none.
+    /// Errors that the ROM of the master already carried; empty if it had none.
     pub of_rom: Vec<Estimate>,
 }
 
-/// A ROM with what a study found of it.
+/// ROM with the errors that a study estimated for it.
 #[derive(Debug)]
 pub struct EstimatedRom {
     /// The ROM.
     pub rom: Rom,
-    /// Whether an error was found that a ROM carries.
+    /// True if the study estimated an error that a ROM can carry.
     pub known: bool,
 }
 
 impl ConvergenceResult {
-    /// The ROM of the master with its errors on this scene; as it was where none was found.
+    /// Returns the ROM of the master with its errors on this scene; unchanged if none was found.
     pub fn with_errors(&self, scene: &Scene) -> EstimatedRom {
         let index = master(scene);
         let of = |name: &str| {
@@ -102,7 +102,8 @@ impl ConvergenceResult {
     }
 }
 
-/// The study of a scene, and the ROM of its master with what was found of it; `source` is where that comes from, if it is a file and known.
+/// Runs the study of a scene, and returns the ROM of its master with the estimated errors; `source` is the origin of that ROM, if it is a known
+/// file.
 ///
 /// # Errors
 /// The scene cannot be read or does not run, or a model cannot be reduced again.
@@ -131,27 +132,27 @@ pub fn study(
 
 /// Request of a convergence study.
 pub struct ConvergenceRequest<'a> {
-    /// Start values that replace its own (name, value as text).
+    /// Start values that replace those of the scene (name, value as text).
     pub settings: &'a [(String, String)],
-    /// Time that is compared (s); where none is given, that of a quick study or of a whole one.
+    /// Compared time (s); by default that of a quick or a full study.
     pub window: Option<f64>,
-    /// Few and short runs.
+    /// True for few and short runs.
     pub quick: bool,
-    /// Runs at the same time.
+    /// Number of parallel runs.
     pub threads: usize,
-    /// Where the ROM of the master comes from, if that is a file and known.
+    /// Origin of the ROM of the master, if it is a known file.
     pub source: Option<&'a dyn RomSource>,
-    /// Where models that ship are kept.
+    /// Cache of the built-in models.
     pub cache: RomCache,
-    /// Mesh of the master where it ships: 1, or what its elements along the edges are multiplied with.
+    /// Mesh of the master if it is a built-in model: 1, or the factor for the number of elements along the edges.
     pub mesh: f64,
-    /// Spaces between contact points of the finest tip, times its own.
+    /// Number of intervals between contact points of the finest tip, relative to the scene.
     pub finest_tip: usize,
     /// Names of the directions; empty for all.
     pub only: &'a [String],
 }
 
-/// Everything about the scene called `name`.
+/// Runs the whole study of the scene called `name`.
 ///
 /// # Errors
 /// The scene does not run, or a model cannot be reduced again.
@@ -196,7 +197,7 @@ pub fn found(name: &str, scene: &Scene, asked: &ConvergenceRequest, console: &Co
     })
 }
 
-/// All runs, as steps times sizes of the models, at the rate of the run of the scene as it stands.
+/// Plans all runs; the work is the number of steps times the size of the model, the rate is that of the run of the unchanged scene.
 fn planned(directions: &[RefinementDirection], scene: &Scene, (own, seconds): (u32, f64), runner: &Runner) -> WorkPlan {
     let mut ledger = WorkPlan::new(seconds / runner.threads as f64);
     for (number, direction) in directions.iter().enumerate() {
@@ -205,11 +206,11 @@ fn planned(directions: &[RefinementDirection], scene: &Scene, (own, seconds): (u
     ledger
 }
 
-/// Work of a direction, in runs of the scene as it stands.
+/// Returns the work of a direction, in runs of the unchanged scene.
 fn work(direction: &RefinementDirection, scene: &Scene, own: u32) -> f64 {
     let size = |scene: &Scene| scene.roms.iter().map(|rom| rom.total_order() as f64).sum::<f64>();
     let steps = |level: &RefinementLevel| match is_adaptive(scene) {
-        // A decade doubles the steps.
+        // A tolerance that is ten times smaller doubles the number of steps.
         true => (f64::from(level.division) / f64::from(own)).powf(0.3),
         false => f64::from(level.division) / f64::from(own),
     };
@@ -217,7 +218,7 @@ fn work(direction: &RefinementDirection, scene: &Scene, own: u32) -> f64 {
     direction.levels.iter().filter(|level| !level.own || direction.shorter.is_some()).map(cost).sum()
 }
 
-/// Shares of the step at which a direction is run once more where one of its levels is refused.
+/// Factors by which the step is shortened to repeat a direction after one of its levels was rejected.
 const SHORTER: [u32; 3] = [2, 4, 8];
 
 /// Runs the levels.
@@ -226,7 +227,7 @@ pub(crate) struct Runner<'a> {
     samples: usize,
     threads: usize,
     console: &'a Console,
-    /// The scene as it stands, where it has been run.
+    /// Result of the unchanged scene, if it has been run.
     own: Option<RunSummary>,
 }
 
@@ -235,7 +236,7 @@ impl<'a> Runner<'a> {
         Self { settings, samples, threads: sweep::processors(), console, own: None }
     }
 
-    /// Run a direction with the steps that it says.
+    /// Runs a direction with its given steps.
     pub(crate) fn as_it_is(&self, direction: RefinementDirection) -> Result<Refined> {
         let count = direction.levels.len();
         let task = self.console.task(&format!("Refining {}", direction.title), Some(count as u64));
@@ -246,7 +247,7 @@ impl<'a> Runner<'a> {
         Ok(Refined { runs: self.runs(&direction, &progress)?, lock_up: vec![None; count], direction })
     }
 
-    /// Run a direction. A ROM with more modes or nodes may ask for a shorter step than the scene's: then all of its levels take one.
+    /// Runs a direction. If a ROM with more modes or nodes requires a shorter step than the scene's, all of its levels use a shorter step.
     fn refined(
         &self,
         mut direction: RefinementDirection,
@@ -302,19 +303,19 @@ impl<'a> Runner<'a> {
 }
 
 impl Refined {
-    /// Levels that ran, with their runs.
+    /// Returns the levels that ran, with their results.
     pub fn ran(&self) -> Vec<(&RefinementLevel, &RunSummary)> {
         let levels = self.direction.levels.iter().zip(&self.runs);
         levels.filter_map(|(level, run)| Some((level, run.as_ref().ok()?))).collect()
     }
 
-    /// Change from every level that ran to the next that did.
+    /// Returns the changes between consecutive levels that ran.
     pub fn changes(&self) -> Vec<[Option<f64>; 5]> {
         self.ran().windows(2).map(|pair| pair[0].1.changes(pair[1].1)).collect()
     }
 
-    /// Levels that are read: the finest of those that ran, the last, and those before it that are far enough apart; sizes go with a power
-    /// of the error.
+    /// Returns the levels for the extrapolation: the finest level that ran, last, and coarser ones that are far enough apart. The error follows a
+    /// power of their sizes.
     fn read(&self) -> Vec<(f64, &RunSummary)> {
         let ran = self.ran();
         let sizes: Vec<f64> = ran.iter().map(|(level, _)| self.direction.size(level.value)).collect();
@@ -337,7 +338,7 @@ impl Refined {
         }
     }
 
-    /// Where the quantities go, and what the finest level lacks of that; `None` of one that is not to be read.
+    /// Returns the limits of the quantities with the remaining errors of the finest level; `None` for a quantity without observed convergence.
     pub fn limits(&self) -> [Option<ConvergedLimit>; 4] {
         let read = self.read();
         let [a, b, c] = &read[..] else { return [None; 4] };
@@ -345,8 +346,8 @@ impl Refined {
         std::array::from_fn(|index| limit::of_values([a.0, b.0, c.0], [x[index], y[index], z[index]]))
     }
 
-    /// Error of a run of this direction: displacements (L2) and every quantity, relative to the limit; `None` where that is not to be
-    /// read. Displacements are as far from the limit as from the finest level, and what that one lacks.
+    /// Returns the errors of a run of this direction: displacements (L2) and every quantity, relative to the limit; `None` if the limit is unknown.
+    /// The error of the displacements is the distance from the finest level plus the remaining error of that level.
     pub fn errors(&self, run: &RunSummary) -> [Option<f64>; 5] {
         let Some((_, finest)) = self.ran().last().copied() else { return [None; 5] };
         let mut found = [None; 5];
@@ -358,7 +359,7 @@ impl Refined {
         found
     }
 
-    /// Error of the scene as it stands.
+    /// Returns the errors of the unchanged scene.
     pub fn own_errors(&self) -> Option<[Option<f64>; 5]> {
         let own = self.ran().into_iter().find(|(level, _)| level.own)?.1;
         Some(self.errors(own))

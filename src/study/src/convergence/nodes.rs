@@ -1,9 +1,9 @@
-//! Which pair the contact nodes of a refined model belong to. Pairs claim nodes by the beginnings of their names, and a model that
-//! is reduced again names its nodes as it likes: what touches would change with what is refined.
+//! Assigns the contact nodes of a refined model to contact pairs. Pairs select nodes by the beginning of their names, but a reduction chooses new
+//! names: without this assignment, the contact would change with the refinement.
 
 use tiprub_core::{Rom, Scene, rom::ContactNode, settings::ContactSettings};
 
-/// The model with the names of the contact nodes of `own`, which are as many and at the same places.
+/// Returns the model with the names of the contact nodes of `own`, which has as many nodes at the same places.
 pub(super) fn named_as(own: &Rom, mut again: Rom) -> Rom {
     for (node, own) in again.contact_nodes.iter_mut().zip(&own.contact_nodes) {
         node.name.clone_from(&own.name);
@@ -11,16 +11,16 @@ pub(super) fn named_as(own: &Rom, mut again: Rom) -> Rom {
     again
 }
 
-/// Whether a pair claims a node, which it does by the beginning of its name.
+/// Returns whether a pair selects a node by the beginning of its name.
 fn claims(contact: &ContactSettings, node: &ContactNode) -> bool {
     contact.nodes.as_ref().is_none_or(|start| node.name.starts_with(start))
 }
 
-/// Returns the common beginning of the names of all contact nodes of the structure at `index`, if one pair claims all of them; then it is clear that
-/// a new node touches, and what.
+/// Returns the common beginning of the names of all contact nodes of the structure at `index`, if one pair selects all of them; then new nodes
+/// belong to that pair.
 ///
 /// # Errors
-/// Why it is one: a new node lies between two that do not belong to the same pair.
+/// A new node lies between two nodes that do not belong to the same pair.
 pub(super) fn common_start(scene: &Scene, index: usize) -> Result<String, String> {
     let (rom, master) = (&scene.roms[index], &scene.settings.structures[index].name);
     let pairs = scene.settings.contacts.iter().enumerate().filter(|(_, contact)| contact.master == *master);
@@ -43,7 +43,7 @@ pub(super) fn common_start(scene: &Scene, index: usize) -> Result<String, String
     Ok(start.unwrap_or_default())
 }
 
-/// The model with names of contact nodes that all begin with `start`; empty, with its own.
+/// Returns the model with names of contact nodes that all begin with `start`; unchanged if `start` is empty.
 pub(super) fn starting_with(start: &str, mut rom: Rom) -> Rom {
     for (index, node) in rom.contact_nodes.iter_mut().enumerate().filter(|_| !start.is_empty()) {
         node.name = format!("{start}{}", index + 1);
@@ -66,7 +66,7 @@ mod tests {
         refine::{Again, Meshed, RefinementDirection, RomSource},
     };
 
-    /// A coarse blade, its nodes named as the reduction likes.
+    /// Coarse blade with the node names of the reduction.
     struct CoarseBlade;
 
     impl RomSource for CoarseBlade {
@@ -83,7 +83,7 @@ mod tests {
         }
     }
 
-    /// Modes and contact nodes of a blade with nodes of these names, and a pair for each beginning.
+    /// Returns the directions of modes and contact nodes of a blade with nodes of these names, with a pair for each beginning.
     fn refined(names: [&str; 3], pairs: &[&str]) -> [RefinementDirection; 3] {
         let console = Console::new(true, false);
         let mut rom = CoarseBlade.reduce(None, 4, TipContact::Nodes(3), &console).unwrap().rom;
@@ -114,7 +114,7 @@ mod tests {
         assert!(mesh.size(mesh.levels[0].value) > mesh.size(mesh.levels[1].value));
     }
 
-    /// Tips as fine as asked, as far as the mesh has places for them; what it has none for is told. Only what is asked is made.
+    /// Tips are refined as far as the mesh has nodes for them; the rest is reported. Only the requested directions are created.
     #[test]
     fn tip_refinement_stops_at_the_mesh_resolution() {
         let console = Console::new(true, false);

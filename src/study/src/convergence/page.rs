@@ -1,4 +1,4 @@
-//! Changes from one refinement to the next as plots, tables and files.
+//! Presents the changes between refinements as plots, tables and files.
 
 use serde_json::{Value, json};
 use tiprub_core::shown;
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{Picture, Sheet, Statement, Study, StudyFigure, estimate};
 
-/// Largest change by the next refinement that is called small.
+/// Changes by the next refinement up to this size count as small.
 const SMALL: f64 = 0.05;
 
 const HOW_TO_READ: &str = "One setting is refined at a time, and all others stay as in the scene. A change is the difference between a run \
@@ -28,7 +28,7 @@ const HOW_TO_READ: &str = "One setting is refined at a time, and all others stay
      limit is given. Refine the direction with the largest change at the scene's setting first. Forces of single \
      internal steps are not compared, because the force of an impact grows as the step shrinks.";
 
-/// The study from everything that was found.
+/// Builds the study from its results.
 ///
 /// # Errors
 /// A plot cannot be drawn.
@@ -70,14 +70,14 @@ pub fn compared() -> impl Iterator<Item = &'static str> {
     std::iter::once("displacements").chain(QUANTITIES.iter().map(|(name, _)| *name))
 }
 
-/// "displacements 1.2 %, impulse ...".
+/// Formats changes, such as "displacements 1.2 %, impulse ...".
 fn changes_text(changes: &[Option<f64>; 5]) -> String {
     let known =
         compared().zip(changes).filter_map(|(name, change)| Some(format!("{name} {:.2} %", 100.0 * (*change)?)));
     known.collect::<Vec<_>>().join(", ")
 }
 
-/// The error of the scene in a direction, as far as the levels tell it.
+/// Returns the error of the scene in a direction, as far as the levels show it.
 fn error(refined: &Refined) -> Option<Statement> {
     if refined.direction.levels.len() < 2 {
         return None;
@@ -117,7 +117,7 @@ pub fn statements(found: &ConvergenceResult) -> Vec<Statement> {
     all
 }
 
-/// Level by level the friction beyond which the closed tip digs in, where there is one.
+/// Returns the lock-up friction of the closed tip for every level, if there is one.
 fn lock_up(refined: &Refined) -> Option<Statement> {
     let levels = refined.direction.levels.iter().zip(&refined.lock_up);
     let known = levels.map(|(level, least)| {
@@ -131,7 +131,7 @@ fn lock_up(refined: &Refined) -> Option<Statement> {
     })
 }
 
-/// "modes of rotor", and with which step where it is not the scene's.
+/// Returns the title, such as "modes of rotor", with the step if it differs from the scene's.
 fn title(refined: &Refined) -> String {
     let RefinementDirection { title, shorter, .. } = &refined.direction;
     match shorter {
@@ -165,7 +165,7 @@ fn worst(found: &ConvergenceResult) -> Option<Statement> {
     ))
 }
 
-/// Titles of the directions with a level finer than the scene that ran, of those with coarser ones only, and of the others.
+/// Returns the titles of the directions with a level finer than the scene that ran, of those with coarser ones only, and of the others.
 fn directions(found: &ConvergenceResult) -> [Vec<&str>; 3] {
     let which = |refined: &Refined| {
         let ran = refined.ran();
@@ -217,7 +217,7 @@ const HEADINGS: [&str; 13] = [
     "change of strain energy",
 ];
 
-/// The internal step of a level (s); empty where it goes by a tolerance.
+/// Formats the internal step of a level (s); empty with adaptive steps.
 fn step(level: &super::RefinementLevel) -> String {
     if is_adaptive(&level.scene) {
         return String::new();
@@ -226,7 +226,7 @@ fn step(level: &super::RefinementLevel) -> String {
     format!("{:.4e}", length / f64::from(level.division))
 }
 
-/// Rows of one direction; a refused level says so in place of its numbers.
+/// Returns the rows of one direction; the row of a rejected level states the reason instead of numbers.
 fn rows(refined: &Refined) -> Vec<Vec<String>> {
     let mut changes = refined.changes().into_iter();
     let levels = refined.direction.levels.iter().zip(&refined.runs);
@@ -254,7 +254,7 @@ fn table(refined: &Refined) -> Table {
 const LIMIT_HEADINGS: [&str; 6] =
     ["direction", "quantity", "order (at most 2)", "limit", "value of the scene", "error of the scene"];
 
-/// Where a direction goes: a row for displacements and for every quantity; cells are empty where nothing is to be read.
+/// Returns the limits of a direction: one row for displacements and one for every quantity; cells without an extrapolation are empty.
 pub fn limit_rows(refined: &Refined) -> Vec<Vec<String>> {
     let ran = refined.ran();
     let (Some((_, own)), Some((_, finest))) = (ran.iter().find(|(level, _)| level.own), ran.last()) else {
@@ -294,14 +294,14 @@ fn csv(found: &ConvergenceResult) -> String {
     [head].into_iter().chain(lines).collect()
 }
 
-/// Errors of a run for a picture: where no limit is read, how far it is from the finest level.
+/// Returns the errors of a run for a plot; without a limit, the distance from the finest level.
 pub fn drawn(refined: &Refined, run: &RunSummary) -> [Option<f64>; 5] {
     let finest = refined.ran().last().map(|(_, finest)| run.changes(finest)).unwrap_or([None; 5]);
     let errors = refined.errors(run);
     std::array::from_fn(|index| errors[index].or(finest[index]))
 }
 
-/// Errors of all levels, both axes logarithmic.
+/// Plots the errors of all levels on logarithmic axes.
 ///
 /// # Errors
 /// The plot cannot be drawn.
@@ -358,7 +358,7 @@ fn figure(refined: &Refined) -> Result<StudyFigure> {
     Ok(StudyFigure { name: direction.name, caption, picture: Picture { html, ..picture }, sheet })
 }
 
-/// For programs.
+/// Returns the results as JSON.
 pub fn results(found: &ConvergenceResult) -> Value {
     let level = |refined: &Refined| {
         let mut changes = refined.changes().into_iter();

@@ -1,11 +1,11 @@
-//! What a direction is in which a scene can be refined, its levels, and where models that are reduced again come from.
+//! Directions of refinement, their levels, and the sources from which models are reduced again.
 
 use tiprub_core::{Rom, Scene, settings::Scheme};
 use tiprub_gallery::rom_cache::RomCache;
 use tiprub_model::rotor37::TipContact;
 use tiprub_shell::{Result, console::Console};
 
-/// A ROM and what it was reduced from.
+/// ROM with the size of the model that it was reduced from.
 #[derive(Debug, Clone)]
 pub struct Meshed {
     /// The ROM.
@@ -14,13 +14,13 @@ pub struct Meshed {
     pub nodes: usize,
 }
 
-/// Where the ROM of the master comes from, if it can be reduced again.
+/// Source of the ROM of the master, from which it can be reduced again.
 pub trait RomSource {
-    /// The ROM with `modes` modes beside the responses to contact and this tip, reduced again: from its own mesh, or from one of
-    /// the [others](Self::others).
+    /// Reduces the model with `modes` modes beside the contact responses and with this tip, from its own mesh or from one of the
+    /// [others](Self::others).
     ///
     /// # Errors
-    /// Whatever the reduction refuses.
+    /// The reduction fails.
     fn reduce(&self, other: Option<usize>, modes: usize, tip: TipContact, console: &Console) -> Result<Meshed>;
 
     /// Returns the number of other meshes of the same structure.
@@ -32,28 +32,28 @@ pub trait RomSource {
 pub struct RefinementLevel {
     /// Internal step (s), tolerance, number of modes, of contact nodes or of nodes of the mesh.
     pub value: f64,
-    /// Whether the scene is as it stands.
+    /// True if this is the unchanged scene.
     pub own: bool,
     /// The scene.
     pub scene: Scene,
-    /// Internal steps per communication step; one over the tolerance where the scene goes by one.
+    /// Internal steps per communication step; with adaptive steps, the inverse of the tolerance.
     pub division: u32,
 }
 
-/// A setting that is refined while all others stay.
+/// Setting that is refined while all others stay fixed.
 #[derive(Debug, Clone)]
 pub struct RefinementDirection {
-    /// For file names.
+    /// Name for files.
     pub name: &'static str,
-    /// `modes of rotor`.
+    /// Title, such as `modes of rotor`.
     pub title: String,
     /// Unit of the values.
     pub unit: &'static str,
-    /// The coarsest first; empty where there is nothing to refine.
+    /// Levels, coarsest first; empty if there is nothing to refine.
     pub levels: Vec<RefinementLevel>,
-    /// Parts that cannot be refined, and why; empty if all can.
+    /// Parts that cannot be refined, with the reasons; empty if all can.
     pub missing: String,
-    /// All levels take a step shorter by this factor than the scene's, at which one of them is refused.
+    /// Factor by which all levels shorten the step of the scene, because one of them is rejected with it.
     pub shorter: Option<u32>,
 }
 
@@ -62,8 +62,8 @@ impl RefinementDirection {
         Self { name, title, unit, levels: Vec::new(), missing: String::new(), shorter: None }
     }
 
-    /// Returns the size that the error of a level follows with a power: the step, one over the number of modes, the length of a patch, the edge of an
-    /// element.
+    /// Returns the size of a level, a power of which is proportional to the error: the step, the inverse of the number of modes, the length of a
+    /// patch, the edge of an element.
     pub fn size(&self, value: f64) -> f64 {
         match self.unit {
             SECONDS | OF_CLEARANCE => value,
@@ -73,7 +73,7 @@ impl RefinementDirection {
         }
     }
 
-    /// Say what cannot be refined, once.
+    /// Adds the reason why something cannot be refined, once.
     pub(super) fn misses(&mut self, why: String) {
         if !self.missing.contains(&why) {
             let between = if self.missing.is_empty() { "" } else { "; " };
@@ -81,7 +81,7 @@ impl RefinementDirection {
         }
     }
 
-    /// The same with shorter steps.
+    /// Returns the direction with shorter steps.
     pub fn stepped(&self, shorter: u32) -> Self {
         let mut finer = Self { shorter: Some(shorter), ..self.clone() };
         for level in &mut finer.levels {
@@ -96,12 +96,12 @@ impl RefinementDirection {
     }
 }
 
-/// Whether a tolerance takes the place of the step.
+/// Returns whether the scene uses a tolerance instead of a step.
 pub(crate) fn is_adaptive(scene: &Scene) -> bool {
     scene.settings.time.scheme == Scheme::Galerkin
 }
 
-/// The scene with `division` internal steps per communication step, or a tolerance of one over that.
+/// Returns the scene with `division` internal steps per communication step, or with the tolerance 1/`division`.
 pub(crate) fn with_division(scene: &Scene, division: u32) -> Scene {
     let mut scene = scene.clone();
     if is_adaptive(&scene) {
@@ -112,46 +112,46 @@ pub(crate) fn with_division(scene: &Scene, division: u32) -> Scene {
     scene
 }
 
-/// Name of the direction of steps.
+/// Name of the direction that refines the step.
 pub const STEP: &str = "step";
-/// Name of the direction of contact nodes or patches.
+/// Name of the direction that refines contact nodes or patches.
 pub const NODES: &str = "nodes";
-/// Name of the direction of rows of patches across the thickness.
+/// Name of the direction that adds rows of patches across the thickness.
 pub const ROWS: &str = "rows";
-/// Name of the direction of meshes.
+/// Name of the direction that refines the mesh.
 pub const MESH: &str = "mesh";
-/// Spaces between contact points of the finest tip, times the scene's own.
+/// Number of intervals between contact points of the finest tip, relative to the scene.
 pub const FINEST_TIP: usize = 4;
-/// Units of values.
+/// Unit of internal steps.
 pub const SECONDS: &str = "s";
 /// Unit of tolerances.
 pub const OF_CLEARANCE: &str = "of the clearance";
 pub(super) const MODES_KEPT: &str = "modes";
 pub(super) const MESH_NODES: &str = "mesh nodes";
 
-/// Names of the directions of structures, for files.
+/// Names of the directions that refine the modes of a structure, for files.
 pub(super) const MODES: [&str; 8] =
     ["modes", "modes-2", "modes-3", "modes-4", "modes-5", "modes-6", "modes-7", "modes-8"];
 
-/// Name of the direction of the modes of a structure.
+/// Returns the name of the direction that refines the modes of a structure.
 pub fn modes_of(structure: usize) -> Option<&'static str> {
     MODES.get(structure).copied()
 }
 
 /// Data for reducing models again.
 pub struct Again<'a> {
-    /// Where the ROM of the master comes from, if that is a file and known.
+    /// Origin of the ROM of the master, if it is a known file.
     pub source: Option<&'a dyn RomSource>,
-    /// Where models that ship are kept.
+    /// Cache of the built-in models.
     pub cache: &'a RomCache,
-    /// Mesh of the scene's model where it ships: 1, or what its elements along the edges are multiplied with.
+    /// Mesh of the scene's model if it is a built-in one: 1, or the factor for the number of elements along the edges.
     pub mesh: f64,
-    /// Spaces between contact points of the finest tip, times its own; 2 of few levels.
+    /// Number of intervals between contact points of the finest tip, relative to the scene; 2 with few levels.
     pub finest_tip: usize,
     /// Names of the directions; empty for all.
     pub only: &'a [String],
-    /// Few levels.
+    /// True for few levels.
     pub quick: bool,
-    /// For progress.
+    /// Console for progress.
     pub console: &'a Console,
 }

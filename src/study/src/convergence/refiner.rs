@@ -1,4 +1,4 @@
-//! Scenes at every level of a direction: other steps, modes, contact nodes, patches and meshes.
+//! Creates the scenes of every level of a direction: other steps, modes, contact nodes, patches and meshes.
 
 use tiprub_core::{Rom, Scene, dynamics::modal::ModalModel, rom::DisplacementFrame, settings::TOLERANCE};
 use tiprub_format::builtin_model;
@@ -21,23 +21,23 @@ use super::{
 };
 use crate::{master, stability::scene::divided};
 
-/// Internal steps, times the scene's own, the coarsest first.
+/// Internal steps relative to the scene's, coarsest first.
 const STEPS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
 const QUICK_STEPS: [f64; 3] = [2.0, 1.0, 0.5];
-/// Tolerances, times the scene's own, the coarsest first.
+/// Tolerances relative to the scene's, coarsest first.
 const DECADES: [f64; 4] = [10.0, 1.0, 0.1, 0.01];
-/// Shares of the ROM's own modes.
+/// Fractions of the modes of the ROM.
 const FEWER: [f64; 3] = [0.25, 0.5, 0.75];
 const QUICK_FEWER: [f64; 1] = [0.5];
-/// More of them, where the model can be reduced again.
+/// Larger numbers of modes relative to the ROM, if the model can be reduced again.
 const MORE: [f64; 2] = [1.5, 2.0];
 const QUICK_MORE: [f64; 1] = [1.5];
-/// Two models are one where their frequencies and contact nodes agree to this (relative).
+/// Two models count as the same if their frequencies and contact nodes agree to this relative tolerance.
 const SAME: f64 = 1e-6;
-/// Makes other models of a scene.
+/// Creates variants of the models of a scene.
 pub(crate) struct Refiner<'a> {
     pub(super) scene: &'a Scene,
-    /// Internal steps per communication step, or one over the tolerance.
+    /// Internal steps per communication step, or the inverse of the tolerance.
     own: u32,
     pub(super) again: &'a Again<'a>,
     /// Number of nodes of the master's mesh, if it can be reduced again.
@@ -45,10 +45,10 @@ pub(crate) struct Refiner<'a> {
 }
 
 impl<'a> Refiner<'a> {
-    /// With a source that gives what the scene has.
+    /// Creates the refiner, and checks that the source reproduces the model of the scene.
     ///
     /// # Errors
-    /// It does not, or its reduction refuses.
+    /// The source does not reproduce the model, or its reduction fails.
     pub(crate) fn checked(scene: &'a Scene, own: u32, again: &'a Again<'a>) -> Result<Self> {
         let mut refiner = Self { scene, own, again, mesh_nodes: None };
         refiner.mesh_nodes = match again.source {
@@ -58,11 +58,11 @@ impl<'a> Refiner<'a> {
         Ok(refiner)
     }
 
-    /// The scene with so many times its modes and spaces between contact points, and with more rows of patches, factor by factor as far as its mesh
-    /// has them; none where the master cannot be reduced again.
+    /// Returns one scene per factor, with as many times its modes and intervals between contact points, and with more rows of patches as far as the
+    /// mesh allows; empty if the master cannot be reduced again.
     pub(crate) fn finer(&self, factors: &[usize]) -> Vec<Scene> {
         let own = self.scene.roms[master(self.scene)].rows();
-        // A row more, then as many as tell how straight the tip stays; a mesh tells no more rows apart than it does.
+        // First one more row, then as many as show how straight the tip stays; the mesh limits the number of rows.
         let rows = |factor: usize| (own..=MOST_ROWS.min(own + factor / 2).max(own)).rev();
         factors.iter().map_while(|factor| rows(*factor).find_map(|rows| self.finer_in_rows(*factor, rows))).collect()
     }
@@ -102,13 +102,13 @@ impl<'a> Refiner<'a> {
         scene
     }
 
-    /// Fixed-interface modes of the master, and its contact nodes along the chord.
+    /// Returns the number of fixed-interface modes of the master, and of its contact nodes along the chord.
     pub(super) fn own_counts(&self) -> (usize, usize) {
         let rom = &self.scene.roms[master(self.scene)];
         (rom.order().saturating_sub(rom.contact_map.nrows()), rom.contact_nodes.len() / rom.rows())
     }
 
-    /// So many nodes along the chord, or patches in its rows where the master has such.
+    /// Returns a tip with `count` nodes along the chord, or with as many patches in each row if the master has patches.
     pub(super) fn tip(&self, count: usize) -> TipContact {
         self.tip_in_rows(count, self.scene.roms[master(self.scene)].rows())
     }
@@ -122,20 +122,21 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// From the source, with the damping of the scene's ROM: a command line may propose another.
+    /// Reduces the model from the source, with the damping of the scene's ROM, because the command line may propose another damping.
     fn reduced(&self, source: &dyn RomSource, other: Option<usize>, [modes, nodes]: [usize; 2]) -> Result<Meshed> {
         let found = source.reduce(other, modes, self.tip(nodes), self.again.console)?;
         let damping_ratio = self.scene.roms[master(self.scene)].damping_ratio;
         Ok(Meshed { rom: Rom { damping_ratio, ..found.rom }, ..found })
     }
 
-    /// The master where it is a model that ships and whose contact nodes and mesh can be chosen anew.
+    /// Returns the name of the master's model if it is a built-in model whose contact nodes and mesh can be chosen.
     pub(super) fn with_chord(&self) -> Option<&'a str> {
         let structure = &self.scene.settings.structures[master(self.scene)];
         builtin_model(structure).filter(|name| builtin::has_chord(name))
     }
 
-    /// The source must give what the scene has; anything else would be a study of another model. Nodes of its mesh.
+    /// Checks that the source reproduces the model of the scene, since the study would otherwise describe another model. Returns the number of nodes
+    /// of its mesh.
     fn check(&self, source: &dyn RomSource) -> Result<usize> {
         let rom = &self.scene.roms[master(self.scene)];
         let (modes, nodes) = self.own_counts();
@@ -185,12 +186,12 @@ impl<'a> Refiner<'a> {
             true => time.tolerance.unwrap_or(TOLERANCE),
             false => divided(self.scene.settings.experiment.communication_step, time.step),
         };
-        // Tolerances a decade apart: errors follow them in steps.
+        // Tolerances are a decade apart, because errors follow them in steps.
         let shares = if tolerant { DECADES.get(..shares.len()).unwrap_or(&DECADES) } else { shares };
         let mut divisions: Vec<u32> = shares.iter().map(|share| count(f64::from(self.own) / share)).collect();
         divisions.dedup();
         let level = |division: u32| {
-            // As it stands, to the last bit.
+            // The level of the scene is the unchanged scene, to the last bit.
             let scene = if division == self.own { self.scene.clone() } else { with_division(self.scene, division) };
             let value = step * f64::from(self.own) / f64::from(division);
             RefinementLevel { value, own: division == self.own, scene, division }
@@ -200,7 +201,7 @@ impl<'a> Refiner<'a> {
         RefinementDirection { levels, ..RefinementDirection::new(STEP, title.into(), unit) }
     }
 
-    /// Modes of one structure: fewer of the ROM's own, more where it can be reduced again.
+    /// Returns the direction for the modes of one structure: fewer of the ROM's modes, and more if the model can be reduced again.
     pub(super) fn modes(&self, index: usize, name: &'static str) -> Result<RefinementDirection> {
         let (rom, structure) = (&self.scene.roms[index], &self.scene.settings.structures[index]);
         let form = Truncation::of(rom);
@@ -250,7 +251,7 @@ impl<'a> Refiner<'a> {
         Some(again.map(|again| named_as(&self.scene.roms[index], again)))
     }
 
-    /// Contact nodes of the master along its chord, each number with the ends of the others.
+    /// Returns the direction for the contact nodes of the master along its chord; all numbers share the same end points.
     pub(super) fn nodes(&self) -> Result<RefinementDirection> {
         let index = master(self.scene);
         let structure = &self.scene.settings.structures[index];
@@ -307,14 +308,14 @@ impl<'a> Refiner<'a> {
                     let scene = self.with_rom(index, starting_with(&start, rom));
                     direction.levels.push(self.level(nodes as f64, false, scene));
                 }
-                // A mesh has no more nodes than it has.
+                // The number of nodes of the mesh limits the number of contact nodes.
                 Err(failure) => direction.misses(format!("{nodes} {}: {failure}", direction.unit)),
             }
         }
         Ok(direction)
     }
 
-    /// Half and a quarter of the patches, which follow from the ROM itself; the fewest first.
+    /// Adds half and a quarter of the patches, which follow from the ROM itself, fewest first.
     fn fewer_patches(&self, direction: &mut RefinementDirection) {
         let index = master(self.scene);
         let mut rom = self.scene.roms[index].clone();
@@ -331,7 +332,7 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// A model that ships, with another tip or mesh.
+    /// Reduces a built-in model with another tip or mesh.
     fn built_in(&self, name: &str, nodes: usize, mesh: f64) -> Result<Rom> {
         self.built_in_with(name, self.tip(nodes), mesh)
     }
@@ -342,10 +343,10 @@ impl<'a> Refiner<'a> {
         found.unwrap_or_else(|| Err(Failure::new(name, "no such model", "")))
     }
 
-    /// Meshes of the master with its number of modes and contact nodes.
+    /// Returns the direction for meshes of the master with its number of modes and contact nodes.
     ///
     /// # Errors
-    /// A mesh that cannot be reduced.
+    /// A mesh cannot be reduced.
     pub(crate) fn meshes(&self) -> Result<RefinementDirection> {
         let index = master(self.scene);
         let (rom, structure) = (&self.scene.roms[index], &self.scene.settings.structures[index]);
@@ -393,7 +394,7 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// Why a ROM from a file stays as it is; coupled sectors are chosen in whole families, which a ROM does not tell.
+/// Explains why a ROM from a file cannot be refined; coupled sectors are chosen in whole families, which a ROM does not contain.
 pub(super) fn no_source(what: &str, rom: &Rom) -> String {
     if rom.is_cyclic() {
         return format!("{what} are not available: of bladed disks, only the built-in one can be reduced again");

@@ -1,4 +1,4 @@
-//! Rows of contact patches of the master, across the thickness of its tip.
+//! Refines the rows of contact patches across the thickness of the master's tip.
 
 use tiprub_core::Rom;
 use tiprub_model::rotor37::TipContact;
@@ -12,11 +12,11 @@ use super::{
 };
 use crate::master;
 
-/// Sides, and the middle between them.
+/// Maximum number of rows: the two sides and the middle between them.
 pub(super) const MOST_ROWS: usize = 3;
 
 impl Refiner<'_> {
-    /// Fewer rows follow from the ROM itself, more where it can be reduced again; none of contact nodes.
+    /// Returns the direction for rows: fewer rows follow from the ROM itself, more rows need another reduction; `None` for contact nodes.
     pub(super) fn rows(&self) -> Result<Option<RefinementDirection>> {
         let index = master(self.scene);
         let (modes, along) = self.own_counts();
@@ -45,7 +45,7 @@ impl Refiner<'_> {
                     let found = starting_with(&start, Rom { damping_ratio: rom.damping_ratio, ..found });
                     direction.levels.push(self.level(rows as f64, false, self.with_rom(index, found)));
                 }
-                // A mesh tells no more rows apart than it does.
+                // The mesh limits the number of rows.
                 Some(Err(failure)) => direction.misses(format!("{rows} rows: {failure}")),
                 None => direction.misses(no_source("more rows of patches", rom)),
             }
@@ -53,7 +53,7 @@ impl Refiner<'_> {
         Ok(Some(direction))
     }
 
-    /// The master with so many modes, patches along the chord and rows of them; `None` where it cannot be reduced again.
+    /// Reduces the master with this number of modes, patches along the chord and rows; `None` if it cannot be reduced again.
     fn in_rows(&self, [modes, along, rows]: [usize; 3]) -> Option<Result<Rom>> {
         let tip = self.tip_in_rows(along, rows);
         match (self.again.source, self.with_chord()) {
@@ -79,7 +79,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::convergence::refine::{Again, Meshed, RomSource};
 
-    /// A coarse blade with patches.
+    /// Coarse blade with patches.
     pub(crate) struct PatchedBlade;
 
     impl RomSource for PatchedBlade {
@@ -88,7 +88,7 @@ pub(crate) mod tests {
             let kind = ReductionKind::FreeInterface;
             let found = reduce_rotor37(&Rotor37Options { mesh, tip, modes, kind, ..Rotor37Options::paper() }, &|_| {});
             let found = found.unwrap();
-            // A few blades do.
+            // A few blades are enough.
             Ok(Meshed { rom: Rom { sectors: 3, ..found.rom }, nodes: found.nodes })
         }
 
@@ -127,8 +127,7 @@ pub(crate) mod tests {
         assert!(levels == [(1, false), (2, true)] && missing.contains("more rows of patches require"), "{missing}");
     }
 
-    /// The first finer model has one row more, the next has as many rows as needed to see whether the tip stays straight, as far as its mesh has
-    /// places for them.
+    /// The first finer model has one more row; the next has as many rows as needed to see whether the tip stays straight, as far as its mesh allows.
     #[test]
     fn finer_models_have_more_patch_rows() {
         let (console, cache) = (Console::new(true, false), RomCache::off());

@@ -1,5 +1,5 @@
-//! A ROM with fewer of its own modes: Craig and Bampton's reduction applied to the reduced model itself, so that contact nodes and
-//! their static responses stay. Of a ROM whose contact nodes leave no room for that, the lowest natural modes.
+//! Truncates a ROM to fewer of its modes with a Craig-Bampton reduction of the reduced model itself, so that contact nodes and their static
+//! responses are kept. If the coordinates of the contact nodes leave no room for that, the lowest natural modes are kept.
 
 use nalgebra::{ComplexField, DMatrix};
 use tiprub_core::{
@@ -10,16 +10,16 @@ use tiprub_core::{
 /// Form of truncation of a ROM.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Truncation {
-    /// Modes with the contact nodes held, beside the displacements of these.
+    /// Fixed-interface modes, beside the displacements of the contact nodes.
     Held,
-    /// Natural modes, beside the responses at rest to contact forces.
+    /// Natural modes, beside the static responses to contact forces.
     Free,
     /// Natural modes alone.
     Natural,
 }
 
 impl Truncation {
-    /// Returns the form for a ROM.
+    /// Returns the form that suits a ROM.
     pub fn of(rom: &Rom) -> Self {
         match rom.extras.basis {
             _ if rom.contact_map.nrows() >= rom.order() => Self::Natural,
@@ -28,7 +28,7 @@ impl Truncation {
         }
     }
 
-    /// Modes that a ROM has in this form; of coupled sectors those of nodal diameter 0.
+    /// Returns the number of modes of a ROM in this form; for coupled sectors, that of nodal diameter 0.
     pub fn modes(self, rom: &Rom) -> usize {
         match self {
             Self::Held | Self::Free => rom.order() - rom.contact_map.nrows(),
@@ -37,10 +37,10 @@ impl Truncation {
     }
 }
 
-/// The ROM with `modes` of its own modes; of coupled sectors at every nodal diameter as many less.
+/// Returns the ROM with `modes` of its modes; for coupled sectors, every nodal diameter loses the same number of modes.
 ///
 /// # Errors
-/// Why it cannot be truncated.
+/// The ROM cannot be truncated.
 pub fn truncated(rom: &Rom, modes: usize) -> Result<Rom, String> {
     let form = Truncation::of(rom);
     let less = form.modes(rom).saturating_sub(modes);
@@ -91,14 +91,14 @@ fn of_spin(spin: &Spin, basis: &DMatrix<f64>) -> Spin {
     }
 }
 
-/// Tᴴ A T of a Hermitian A, Hermitian to the last bit.
+/// Returns Tᴴ A T of a Hermitian matrix A, made Hermitian to the last bit.
 fn congruent<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>, basis: &DMatrix<T>) -> DMatrix<T> {
     let found = basis.adjoint() * matrix * basis;
     (&found + found.adjoint()).map(|entry| entry.scale(0.5))
 }
 
-/// Columns that are kept: static responses to displacements of the contact nodes and modes with these held, or natural modes; `less`
-/// of the highest modes are left out.
+/// Returns the basis of the truncated model: static responses to displacements of the contact nodes and fixed-interface modes, or natural modes. The
+/// `less` highest modes are omitted.
 fn basis<T: ComplexField<RealField = f64>>(
     form: Truncation,
     [mass, stiffness, map]: [&DMatrix<T>; 3],
@@ -112,7 +112,7 @@ fn basis<T: ComplexField<RealField = f64>>(
     if form == Truncation::Free {
         return free_basis([mass, stiffness, map], less);
     }
-    // Displacements of the contact nodes by the shortest coordinates, and what moves none of them.
+    // Minimum-norm coordinates of the contact displacements, and the space that moves no contact node.
     let gram = (map * map.adjoint()).try_inverse().ok_or("two contact displacements are linearly dependent")?;
     let inverse = map.adjoint() * gram;
     let projector = DMatrix::identity(order, order) - &inverse * map;
@@ -130,7 +130,7 @@ fn basis<T: ComplexField<RealField = f64>>(
     Ok(basis)
 }
 
-/// Natural modes but the `less` highest of those that are beside the responses at rest, and these.
+/// Returns the static responses, and the natural modes beside them without the `less` highest.
 fn free_basis<T: ComplexField<RealField = f64>>(
     [mass, stiffness, map]: [&DMatrix<T>; 3],
     less: usize,
@@ -140,7 +140,7 @@ fn free_basis<T: ComplexField<RealField = f64>>(
     let flexibility =
         stiffness.clone().try_inverse().ok_or("the structure moves as a rigid body and has no static response")?;
     let mut basis = DMatrix::zeros(order, rows + kept);
-    // Of the size of modes, so that neither drowns the other.
+    // Scaled to the size of modes for good conditioning.
     let responses = flexibility * map.adjoint();
     let energies = congruent(stiffness, &responses).diagonal().map(|entry| entry.real().sqrt());
     for (column, energy) in energies.iter().enumerate() {
@@ -150,7 +150,7 @@ fn free_basis<T: ComplexField<RealField = f64>>(
     Ok(basis)
 }
 
-/// The `kept` lowest modes of the pencil within a space.
+/// Returns the `kept` lowest modes of the pencil within a subspace.
 fn modes<T: ComplexField<RealField = f64>>(
     space: &DMatrix<T>,
     mass: &DMatrix<T>,
@@ -177,7 +177,7 @@ mod tests {
 
     use super::*;
 
-    /// Craig and Bampton's modes are nested: fewer of them by truncation are fewer of them by reduction, spin included.
+    /// Craig-Bampton modes are nested: truncation to fewer modes equals reduction with fewer modes, spin matrices included.
     #[test]
     fn truncation_is_the_reduction_with_fewer_modes() {
         let options = |modes: usize| Rotor37Options {
@@ -193,14 +193,14 @@ mod tests {
             (Truncation::of(&fine), Truncation::of(&fine).modes(&fine), found.order()),
             (Truncation::Held, 8, coarse.order())
         );
-        // The stiffness over speed is a fit, to the modes that are kept.
+        // The dependence of the stiffness on the speed is a fit to the modes that are kept.
         for (speed, close) in [(0.0, 1e-6), (900.0, 1e-3)] {
             let [own, other] = [&found, &coarse].map(|rom| ModalModel::at_speed(rom, 0.01, speed).unwrap());
             for (a, b) in own.frequencies.iter().zip(&other.frequencies) {
                 assert!((a / b - 1.0).abs() < close, "{a} {b} at {speed}");
             }
         }
-        // With all modes nothing changes; and the response at rest never does. Coordinates of another kind are no matter.
+        // With all modes nothing changes, and the static response never changes. The result does not depend on the kind of coordinates.
         let order = fine.order();
         let turned = DMatrix::from_fn(order, order, |i, j| if i == j { 1.0 } else { 0.3 / (1 + i + 2 * j) as f64 });
         let mut other = fine.clone();
@@ -229,7 +229,7 @@ mod tests {
         };
         let mut rom = reduce_rotor37(&options, &|_| {}).unwrap().rom;
         let frequencies = ModalModel::from_rom(&rom, 0.01).unwrap().frequencies;
-        // The same displacements named many times over.
+        // The same displacements are repeated several times.
         rom.contact_map = DMatrix::from_fn(18, rom.order(), |row, column| rom.contact_map[(row % 6, column)]);
         let nodes = rom.contact_nodes.iter().cycle().take(6).enumerate();
         rom.contact_nodes = nodes

@@ -1,4 +1,4 @@
-//! What every scene of the study offers: its sizes, its steps, and a run of any competitor.
+//! Interface of the scenes of the error study: sizes, steps, and runs of any competitor.
 
 use super::{
     competitor::{Competitor, DEFAULT, EquationFamily, TOLERANT},
@@ -7,60 +7,60 @@ use super::{
 
 /// A scene in several sizes: numbers of elements, or of component modes.
 pub trait ErrorCase {
-    /// For file names and `--scene`.
+    /// Returns the name for files and for `--scene`.
     fn name(&self) -> &'static str;
 
-    /// Names of its two figures: error of the steps, total error.
+    /// Returns the names of the two figures: error of the steps, total error.
     fn figures(&self) -> [&'static str; 2];
 
-    /// For headings.
+    /// Returns the title for headings.
     fn title(&self) -> &str;
 
     /// Returns a description of the scene in a sentence or two, with the limits of its figures.
     fn description(&self) -> String;
 
-    /// Returns the meaning of a size: `elements per bar`.
+    /// Returns the meaning of a size, such as `elements per bar`.
     fn size_name(&self) -> &'static str;
 
-    /// The sizes, ascending.
+    /// Returns the sizes, ascending.
     fn sizes(&self) -> Vec<usize>;
 
-    /// Index of the size at which all competitors are compared for their steps.
+    /// Returns the index of the size at which the steps of all competitors are compared.
     fn standard(&self) -> usize {
         self.sizes().len().saturating_sub(2)
     }
 
-    /// Time between samples (s), common to all runs.
+    /// Returns the time between samples (s), the same for all runs.
     fn interval(&self) -> f64;
 
-    /// Samples until the window ends.
+    /// Returns the number of samples until the window ends.
     fn samples(&self) -> usize;
 
-    /// Samples per window of impulses.
+    /// Returns the number of samples per window of impulses.
     fn impulse_window(&self) -> usize;
 
-    /// Internal steps per sample to be tried, ascending; the first are beyond the limit of central differences.
+    /// Returns the internal steps per sample to try, ascending; the first ones are beyond the limit of central differences.
     fn divisions(&self, size: usize) -> Vec<u32>;
 
-    /// The same for one competitor.
+    /// Returns the internal steps per sample to try with one competitor.
     fn divisions_of(&self, size: usize, _: Competitor) -> Vec<u32> {
         self.divisions(size)
     }
 
-    /// Internal steps per sample of the references: the product's, and the outside one's where the scene has one.
+    /// Returns the internal steps per sample of the two references: the one of tiprub, and the independent one if the scene has one.
     fn reference_divisions(&self, size: usize) -> (u32, u32);
 
-    /// The first reference.
+    /// Returns the first reference.
     fn first(&self) -> Competitor {
         DEFAULT
     }
 
-    /// The method with adaptive steps, which solves the equations of its family.
+    /// Returns the method with adaptive steps that solves the same equations as the first reference.
     fn tolerant(&self) -> Competitor {
         TOLERANT
     }
 
-    /// The second reference, and the competitors at a size.
+    /// Returns the second reference.
     fn second(&self) -> Competitor {
         Competitor::Moreau
     }
@@ -70,7 +70,7 @@ pub trait ErrorCase {
         "an independent implementation"
     }
 
-    /// The second reference where it is the same at all sizes.
+    /// Returns the second reference if it is the same at all sizes.
     fn second_trace(&self) -> Option<Trace> {
         None
     }
@@ -80,17 +80,17 @@ pub trait ErrorCase {
         None
     }
 
-    /// Who takes part at a size: outside methods at the standard size only, since they take long and truncation is the same
-    /// for all.
+    /// Returns the competitors at a size. Independent methods take part at the standard size only, since they take long and the truncation error is
+    /// the same for all.
     fn competitors(&self, size: usize) -> Vec<Competitor> {
         let all = Competitor::reduced().into_iter();
         all.filter(|competitor| competitor.is_core() || size == self.standard()).collect()
     }
 
-    /// Start a run at a size, with a relative perturbation of the initial gap.
+    /// Starts a run at a size, with a relative perturbation of the initial gap.
     ///
     /// # Errors
-    /// The competitor refuses.
+    /// The competitor rejects the scene or the step.
     fn start<'a>(
         &'a self,
         size: usize,
@@ -99,18 +99,18 @@ pub trait ErrorCase {
         perturbation: f64,
     ) -> Result<Box<dyn TimedRun + 'a>, String>;
 
-    /// The exact solution, or that of the full model, where there is one.
+    /// Returns the exact solution, or that of the full model, if there is one.
     fn exact(&self) -> Option<Trace> {
         None
     }
 
-    /// Known error of the displacements by modes, patches, rows and mesh of the model, added up (relative); `None` where it is unknown or where
-    /// other sizes show it.
+    /// Returns the known error of the displacements by modes, patches, rows and mesh of the model, added up (relative); `None` if it is unknown or
+    /// if other sizes show it.
     fn model_error(&self) -> Option<f64> {
         None
     }
 
-    /// Releases that are looked for: a time before which contact has ended (s), and a time after which it began.
+    /// Returns the releases to evaluate, each as a time after which contact begins and a time before which it has ended (s).
     fn releases(&self) -> Vec<[f64; 2]> {
         Vec::new()
     }
@@ -131,17 +131,17 @@ pub trait ErrorCase {
         "a gap"
     }
 
-    /// Whether a coating gives way.
+    /// Returns whether a coating can yield.
     fn is_coated(&self) -> bool {
         false
     }
 
-    /// Whether contact nodes act on each other, so that solvers differ.
+    /// Returns whether contact nodes act on each other, so that solvers differ.
     fn several_nodes(&self) -> bool {
         true
     }
 
-    /// Equations other than those of the first reference whose limits are computed at a size.
+    /// Returns the equations other than those of the first reference whose limits are computed at a size.
     fn families(&self, size: usize) -> Vec<EquationFamily>;
 }
 

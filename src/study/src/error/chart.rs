@@ -1,4 +1,4 @@
-//! Error against time as a picture: logarithmic axes, a colour per scheme, a marker per solver, the Pareto front drawn.
+//! Plots error against time: logarithmic axes, a colour per scheme, a marker per solver, and the Pareto front.
 
 use std::fmt::Write as _;
 
@@ -6,41 +6,41 @@ use tiprub_figure::escape;
 
 use super::competitor::Competitor;
 
-/// Size of the picture and of the plot in it (SVG units).
+/// Size of the picture and of the plot area (SVG units).
 const WIDTH: f64 = 920.0;
 const HEIGHT: f64 = 470.0;
 const LEFT: f64 = 70.0;
 const RIGHT: f64 = 660.0;
 const TOP: f64 = 16.0;
 const BOTTOM: f64 = 420.0;
-/// By colour index; distinguishable with colour-vision deficiency.
+/// Colours by index, distinguishable with colour-vision deficiency.
 const COLORS: [&str; 8] = ["#d67018", "#1f5da0", "#248c76", "#aa3474", "#6e747c", "#b9a12a", "#5b3a1e", "#c4151c"];
-/// Errors outside of this are drawn at its edge.
+/// Errors outside this range are drawn at its edge.
 const ERRORS: [f64; 2] = [1e-7, 3.0];
 
 /// Points of one competitor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Points {
-    /// Who.
+    /// The competitor.
     pub competitor: Competitor,
-    /// Seconds and errors, in the order of the steps.
+    /// Times (s) and errors, in the order of the steps.
     pub points: Vec<(f64, f64)>,
 }
 
-/// A chart.
+/// Chart of errors against time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorChart {
-    /// Text of the vertical axis.
+    /// Label of the vertical axis.
     pub error_label: String,
-    /// The competitors.
+    /// Points of all competitors.
     pub all: Vec<Points>,
-    /// Join the points of a competitor by lines.
+    /// True to join the points of a competitor by lines.
     pub joined: bool,
-    /// Below this error the references do not tell any more, and what it is.
+    /// Error below which the references cannot resolve differences, with its description.
     pub readable: Option<(f64, String)>,
 }
 
-/// The points that no other point beats in time and error, by time.
+/// Returns the Pareto front, ordered by time: the points that no other point beats in both time and error.
 pub fn front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut sorted: Vec<_> = points.iter().copied().filter(|(time, error)| *time > 0.0 && error.is_finite()).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -53,7 +53,7 @@ pub fn front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     sorted
 }
 
-/// Whole decades around values.
+/// Returns whole decades that enclose the values.
 fn decades(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let extend = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
     let [low, high] = values.filter(|value| *value > 0.0).fold([f64::INFINITY, 0.0], extend);
@@ -64,7 +64,7 @@ fn decades(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low, if high > low { high } else { low + 1.0 }]
 }
 
-/// Places on the page.
+/// Mapping from values to positions on the page.
 struct ChartFrame {
     time: [f64; 2],
     error: [f64; 2],
@@ -86,7 +86,7 @@ fn tenth(value: f64) -> f64 {
 }
 
 impl ErrorChart {
-    /// A whole SVG file.
+    /// Returns the complete SVG file.
     pub fn to_svg(&self) -> String {
         let points = || self.all.iter().flat_map(|each| each.points.iter());
         let clamped = points().map(|point| point.1.clamp(ERRORS[0], ERRORS[1]));
@@ -187,13 +187,13 @@ impl ErrorChart {
     }
 }
 
-/// The powers of ten in a range.
+/// Returns the integer powers of ten in a range.
 #[expect(clippy::cast_possible_truncation, reason = "powers of ten of seconds and errors")]
 fn whole([low, high]: [f64; 2]) -> std::ops::RangeInclusive<i32> {
     low as i32..=high as i32
 }
 
-/// Square, disc, triangle, cross, plus.
+/// Draws a marker: square, disc, triangle, cross or plus.
 fn mark(svg: &mut String, marker: usize, color: &str, x: f64, y: f64) {
     let at = |dx: f64, dy: f64| format!("{} {}", tenth(x + dx), tenth(y + dy));
     let _ = match marker {

@@ -2,18 +2,18 @@
 
 use std::time::Duration;
 
-/// Meaning of the measured time, in words.
+/// Description of the measured time.
 pub const MEANING: &str =
     if cfg!(unix) { "processor time of the stepping thread" } else { "wall time, as there is no processor clock" };
 
-/// Processor time this thread has used.
+/// Returns the processor time that this thread has used.
 #[cfg(unix)]
 pub fn now() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     Duration::new(time.tv_sec.unsigned_abs(), u32::try_from(time.tv_nsec).unwrap_or(0))
 }
 
-/// Wall time since the first call.
+/// Returns the wall time since the first call.
 #[cfg(not(unix))]
 pub fn now() -> Duration {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();

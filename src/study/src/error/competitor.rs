@@ -1,17 +1,17 @@
-//! Who takes part: every scheme with every solver of the product, and methods that share nothing with it.
+//! Competitors: every scheme with every solver of tiprub, and independent methods that share no code with it.
 
 use tiprub_core::settings::{Scheme, Solver};
 
-/// One way to step a scene.
+/// Method that steps a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Competitor {
-    /// The product.
+    /// A scheme and a solver of tiprub.
     Core(Scheme, Solver),
-    /// Moreau and Jean, θ = ½: implicit, exact complementarity.
+    /// Moreau-Jean scheme with θ = ½: implicit, exact complementarity.
     Moreau,
     /// Newmark with an augmented Lagrangian.
     Augmented,
-    /// Central differences with contact springs of so many times the scene's own stiffness.
+    /// Central differences with contact springs of this many times the scene's own stiffness.
     Penalty(u32),
     /// A method on the full finite-element model.
     Full(Full),
@@ -31,91 +31,92 @@ pub enum Full {
 }
 
 impl Full {
-    /// All four.
+    /// All four methods.
     pub const ALL: [Self; 4] = [Self::Film, Self::Bipotential, Self::Augmented, Self::Penalty];
 }
 
-/// Steps by a tolerance.
+/// Adaptive steps with a tolerance.
 pub const TOLERANT: Competitor = Competitor::Core(Scheme::Galerkin, Solver::Lcp);
-/// One over its tolerances that are compared.
+/// Inverses of the compared tolerances.
 pub const TOLERANCES: [u32; 4] = [100, 1000, 10_000, 100_000];
-/// One over that of its finest run.
+/// Inverse of the tolerance of the finest run.
 pub const FINEST: u32 = 10_000_000;
 /// The method of the paper.
 pub const PAPER: Competitor = Competitor::Core(Scheme::CentralDifference, Solver::Film);
-/// The first reference and default of the product.
+/// First reference and default of tiprub.
 pub const DEFAULT: Competitor = Competitor::Core(Scheme::ModalExact, Solver::Lcp);
-/// Which equations a competitor solves: runs of one family have one limit for h → 0.
+/// Equations that a competitor solves: all runs of one family converge to the same limit for h → 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EquationFamily {
-    /// The contact nodes have no inertia.
+    /// True if the contact nodes have no inertia.
     pub massless: bool,
-    /// Contacts may stick, and slide in any direction; otherwise they slide along the circumference.
+    /// True if contacts may stick, and slide in any direction; otherwise they slide along the circumference.
     pub sticking: bool,
 }
 
 impl EquationFamily {
-    /// Inertia everywhere and sliding, as the first reference.
+    /// Inertia at all nodes and sliding contact, as in the first reference.
     pub const PLAIN: Self = Self { massless: false, sticking: false };
-    /// No inertia of the contact nodes.
+    /// Contact nodes without inertia.
     pub const MASSLESS: Self = Self { massless: true, sticking: false };
-    /// Sticking.
+    /// Sticking contact.
     pub const STICKING: Self = Self { massless: false, sticking: true };
-    /// Both.
+    /// Contact nodes without inertia, and sticking contact.
     pub const BOTH: Self = Self { massless: true, sticking: true };
 
-    /// Whose fine run stands for the limit.
+    /// Returns the competitor whose fine run represents the limit.
     pub fn reference(self) -> Competitor {
         let scheme = if self.massless { Scheme::MasslessBoundary } else { Scheme::ModalExact };
         Competitor::Core(scheme, if self.sticking { Solver::Coulomb } else { Solver::Lcp })
     }
 }
 
-/// Name of a scheme with a solver, as in scene files.
+/// Returns the name of a scheme with a solver, as in scene files.
 pub fn method_name((scheme, solver): (Scheme, Solver)) -> String {
     Competitor::Core(scheme, solver).name()
 }
 
 impl Competitor {
-    /// Everyone, the product's own first.
+    /// Returns all competitors, those of tiprub first.
     pub fn all() -> Vec<Self> {
         Self::reduced().into_iter().chain([TOLERANT]).chain(Full::ALL.map(Self::Full)).collect()
     }
 
-    /// Everyone who steps a reduced model, the product's own first.
+    /// Returns all competitors that step a reduced model, those of tiprub first.
     pub fn reduced() -> Vec<Self> {
         let own =
             Scheme::RECURRENCES.into_iter().flat_map(|scheme| Solver::ALL.map(|solver| Self::Core(scheme, solver)));
         own.chain([Self::Moreau, Self::Augmented, Self::Penalty(1), Self::Penalty(10)]).collect()
     }
 
-    /// The product's own.
+    /// Returns whether the method is part of tiprub.
     pub fn is_core(self) -> bool {
         matches!(self, Self::Core(..))
     }
 
-    /// Whether it steps the full finite-element model.
+    /// Returns whether the method steps the full finite-element model.
     pub fn is_full(self) -> bool {
         matches!(self, Self::Full(_))
     }
 
-    /// The equations it solves.
+    /// Returns the equations that the method solves.
     pub fn family(self) -> EquationFamily {
         let Self::Core(scheme, solver) = self else { return EquationFamily::PLAIN };
         EquationFamily { massless: scheme.is_massless(), sticking: solver == Solver::Coulomb }
     }
 
-    /// Whether a tolerance takes the place of its step. What divides the sample then divides the smallest clearance.
+    /// Returns whether the method uses a tolerance instead of a step; a division then applies to the smallest clearance instead of the sample
+    /// interval.
     pub fn is_by_tolerance(self) -> bool {
         matches!(self, Self::Core(Scheme::Galerkin, _))
     }
 
-    /// `h = 0.500 µs` of a step (s), or `tolerance 1e-3`.
+    /// Formats a setting: `h = 0.500 µs` for a step (s), or `tolerance 1e-3`.
     pub fn setting(self, value: f64) -> String {
         if self.is_by_tolerance() { format!("tolerance {value:.0e}") } else { format!("h = {:.3} µs", 1e6 * value) }
     }
 
-    /// As in scene files, or in words.
+    /// Returns the name as in scene files, or a description.
     pub fn name(self) -> String {
         match self {
             TOLERANT => "galerkin".into(),
@@ -131,7 +132,7 @@ impl Competitor {
         }
     }
 
-    /// Index of the colour: one per scheme or outside method.
+    /// Returns the index of the colour: one per scheme or independent method.
     pub fn color(self) -> usize {
         match self {
             Self::Core(Scheme::CentralDifference, _) => 0,
@@ -145,7 +146,7 @@ impl Competitor {
         }
     }
 
-    /// Index of the marker: one per solver; outside methods have a cross, the stiffer penalty another.
+    /// Returns the index of the marker: one per solver; independent methods have a cross, the stiffer penalty another marker.
     pub fn marker(self) -> usize {
         match self {
             Self::Core(_, Solver::Film) | Self::Full(Full::Film) => 0,

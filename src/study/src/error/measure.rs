@@ -1,4 +1,4 @@
-//! Errors and times of all configurations of a scene, against references that are computed first.
+//! Measures errors and times of all configurations of a scene against references that are computed first.
 
 use std::iter::zip;
 
@@ -13,22 +13,23 @@ use super::{
     run::{self, Trace},
 };
 
-/// Figures of a run. Relative errors unless units are given.
+/// Measured values of a run; errors are relative unless a unit is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Figures {
     /// Median processor time of stepping (s).
     pub seconds: f64,
-    /// Displacements against the truth: exact, or the reference of the largest size. These, and impulses, of the worst structure.
+    /// Error of the displacements against the truth: the exact solution, or the reference of the largest size. Displacements and impulses are those
+    /// of the worst structure.
     pub total: f64,
-    /// Displacements against the reference of the same size: what the steps alone do.
+    /// Error of the displacements against the reference of the same size: the effect of the steps alone.
     pub of_time: f64,
-    /// Displacements against the limit of the same equations, which differ for massless contact nodes and for sticking.
+    /// Error of the displacements against the limit of the same equations, which differs for massless contact nodes and for sticking.
     pub of_own: f64,
-    /// Normal impulse in windows against the reference of the same size.
+    /// Error of the normal impulse in windows against the reference of the same size.
     pub impulse: f64,
-    /// Normal impulse in windows against the truth.
+    /// Error of the normal impulse in windows against the truth.
     pub impulse_total: f64,
-    /// Energy in the end against that of the truth, relative to the largest energy there was.
+    /// Error of the final energy against the truth, relative to the largest energy.
     pub energy: f64,
     /// Residual of the energy ledger.
     pub residual: Option<f64>,
@@ -36,39 +37,39 @@ pub struct Figures {
     pub penetration: f64,
     /// Most negative normal force (N).
     pub adhesion: f64,
-    /// Largest error of a release, relative to the duration of its contact.
+    /// Largest error of a release time, relative to the duration of its contact.
     pub release: Option<f64>,
 }
 
-/// One configuration.
+/// Row of results: one configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredRow {
     /// Index of the size.
     pub size: usize,
-    /// Who.
+    /// The competitor.
     pub competitor: Competitor,
-    /// Internal step (s); the tolerance of those that go by one.
+    /// Internal step (s), or tolerance with adaptive steps.
     pub step: f64,
-    /// Figures, or the reason of a rejection or failure.
+    /// Measured values, or the reason of a rejection or failure.
     pub outcome: Result<Figures, String>,
 }
 
 /// References of one size.
 pub struct CaseReferences {
-    /// The product's.
+    /// Reference of tiprub.
     pub first: Trace,
-    /// The outside one.
+    /// Independent reference.
     pub second: Trace,
-    /// The product's for other equations.
+    /// References of tiprub for other equations.
     pub limits: Vec<(EquationFamily, Trace)>,
-    /// Displacements and windowed impulses of the first two, relative.
+    /// Relative distances of the first two: displacements and windowed impulses.
     pub apart: [f64; 2],
-    /// Displacements of two schemes without mass of the contact nodes, relative, where one of them goes by a tolerance.
+    /// Relative distance of the displacements of two schemes with massless contact nodes, one of them with adaptive steps.
     pub massless_apart: Option<f64>,
 }
 
 impl CaseReferences {
-    /// Limit of the equations of a family; where nothing can stick, those of sliding.
+    /// Returns the limit of the equations of a family; if nothing can stick, that of sliding contact.
     pub fn limit(&self, family: EquationFamily) -> &Trace {
         let of = |family: EquationFamily| self.limits.iter().find(|limit| limit.0 == family).map(|limit| &limit.1);
         of(family).or_else(|| of(EquationFamily { sticking: false, ..family })).unwrap_or(&self.first)
@@ -81,28 +82,29 @@ impl CaseReferences {
     }
 }
 
-/// Everything measured of a scene.
+/// All measured values of a scene.
 pub struct Measured {
     /// All configurations.
     pub rows: Vec<MeasuredRow>,
-    /// By size.
+    /// References by size.
     pub references: Vec<CaseReferences>,
-    /// Displacements of the reference of each size from the truth.
+    /// Distance of the displacements of the reference of each size from the truth.
     pub truncation: Vec<f64>,
 }
 
-/// A run whose displacements are further away than so many times their size has failed.
+/// A run has failed if the error of its displacements exceeds this multiple of their norm.
 const DIVERGED: f64 = 10.0;
 
 /// Smallest motion that is judged by its own norm, as a fraction of the largest motion; the norm of less would be that of rounding.
 pub(super) const STILL: f64 = 1e-6;
 
-/// |a − b| / |b| over all samples, of the structure of which it is largest: one that moves far would hide the errors of another.
+/// Returns |a − b| / |b| over all samples, of the structure with the largest error, so that a large motion does not hide the errors of another
+/// structure.
 pub fn apart(a: &Trace, b: &Trace) -> f64 {
     parts_apart(&a.displacements, &b.displacements, &b.parts)
 }
 
-/// The same of samples that hold so many values of each part.
+/// Returns the same measure for samples with this number of values for each structure.
 pub fn parts_apart(a: &[Vec<f64>], b: &[Vec<f64>], parts: &[usize]) -> f64 {
     let mut from = 0;
     let squares = parts.iter().map(|length| {
@@ -123,12 +125,12 @@ pub fn parts_apart(a: &[Vec<f64>], b: &[Vec<f64>], parts: &[usize]) -> f64 {
     worst(squares.iter().map(of))
 }
 
-/// The largest; NaN where one is.
+/// Returns the largest error; NaN if one of them is NaN.
 pub(super) fn worst(errors: impl Iterator<Item = f64>) -> f64 {
     errors.fold(0.0, |most: f64, error| if most.is_nan() || error <= most { most } else { error })
 }
 
-/// |a − b| / |b| of impulses summed over windows of so many samples; of several structures the largest.
+/// Returns |a − b| / |b| of impulses summed over windows of `window` samples; the largest of several structures.
 fn windows_apart(a: &Trace, b: &Trace, window: usize) -> f64 {
     if b.parts.len() < 2 || a.shares.len() != b.shares.len() {
         let sums = |trace: &Trace| vec![sums(&trace.impulses, window)];
@@ -145,16 +147,16 @@ fn sums(values: &[f64], window: usize) -> Vec<f64> {
     values.chunks(window).map(|part| part.iter().sum()).collect()
 }
 
-/// Kinds of work, for a forecast: references, then a kind for every competitor.
+/// Number of kinds of work for a forecast: one for references, one for every competitor.
 const KINDS: usize = 64;
 
-/// The kind of a competitor's runs of the case with that number.
+/// Returns the kind of work of a competitor's runs in the case with this number.
 pub(super) fn kind(case_number: usize, competitor: Competitor) -> usize {
     let known = Competitor::all().iter().position(|other| *other == competitor);
     KINDS * case_number + 1 + known.unwrap_or(KINDS - 2)
 }
 
-/// Work of a run, as internal steps of one size: a decade of a tolerance doubles the steps.
+/// Returns the work of a run, as internal steps of one size; a tolerance that is ten times smaller doubles the steps.
 pub(super) fn units(case: &dyn ErrorCase, size: usize, competitor: Competitor, division: u32) -> f64 {
     let usual = || {
         let divisions = case.divisions(size);
@@ -169,10 +171,10 @@ pub(super) fn units(case: &dyn ErrorCase, size: usize, competitor: Competitor, d
     steps * case.samples() as f64 * elements
 }
 
-/// One over the tolerance at which a run is taken to cost as much as one with a usual number of steps.
+/// Inverse of the tolerance at which a run is assumed to cost as much as one with the usual number of steps.
 const USUAL_TOLERANCE: f64 = 1e3;
 
-/// Runs for time, beside the one that is looked at.
+/// Returns the number of runs of a configuration: one for its results and `repetitions` for its time.
 fn timed(repetitions: usize) -> f64 {
     (1 + repetitions) as f64
 }
@@ -186,7 +188,7 @@ fn of_references(case: &dyn ErrorCase, size: usize) -> f64 {
     own * (1 + case.families(size).len()) as f64 + second + finest
 }
 
-/// Plan the runs of the case with that number.
+/// Plans the runs of the case with this number.
 pub fn plan(case: &dyn ErrorCase, case_number: usize, repetitions: usize, ledger: &mut WorkPlan) {
     for size in 0..case.sizes().len() {
         ledger.plan(KINDS * case_number, of_references(case, size));
@@ -199,7 +201,7 @@ pub fn plan(case: &dyn ErrorCase, case_number: usize, repetitions: usize, ledger
     }
 }
 
-/// Number of runs of a scene.
+/// Returns the number of runs of a scene.
 pub fn count(case: &dyn ErrorCase) -> u64 {
     let of = |size: usize| {
         let all = case.competitors(size).into_iter();
@@ -208,7 +210,7 @@ pub fn count(case: &dyn ErrorCase) -> u64 {
     (0..case.sizes().len()).map(of).sum::<usize>() as u64
 }
 
-/// Run everything, configurations so many times each for their time. One run at a time.
+/// Runs all configurations, one run at a time, each `repetitions` times to measure its time.
 ///
 /// # Errors
 /// A reference fails.
@@ -237,7 +239,7 @@ pub fn measure(case: &dyn ErrorCase, case_number: usize, repetitions: usize, for
     Ok(Measured { rows, truncation, references })
 }
 
-/// The references of one size.
+/// Computes the references of one size.
 fn refer(case: &dyn ErrorCase, size: usize) -> Result<CaseReferences> {
     let (division, outside) = case.reference_divisions(size);
     let trace = |competitor: Competitor, division: u32| {
@@ -252,7 +254,7 @@ fn refer(case: &dyn ErrorCase, size: usize) -> Result<CaseReferences> {
     };
     let first = trace(case.first(), division)?;
     let second = case.second_trace().map_or_else(|| trace(case.second(), outside), Ok)?;
-    // Equations that are refused at this size have no limit; their rows say why.
+    // Equations that are rejected at this size have no limit; their rows state the reason.
     let limits =
         case.families(size).into_iter().map(|family| Some((family, trace(family.reference(), division).ok()?)));
     let mut limits: Vec<(EquationFamily, Trace)> = limits.flatten().collect();
@@ -274,7 +276,7 @@ fn refer(case: &dyn ErrorCase, size: usize) -> Result<CaseReferences> {
     })
 }
 
-/// Run one configuration once to look at it, and again for its time.
+/// Runs one configuration once to evaluate its results, and again to measure its time.
 fn judge(
     case: &dyn ErrorCase,
     size: usize,
@@ -286,7 +288,7 @@ fn judge(
     let start = || case.start(size, competitor, division, 0.0);
     let mut run = start()?;
     let found = run::trace(run.as_mut(), case.samples())?;
-    // The full model has a limit of its own.
+    // The full model has a different limit.
     let plain = if competitor.is_full() { truth } else { &own.first };
     let error = apart(&found, plain);
     if error.is_nan() || error > DIVERGED {
@@ -313,7 +315,7 @@ fn judge(
     })
 }
 
-/// Largest error of a release.
+/// Returns the largest error of a release time.
 fn release(case: &dyn ErrorCase, found: &Trace, truth: &Trace) -> Option<f64> {
     let errors = case.releases().into_iter().map(|[touch, free]| {
         let before = |trace: &Trace| {
@@ -332,7 +334,7 @@ fn release(case: &dyn ErrorCase, found: &Trace, truth: &Trace) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Two structures with one displacement each, a window of one sample.
+    /// Creates the trace of two structures with one displacement each, in a window of one sample.
     fn trace(displacements: [f64; 2], shares: [f64; 2]) -> Trace {
         Trace {
             displacements: vec![displacements.to_vec()],
@@ -352,7 +354,7 @@ mod tests {
     fn error_is_relative_to_the_size_of_the_worst_structure() {
         let (found, truth) = (trace([1e-3, 1.2e-6], [5.0, 0.03]), trace([1e-3, 1.0e-6], [5.0, 0.02]));
         assert!((apart(&found, &truth) - 0.2).abs() < 1e-12 && (windows_apart(&found, &truth, 1) - 0.5).abs() < 1e-12);
-        // What hardly moves is rounding; a number that is none stays so.
+        // Motions within rounding are ignored; NaN stays NaN.
         assert!(apart(&trace([1e-3, 2e-14], [1.0; 2]), &trace([1e-3, 1e-14], [1.0; 2])) < 1e-4);
         assert!(apart(&trace([f64::NAN, 1e-6], [1.0; 2]), &truth).is_nan());
     }

@@ -1,8 +1,8 @@
-//! Error against run time: every scheme, solver and step of the product on a scene, against fine runs that must meet.
+//! Error study: error against run time of every scheme, solver and step of tiprub on a scene, compared with fine reference runs that must agree.
 //!
-//! A [`case::ErrorCase`] is a scene in one or several sizes; [`competitor::Competitor`] is who steps it; [`measure`] holds every
-//! configuration against two references, and [`ranking`] says who is cheapest. Refusals and failures are rows like all others.
-//! [`user_scene::UserScene`] makes a case of any scene.
+//! A [`case::ErrorCase`] is a scene in one or several sizes, a [`competitor::Competitor`] is a method that steps it. [`measure`] compares every
+//! configuration with two references, and [`ranking`] finds the cheapest ones. Rejections and failures are rows like all others.
+//! [`user_scene::UserScene`] turns any scene into a case.
 
 pub mod case;
 pub mod chart;
@@ -41,10 +41,10 @@ use crate::{
     convergence::refine::{Again, FINEST_TIP, RomSource},
 };
 
-/// Largest distance of the two references of a scene.
+/// Largest accepted distance between the two references of a scene.
 const MEET: f64 = 2e-3;
 
-/// The study of a scene of one's own; `source` is where the ROM of its master comes from, if that is a file and known.
+/// Runs the study of a user scene; `source` is the origin of the ROM of its master, if it is a known file.
 ///
 /// # Errors
 /// The scene cannot be read or stepped, a reference fails, or the source does not give the ROM of the scene.
@@ -52,7 +52,7 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn RomSource>, console
     let case = user_scene::UserScene::new(arguments, console)?;
     let (quick, cache) = (arguments.common.quick, arguments.common.cache.cache());
     let (title, all) = (case.title().to_owned(), measure::count(&case));
-    // First: what cannot be reduced again is told before the long work.
+    // Checked first, so that a model that cannot be reduced again is reported before the long work.
     let again = Again { source, cache: &cache, mesh: 1.0, finest_tip: FINEST_TIP, only: &[], quick, console };
     let prepared = total::prepare(&case, &again)?;
     let mut ledger = case.ledger();
@@ -108,7 +108,7 @@ pub fn study(arguments: &ErrorArguments, source: Option<&dyn RomSource>, console
     Ok(study)
 }
 
-/// Timed runs of a configuration.
+/// Returns the number of timed runs of a configuration.
 fn repetitions(quick: bool) -> usize {
     if quick { 1 } else { run::REPETITIONS }
 }
@@ -125,7 +125,7 @@ pub fn planned(cases: &[Box<dyn ErrorCase>], smooth: &[&dyn ErrorCase], quick: b
     ledger
 }
 
-/// The study of several cases; `smooth` are further ones, of which only orders are told.
+/// Runs the study of several cases; for the cases `smooth`, only orders of convergence are reported.
 ///
 /// # Errors
 /// A reference fails.
@@ -171,7 +171,7 @@ pub fn of_cases(
     Ok(study)
 }
 
-/// Tables over all scenes, where there are several.
+/// Adds tables over all scenes if there are several.
 fn add_summary(study: &mut Study, measured: &[(Box<dyn ErrorCase>, Measured)]) {
     if measured.len() < 2 {
         return;
@@ -188,19 +188,19 @@ fn add_summary(study: &mut Study, measured: &[(Box<dyn ErrorCase>, Measured)]) {
     }
 }
 
-/// Head of the page of the guide.
+/// Returns the head of the page of the guide.
 fn guide_page(facts: &[(String, String)]) -> String {
     let facts: String = facts.iter().map(|(name, value)| format!("* {name}: {value}\n")).collect();
     format!("# Error against run time: pictures and tables\n\n{facts}")
 }
 
-/// A scene's part of it.
+/// Returns the section of a scene in that page.
 fn section(case: &dyn ErrorCase, tables: &[Table]) -> String {
     let title = case.title();
     let drawn = if sheets::has_total(case) { 2 } else { 1 };
     let pictures: String =
         case.figures().iter().take(drawn).map(|figure| format!("![{title}]({figure}.svg)\n\n")).collect();
-    // Captions on the page of all scenes begin with the scene.
+    // Captions on the page of all scenes begin with the name of the scene.
     let own = |table: &Table| {
         let caption =
             table.caption.strip_prefix(title).map_or(table.caption.as_str(), |rest| rest.trim_start_matches(": "));
@@ -209,7 +209,7 @@ fn section(case: &dyn ErrorCase, tables: &[Table]) -> String {
     format!("\n## {title}\n\n{pictures}{}", tables.iter().map(own).collect::<Vec<_>>().join("\n"))
 }
 
-/// Orders while nothing changes its contact, and in the scenes that were measured.
+/// Tabulates orders of convergence without changes of contact, and in the measured scenes.
 fn orders(
     smooth: &[&dyn ErrorCase],
     measured: &[(Box<dyn ErrorCase>, Measured)],
@@ -223,11 +223,11 @@ fn orders(
     Ok(ranking::orders(&all))
 }
 
-/// Figures, statements and files of one scene; its tables are returned.
+/// Adds figures, statements and files of one scene; returns its tables.
 fn add(study: &mut Study, case: &dyn ErrorCase, found: &Measured) -> Vec<Table> {
     let about = sheets::references(case, found);
     let mut all = vec![about.clone()];
-    // With one size and no exact solution both are one.
+    // With one size and no exact solution, both figures are the same.
     let of_steps = ErrorKind::of_steps(case);
     let kinds: &[ErrorKind] = if sheets::has_total(case) { &[of_steps, ErrorKind::Total] } else { &[of_steps] };
     for (&kind, name) in zip(kinds, case.figures()) {
@@ -315,7 +315,7 @@ fn statements(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
         Statement {
             expected: format!("{title}: lcp has no penetration and no tensile force at any internal step of any run"),
             found: format!("largest penetration {deepest:.1e} m, smallest force {least:.1e} N in {} runs", ran.len()),
-            // The surface of a coating is there to be penetrated.
+            // A tip is expected to penetrate a coating.
             holds: (!case.is_coated())
                 .then(|| !ran.is_empty() && ran.iter().all(|one| one.penetration <= 0.0 && one.adhesion >= 0.0)),
         }
@@ -325,7 +325,7 @@ fn statements(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     all
 }
 
-/// Two references that share no code meet.
+/// Returns the statement that two independent references agree.
 fn meeting(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
     let title = case.title();
     let (size, apart) = (case.sizes()[case.standard()], found.references[case.standard()].apart[0]);
@@ -377,9 +377,9 @@ fn massless(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
 /// Result of one step of central differences.
 struct Tried {
     size: usize,
-    /// s
+    /// Internal step (s).
     step: f64,
-    /// Whether it ran, was refused for its stability, or failed otherwise.
+    /// Result: it ran, was rejected for its stability, or failed otherwise.
     outcome: RunOutcome,
 }
 
@@ -401,7 +401,7 @@ impl RunOutcome {
     }
 }
 
-/// Whether steps were refused, all for ω_max·h ≥ 2, and at every size some ran, all of them shorter than those refused.
+/// Returns whether steps were rejected, all for ω_max·h ≥ 2, and whether at every size some steps ran, all of them shorter than the rejected ones.
 fn bounded(tried: &[Tried]) -> bool {
     let steps = |size: usize, outcome: RunOutcome| {
         tried.iter().filter(move |one| one.size == size && one.outcome == outcome).map(|one| one.step)
@@ -414,7 +414,7 @@ fn bounded(tried: &[Tried]) -> bool {
     has(RunOutcome::Unstable) && !has(RunOutcome::Failed) && tried.iter().all(|one| parted(one.size))
 }
 
-/// The longest step that ran and the shortest that did not, at each size.
+/// Returns the longest step that ran and the shortest that did not, at each size.
 fn bounds(case: &dyn ErrorCase, tried: &[Tried]) -> String {
     let of = |at: usize, size: usize| {
         let steps = |ran: bool| {
@@ -454,7 +454,7 @@ fn limits(case: &dyn ErrorCase, found: &Measured) -> Vec<Statement> {
                 case.title()
             ),
             found: bounds(case, &tried),
-            // Steps that all run say nothing about the limit.
+            // If all steps run, they do not show the limit.
             holds: tried.iter().any(|one| one.outcome != RunOutcome::Ran).then(|| bounded(&tried)),
         },
         Statement::remark(

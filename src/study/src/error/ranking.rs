@@ -1,4 +1,4 @@
-//! Who is cheapest for an error, and orders of convergence.
+//! Ranks configurations by cost for a given error, and determines orders of convergence.
 
 use tiprub_core::settings::{Scheme, Solver};
 use tiprub_figure::table::Table;
@@ -10,32 +10,32 @@ use super::{
 };
 use crate::Statement;
 
-/// Errors that are asked for.
+/// Target errors.
 pub const TARGETS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
-/// Points of which an order is fitted.
+/// Number of points for the fit of an order.
 const FITTED: usize = 3;
 /// Errors below this are rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Which error.
+/// Kind of error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
     /// Error of the steps alone, at the standard size.
     OfTime,
-    /// The same, against the limit of the equations that a competitor solves: those without mass of the contact nodes, or with sticking,
-    /// have another, and that is no error of the steps.
+    /// Error of the steps against the limit of the equations that a competitor solves: methods with massless contact nodes or with sticking have
+    /// another limit, which is no error of the steps.
     OfOwn,
-    /// Against the truth, over all sizes.
+    /// Error against the truth, over all sizes.
     Total,
 }
 
 impl ErrorKind {
-    /// Errors of the steps of a case: with one size and no exact solution each competitor has its own limit.
+    /// Returns the kind of error for the steps of a case: with one size and no exact solution, each competitor has its own limit.
     pub fn of_steps(case: &dyn ErrorCase) -> Self {
         if case.sizes().len() > 1 || case.exact().is_some() { Self::OfTime } else { Self::OfOwn }
     }
 
-    /// The error of this kind.
+    /// Returns the error of this kind.
     pub fn of(self, figures: &Figures) -> f64 {
         match self {
             Self::OfTime => figures.of_time,
@@ -44,14 +44,14 @@ impl ErrorKind {
         }
     }
 
-    /// The rows it is about.
+    /// Returns the rows to which this kind of error applies.
     pub fn rows<'a>(self, case: &dyn ErrorCase, measured: &'a Measured) -> Vec<&'a MeasuredRow> {
         let standard = case.standard();
         measured.rows.iter().filter(|row| self == Self::Total || row.size == standard).collect()
     }
 }
 
-/// Errors below this cannot be read: how far two references that share no code are apart where the truth is one of them.
+/// Returns the error below which differences cannot be resolved: the distance of two independent references, if the truth is one of them.
 pub fn readable(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> f64 {
     let apart = |size: usize| measured.references.get(size).map_or(0.0, |references| references.apart[0]);
     match (case.meeting(), kind) {
@@ -62,14 +62,14 @@ pub fn readable(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> f
     }
 }
 
-/// The same for one competitor: that of its own limit.
+/// Returns the same bound for one competitor, with respect to its own limit.
 pub fn readable_of(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind, competitor: Competitor) -> f64 {
     let own = || measured.references.get(case.standard())?.massless_apart;
     let massless = kind == ErrorKind::OfOwn && competitor.family().massless;
     own().filter(|_| massless).unwrap_or_else(|| readable(case, measured, kind))
 }
 
-/// The rows of competitors whose limit is known well enough to tell this error.
+/// Returns the rows of competitors whose limit is known accurately enough for this error.
 pub fn that_tell<'a>(
     case: &dyn ErrorCase,
     measured: &Measured,
@@ -80,7 +80,7 @@ pub fn that_tell<'a>(
     rows.iter().copied().filter(|row| error >= readable_of(case, measured, kind, row.competitor)).collect()
 }
 
-/// The row of least time with at most this error, among those of a competitor or of all.
+/// Returns the fastest row with at most this error, among those of a competitor or of all.
 pub fn cheapest<'a>(
     rows: &[&'a MeasuredRow],
     kind: ErrorKind,
@@ -93,7 +93,7 @@ pub fn cheapest<'a>(
     good.min_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds))
 }
 
-/// A duration in words.
+/// Formats a duration.
 pub fn seconds(time: f64) -> String {
     match time {
         time if time < 1e-3 => format!("{:.3} ms", 1e3 * time),
@@ -102,7 +102,7 @@ pub fn seconds(time: f64) -> String {
     }
 }
 
-/// Cheapest configuration for every target, and what the paper's method needs.
+/// Tabulates the cheapest configuration for every target, and the cost of the paper's method.
 pub fn winners(case: &dyn ErrorCase, measured: &Measured, kind: ErrorKind) -> Table {
     let rows = kind.rows(case, measured);
     let sizes = case.sizes();
@@ -212,18 +212,18 @@ pub fn floor(case: &dyn ErrorCase, found: &Measured) -> Option<Statement> {
 /// Order of convergence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Order {
-    /// The error goes with this power of h.
+    /// The error is proportional to this power of h.
     Power(f64),
-    /// There is no error but rounding.
+    /// There is only rounding error.
     Exact,
-    /// The error falls no more: it does not tend to this limit.
+    /// The error stops decreasing: it does not tend to this limit.
     Floor(f64),
-    /// Too few runs.
+    /// There are too few runs.
     Unknown,
 }
 
 impl Order {
-    /// As in a table.
+    /// Formats the order for a table.
     pub fn text(self) -> String {
         match self {
             Self::Power(power) => format!("{power:.1}"),
@@ -234,7 +234,7 @@ impl Order {
     }
 }
 
-/// Order of a competitor at the standard size, from its finest steps, against the limit of its own equations.
+/// Returns the order of a competitor at the standard size, from its finest steps, against the limit of its own equations.
 pub fn order(case: &dyn ErrorCase, measured: &Measured, competitor: Competitor) -> Order {
     let rows = measured.rows.iter().filter(|row| row.size == case.standard() && row.competitor == competitor);
     let points: Vec<(f64, f64)> =
@@ -250,7 +250,7 @@ pub fn order(case: &dyn ErrorCase, measured: &Measured, competitor: Competitor) 
     if power < 0.3 { Order::Floor(fine[FITTED - 1].1) } else { Order::Power(power) }
 }
 
-/// Slope of a straight line through the logarithms.
+/// Returns the slope of a straight line through the logarithms.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let count = points.len() as f64;
     let logs: Vec<(f64, f64)> = points.iter().map(|(h, e)| (h.ln(), e.max(f64::MIN_POSITIVE).ln())).collect();
@@ -260,7 +260,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     above / logs.iter().map(|(a, _)| (a - x) * (a - x)).sum::<f64>()
 }
 
-/// Orders of all competitors in several scenes.
+/// Tabulates the orders of all competitors in several scenes.
 pub fn orders(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let caption = format!(
         "Observed orders of convergence of the displacements to the converged solution of the same model, from the \

@@ -1,29 +1,29 @@
-//! One run of one competitor: what is recorded at the sample times, and the time that stepping takes.
+//! Runs one competitor: records results at the sample times, and measures the time of the steps.
 
 use super::clock;
 
-/// Timed runs of a configuration.
+/// Number of timed runs of a configuration.
 pub const REPETITIONS: usize = 3;
-/// Short runs are repeated until they add up to this much (s).
+/// Minimum total time (s) of the timed runs; short runs are repeated until they reach it.
 const LEAST_TIME: f64 = 5e-3;
-/// Most timed runs of a configuration.
+/// Maximum number of timed runs of a configuration.
 const MOST_REPETITIONS: usize = 40;
 
-/// A competitor that marches a scene from one sample time to the next.
+/// Competitor that advances a scene from one sample time to the next.
 pub trait TimedRun {
-    /// March to the next sample time.
+    /// Advances to the next sample time.
     ///
     /// # Errors
-    /// Why the run ends here.
+    /// The run ends here.
     fn advance(&mut self) -> Result<(), String>;
 
-    /// The same, looking at every internal step.
+    /// Advances to the next sample time, and records every internal step.
     ///
     /// # Errors
-    /// As there.
+    /// The run ends here.
     fn watch(&mut self, seen: &mut StepExtremes) -> Result<(), String>;
 
-    /// The displacements that are compared (m).
+    /// Returns the displacements that are compared (m).
     fn displacements(&self) -> Vec<f64>;
 
     /// Returns the number of displacements of each structure that touches, in their order.
@@ -31,13 +31,13 @@ pub trait TimedRun {
         vec![self.displacements().len()]
     }
 
-    /// Kinetic, strain and potential energy (J).
+    /// Returns the kinetic, strain and potential energy (J).
     fn energy(&self) -> f64;
 
-    /// Residual of the energy ledger relative to what was exchanged; `None` where there is no ledger.
+    /// Returns the residual of the energy ledger relative to the exchanged energy; `None` if there is no ledger.
     fn residual(&self) -> Option<f64>;
 
-    /// Processor time of the stepping (s), where the run takes it itself.
+    /// Returns the processor time of the steps (s), if the run measures it itself.
     fn own_seconds(&self) -> Option<f64> {
         None
     }
@@ -48,29 +48,29 @@ pub trait TimedRun {
 pub struct StepExtremes {
     /// ∫ of all normal forces since the last sample (N·s).
     pub impulse: f64,
-    /// The same of every structure that touches, where a run tells them apart.
+    /// The same integral for every structure with contact nodes, if the run distinguishes them.
     pub shares: Vec<f64>,
-    /// Time of the last force (s); NaN before there was one.
+    /// Time of the last force (s); NaN before the first force.
     pub last_force: f64,
     /// Deepest penetration so far (m).
     pub penetration: f64,
-    /// Most negative normal force so far (N), 0 if there is none.
+    /// Most negative normal force so far (N); 0 if there is none.
     pub adhesion: f64,
 }
 
 impl StepExtremes {
-    /// The next sample.
+    /// Starts the next sample.
     pub fn next(&mut self) {
         self.impulse = 0.0;
         self.shares.fill(0.0);
     }
 
-    /// Nothing yet.
+    /// Returns extremes without any steps.
     pub fn nothing() -> Self {
         Self { impulse: 0.0, shares: Vec::new(), last_force: f64::NAN, penetration: 0.0, adhesion: 0.0 }
     }
 
-    /// A step of length `step` (s) that ends at `time` (s).
+    /// Adds a step of length `step` (s) that ends at `time` (s).
     pub fn add(&mut self, time: f64, step: f64, forces: impl Iterator<Item = f64>, least_gap: f64) {
         let mut total = 0.0;
         for force in forces {
@@ -95,7 +95,7 @@ pub struct Trace {
     pub parts: Vec<usize>,
     /// Normal impulse between samples (N·s).
     pub impulses: Vec<f64>,
-    /// The same of every structure that touches, where a run tells them apart.
+    /// Normal impulse of every structure with contact nodes, if a run distinguishes them.
     pub shares: Vec<Vec<f64>>,
     /// Time of the last force up to every sample (s).
     pub last_forces: Vec<f64>,
@@ -111,10 +111,10 @@ pub struct Trace {
     pub adhesion: f64,
 }
 
-/// Record `samples` samples.
+/// Records `samples` samples.
 ///
 /// # Errors
-/// Why the run ends early.
+/// The run ends early.
 pub fn trace(run: &mut dyn TimedRun, samples: usize) -> Result<Trace, String> {
     let mut found = Trace {
         displacements: Vec::with_capacity(samples),
@@ -143,11 +143,11 @@ pub fn trace(run: &mut dyn TimedRun, samples: usize) -> Result<Trace, String> {
     Ok(found)
 }
 
-/// Median of the processor time of stepping over `samples` samples (s), of at least `repetitions` runs; `known`, that of one
-/// that is over already.
+/// Returns the median of the processor time of the steps over `samples` samples (s) in at least `repetitions` runs; `known` is the time of a run
+/// that has already finished.
 ///
 /// # Errors
-/// Why a run ends early.
+/// A run ends early.
 pub fn time<'a>(
     start: &dyn Fn() -> Result<Box<dyn TimedRun + 'a>, String>,
     samples: usize,

@@ -1,4 +1,4 @@
-//! Runs of whole scenes through [`Simulation`], as an FMU would step them.
+//! Runs whole scenes with [`Simulation`], in the same way as an FMU steps them.
 
 use tiprub_core::{
     Scene, Simulation,
@@ -19,21 +19,21 @@ pub struct SceneRun {
     interval: f64,
     division: u32,
     samples: u32,
-    /// Motion without contact of every structure that touches.
+    /// Motion without contact of every structure that has contact nodes.
     unmoved: Vec<Unmoved>,
 }
 
-/// Motion of a structure without contact: at rest where it starts, or in straight flight.
+/// Motion of a structure without contact: at rest at its start position, or in straight flight.
 struct Unmoved {
     /// Displacements at the start (m).
     start: Vec<f64>,
-    /// Their rates (m/s); empty where it does not fly.
+    /// Their rates (m/s); empty if the structure does not move freely.
     rates: Vec<f64>,
-    /// Whether something has touched it.
+    /// True if contact forces have acted on it.
     touched: bool,
 }
 
-/// Displacements of all contact nodes: node by node, axis by axis, sector by sector (m).
+/// Returns the displacements of all contact nodes: node by node, axis by axis, sector by sector (m).
 fn rows(structure: &Structure) -> Vec<f64> {
     let modes = structure.modes();
     (0..modes.rows()).flat_map(|row| (0..modes.sectors()).map(move |sector| modes.row(row, sector))).collect()
@@ -58,10 +58,10 @@ impl Unmoved {
 }
 
 impl SceneRun {
-    /// Compile and initialise; `perturbation` is a relative change of clearances and velocities.
+    /// Compiles and initialises the scene; `perturbation` is a relative change of clearances and velocities.
     ///
     /// # Errors
-    /// The refusal of the core.
+    /// The core rejects the scene.
     pub fn new(
         scene: &Scene,
         (scheme, solver): (Scheme, Solver),
@@ -73,8 +73,8 @@ impl SceneRun {
         Self::with_start_values(&scene, interval, division, &[])
     }
 
-    /// The scene by another method: with `division` internal steps in `interval` (s), or a tolerance of one over `division`; and a relative
-    /// change of clearances and velocities.
+    /// Returns the scene with another method: with `division` internal steps in `interval` (s), or with the tolerance 1/`division`; and with a
+    /// relative change of clearances and velocities.
     pub fn by(
         scene: &Scene,
         (scheme, solver): (Scheme, Solver),
@@ -90,7 +90,7 @@ impl SceneRun {
         scene
     }
 
-    /// The scene with another method and internal step (s), and a relative change of clearances and velocities.
+    /// Returns the scene with another method and internal step (s), and with a relative change of clearances and velocities.
     pub fn changed(scene: &Scene, (scheme, solver): (Scheme, Solver), step: f64, perturbation: f64) -> Scene {
         let mut scene = scene.clone();
         scene.settings.time.scheme = scheme;
@@ -100,16 +100,16 @@ impl SceneRun {
             contact.gap *= 1.0 + perturbation;
             contact.sector_gaps.iter_mut().for_each(|gap| *gap *= 1.0 + perturbation);
         }
-        // The gaps of free bodies are in their ROMs.
+        // The gaps of free bodies are part of their ROMs.
         let velocities = scene.settings.structures.iter_mut().flat_map(|structure| &mut structure.velocity);
         velocities.for_each(|velocity| *velocity *= 1.0 + perturbation);
         scene
     }
 
-    /// As the scene says, with start values replaced (name, value as text).
+    /// Compiles and initialises the scene with replaced start values (name, value as text).
     ///
     /// # Errors
-    /// As [`Self::new`], or a value that is refused.
+    /// The errors of [`Self::new`], or a rejected value.
     pub fn with_start_values(
         scene: &Scene,
         interval: f64,
@@ -134,32 +134,32 @@ impl SceneRun {
         Ok(Self { simulation, start, interval, division, samples: 0, unmoved })
     }
 
-    /// Strain energy of all structures (J).
+    /// Returns the strain energy of all structures (J).
     pub fn strain_energy(&self) -> f64 {
         self.simulation.system().energies().1
     }
 
-    /// Work of friction since the start (J).
+    /// Returns the work of friction since the start (J).
     pub fn friction_work(&self) -> f64 {
         self.simulation.system().ledger().friction_loss.value()
     }
 
-    /// Displacements of all contact nodes, flight included (m).
+    /// Returns the displacements of all contact nodes, free flight included (m).
     pub fn displacements_with_flight(&self) -> Vec<f64> {
         self.touching().flat_map(rows).collect()
     }
 
-    /// Structures with contact nodes.
+    /// Returns the structures with contact nodes.
     fn touching(&self) -> impl Iterator<Item = &Structure> {
         self.simulation.system().structures().iter().filter(|structure| structure.nodes() > 0)
     }
 
-    /// Displacements of watched points (m).
+    /// Returns the displacements of watched points (m).
     pub fn watched_displacements(&self) -> Vec<f64> {
         self.simulation.watched_displacements()
     }
 
-    /// Time reached (s).
+    /// Returns the current time (s).
     pub fn time(&self) -> f64 {
         self.start + f64::from(self.samples) * self.interval
     }
@@ -179,7 +179,7 @@ impl TimedRun for SceneRun {
         loop {
             let progress = self.simulation.advance().map_err(|error| error.to_string())?;
             let system = self.simulation.system();
-            // Spans of those that go by a tolerance divide nothing.
+            // Adaptive steps are not divided.
             let step = match system.settings().scheme {
                 Scheme::Galerkin => system.step_size(),
                 _ => self.interval / f64::from(self.division),
@@ -197,7 +197,7 @@ impl TimedRun for SceneRun {
         }
     }
 
-    /// Returns the displacements caused by contact: without the start and without flight, which would hide it.
+    /// Returns the displacements caused by contact: without the start values and without free flight, which would hide them.
     fn displacements(&self) -> Vec<f64> {
         let time = f64::from(self.samples) * self.interval;
         let each = self.touching().zip(&self.unmoved);

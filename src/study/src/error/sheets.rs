@@ -1,4 +1,4 @@
-//! Everything measured of a scene: chart, CSV, JSON, table of all runs.
+//! Presents all measurements of a scene: chart, CSV, JSON, table of all runs.
 
 use std::fmt::Write as _;
 
@@ -15,15 +15,15 @@ use super::{
 };
 use crate::Sheet;
 
-/// Column of steps and tolerances.
+/// Name of the column of steps and tolerances.
 pub(super) const STEP: &str = "h (s) or tolerance";
 
-/// Key of the step, or tolerance, of a competitor.
+/// Returns the key for the step or tolerance of a competitor.
 pub fn step_name(competitor: Competitor) -> &'static str {
     if competitor.is_by_tolerance() { "tolerance" } else { "internal_step" }
 }
 
-/// Chart of one kind of error, and its numbers: a row per configuration, its error in the column of the competitor.
+/// Returns the chart of one kind of error and its numbers: a row per configuration, with its error in the column of the competitor.
 pub fn chart(case: &dyn ErrorCase, found: &Measured, kind: ErrorKind) -> (ErrorChart, Sheet) {
     let rows = kind.rows(case, found);
     let mut chart = ErrorChart {
@@ -59,7 +59,7 @@ pub fn chart(case: &dyn ErrorCase, found: &Measured, kind: ErrorKind) -> (ErrorC
     (chart, sheet)
 }
 
-/// A figure of a run: its name, its key for programs, whether it is against a finer model than the case's own, and its value.
+/// Value of a run: its name, its key for programs, true if it is compared with a finer model than the case's own, and the value.
 type NamedFigure = (&'static str, &'static str, bool, fn(&Figures) -> Option<f64>);
 
 const FIGURES: [NamedFigure; 11] = [
@@ -76,18 +76,18 @@ const FIGURES: [NamedFigure; 11] = [
     ("release error", "release_error", false, |figures| figures.release),
 ];
 
-/// Whether a case has models finer than its own, or an exact solution: without them there are no total errors.
+/// Returns whether a case has models finer than its own, or an exact solution; otherwise it has no total errors.
 pub fn has_total(case: &dyn ErrorCase) -> bool {
     case.sizes().len() > 1 || case.exact().is_some()
 }
 
-/// The figures that a case has.
+/// Returns the values that a case has.
 fn figures_of(case: &dyn ErrorCase) -> impl Iterator<Item = &'static NamedFigure> {
     let has_total = has_total(case);
     FIGURES.iter().filter(move |(_, _, total, _)| has_total || !total)
 }
 
-/// Every configuration as comma-separated values; refusals with their reason.
+/// Returns every configuration as comma-separated values; rejections with their reason.
 pub fn csv(case: &dyn ErrorCase, found: &Measured) -> String {
     let names: Vec<&str> = figures_of(case).map(|figure| figure.0).collect();
     let mut text = format!("competitor,{},{STEP},{},remark\n", case.size_name(), names.join(","));
@@ -110,7 +110,7 @@ pub fn csv(case: &dyn ErrorCase, found: &Measured) -> String {
     text
 }
 
-/// Every configuration, for the page.
+/// Returns every configuration as a table for the page.
 pub fn rows(case: &dyn ErrorCase, found: &Measured) -> Table {
     let mut columns = vec!["competitor".to_owned(), case.size_name().to_owned(), "step or tolerance".to_owned()];
     columns.extend(figures_of(case).map(|figure| figure.0.to_owned()).chain(["remark".to_owned()]));
@@ -174,7 +174,7 @@ pub fn references(case: &dyn ErrorCase, found: &Measured) -> Table {
     table
 }
 
-/// The cheapest of the steps alone for an error, where it can be read.
+/// Returns the cheapest configuration for an error of the steps, if the references can resolve it.
 fn cheapest(case: &dyn ErrorCase, found: &Measured, target: f64) -> Value {
     let kind = ErrorKind::of_steps(case);
     let rows = ranking::that_tell(case, found, kind, &kind.rows(case, found), target);
@@ -187,7 +187,7 @@ fn cheapest(case: &dyn ErrorCase, found: &Measured, target: f64) -> Value {
     }
 }
 
-/// For programs.
+/// Returns the results as JSON.
 pub fn to_json(case: &dyn ErrorCase, found: &Measured) -> Value {
     let rows = found.rows.iter().map(|row| {
         let mut object = json!({

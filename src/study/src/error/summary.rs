@@ -10,10 +10,10 @@ use super::{
     ranking::{self, ErrorKind, TARGETS, cheapest, that_tell},
 };
 
-/// A run that finished: its setting and its figures.
+/// Run that finished: its setting and its measured values.
 type Finished<'a> = (&'a MeasuredRow, &'a Figures);
 
-/// Processor time per simulated time (s/s) with three significant digits.
+/// Formats processor time per simulated time (s/s) with three significant digits.
 pub fn rate(seconds: f64) -> String {
     match seconds {
         _ if seconds < 0.00995 => format!("{seconds:.2e}"),
@@ -24,7 +24,7 @@ pub fn rate(seconds: f64) -> String {
     }
 }
 
-/// Columns of both tables.
+/// Returns the columns of both tables.
 fn columns(error: &str) -> [&str; 8] {
     [
         "scene",
@@ -38,7 +38,7 @@ fn columns(error: &str) -> [&str; 8] {
     ]
 }
 
-/// Cheapest setting for each error of the steps. Every method is compared with the converged solution of its own equations.
+/// Tabulates the cheapest setting for each error of the steps. Every method is compared with the converged solution of its own equations.
 pub fn of_steps(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let mut table = Table::new("Cheapest setting for an error of the steps", columns("error of the steps"));
     for &(case, measured) in scenes {
@@ -55,7 +55,7 @@ pub fn of_steps(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     table
 }
 
-/// Cheapest setting for each total error: steps, and the errors of the model (modes, patches, rows, mesh, elements).
+/// Tabulates the cheapest setting for each total error: steps, and the errors of the model (modes, patches, rows, mesh, elements).
 pub fn in_total(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let mut table = Table::new("Cheapest setting for a total error", columns("total error"));
     for &(case, measured) in scenes {
@@ -88,10 +88,10 @@ pub fn in_total(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     table
 }
 
-/// Total error of a run from its figures.
+/// Function for the total error of a run.
 type TotalError = Box<dyn Fn(&Figures) -> f64>;
 
-/// Returns the function that gives the total error of a run from its figures; `None` if a case has no finer model and no known errors.
+/// Returns the function for the total error of a run; `None` if a case has no finer model and no known errors.
 fn total_error(case: &dyn ErrorCase) -> Option<TotalError> {
     if let Some(left) = case.model_error() {
         return Some(Box::new(move |figures| figures.of_own + left));
@@ -103,7 +103,8 @@ fn beside(case: &dyn ErrorCase, target: f64, cells: Vec<String>) -> Vec<String> 
     [case.title().to_owned(), format!("{target:.0e}")].into_iter().chain(cells).collect()
 }
 
-/// Cheapest method, its setting and time; the times of `galerkin` and of the paper's method; the factor between the first and the last.
+/// Returns the cheapest method with its setting and time, the times of `galerkin` and of the paper's method, and the factor between the first and
+/// the last.
 fn cells<'a>(
     case: &dyn ErrorCase,
     readable: &[&'a MeasuredRow],
@@ -134,7 +135,7 @@ fn cells<'a>(
         .collect()
 }
 
-/// Why the paper's method does not reach an error: rejected at every step that was tried, or its smallest error.
+/// Explains why the paper's method does not reach an error: rejected at every step that was tried, or its smallest error.
 fn paper_misses(rows: &[&MeasuredRow]) -> String {
     let own = || rows.iter().filter(|row| row.competitor == PAPER);
     let shortest = own().map(|row| row.step).fold(f64::INFINITY, f64::min);
@@ -146,7 +147,7 @@ fn paper_misses(rows: &[&MeasuredRow]) -> String {
     }
 }
 
-/// Distances of the references, which limit the errors that can be read.
+/// Tabulates the distances of the references, which limit the errors that can be resolved.
 pub fn limits(scenes: &[(&dyn ErrorCase, &Measured)]) -> Table {
     let mut table = Table::new(
         "Smallest measurable errors: differences between the references",

@@ -1,10 +1,10 @@
-//! Total error against run time of a scene: other steps, schemes, numbers of patches, of rows of them and of modes, against one truth with more of
-//! all.
+//! Total error against run time of a scene: other steps, schemes and numbers of patches, rows of patches and modes, compared with one reference that
+//! has more of all.
 //!
-//! Models with fewer patches, rows and modes follow from the ROM itself; those with more are reduced again, where that is possible. Where it is
-//! not, the truth has the modes and patches of the scene: the errors are then of the steps, and are called so. All are held
-//! against one truth, by what their tips have in common (watched points, or patches that all have). Time is that of the steps: a
-//! model is as cheap as it is small. A mesh costs no run time: what it leaves is told beside the others.
+//! Models with fewer patches, rows and modes follow from the ROM itself; those with more are reduced again, if that is possible. If it is not, the
+//! reference has the modes and patches of the scene: the errors are then those of the steps and are named accordingly. All models are compared with
+//! one reference at the points that their tips have in common (watched points, or common patches). The time is that of the steps, so that smaller
+//! models are cheaper. The mesh does not affect the run time; its error is reported separately.
 
 use tiprub_core::{
     Scene,
@@ -37,16 +37,16 @@ use crate::{
     master,
 };
 
-/// Internal steps, times the number that the scene asks for.
+/// Numbers of internal steps, relative to the scene.
 const SHARES: [f64; 5] = [0.125, 0.25, 0.5, 1.0, 2.0];
 const QUICK_SHARES: [f64; 2] = [0.5, 1.0];
-/// Internal steps of the truth, times the number that the scene asks for: more where fewer are refused.
+/// Numbers of internal steps of the reference, relative to the scene; larger ones are used if smaller ones are rejected.
 const TRUE_SHARES: [u32; 3] = [4, 8, 16];
-/// Models finer than the scene's: so many times its modes and spaces between contact points. The last is the truth.
+/// Factors of the models finer than the scene's, for modes and for intervals between contact points. The last one is the reference.
 const FINER: [usize; 2] = [2, 4];
-/// Halvings of patches and of modes.
+/// Number of times that patches and modes are halved.
 const COARSER: usize = 2;
-/// Timed runs add up to so much at least (s), and are no more than so many.
+/// Minimum total time (s) and maximum number of the timed runs.
 const LEAST_TIME: f64 = 5e-3;
 const MOST_RUNS: usize = 5;
 
@@ -57,9 +57,9 @@ pub struct SceneModel {
     pub points: usize,
     /// Rows of patches across the thickness.
     pub rows: usize,
-    /// Modes of the structure that touches.
+    /// Modes of the structure that has contact nodes.
     pub modes: usize,
-    /// Whether it is the scene's.
+    /// True if it is the scene's own model.
     pub own: bool,
     scene: Scene,
 }
@@ -71,32 +71,32 @@ impl SceneModel {
         Self { points: rom.contact_nodes.len() / rows, rows, modes: Truncation::of(rom).modes(rom), own, scene }
     }
 
-    /// "9 × 2 patches", "3 nodes".
+    /// Describes the tip, such as "9 × 2 patches" or "3 nodes".
     pub(super) fn tip(&self, touching: &str) -> String {
         let rows = if self.rows == 1 { String::new() } else { format!(" × {}", self.rows) };
         format!("{}{rows} {touching}", self.points)
     }
 }
 
-/// One setting and what became of it.
+/// One setting and its result.
 #[derive(Debug)]
 pub struct TotalRow {
     /// Index of the model.
     pub model: usize,
-    /// Who.
+    /// The competitor.
     pub competitor: Competitor,
-    /// Internal step (s); the tolerance of those that go by one.
+    /// Internal step (s), or tolerance with adaptive steps.
     pub step: f64,
-    /// Whether it is the scene as it stands.
+    /// True for the unchanged scene.
     pub own: bool,
-    /// Processor time of the steps (s) and error of the displacements (relative L2), or why it is refused.
+    /// Processor time of the steps (s) and error of the displacements (relative L2), or the reason of a rejection.
     pub outcome: std::result::Result<(f64, f64), String>,
 }
 
-/// Everything that was found.
+/// Results of the measurement of total errors.
 #[derive(Debug)]
 pub struct Total {
-    /// The models that ran, the truth not among them.
+    /// Models that ran, without the reference.
     pub models: Vec<SceneModel>,
     /// All settings.
     pub rows: Vec<TotalRow>,
@@ -104,18 +104,18 @@ pub struct Total {
     pub truth: String,
     /// Change by the last refinement on the way to the reference: errors below cannot be read. `None` if the reference is the scene's own model.
     pub readable: Option<f64>,
-    /// `patches` or `nodes`.
+    /// Kind of contact points: `patches` or `nodes`.
     pub touching: &'static str,
-    /// Whether the truth has more modes than the scene, more contact points along the chord, and more rows of them; nodes have no rows, and count
+    /// True if the reference has more modes than the scene, more contact points along the chord, and more rows of them; nodes have no rows and count
     /// as refined.
     pub finer: [bool; 3],
     /// Errors that the ROM carries; empty if it has none.
     pub of_rom: Vec<Estimate>,
-    /// Error of the mesh, or why it is unknown.
+    /// Error of the mesh, or the reason why it is unknown.
     pub mesh: std::result::Result<f64, String>,
 }
 
-/// Models that are held against each other, and the finest, which the truth is found with.
+/// Models that are compared, and the finest one, which gives the reference.
 pub struct Prepared<'a> {
     refiner: Refiner<'a>,
     models: Vec<SceneModel>,
@@ -123,10 +123,10 @@ pub struct Prepared<'a> {
     truth: Option<Scene>,
 }
 
-/// Make the models of a case of one's own; the inner error says why there is nothing to measure.
+/// Creates the models for a user scene; the inner error states why there is nothing to measure.
 ///
 /// # Errors
-/// A model that is reduced again and does not give the scene's.
+/// A reduction does not reproduce the model of the scene.
 pub fn prepare<'a>(case: &'a UserScene, again: &'a Again<'a>) -> Result<std::result::Result<Prepared<'a>, String>> {
     let scene = case.scene();
     if let Err(several) = crate::one_rotor(&scene.settings) {
@@ -142,13 +142,13 @@ pub fn prepare<'a>(case: &'a UserScene, again: &'a Again<'a>) -> Result<std::res
     Ok(Ok(Prepared { refiner, models, finer, truth }))
 }
 
-/// Kind of work of other meshes, for a forecast: beside those of competitors.
+/// Kind of work of other meshes in a forecast, apart from those of competitors.
 const MESHES: usize = 1000;
-/// Meshes that are run, the scene's among them.
+/// Number of meshes that are run, including that of the scene.
 const MESHES_RUN: f64 = 3.0;
 
 impl Prepared<'_> {
-    /// Plan all runs.
+    /// Plans all runs.
     pub fn plan(&self, case: &UserScene, quick: bool, ledger: &mut WorkPlan) {
         let own = (case.method(), case.own_division());
         let truth = self.truth.as_ref().unwrap_or(case.scene());
@@ -167,16 +167,16 @@ impl Prepared<'_> {
     }
 }
 
-/// Work of a run of a model, as internal steps of the scene's.
+/// Returns the work of a run of a model, as internal steps of the scene's model.
 fn work(case: &UserScene, scene: &Scene, competitor: Competitor, division: u32) -> f64 {
     let order = |scene: &Scene| scene.roms.iter().map(|rom| rom.total_order() as f64).sum::<f64>();
     units(case, 0, competitor, division) * order(scene) / order(case.scene())
 }
 
-/// Measure a case of one's own; the inner error says why nothing was measured.
+/// Measures a user scene; the inner error states why nothing was measured.
 ///
 /// # Errors
-/// A mesh that cannot be reduced.
+/// A mesh cannot be reduced.
 pub fn measure(
     case: &UserScene,
     prepared: Prepared<'_>,
@@ -215,7 +215,8 @@ pub fn measure(
     Ok(Ok(Total { models, rows, truth, readable, touching, finer, of_rom, mesh }))
 }
 
-/// The scene's model and coarser ones: patches and modes halved, and halved again, each with each; fewer rows with all patches along the chord.
+/// Returns the scene's model and coarser ones: all combinations of patches and modes that are halved once or twice; fewer rows with all patches
+/// along the chord.
 fn coarser(scene: &Scene, quick: bool) -> Vec<SceneModel> {
     let index = master(scene);
     let halvings = if quick { 1 } else { COARSER };
@@ -231,7 +232,7 @@ fn coarser(scene: &Scene, quick: bool) -> Vec<SceneModel> {
     let mut models = Vec::new();
     for (tip, rom) in tips.into_iter().enumerate() {
         for halving in 0..=halvings {
-            // A coarser tip leaves its coordinates behind as modes.
+            // The coordinates of omitted contact points become modes of a coarser tip.
             let kept = own_modes >> halving;
             let found = if Truncation::of(&rom).modes(&rom) == kept { Ok(rom.clone()) } else { truncated(&rom, kept) };
             if let (Ok(rom), true) = (found, kept > 0) {
@@ -244,7 +245,7 @@ fn coarser(scene: &Scene, quick: bool) -> Vec<SceneModel> {
     models
 }
 
-/// The truth with the longest of its steps that are accepted, and their number per communication step.
+/// Runs the reference with the longest of its steps that is accepted; also returns the number of steps per communication step.
 fn true_run(case: &UserScene, scene: &Scene) -> std::result::Result<(u32, RunSummary), String> {
     let mut refused = String::new();
     for share in TRUE_SHARES {
@@ -257,7 +258,7 @@ fn true_run(case: &UserScene, scene: &Scene) -> std::result::Result<(u32, RunSum
     Err(refused)
 }
 
-/// Who takes part: the schemes with the solver of the scene's law, and the paper's method.
+/// Returns the competitors: the schemes with the solver of the scene's law, and the paper's method.
 fn competitors(case: &UserScene) -> Vec<Competitor> {
     let Competitor::Core(_, solver) = case.method() else { return Vec::new() };
     let solvers = if solver == Solver::Coulomb { &[Solver::Coulomb][..] } else { &[Solver::Lcp, Solver::Film] };
@@ -265,7 +266,7 @@ fn competitors(case: &UserScene) -> Vec<Competitor> {
     all.map(|(scheme, solver)| Competitor::Core(scheme, solver)).chain([TOLERANT]).collect()
 }
 
-/// Internal step (s), or tolerance.
+/// Returns the internal step (s) or the tolerance.
 fn value(case: &UserScene, competitor: Competitor, division: u32) -> f64 {
     (if competitor.is_by_tolerance() { 1.0 } else { case.interval() }) / f64::from(division)
 }
@@ -298,7 +299,7 @@ fn rows(
     rows
 }
 
-/// Displacements of a run, and the processor time of its steps (s): the median of several where it is short.
+/// Returns the processor time of the steps (s), the median of several runs if they are short, and the displacements of a run.
 fn observed(
     case: &UserScene,
     scene: &Scene,
@@ -328,7 +329,7 @@ fn observed(
     }
 }
 
-/// Error of the scene by its mesh, from others.
+/// Estimates the mesh error of the scene from runs with other meshes.
 fn mesh(case: &UserScene, refiner: &Refiner, again: &Again) -> Result<std::result::Result<f64, String>> {
     if again.quick {
         return Ok(Err("a quick study does not run other meshes".into()));
@@ -352,7 +353,7 @@ mod tests {
     use super::*;
     use crate::convergence::rows::tests::{PatchedBlade, scene};
 
-    /// One row is held against more, two are taken apart into one, and where none can be added the error is not called total.
+    /// One row is compared with more rows, two rows are merged into one; if no row can be added, the error is not called total.
     #[test]
     fn patch_rows_contribute_to_the_total_error() {
         let (console, cache) = (Console::new(true, false), RomCache::off());

@@ -1,4 +1,4 @@
-//! Total errors as a picture, tables, files and statements.
+//! Presents total errors as a picture, tables, files and statements.
 
 use serde_json::{Value, json};
 use tiprub_figure::table::Table;
@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{Picture, Sheet, Statement, StudyFigure, estimate};
 
-/// Errors that are asked for.
+/// Target errors.
 pub const TARGETS: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 impl Total {
@@ -31,12 +31,12 @@ impl Total {
         }
     }
 
-    /// Whether nothing of the model but its mesh is left out.
+    /// Returns whether the error contains all discretisation errors of the model except that of the mesh.
     pub fn is_total(&self) -> bool {
         self.finer == [true; 3]
     }
 
-    /// The same in names of files and of results.
+    /// Returns the name of the errors for files and results.
     pub fn key(&self) -> &'static str {
         if self.is_total() { "total" } else { "own_model" }
     }
@@ -50,36 +50,36 @@ impl Total {
         [true, false].map(|which| all.clone().filter(|(_, finer)| *finer == which).map(|(name, _)| *name).collect())
     }
 
-    /// The same in words.
+    /// Describes these directions.
     pub fn scope(&self) -> String {
         let [refined, not] = self.directions().map(|all| all.join(", "));
         if not.is_empty() { format!("refined: {refined}") } else { format!("refined: {refined}; not refined: {not}") }
     }
 
-    /// Settings that ran, with time (s) and error.
+    /// Returns the settings that ran, with time (s) and error.
     fn ran(&self) -> impl Iterator<Item = (&TotalRow, f64, f64)> {
         self.rows.iter().filter_map(|row| row.outcome.as_ref().ok().map(|(seconds, error)| (row, *seconds, *error)))
     }
 
-    /// The setting of least time with at most this error.
+    /// Returns the fastest setting with at most this error.
     pub fn cheapest(&self, error: f64, only: Option<Competitor>) -> Option<(&TotalRow, f64, f64)> {
         let good = self.ran().filter(|(row, _, own)| *own <= error && only.is_none_or(|only| row.competitor == only));
         good.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// "5 patches, 40 modes, modal-exact + lcp, h = 1.000 µs".
+    /// Formats a setting, such as "5 patches, 40 modes, modal-exact + lcp, h = 1.000 µs".
     fn setting(&self, row: &TotalRow) -> String {
         let model = &self.models[row.model];
         let (tip, modes) = (model.tip(self.touching), model.modes);
         format!("{tip}, {modes} modes, {}, {}", row.competitor.name(), row.competitor.setting(row.step))
     }
 
-    /// Whether an error is too small to be told from that of the truth.
+    /// Returns whether an error is too small to be distinguished from that of the reference.
     fn hidden(&self, error: f64) -> bool {
         self.readable.is_some_and(|least| error < least)
     }
 
-    /// With what the mesh leaves.
+    /// Formats an error together with that of the mesh.
     fn with_mesh(&self, error: f64) -> String {
         self.mesh.as_ref().map_or("unknown".into(), |mesh| format!("{:.1e}", error + mesh))
     }
@@ -105,7 +105,7 @@ impl Total {
         table
     }
 
-    /// Settings that no other beats in both time and error.
+    /// Tabulates the settings that no other setting beats in both time and error.
     fn best(&self, title: &str) -> Table {
         let points: Vec<(f64, f64)> = self.ran().map(|(_, time, error)| (time, error)).collect();
         let mut table = Table::new(
@@ -159,7 +159,7 @@ impl Total {
         sheet
     }
 
-    /// Picture and tables.
+    /// Returns the picture and the tables.
     pub fn figure(&self, title: &str) -> StudyFigure {
         let chart = self.chart();
         let mut html = chart.to_svg();
@@ -226,7 +226,7 @@ impl Total {
         all
     }
 
-    /// Every setting as comma-separated values; refusals with their reason.
+    /// Returns every setting as comma-separated values; rejections with their reason.
     pub fn csv(&self) -> String {
         let mut text = format!("competitor,{},rows,modes,{STEP},time (s),{},remark\n", self.touching, self.name());
         for row in &self.rows {
@@ -241,7 +241,7 @@ impl Total {
         text
     }
 
-    /// The cheapest setting for a target as comma-separated values.
+    /// Returns the cheapest setting for a target as comma-separated values.
     fn cheapest_row(&self, target: f64) -> String {
         let Some((row, time, error)) = self.cheapest(target, None).filter(|_| !self.hidden(target)) else {
             return format!("{},{target:e},,,,,,,\n", self.key());
@@ -251,7 +251,7 @@ impl Total {
         format!("{key},{target:e},\"{name}\",{points},{rows},{modes},{},{time:.4e},{error:.4e}\n", shortest(row.step))
     }
 
-    /// For programs.
+    /// Returns the results as JSON.
     pub fn to_json(&self) -> Value {
         let error_name = if self.is_total() { "total_error" } else { "error" };
         let [refined, not_refined] = self.directions();
@@ -275,7 +275,8 @@ impl Total {
     }
 }
 
-/// The cheapest settings for errors of the steps, as [`super::sheets::to_json`] has them, and against the truth of `total`.
+/// Returns the cheapest settings for errors of the steps, in the form of [`super::sheets::to_json`], and for errors against the reference of
+/// `total`.
 pub fn cheapest_csv(of_steps: &[Value], total: &Total) -> String {
     let mut text = format!("error of,at most,competitor,{},rows,modes,{STEP},time (s),error\n", total.touching);
     for row in of_steps {

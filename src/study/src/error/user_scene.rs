@@ -1,4 +1,4 @@
-//! Any scene as a case: all schemes and solvers of the product at steps around the one the scene asks for.
+//! Makes any scene a case of the error study: all schemes and solvers of tiprub at steps around the scene's own step.
 
 use tiprub_core::{
     Scene,
@@ -17,26 +17,26 @@ use super::{
 };
 use crate::{arguments::ErrorArguments, convergence::refine::is_adaptive, divisions};
 
-/// Internal steps tried, as multiples of the number that the scene asks for.
+/// Internal steps to try, as multiples of the scene's number.
 const SHARES: [f64; 7] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 const QUICK_SHARES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
-/// Internal steps of the references, in multiples of the most that are tried.
+/// Internal steps of the references, as multiples of the largest number that is tried.
 const FINER: u32 = 8;
-/// Halvings of the longest step of a scene that goes by a tolerance, until others can be compared.
+/// Maximum number of times that the longest step of a scene with adaptive steps is halved until fixed-step methods accept it.
 const MOST_HALVINGS: u32 = 12;
-/// Times that steps of a scene that goes by a tolerance are halved again where one is refused on its way.
+/// Maximum number of further halvings if a fixed step is rejected during the run of a scene with adaptive steps.
 const MOST_DOUBLINGS: u32 = 3;
-/// Samples of the window where none is asked for.
+/// Default number of samples of the window.
 const SAMPLES: usize = 400;
 const QUICK_SAMPLES: usize = 100;
 
 /// Parameters that start values must not replace.
 const COMPARED: [&str; 4] = ["scheme", "solver", "internal_step_max", "tolerance"];
 
-/// Start values that a study varies itself.
+/// Rejects start values that a study varies itself.
 ///
 /// # Errors
-/// One of them.
+/// One of the start values is such a parameter.
 pub fn refuse_compared(settings: &[(String, String)]) -> Result<()> {
     match settings.iter().find(|(name, _)| COMPARED.contains(&name.as_str())) {
         Some((name, _)) => {
@@ -47,34 +47,34 @@ pub fn refuse_compared(settings: &[(String, String)]) -> Result<()> {
     }
 }
 
-/// A scene of one's own.
+/// User scene as a case of the error study.
 pub struct UserScene {
     title: String,
     scene: Scene,
     settings: Vec<(String, String)>,
     interval: f64,
     samples: usize,
-    /// Internal steps per communication step around which those of one length are tried.
+    /// Internal steps per communication step around which fixed steps are tried.
     base: u32,
     divisions: Vec<u32>,
     parting: Vec<f64>,
 }
 
 impl UserScene {
-    /// Read the scene, and see how long it can be followed.
+    /// Reads the scene, and finds the window in which runs do not diverge.
     ///
     /// # Errors
-    /// The scene cannot be read or does not run; nothing touches within the window.
+    /// The scene cannot be read or does not run, or there is no contact within the window.
     pub fn new(arguments: &ErrorArguments, console: &Console) -> Result<Self> {
         refuse_compared(&arguments.set)?;
         let scene = arguments.common.options.load(&arguments.scene, &arguments.common.cache.cache(), console)?;
         Self::of(&arguments.scene, scene, &arguments.set, (arguments.window, arguments.common.quick), console)
     }
 
-    /// The scene called `name`, with start values replaced; a `window` (s) is that of a quick study or of a whole one.
+    /// Creates the case of the scene called `name` with replaced start values; without a `window` (s), that of a quick or a full study applies.
     ///
     /// # Errors
-    /// The scene does not run; nothing touches within the window.
+    /// The scene does not run, or there is no contact within the window.
     pub fn of(
         name: &str,
         scene: Scene,
@@ -105,7 +105,7 @@ impl UserScene {
                     case.parting = parting;
                     break (touch, samples);
                 }
-                // Growth by friction comes in bands, and what it does while contact is closed is known only then.
+                // Friction causes growth in bands of steps, and whether closed contact grows is known only during the run.
                 Err(_) if is_adaptive(&case.scene) && case.base < base << MOST_DOUBLINGS => {
                     case.base *= 2;
                     case.divisions = divisions_around(case.base, quick);
@@ -132,7 +132,7 @@ impl UserScene {
     }
 }
 
-/// Internal steps per communication step that are tried around `base`, ascending.
+/// Returns the internal steps per communication step to try around `base`, ascending.
 fn divisions_around(base: u32, quick: bool) -> Vec<u32> {
     let shares = if quick { &QUICK_SHARES[..] } else { &SHARES[..] };
     let mut divisions: Vec<u32> = shares.iter().map(|share| count(share * f64::from(base))).collect();
@@ -141,8 +141,8 @@ fn divisions_around(base: u32, quick: bool) -> Vec<u32> {
 }
 
 impl UserScene {
-    /// The sample of the first contact, the samples of a `window` (s), or of `most` beyond that contact, and how far runs part over them; the
-    /// experiment has `all`.
+    /// Returns the sample of the first contact, the number of samples of a `window` (s), or of `most` samples after that contact, and the divergence
+    /// of two runs over them; the experiment has `all` samples.
     fn follow(&self, (window, most): (Option<f64>, usize), all: usize) -> Result<(usize, usize, Vec<f64>), String> {
         let touch = self.first_touch(self.base, all)?;
         let asked = window.map_or(touch + most, |window| count(window / self.interval) as usize);
@@ -151,23 +151,23 @@ impl UserScene {
         Ok((touch, samples, parting))
     }
 
-    /// The scene.
+    /// Returns the scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// Start values that replace its own.
+    /// Returns the start values that replace those of the scene.
     pub fn settings(&self) -> &[(String, String)] {
         &self.settings
     }
 
-    /// Internal steps per communication step that the scene asks for, or one over its tolerance.
+    /// Returns the scene's number of internal steps per communication step, or the inverse of its tolerance.
     pub fn own_division(&self) -> u32 {
         own_division(&self.scene)
     }
 
-    /// Internal steps per communication step, or one over the tolerance, that are tried with a competitor, ascending: around what the
-    /// scene asks for, by `shares` of it.
+    /// Returns the internal steps per communication step, or inverse tolerances, to try with a competitor, ascending: `shares` times the scene's
+    /// number.
     pub(super) fn tried(&self, competitor: Competitor, shares: &[f64]) -> Vec<u32> {
         let mut all: Vec<u32> = match competitor.is_by_tolerance() {
             true => TOLERANCES.to_vec(),
@@ -181,24 +181,24 @@ impl UserScene {
         all
     }
 
-    /// Returns scheme and solver of the scene.
+    /// Returns the scheme and the solver of the scene.
     pub fn method(&self) -> Competitor {
         Competitor::Core(self.scene.settings.time.scheme, self.scene.settings.contacts[0].solver)
     }
 
-    /// Plans nothing yet. Its rate is the slowest of three runs per unit of work: the scene's own method, and fixed steps with `lcp` and `coulomb`,
-    /// which most of the work consists of.
+    /// Returns an empty work plan. Its rate is the slowest of three runs per unit of work: the scene's own method, and fixed steps with `lcp` and
+    /// `coulomb`, of which most of the work consists.
     pub fn ledger(&self) -> WorkPlan {
         let sticking = Competitor::Core(Scheme::ModalExact, Solver::Coulomb);
         let runs = [(self.method(), self.own_division()), (DEFAULT, self.base), (sticking, self.base)];
         WorkPlan::new(runs.into_iter().filter_map(|(method, division)| self.rate(method, division)).fold(0.0, f64::max))
     }
 
-    /// Seconds per unit of work of a method, from its first second of stepping; `None` if it does not start.
+    /// Returns the time (s) per unit of work of a method, from its first second of stepping; `None` if it does not start.
     fn rate(&self, method: Competitor, division: u32) -> Option<f64> {
         let mut run = self.start(0, method, division, 0.0).ok()?;
         let clock = std::time::Instant::now();
-        // A run that ends early has a rate as well, and a row that says why.
+        // A run that ends early has a rate as well, and a row that states the reason.
         let ran = (0..self.samples)
             .take_while(|_| run.advance().is_ok() && clock.elapsed().as_secs_f64() < 1.0)
             .count()
@@ -207,7 +207,7 @@ impl UserScene {
         Some(clock.elapsed().as_secs_f64() / (share * units(self, 0, method, division)).max(1.0))
     }
 
-    /// Communication steps before the first contact, at most `most`.
+    /// Returns the number of communication steps before the first contact, at most `most`.
     fn first_touch(&self, division: u32, most: usize) -> Result<usize, String> {
         let mut run = self.start(0, DEFAULT, division, 0.0)?;
         let mut seen = StepExtremes::nothing();
@@ -221,7 +221,7 @@ impl UserScene {
     }
 }
 
-/// Internal steps per communication step that a scene asks for, or one over its tolerance.
+/// Returns a scene's number of internal steps per communication step, or the inverse of its tolerance.
 pub(crate) fn own_division(scene: &Scene) -> u32 {
     let time = &scene.settings.time;
     match time.scheme {
@@ -230,8 +230,8 @@ pub(crate) fn own_division(scene: &Scene) -> u32 {
     }
 }
 
-/// Internal steps per communication step (s) around which those of one length are tried: what the scene asks for; where it goes by a
-/// tolerance, a fourth of the longest step that the first reference starts with.
+/// Returns the internal steps per communication step around which fixed steps are tried: the scene's number; for adaptive steps, those of a quarter
+/// of the longest step that the first reference accepts at its start.
 fn base(scene: &Scene, settings: &[(String, String)], interval: f64) -> Result<u32, String> {
     let own = divisions(interval, scene.settings.time.step);
     if scene.settings.time.scheme != Scheme::Galerkin {
@@ -260,7 +260,7 @@ impl ErrorCase for UserScene {
         "scene"
     }
 
-    /// The second is that of [`super::total`].
+    /// The second figure is that of [`super::total`].
     fn figures(&self) -> [&'static str; 2] {
         ["scene-steps", "scene-total"]
     }
@@ -364,7 +364,7 @@ mod tests {
         rows::tests::{PatchedBlade, scene},
     };
 
-    /// The base of the fixed steps is one that the whole window accepts, so that half of it and more can be compared.
+    /// The whole window accepts the base of the fixed steps, so that half of it and multiples can be compared.
     #[test]
     fn fixed_reference_steps_cover_the_whole_window() {
         let console = Console::new(true, false);

@@ -1,4 +1,4 @@
-//! How long a scene can be followed: runs from starts that differ by almost nothing part when contact is chaotic.
+//! Finds the window over which a scene can be compared: in chaotic contact, runs from nearly identical starts diverge.
 
 use std::{iter::zip, ops::Range};
 
@@ -12,16 +12,17 @@ use super::{
 };
 use crate::Statement;
 
-/// Relative change of the initial gap of the run that is compared.
+/// Relative change of the initial gap in the perturbed run.
 pub const PERTURBATION: f64 = 1e-9;
 
-/// Runs that differ by more than this have parted: what a scheme does wrong is then enlarged as much.
+/// Runs that differ by more than this have diverged: the errors of a scheme are then amplified as much.
 pub const PARTED: f64 = 1e-6;
-/// Internal steps per sample of the runs that statistics are taken of, and of the run they are held against.
+/// Internal steps per sample of the runs for statistics, and of the run with which they are compared.
 const DIVISION: u32 = 20;
 const FINE: u32 = 160;
 
-/// Difference of two runs at every sample, relative to the largest displacements, of the structure of which it is largest, over `samples` samples.
+/// Returns the difference of two runs at each of `samples` samples, relative to the largest displacements, of the structure with the largest
+/// difference.
 ///
 /// # Errors
 /// A run fails.
@@ -50,12 +51,12 @@ pub fn parting(case: &dyn ErrorCase, division: u32, samples: usize) -> Result<Ve
     Ok(zip(&plain.displacements, &perturbed.displacements).map(at).collect())
 }
 
-/// Samples before the runs of [`parting`] have parted, at most `most`.
+/// Returns the number of samples before the runs of [`parting`] have diverged, at most `most`.
 pub fn samples(parting: &[f64], most: usize) -> usize {
     parting.iter().position(|apart| *apart > PARTED).unwrap_or(most).min(most)
 }
 
-/// Whether the window of a scene ends before its runs part.
+/// Returns the statement about whether the window of a scene ends before its runs diverge.
 pub fn statement(case: &dyn ErrorCase) -> Option<Statement> {
     let parting = case.parting();
     let end = *parting.get(case.samples().checked_sub(1)?)?;
@@ -77,8 +78,8 @@ pub fn statement(case: &dyn ErrorCase) -> Option<Statement> {
     ))
 }
 
-/// Effective displacement and mean force from the end of the window on, of every competitor at one step, against the
-/// product at a fine one; `None` for scenes that end with their window.
+/// Tabulates the effective displacement and mean force after the window for every competitor at one step, against tiprub with a fine step; `None`
+/// for scenes that end with their window.
 pub fn statistics(case: &dyn ErrorCase) -> Option<Table> {
     let samples = case.parting().len();
     if samples <= case.samples() {
@@ -129,7 +130,7 @@ pub fn statistics(case: &dyn ErrorCase) -> Option<Table> {
     Some(table)
 }
 
-/// The beginning of a reason, which stands whole beside the run in the table of all runs where this step was tried.
+/// Shortens a reason that the table of all runs states in full beside the run with this step.
 fn shortened(problem: &str) -> String {
     const MOST: usize = 80;
     match problem.char_indices().nth(MOST) {

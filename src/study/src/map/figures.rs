@@ -10,14 +10,14 @@ use super::{
 };
 use crate::{Picture, Sheet, StudyFigure};
 
-/// Decades of amplitude that have a colour.
+/// Decades of amplitude that the colour scale covers.
 const DECADES: f64 = 4.0;
-/// Points of a line that is not straight.
+/// Number of points of a curved line.
 const POINTS: u32 = 24;
-/// Engine orders with a curve of their own.
+/// Number of engine orders that have a separate curve.
 const CURVES: usize = 3;
 
-/// All figures.
+/// Returns all figures.
 pub fn figures(map: &Map) -> Result<Vec<StudyFigure>> {
     let mut figures = vec![heat_map(map), amplitudes(map)?];
     figures.extend(contact(map)?);
@@ -109,7 +109,7 @@ fn map_sheet(map: &Map) -> Sheet {
     sheet
 }
 
-/// The excited orders of largest amplitude.
+/// Returns the excited orders of largest amplitude.
 fn strongest_orders(map: &Map) -> Vec<usize> {
     let most = |order: usize| {
         order_curve(&map.runs, order, map.setup.revolutions).iter().map(|point| point.1).fold(0.0, f64::max)
@@ -170,7 +170,7 @@ fn amplitudes(map: &Map) -> Result<StudyFigure> {
     })
 }
 
-/// A quantity of every run against angular velocity.
+/// Plots a quantity of every run against angular velocity.
 fn against_speed(
     map: &Map,
     name: &'static str,
@@ -203,7 +203,7 @@ fn contact(map: &Map) -> Result<[StudyFigure; 2]> {
     ])
 }
 
-/// The spectrum at the speed of the largest response.
+/// Plots the spectrum at the speed of the largest response.
 fn spectrum(map: &Map) -> Result<Option<StudyFigure>> {
     let largest = map.answered().max_by(|a, b| a.1.deflection[0].total_cmp(&b.1.deflection[0]));
     let Some((speed, response)) = largest else { return Ok(None) };

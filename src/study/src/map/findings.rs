@@ -1,4 +1,4 @@
-//! What the map shows: peaks, and coincidences with predicted resonances.
+//! Findings of the map: peaks, and coincidences with predicted resonances.
 
 use serde_json::{Value, json};
 use tiprub_core::{Scene, dynamics::modal::ModalModel};
@@ -11,13 +11,12 @@ use super::{
 };
 use crate::Sheet;
 
-/// Peaks below this share of the largest amplitude of the map are not listed; side lobes of the window are below it, too.
+/// Smallest peak that is listed, as a fraction of the largest amplitude of the map; side lobes of the window lie below it, too.
 const LEAST_PEAK: f64 = 1e-2;
-/// A response counts as lying at a coincidence within this relative distance of its speed; further below one it is that of
-/// the crossing before.
+/// Largest relative distance below a crossing at which a response still belongs to it; farther below, it belongs to the previous crossing.
 pub const NEAR: f64 = 0.05;
 
-/// A peak of the map, at the leading edge of the blade that swings most.
+/// Peak of the map, at the leading edge of the blade with the largest amplitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapPeak {
     /// Angular velocity (rad/s).
@@ -26,32 +25,32 @@ pub struct MapPeak {
     pub frequency: f64,
     /// Amplitude (m).
     pub amplitude: f64,
-    /// Frequency in multiples of the rotational one.
+    /// Frequency as a multiple of the rotational frequency.
     pub order: f64,
-    /// Distance of the bins, in the same.
+    /// Distance of the bins, as a multiple of the rotational frequency.
     pub bin: f64,
 }
 
-/// A crossing of the casing's engine orders with a mode, and the largest response to that order around it.
+/// Crossing of an engine order of the casing with a mode, and the largest response to that order around it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coincidence {
-    /// The crossing predicted.
+    /// Predicted crossing.
     pub crossing: Crossing,
-    /// Angular velocities (rad/s) between which the response is that of this crossing and of no neighbour.
+    /// Range of angular velocities (rad/s) in which the response belongs to this crossing and not to a neighbour.
     pub window: [f64; 2],
-    /// Angular velocity (rad/s) and amplitude (m) of the response's maximum in the window; none where it has none.
+    /// Angular velocity (rad/s) and amplitude (m) at the maximum of the response in the window; `None` if there is no maximum.
     pub response: Option<(f64, f64)>,
-    /// The same at that end of the range of speeds where the response is larger still, if it is.
+    /// Angular velocity and amplitude at an end of the range of speeds, if the response is larger there.
     pub beyond: Option<(f64, f64)>,
 }
 
 impl MapPeak {
-    /// For programs.
+    /// Returns the peak as JSON.
     pub fn json(&self) -> Value {
         json!({ "speed": self.speed, "frequency": self.frequency, "amplitude": self.amplitude, "engine_order": self.order })
     }
 
-    /// Whether it lies on an engine order that the casing excites, to within a bin.
+    /// Returns whether the peak lies within one bin of an engine order that the casing excites.
     pub fn on_order(&self, prediction: &FrequencyPrediction) -> bool {
         let nearest = self.order.round();
         let excited = prediction.base_order > 0 && (nearest / prediction.base_order as f64).fract() == 0.0;
@@ -60,12 +59,12 @@ impl MapPeak {
 }
 
 impl Coincidence {
-    /// By how much the response lies above the prediction, relative to it.
+    /// Returns the relative distance of the response above the predicted speed.
     pub fn shift(&self) -> Option<f64> {
         Some(self.response?.0 / self.crossing.speed - 1.0)
     }
 
-    /// For programs.
+    /// Returns the coincidence as JSON.
     pub fn json(&self) -> Value {
         json!({
             "engine_order": self.crossing.order,
@@ -82,7 +81,7 @@ impl Coincidence {
     }
 }
 
-/// All peaks, speed by speed.
+/// Returns all peaks, speed by speed.
 pub fn peaks(runs: &[SpeedRun]) -> Vec<MapPeak> {
     let responses = || runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().ok()?)));
     let spectra = responses().flat_map(|(_, response)| response.largest_blade[0].iter().skip(spectrum::FIRST_BIN));
@@ -102,13 +101,13 @@ pub fn peaks(runs: &[SpeedRun]) -> Vec<MapPeak> {
     all
 }
 
-/// Amplitude of one engine order at every speed (m), at the leading edge of the blade that swings most.
+/// Returns the amplitude of one engine order at every speed (m), at the leading edge of the blade with the largest amplitude.
 pub fn order_curve(runs: &[SpeedRun], order: usize, revolutions: usize) -> Vec<(f64, f64)> {
     let amplitude = |run: &SpeedRun| run.outcome.as_ref().ok()?.largest_blade[0].get(order * revolutions).copied();
     runs.iter().filter_map(|run| Some((run.speed, amplitude(run)?))).collect()
 }
 
-/// The excited crossings with the response found between those of the same engine order beside them.
+/// Returns the excited crossings with the responses between the neighbouring crossings of the same engine order.
 pub fn coincidences(
     runs: &[SpeedRun],
     prediction: &FrequencyPrediction,
@@ -131,8 +130,8 @@ pub fn coincidences(
     excited.map(found).collect()
 }
 
-/// Speeds (rad/s) at which the response to an engine order is that of this crossing. Contact stiffens, so that it leans
-/// upwards from the crossing, maybe far: it ends only where that of the next crossing of the same order may begin.
+/// Returns the range of speeds (rad/s) in which the response to an engine order belongs to this crossing. Contact stiffens the blades, so that the
+/// response extends upwards from the crossing, possibly far: the range ends where that of the next crossing of the same order begins.
 fn window(prediction: &FrequencyPrediction, crossing: &Crossing) -> [f64; 2] {
     let Crossing { order, speed, .. } = *crossing;
     let all = || (0..prediction.modes(order, speed).len()).filter_map(|mode| prediction.meeting(order, mode));
@@ -142,7 +141,7 @@ fn window(prediction: &FrequencyPrediction, crossing: &Crossing) -> [f64; 2] {
     [below.map_or(0.0, |below| border(below, speed)), above.map_or(f64::INFINITY, |above| border(speed, above))]
 }
 
-/// The largest local maximum of a curve within a window of speeds, refined by a parabola; the ends of the curve are none.
+/// Returns the largest local maximum of a curve within a range of speeds, refined by a parabola; the ends of the curve do not count.
 fn resonance(curve: &[(f64, f64)], window: [f64; 2]) -> Option<(f64, f64)> {
     let within = |point: &(f64, f64)| (window[0]..=window[1]).contains(&point.0);
     let tops =
@@ -153,11 +152,10 @@ fn resonance(curve: &[(f64, f64)], window: [f64; 2]) -> Option<(f64, f64)> {
     Some((speed.clamp(window[0], window[1]), height.exp()))
 }
 
-/// Length of the displacement of the leading edge when a contact pushes it inwards by `depth` (m), slowly; none of
-/// coupled sectors.
+/// Returns the length of the displacement of the leading edge when a contact pushes it slowly inwards by `depth` (m); `None` for coupled sectors.
 ///
 /// # Errors
-/// A ROM whose eigenproblem cannot be solved.
+/// The eigenproblem of the ROM cannot be solved.
 pub fn static_displacement(scene: &Scene, depth: f64) -> Result<Option<f64>> {
     let rom = &scene.roms[start::master(&scene.settings)?];
     if rom.is_cyclic() || depth <= 0.0 {
@@ -178,7 +176,7 @@ pub fn static_displacement(scene: &Scene, depth: f64) -> Result<Option<f64>> {
     Ok((column[0] > 0.0).then(|| depth * length / column[0]))
 }
 
-/// The list of peaks as a table.
+/// Tabulates the peaks.
 pub fn peak_sheet(peaks: &[MapPeak], prediction: &FrequencyPrediction) -> Sheet {
     let mut sheet = Sheet::new([
         "speed (rad/s)",
@@ -197,7 +195,7 @@ pub fn peak_sheet(peaks: &[MapPeak], prediction: &FrequencyPrediction) -> Sheet 
     sheet
 }
 
-/// Predicted and found resonances as a table.
+/// Tabulates predicted and observed resonances.
 pub fn coincidence_sheet(coincidences: &[Coincidence]) -> Sheet {
     let mut sheet = Sheet::new([
         "engine order",

@@ -1,5 +1,5 @@
-//! The interaction map: how large the tips swing over angular velocity and frequency when blades rub a casing out of round,
-//! and whether they do so where engine orders of the casing meet natural frequencies.
+//! Interaction map: amplitude of the tips over angular velocity and frequency when blades rub an out-of-round casing, compared with the speeds at
+//! which engine orders of the casing meet natural frequencies.
 
 mod figures;
 mod findings;
@@ -28,30 +28,31 @@ use crate::one_rotor_and_friction;
 pub use run::{MapSetup, SpeedResponse, SpeedRun};
 use start::MapStart;
 
-/// Angular velocities, relative to the one at which the second harmonic of the casing meets the first mode: a fifth to both
-/// sides, and above it room for what leans to higher speeds (see [`LEAN`]).
+/// Range of angular velocities relative to the resonance of the second harmonic of the casing with the first mode: a fifth to both sides, and room
+/// above for responses that extend to higher speeds (see [`LEAN`]).
 const RANGE: [f64; 2] = [0.8, 1.2 * LEAN];
-/// Every crossing up to a fifth above the middle has this much of its own speed above it, which is as far as rotor 37 was seen to
-/// lean; the middle itself has more.
+/// Ratio of the highest speed of the map to a crossing up to a fifth above the middle, which is the largest shift of resonance observed for rotor
+/// 37; the middle itself has more room.
 const LEAN: f64 = 1.25;
 const COUNT: usize = 141;
 const QUICK_COUNT: usize = 8;
-/// Revolutions of the window: a bin is as wide as the speed divided by this.
+/// Revolutions of the window; the bin width is the speed divided by this number.
 const REVOLUTIONS: usize = 64;
 const QUICK_REVOLUTIONS: usize = 16;
-/// The start-up passes for so many decay times of the first mode: 0.7 % of it are left.
+/// Duration of the start-up in decay times of the first mode, after which 0.7 % of the start-up vibration remain.
 const DECAY_TIMES: f64 = 5.0;
 const LEAST_TRANSIENT: usize = 20;
 const MOST_TRANSIENT: usize = 400;
 const QUICK_TRANSIENT: usize = 40;
-/// Modes in the map, and room above the last one: a response that leans to higher speeds leans to higher frequencies.
+/// Number of modes in the map. Above the last one there is room, because a response that extends to higher speeds also extends to higher
+/// frequencies.
 const MODES: usize = 3;
 const ABOVE: f64 = LEAN;
 /// Sampling rate relative to the highest frequency of the map; see [`spectrum::Decimator`].
 const OVERSAMPLING: f64 = 8.0;
-/// Most samples in a revolution.
+/// Maximum number of samples in a revolution.
 const MOST_PER_REVOLUTION: f64 = 1e6;
-/// Order of the casing's base order at whose resonance the range of speeds lies.
+/// Multiple of the base order of the casing whose resonance is the middle of the range of speeds.
 const HARMONIC: usize = 2;
 
 /// Request and results of a map.
@@ -66,18 +67,18 @@ struct Map {
     intrusion: f64,
     /// Difference between the casing's largest and smallest radius (m).
     depth: f64,
-    /// Displacement of the leading edge when it is pushed back slowly by that much (m).
+    /// Displacement of the leading edge when it is slowly pushed inwards by `depth` (m).
     static_displacement: Option<f64>,
     start: MapStart,
 }
 
-/// The study: run all speeds, transform, draw, compare.
+/// Runs the study: simulates all speeds, transforms the responses, draws and compares.
 ///
 /// # Errors
-/// A scene that cannot be loaded, or that is refused at every speed.
+/// The scene cannot be loaded, or is rejected at every speed.
 pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     let name = arguments.scene.as_str();
-    // Before models are reduced for nothing.
+    // Checked before any model is reduced.
     let settings = scene_source::settings(name)?;
     start::master(&settings)?;
     one_rotor_and_friction(&settings)?;
@@ -91,7 +92,7 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     };
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
     let (study, warnings) = {
-        // Nothing is known of its rate before the first run is done.
+        // The rate is unknown before the first run has finished.
         let forecast = Forecast::new(console, "Running the interaction map", WorkPlan::new(0.0));
         let found = of_scene(scene, &request, threads, |done, all, steps| match done {
             0 => forecast.plan(0, steps),
@@ -104,26 +105,26 @@ pub fn study(arguments: &MapArguments, console: &Console) -> Result<Study> {
     Ok(study)
 }
 
-/// Request of a map; `None` is the default of the study.
+/// Request of a map; `None` selects the default of the study.
 #[derive(Debug, Clone, Default)]
 pub struct MapRequest {
-    /// Few short runs.
+    /// True for few short runs.
     pub quick: bool,
     /// Angular velocities.
     pub speeds: Option<Speeds>,
     /// Revolutions of the window.
     pub revolutions: Option<usize>,
-    /// Revolutions before it.
+    /// Revolutions before the window.
     pub transient: Option<usize>,
-    /// Start values replaced.
+    /// Start values to replace (name, value as text).
     pub settings: Vec<(String, String)>,
 }
 
-/// The study of a scene, and the warnings of its runs; `progress` is told the runs done and all, first before any is, and
-/// the internal steps of all.
+/// Runs the study of a scene; also returns the warnings of its runs. `progress` receives the number of finished runs, starting with 0, the number of
+/// all runs and the internal steps of all.
 ///
 /// # Errors
-/// As [`study`].
+/// The errors of [`study`].
 pub fn of_scene(
     scene: Scene,
     request: &MapRequest,
@@ -151,7 +152,7 @@ pub fn of_scene(
 }
 
 impl Map {
-    /// Everything before the runs, and the speeds to run.
+    /// Prepares the map, and returns the speeds to run.
     fn prepare(scene: Scene, request: &MapRequest) -> Result<(Self, Vec<f64>)> {
         if request.settings.iter().any(|(name, _)| name == "speed") {
             return Err(Failure::usage("--set speed", "the study varies the speed", "Use --speeds FROM:TO:COUNT"));
@@ -160,7 +161,7 @@ impl Map {
             MapSetup { scene, settings: request.settings.clone(), samples: 0, transient: 0, revolutions: 0, top: 0.0 };
         let master = start::master(&setup.scene.settings)?;
         let fastest = setup.scene.roms[master].extras.spin.as_ref().map_or(0.0, |spin| spin.largest_speed);
-        // At its own speed: those of the study may be refused.
+        // At the speed of the scene, because the speeds of the study may be rejected.
         let probe = setup.simulation(setup.scene.settings.structures[master].speed.abs())?;
         let start = MapStart::of(&setup.scene, &probe)?;
         let prediction = FrequencyPrediction::new(&setup.scene, &start, fastest)?;
@@ -207,12 +208,12 @@ impl Map {
         speeds.iter().map(|speed| count * per_sample(speed).ceil().max(1.0)).sum()
     }
 
-    /// The runs that were not refused.
+    /// Returns the runs that were not rejected.
     fn answered(&self) -> impl Iterator<Item = (f64, &SpeedResponse)> {
         self.runs.iter().filter_map(|run| Some((run.speed, run.outcome.as_ref().ok()?)))
     }
 
-    /// Every warning once, whichever run it came from.
+    /// Returns every warning once, even if several runs report it.
     fn warnings(&self) -> Vec<String> {
         let mut all: Vec<String> = self.answered().flat_map(|(_, response)| response.warnings.clone()).collect();
         all.sort();
@@ -357,8 +358,8 @@ impl Map {
     }
 }
 
-/// The angular velocities asked for, or those around the resonance of the second harmonic of the casing, up to the `fastest`
-/// one (rad/s) that the model holds for.
+/// Returns the requested angular velocities, or those around the resonance of the second harmonic of the casing, up to the `fastest` valid speed of
+/// the model (rad/s).
 fn speeds(prediction: &FrequencyPrediction, request: &MapRequest, fastest: f64) -> Result<Vec<f64>> {
     if let Some(speeds) = request.speeds {
         return Ok(speeds.values());
@@ -371,19 +372,19 @@ fn speeds(prediction: &FrequencyPrediction, request: &MapRequest, fastest: f64) 
     })?;
     let count = if request.quick { QUICK_COUNT } else { COUNT };
     let [from, to] = RANGE.map(|share| share * middle);
-    // Where not even the resonance is in reach, the refusals of the runs say so.
+    // If even the resonance is too fast for the model, the rejections of the runs report it.
     let to = if fastest > middle { to.min(fastest) } else { to };
     Ok(Speeds { from, to, count }.values())
 }
 
-/// Samples per revolution, a power of two, so that even at the slowest speed (rad/s) the rate is [`OVERSAMPLING`] times the
-/// top frequency (Hz).
+/// Returns the number of samples per revolution, a power of two, for which the sampling rate is at least [`OVERSAMPLING`] times the top frequency
+/// (Hz) even at the slowest speed (rad/s).
 fn samples(top: f64, slowest: f64) -> Result<usize> {
     let least = OVERSAMPLING * top * std::f64::consts::TAU / slowest;
     if least <= MOST_PER_REVOLUTION {
         return Ok(as_count(least).next_power_of_two());
     }
-    // Two digits are shown: rounded down they would be refused again.
+    // The message shows two digits; rounded down, the value would be rejected again.
     let lowest = 1.05 * OVERSAMPLING * top * std::f64::consts::TAU / MOST_PER_REVOLUTION;
     Err(Failure::usage(
         "--speeds",

@@ -1,4 +1,4 @@
-//! The interaction map as a picture: amplitude in colour over speed and frequency, engine orders and modes as lines.
+//! Draws the interaction map: amplitude in colour over speed and frequency, engine orders and modes as lines.
 
 use std::fmt::Write as _;
 
@@ -7,14 +7,14 @@ use tiprub_figure::escape;
 /// Size of the picture (SVG units).
 const WIDTH: f64 = 920.0;
 const HEIGHT: f64 = 600.0;
-/// Left, top, right and bottom of the map in it.
+/// Left, top, right and bottom of the map in the picture (SVG units).
 const FRAME: [f64; 4] = [74.0, 16.0, 772.0, 540.0];
-/// Rows of colour.
+/// Number of colour rows.
 const ROWS: usize = 393;
-/// Steps of colour.
+/// Number of colour levels.
 const LEVELS: usize = 32;
-/// The matplotlib colour map viridis at nine equidistant places (public domain, CC0): grows evenly in lightness, and reads
-/// the same with colour-vision deficiency and in grey.
+/// The matplotlib colour map viridis at nine equidistant values (public domain, CC0): its lightness increases evenly, and it remains readable with
+/// colour-vision deficiency and in grey.
 const VIRIDIS: [[f64; 3]; 9] = [
     [68.0, 1.0, 84.0],
     [71.0, 45.0, 123.0],
@@ -34,16 +34,16 @@ pub struct SpeedColumn<'a> {
     pub speed: f64,
     /// Distance of the bins (Hz).
     pub resolution: f64,
-    /// One per bin (µm), from frequency 0; nothing where the run was refused.
+    /// Amplitudes per bin (µm), from frequency 0; `None` if the run was rejected.
     pub amplitudes: Option<&'a [f64]>,
 }
 
-/// A line on the map.
+/// Line on the map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapLine {
     /// Points (speed in rad/s, frequency in Hz).
     pub points: Vec<(f64, f64)>,
-    /// Text at the right end.
+    /// Label at the right end.
     pub label: String,
     /// Style of the line.
     pub kind: LineKind,
@@ -52,18 +52,18 @@ pub struct MapLine {
 /// Meaning of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineKind {
-    /// An engine order that the casing excites.
+    /// Engine order that the casing excites.
     Excited,
-    /// One that it does not.
+    /// Engine order that the casing does not excite.
     Silent,
-    /// A natural frequency.
+    /// Natural frequency.
     Mode,
 }
 
-/// The whole map.
+/// Complete map.
 #[derive(Debug, Clone)]
 pub struct HeatMap<'a> {
-    /// Speeds ascending.
+    /// Columns in ascending order of speed.
     pub columns: Vec<SpeedColumn<'a>>,
     /// Highest frequency (Hz).
     pub top: f64,
@@ -71,12 +71,12 @@ pub struct HeatMap<'a> {
     pub range: [f64; 2],
     /// Lines, drawn in this order.
     pub lines: Vec<MapLine>,
-    /// Marks: excited crossings as circles.
+    /// Excited crossings, marked as circles.
     pub marks: Vec<(f64, f64)>,
 }
 
 impl HeatMap<'_> {
-    /// The SVG element.
+    /// Returns the SVG element.
     pub fn to_svg(&self) -> String {
         let mut svg = format!(
             r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="14" fill="#343a42">"##
@@ -103,7 +103,7 @@ impl HeatMap<'_> {
         if last > first { [first, last] } else { [first - 0.5, first + 0.5] }
     }
 
-    /// Half the width of a column at the ends, so that all are whole.
+    /// Returns the shown range of speeds, extended by half a column width at both ends so that all columns are complete.
     fn shown_speeds(&self) -> [f64; 2] {
         let [first, last] = self.speeds();
         let half = 0.5 * (last - first) / self.columns.len().saturating_sub(1).max(1) as f64;
@@ -119,7 +119,7 @@ impl HeatMap<'_> {
         tenth(FRAME[3] - (FRAME[3] - FRAME[1]) * frequency / self.top)
     }
 
-    /// Colour step of an amplitude.
+    /// Returns the colour level of an amplitude.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the steps there are")]
     fn level(&self, amplitude: f64) -> usize {
         let [low, high] = self.range.map(f64::ln);
@@ -127,7 +127,7 @@ impl HeatMap<'_> {
         (share * LEVELS as f64).clamp(0.0, LEVELS as f64 - 1.0) as usize
     }
 
-    /// Largest amplitude within a row of the picture, that of the nearest bin where none lies in it.
+    /// Returns the largest amplitude within a row of the picture; that of the nearest bin if no bin lies in the row.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows and bins are few")]
     fn row(&self, column: &SpeedColumn<'_>, amplitudes: &[f64], row: usize) -> f64 {
         let edge = |row: usize| self.top * row as f64 / ROWS as f64 / column.resolution;
@@ -137,7 +137,7 @@ impl HeatMap<'_> {
         inside.iter().copied().reduce(f64::max).or(amplitudes.get(nearest).copied()).unwrap_or(0.0)
     }
 
-    /// Cells of one colour above each other are one rectangle; all rectangles of one colour are one path.
+    /// Draws the cells: adjacent cells of one colour in a column are one rectangle, and all rectangles of one colour are one path.
     fn draw_cells(&self, svg: &mut String) {
         let mut paths = vec![String::new(); LEVELS];
         let [first, last] = self.shown_speeds();
@@ -266,7 +266,7 @@ fn tenth(value: f64) -> f64 {
     (value * 10.0).round() / 10.0
 }
 
-/// Round numbers within a range, about `count` of them.
+/// Returns about `count` round numbers within a range.
 fn ticks([low, high]: [f64; 2], count: f64) -> Vec<f64> {
     let raw = (high - low) / count;
     let power = 10_f64.powf(raw.log10().floor());

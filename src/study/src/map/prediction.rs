@@ -1,4 +1,4 @@
-//! Where linear theory expects resonance: engine orders of the casing against natural frequencies in the rotating frame.
+//! Resonances predicted by linear theory: engine orders of the casing and natural frequencies in the rotating frame.
 
 use realfft::RealFftPlanner;
 use tiprub_core::{
@@ -10,49 +10,49 @@ use tiprub_shell::{Failure, Result};
 
 use super::start::{MapStart, master};
 
-/// The nodal diameter that an engine order excites among `sectors` blades, and whether the wave runs backwards.
+/// Returns the nodal diameter that an engine order excites among `sectors` blades, and whether the wave travels backwards.
 ///
-/// What stands still and has k waves around is seen by blade s of N with the phase 2πks/N: k and k ± N are the same to
-/// the blades, and k beyond N/2 is a wave of N − k diameters the other way.
+/// Blade s of N passes a stationary pattern with k waves with the phase 2πks/N: the blades cannot distinguish k from k ± N, and for k above N/2 the
+/// pattern is a wave of N − k nodal diameters in the opposite direction.
 pub fn folded(order: usize, sectors: usize) -> (usize, bool) {
     let rest = order % sectors;
     if 2 * rest > sectors { (sectors - rest, true) } else { (rest, false) }
 }
 
-/// Speeds at which modes that stiffen are computed; linear in between.
+/// Number of speeds at which modes with stiffening are computed; linear interpolation in between.
 const GRID: usize = 33;
-/// Angles at which the shape of the casing is sampled.
+/// Number of angles at which the shape of the casing is sampled.
 const ANGLES: usize = 4096;
-/// Harmonics of the shape below this share of the largest are rounding.
+/// Harmonics of the shape below this fraction of the largest are rounding.
 const NOTHING: f64 = 1e-6;
 
-/// Natural frequencies of the master over a range of speeds, and what the casing excites.
+/// Natural frequencies of the master over a range of speeds, and the orders that the casing excites.
 #[derive(Debug, Clone)]
 pub struct FrequencyPrediction {
     /// Speeds of the grid (rad/s).
     speeds: Vec<f64>,
-    /// `[speed][nodal diameter][mode]` (Hz); one nodal diameter where sectors are uncoupled, one speed where the modes do not
-    /// depend on it.
+    /// Frequencies `[speed][nodal diameter][mode]` (Hz); one nodal diameter if the sectors are uncoupled, one speed if the modes do not depend on
+    /// it.
     frequencies: Vec<Vec<Vec<f64>>>,
     sectors: usize,
-    /// Engine orders excited are the multiples of this; 0 where the casing is round.
+    /// Base order: its multiples are the excited engine orders; 0 if the casing is round.
     pub base_order: usize,
-    /// Whether the modes are those of the turning structure.
+    /// True if the modes include the stiffening by rotation.
     pub stiffening: bool,
 }
 
-/// An engine order meets a mode.
+/// Crossing of an engine order with a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
     /// Engine order n.
     pub order: usize,
-    /// Mode, from 0.
+    /// Index of the mode, from 0.
     pub mode: usize,
     /// Angular velocity (rad/s).
     pub speed: f64,
     /// Frequency (Hz).
     pub frequency: f64,
-    /// Whether the casing has this order.
+    /// True if the casing excites this order.
     pub excited: bool,
 }
 
@@ -60,7 +60,7 @@ impl FrequencyPrediction {
     /// Predicts frequencies of the first master of a scene with its start values, at speeds up to `fastest` (rad/s).
     ///
     /// # Errors
-    /// A ROM whose eigenproblem cannot be solved, a shape that cannot be evaluated.
+    /// The eigenproblem of the ROM cannot be solved, or the shape cannot be evaluated.
     pub fn new(scene: &Scene, start: &MapStart, fastest: f64) -> Result<Self> {
         let master = master(&scene.settings)?;
         let (structure, rom) = (&scene.settings.structures[master], &scene.roms[master]);
@@ -84,7 +84,7 @@ impl FrequencyPrediction {
         Ok(Self { speeds, frequencies, sectors: rom.sectors, base_order: base_order(scene, start)?, stiffening })
     }
 
-    /// Natural frequencies that an engine order can excite at a speed (rad/s), in Hz.
+    /// Returns the natural frequencies that an engine order can excite at a speed (rad/s), in Hz.
     pub fn modes(&self, order: usize, speed: f64) -> Vec<f64> {
         let diameters = self.frequencies[0].len();
         let diameter = if diameters > 1 { folded(order, self.sectors).0.min(diameters - 1) } else { 0 };
@@ -97,24 +97,24 @@ impl FrequencyPrediction {
         low.iter().zip(high).map(|(low, high)| low + share * (high - low)).collect()
     }
 
-    /// Frequencies of all nodal diameters at a speed: lines to draw.
+    /// Returns the frequencies of all nodal diameters at a speed, for the lines of the map.
     pub fn lines(&self, speed: f64) -> Vec<f64> {
         let orders = 0..if self.frequencies[0].len() > 1 { self.sectors / 2 + 1 } else { 1 };
         orders.flat_map(|order| self.modes(order, speed)).collect()
     }
 
-    /// Speed (rad/s) at which an engine order meets the mode (from 0); stiffening makes it a fixed point.
+    /// Returns the speed (rad/s) at which an engine order meets the mode (from 0); with stiffening, this is a fixed point.
     pub fn meeting(&self, order: usize, mode: usize) -> Option<f64> {
         let next = |speed: f64| Some(std::f64::consts::TAU * self.modes(order, speed).get(mode)? / order as f64);
         (0..100).try_fold(0.0, |speed, _| next(speed))
     }
 
-    /// Whether the casing excites an engine order.
+    /// Returns whether the casing excites an engine order.
     pub fn excites(&self, order: usize) -> bool {
         self.base_order > 0 && order.is_multiple_of(self.base_order)
     }
 
-    /// All crossings within a range of speeds (rad/s) and below a frequency (Hz), by frequency and speed.
+    /// Returns all crossings within a range of speeds (rad/s) and below a frequency (Hz), ordered by mode and speed.
     pub fn crossings(&self, range: [f64; 2], top: f64) -> Vec<Crossing> {
         let mut found = Vec::new();
         let most =
@@ -133,10 +133,10 @@ impl FrequencyPrediction {
     }
 }
 
-/// The casing's rigid shape at equally spaced angles (m), `factor` times that of the scene.
+/// Returns the rigid shape of the casing at equally spaced angles (m), scaled by `factor`.
 ///
 /// # Errors
-/// A shape that cannot be evaluated.
+/// The shape cannot be evaluated.
 pub fn shape(scene: &Scene, factor: f64) -> Result<Vec<f64>> {
     let (Some(contact), Some(surface)) = (scene.settings.contacts.first(), scene.settings.surfaces.first()) else {
         return Ok(vec![0.0; ANGLES]);
@@ -146,8 +146,8 @@ pub fn shape(scene: &Scene, factor: f64) -> Result<Vec<f64>> {
     Ok((0..ANGLES).map(|index| factor * shape.evaluate(angle(index)).0).collect())
 }
 
-/// Greatest common divisor of the orders in the shape of the casing and in what else acts. Contact makes harmonics of what
-/// is there, and nothing else as long as the motion repeats with it.
+/// Returns the greatest common divisor of the orders in the shape of the casing and in the other excitations. Contact creates harmonics of these
+/// orders and no others, as long as the motion repeats with them.
 fn base_order(scene: &Scene, start: &MapStart) -> Result<usize> {
     let mut values = shape(scene, start.shape_factor)?;
     let transform = RealFftPlanner::new().plan_fft_forward(values.len());
@@ -174,7 +174,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// One mode of `frequency` Hz and one ten times as high, radial, one tangential component.
+    /// Returns a blade with one mode of `frequency` Hz and one of ten times that frequency, both radial with one tangential component.
     pub fn blade(frequency: f64, sectors: usize) -> Rom {
         let square = |hertz: f64| (std::f64::consts::TAU * hertz).powi(2);
         let node = |name: &str, z: f64| ContactNode {
@@ -201,7 +201,7 @@ pub(super) mod tests {
         }
     }
 
-    /// That blade in the scene of rotor 37.
+    /// Returns that blade in the scene of rotor 37.
     pub fn scene(frequency: f64, sectors: usize) -> Scene {
         tiprub_gallery::scene_source::rotor37_scene_with(blade(frequency, sectors)).unwrap()
     }
@@ -232,11 +232,11 @@ pub(super) mod tests {
         assert_eq!(of_first.len(), 1, "{found:?}");
         assert!(of_first[0].order == 4 && of_first[0].excited && (of_first[0].frequency - 100.0).abs() < 1e-9);
         assert!((of_first[0].speed - 50.0 * std::f64::consts::PI).abs() < 1e-9);
-        // 1000 Hz between 140 and 160 rad/s: orders 40 to 44.
+        // 1000 Hz lies between orders 40 and 44 from 140 to 160 rad/s.
         assert_eq!(found.iter().filter(|crossing| crossing.mode == 1).count(), 5, "{found:?}");
     }
 
-    /// f² = f₀² + B (Ω/2π)², so that order n meets the mode at Ω/2π = f₀/√(n² − B).
+    /// With f² = f₀² + B (Ω/2π)², order n meets the mode at Ω/2π = f₀/√(n² − B).
     #[test]
     fn stiffening_moves_the_crossings() {
         let mut scene = scene(100.0, 4);

@@ -1,4 +1,4 @@
-//! One run of the interaction map: the start-up passes, then a window is recorded and transformed.
+//! Runs the interaction map at one speed: after the start-up, a window is recorded and transformed.
 
 use std::time::{Duration, Instant};
 
@@ -10,14 +10,14 @@ use super::{
     start,
 };
 
-/// Most numbers of recorded displacements in memory per run; beyond it not every blade is recorded.
+/// Maximum number of recorded displacements in memory per run; beyond it, not every blade is recorded.
 const MOST_SAMPLES: usize = 16_000_000;
-/// Numbers recorded of a blade at a time: two nodes, three components each.
+/// Numbers recorded per blade and sample: two nodes, three components each.
 const ROWS: usize = 6;
-/// Most memory for the spectra of all runs together, and what one bin of them takes: numbers, their table and its text.
+/// Maximum memory (bytes) for the spectra of all runs together, and the memory per bin: numbers, their table and its text.
 const MOST_BYTES: usize = 2 << 30;
 const BYTES_PER_BIN: usize = 256;
-/// At most one bin for so many samples is kept: the sampling rate is [`super::OVERSAMPLING`] times the highest frequency.
+/// Number of samples per bin that is kept, at least: the sampling rate is [`super::OVERSAMPLING`] times the highest frequency.
 const BIN_SHARE: usize = 8;
 /// Smallest number of steps per sample from which [`Decimator`] filters the motion between samples.
 const LEAST_FACTOR: f64 = 4.0;
@@ -25,17 +25,17 @@ const LEAST_FACTOR: f64 = 4.0;
 /// Data that all runs share.
 #[derive(Debug, Clone)]
 pub struct MapSetup {
-    /// The scene, but for the size of its speed.
+    /// Scene, except for the magnitude of its speed.
     pub scene: Scene,
-    /// Start values replaced (name, value as text).
+    /// Start values to replace (name, value as text).
     pub settings: Vec<(String, String)>,
     /// Samples per revolution; a power of two.
     pub samples: usize,
-    /// Revolutions that pass before the window.
+    /// Revolutions before the window.
     pub transient: usize,
     /// Revolutions of the window.
     pub revolutions: usize,
-    /// Highest frequency kept (Hz).
+    /// Highest frequency that is kept (Hz).
     pub top: f64,
 }
 
@@ -44,23 +44,23 @@ pub struct MapSetup {
 pub struct SpeedRun {
     /// Angular velocity (rad/s).
     pub speed: f64,
-    /// The response, or why there is none.
+    /// Response, or the reason why there is none.
     pub outcome: Result<SpeedResponse, String>,
 }
 
-/// Response in the window at one speed. Of the two ends of a blade tip the leading edge comes first; a structure with one
-/// contact node has it twice.
+/// Response in the window at one speed. The two ends of a blade tip are given, leading edge first; for a structure with one contact node they are
+/// equal.
 #[derive(Debug, Clone)]
 pub struct SpeedResponse {
     /// Distance of the bins (Hz).
     pub resolution: f64,
-    /// Amplitude of the displacement vector per bin, first blade (m).
+    /// Amplitude of the displacement vector of the first blade per bin (m).
     pub first_blade: [Vec<f64>; 2],
-    /// The largest of all blades per bin (m).
+    /// Largest amplitude of all blades per bin (m).
     pub largest_blade: [Vec<f64>; 2],
     /// Largest distance of a tip node from its mean position, over all blades (m).
     pub deflection: [f64; 2],
-    /// Mean over all blades of the share of time in contact.
+    /// Fraction of time in contact, averaged over all blades.
     pub contact_share: f64,
     /// Mean over time of the sum of all normal forces (N).
     pub normal_force: f64,
@@ -68,15 +68,15 @@ pub struct SpeedResponse {
     pub largest_force: f64,
     /// Deepest penetration of any node at any internal step (m).
     pub penetration: f64,
-    /// Effective displacement of the leading edges in the second half of the window relative to the first, less one.
+    /// Relative change of the effective displacement of the leading edges from the first to the second half of the window.
     pub drift: f64,
-    /// Closure residual of the energy ledger, relative; 0 where the scene keeps none.
+    /// Relative residual of the energy ledger; 0 if the scene has none.
     pub energy_residual: f64,
     /// Internal steps per sample.
     pub factor: usize,
-    /// All internal steps.
+    /// Number of all internal steps.
     pub internal_steps: u64,
-    /// Time spent stepping.
+    /// Time spent for stepping.
     pub stepping: Duration,
     /// Warnings of the simulation.
     pub warnings: Vec<String>,
@@ -107,10 +107,10 @@ impl WindowTally {
 }
 
 impl MapSetup {
-    /// A simulation with its start values, not yet initialised, that turns with `speed` (rad/s) in the sense of the scene.
+    /// Creates a simulation with its start values, not yet initialised, that rotates with `speed` (rad/s) in the sense of the scene.
     ///
     /// # Errors
-    /// A refused scene, unknown or wrong settings.
+    /// The scene is rejected, or settings are unknown or wrong.
     pub fn simulation(&self, speed: f64) -> Result<Simulation> {
         let mut scene = self.scene.clone();
         let master = start::master(&scene.settings)?;
@@ -122,7 +122,7 @@ impl MapSetup {
         Ok(simulation)
     }
 
-    /// −1 where the scene's own speed is negative, else 1.
+    /// Returns −1 if the scene's own speed is negative, else 1.
     pub fn sense(&self) -> f64 {
         let master = start::master(&self.scene.settings);
         if master.is_ok_and(|master| self.scene.settings.structures[master].speed < 0.0) { -1.0 } else { 1.0 }
@@ -131,7 +131,7 @@ impl MapSetup {
     /// Rejects requests that would not fit into memory: samples of one blade in one run, and the spectra of all `runs`.
     ///
     /// # Errors
-    /// Naming the most revolutions that would fit.
+    /// The request is too large; the error names the largest number of revolutions that fits.
     pub fn check_size(&self, runs: usize) -> Result<()> {
         let per_blade = ROWS * self.samples;
         let spectra = runs.saturating_mul(self.samples.div_ceil(BIN_SHARE)).saturating_mul(BYTES_PER_BIN);
@@ -158,16 +158,17 @@ impl MapSetup {
         Failure::from_core(format!("scene `{}` at {} rad/s", self.scene.settings.name, shown(speed)), error)
     }
 
-    /// Run at one speed (rad/s). A refusal is an outcome, not a failure.
+    /// Runs the scene at one speed (rad/s). A rejection is an outcome, not an error.
     ///
     /// # Errors
-    /// None but those of programming.
+    /// Only programming errors.
     pub fn run(&self, speed: f64) -> Result<SpeedRun> {
         let outcome = self.response(speed).map_err(|failure| failure.to_string());
         Ok(SpeedRun { speed, outcome })
     }
 
-    /// Where a tolerance takes the place of the step, what is called that is how long blades may go unseen: at most `longest` (s).
+    /// Limits the span of adaptive steps to `longest` (s), since the displacements are observed only at the ends of spans. With a tolerance, the
+    /// variable of the internal step is the longest span.
     fn shorten_spans(&self, simulation: &mut Simulation, longest: f64) -> tiprub_core::Result<()> {
         let table = simulation.table();
         let reference = |quantity| table.with_quantity(quantity).map(|variable| variable.reference);
@@ -184,11 +185,11 @@ impl MapSetup {
     fn response(&self, speed: f64) -> Result<SpeedResponse> {
         let mut simulation = self.simulation(speed)?;
         let start = self.scene.settings.experiment.start;
-        // A whole number of samples per revolution: engine orders then lie in the middle of bins.
+        // With a whole number of samples per revolution, engine orders lie in the middle of bins.
         let step = std::f64::consts::TAU / (speed * self.samples as f64);
         self.shorten_spans(&mut simulation, step / LEAST_FACTOR).map_err(|error| self.at(speed, error))?;
         simulation.initialise(start).map_err(|error| self.at(speed, error))?;
-        // Each sample is made of several internal steps, so that there is something to filter.
+        // Each sample consists of several internal steps, so that the filter has an effect.
         if let Some(variable) = simulation.table().with_quantity(Quantity::StepMax) {
             let (reference, coarsest) = (variable.reference, step / LEAST_FACTOR);
             if simulation.real(reference).is_ok_and(|longest| longest > coarsest) {
@@ -209,7 +210,7 @@ impl MapSetup {
     }
 }
 
-/// A simulation on its way.
+/// Simulation that is advanced step by step.
 struct March<'a> {
     setup: &'a MapSetup,
     speed: f64,
@@ -218,11 +219,11 @@ struct March<'a> {
     step: f64,
     simulation: Simulation,
     internal_steps: u64,
-    /// Communication steps done.
+    /// Number of finished communication steps.
     index: usize,
 }
 
-/// Recorded results of the window.
+/// Recorded data of the window.
 struct WindowRecording {
     decimator: Decimator,
     /// Contact rows recorded per blade: two nodes, three components each.
@@ -236,7 +237,7 @@ impl March<'_> {
         self.start + index as f64 * self.step
     }
 
-    /// One communication step; `seen` is called after every internal step.
+    /// Performs one communication step; `seen` is called after every internal step.
     fn advance(&mut self, mut seen: impl FnMut(&System)) -> Result<()> {
         let time = self.time(self.index);
         let next = self.time(self.index + 1) - time;
@@ -287,7 +288,7 @@ impl March<'_> {
         Ok(WindowRecording { decimator, blades, tally, factor })
     }
 
-    /// Internal steps of one communication step.
+    /// Returns the number of internal steps of one communication step.
     fn factor(&mut self) -> Result<usize> {
         let before = self.internal_steps;
         self.advance(|_| {})?;
@@ -349,7 +350,7 @@ impl March<'_> {
     }
 }
 
-/// Root of the sum of the squared amplitudes of three components: for a motion along a line the amplitude of the vector.
+/// Returns the root of the sum of the squared amplitudes of three components; for a motion along a line, this is the amplitude of the vector.
 fn vector_spectrum(analyser: &Analyser, decimator: &Decimator, channels: [usize; 3], count: usize) -> Result<Vec<f64>> {
     let mut sum: Vec<f64> = Vec::new();
     for channel in channels {
@@ -361,7 +362,7 @@ fn vector_spectrum(analyser: &Analyser, decimator: &Decimator, channels: [usize;
     Ok(sum.iter().enumerate().map(|(bin, square)| square.sqrt() / gain(bin)).collect())
 }
 
-/// Distance from the mean position, sample by sample.
+/// Returns the distance from the mean position, sample by sample.
 fn distances(decimator: &Decimator, channels: [usize; 3], count: usize) -> Vec<f64> {
     let mut squares = vec![0.0; count];
     for channel in channels {

@@ -1,20 +1,19 @@
-//! From displacements at every internal step to amplitudes over frequency: decimation, Hann window, Fourier transform, peaks.
+//! Converts displacements at every internal step to amplitudes over frequency: decimation, Hann window, Fourier transform, peaks.
 
 use realfft::RealFftPlanner;
 use tiprub_shell::{Failure, Result};
 
-/// Boxcars in the decimation filter.
+/// Number of boxcars in the decimation filter.
 const BOXCARS: usize = 4;
-/// The first bins hold what the window leaves of the mean.
+/// First bin that is used; the window spreads the mean over the bins below.
 pub const FIRST_BIN: usize = 3;
-/// A peak is the largest of this many bins to either side: the first side lobe of the Hann window lies 2.4 bins away.
+/// Number of bins on either side that a peak must exceed: the first side lobe of the Hann window lies 2.4 bins away.
 const NEIGHBOURS: usize = 3;
 
-/// Decimation by a whole number M: four boxcars of M internal steps one after the other (a cubic B-spline over 4M steps),
-/// taken at every M-th step.
+/// Decimation by an integer factor M: four consecutive boxcars of M internal steps (a cubic B-spline over 4M steps), sampled at every M-th step.
 ///
-/// A boxcar of M steps is blind at every multiple of the sampling rate, which is what folds down to frequencies near zero.
-/// What it takes from the frequencies kept is known exactly, and given back by [`Decimator::gain`].
+/// A boxcar of M steps removes every multiple of the sampling rate, which would alias to frequencies near zero. Its attenuation of the retained
+/// frequencies is known exactly and is corrected with [`Decimator::gain`].
 #[derive(Debug, Clone)]
 pub struct Decimator {
     factor: usize,
@@ -22,12 +21,12 @@ pub struct Decimator {
     weights: Vec<f64>,
     /// Samples, time by time.
     samples: Vec<f64>,
-    /// Internal steps seen.
+    /// Number of internal steps so far.
     seen: usize,
 }
 
 impl Decimator {
-    /// For `count` samples of `channels` signals, each from `factor` internal steps.
+    /// Creates a decimator for `count` samples of `channels` signals, each from `factor` internal steps.
     pub fn new(factor: usize, channels: usize, count: usize) -> Self {
         let mut weights = vec![1.0];
         for _ in 0..BOXCARS {
@@ -41,10 +40,10 @@ impl Decimator {
         Self { factor, channels, weights, samples: vec![0.0; channels * count], seen: 0 }
     }
 
-    /// Samples beyond the last one that must pass before it is complete.
+    /// Number of further samples after which the last one is complete.
     pub const TAIL: usize = BOXCARS - 1;
 
-    /// Values of all channels at the next internal step.
+    /// Adds the values of all channels at the next internal step.
     pub fn push(&mut self, values: &[f64]) {
         let (block, place) = (self.seen / self.factor, self.seen % self.factor);
         for age in 0..BOXCARS.min(block + 1) {
@@ -56,7 +55,7 @@ impl Decimator {
         self.seen += 1;
     }
 
-    /// Samples of one channel.
+    /// Returns the samples of one channel.
     pub fn channel(&self, channel: usize) -> impl Iterator<Item = f64> {
         self.samples.iter().skip(channel).step_by(self.channels).copied()
     }
@@ -67,23 +66,23 @@ impl Decimator {
     }
 }
 
-/// (sin πν / (M sin(πν/M)))⁴ at ν periods per sample.
+/// Returns the gain (sin πν / (M sin(πν/M)))⁴ at ν periods per sample.
 pub fn gain(periods: f64, factor: usize) -> f64 {
     let (angle, count) = (std::f64::consts::PI * periods, factor as f64);
     let whole = count * (angle / count).sin();
     if whole.abs() < 1e-12 { 1.0 } else { (angle.sin() / whole).powi(4) }
 }
 
-/// Amplitudes over frequency of what oscillates about a mean; bin k is k periods in the length of the window.
+/// Computes amplitudes over frequency for an oscillation about a mean; bin k is k periods in the length of the window.
 pub struct Analyser {
     transform: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
     window: Vec<f64>,
-    /// Bins asked for.
+    /// Number of requested bins.
     bins: usize,
 }
 
 impl Analyser {
-    /// For windows of `count` samples, and the first `bins` bins.
+    /// Creates an analyser for windows of `count` samples and the first `bins` bins.
     pub fn new(count: usize, bins: usize) -> Self {
         let turn = std::f64::consts::TAU / count as f64;
         Self {
@@ -93,10 +92,10 @@ impl Analyser {
         }
     }
 
-    /// Squared amplitudes: a sine of amplitude a in the middle of a bin gives a² there.
+    /// Returns squared amplitudes: a sine of amplitude a in the middle of a bin gives a² there.
     ///
     /// # Errors
-    /// Never with as many samples as the window has.
+    /// The number of samples differs from that of the window.
     pub fn squares(&self, samples: impl Iterator<Item = f64>) -> Result<Vec<f64>> {
         let mut input: Vec<f64> = samples.collect();
         let count = input.len() as f64;
@@ -105,24 +104,24 @@ impl Analyser {
         let mut output = self.transform.make_output_vec();
         let transformed = self.transform.process(&mut input, &mut output);
         transformed.map_err(|error| Failure::new("spectrum", error, "Report this to the developers"))?;
-        // One half for the two signs of the frequency, one half for the mean of the window.
+        // One factor ½ for the two signs of the frequency, one for the mean of the window.
         let scale = 4.0 / count;
         Ok(output.iter().take(self.bins).map(|value| (scale * value.norm()).powi(2)).collect())
     }
 }
 
-/// A local maximum of a spectrum.
+/// Local maximum of a spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// ClosestPoint in bins, refined between them.
+    /// Position in bins, interpolated between them.
     pub bin: f64,
-    /// Amplitude there.
+    /// Amplitude at the maximum.
     pub amplitude: f64,
 }
 
-/// Largest bins of their neighbourhood that reach `least` and ten times the median. Their place is that of the parabola
-/// through the logarithms of three bins, which misses the peak of a Hann window by at most 0.016 bins; their amplitude is what
-/// the window leaves at that distance, given back.
+/// Returns the bins that are the largest of their neighbourhood and reach `least` and ten times the median. Their position is that of the parabola
+/// through the logarithms of three bins, which misses the peak of a Hann window by at most 0.016 bins; their amplitude is corrected for the
+/// attenuation of the window at that distance.
 pub fn peaks(spectrum: &[f64], least: f64) -> Vec<Peak> {
     let mut sorted = spectrum.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -141,14 +140,14 @@ pub fn peaks(spectrum: &[f64], least: f64) -> Vec<Peak> {
     inner.filter(is_peak).map(refined).collect()
 }
 
-/// Main lobe of the Hann window: sin πδ / (πδ (1 − δ²)) at δ bins from its top, |δ| ≤ ½.
+/// Returns the main lobe of the Hann window: sin πδ / (πδ (1 − δ²)) at δ bins from its top, |δ| ≤ ½.
 fn lobe(distance: f64) -> f64 {
     let angle = std::f64::consts::PI * distance;
     if angle.abs() < 1e-9 { 1.0 } else { angle.sin() / (angle * (1.0 - distance * distance)) }
 }
 
-/// ClosestPoint (in spacings from the middle) and height of the top of the parabola through three equidistant values, of which the
-/// middle one is the largest; the middle itself where there is no such parabola.
+/// Returns position (in spacings from the middle) and height of the vertex of the parabola through three equidistant values, of which the middle one
+/// is the largest; the middle value itself if there is no such parabola.
 pub fn parabola([before, here, after]: [f64; 3]) -> (f64, f64) {
     let bend = before - 2.0 * here + after;
     if !(bend.is_finite() && bend < 0.0) {
@@ -193,7 +192,7 @@ mod tests {
         }
     }
 
-    /// Frequencies near the sampling rate would fold down; plain sampling at the same rate shows how much.
+    /// Frequencies near the sampling rate would alias to low ones; plain sampling at the same rate shows by how much.
     #[test]
     fn frequencies_near_the_sampling_rate_do_not_alias() {
         let high = COUNT as f64 - 100.0;

@@ -1,4 +1,4 @@
-//! What the runs start with, after the start values that were changed: the master that turns, clearances, the casing's shape, and what else acts.
+//! Start of the runs after the start values were changed: rotating master, clearances, shape of the casing, and other excitations.
 
 use tiprub_core::{
     Scene, Simulation,
@@ -12,17 +12,17 @@ use tiprub_shell::{Failure, Result};
 pub struct MapStart {
     /// Smallest and largest clearance of the tips from the round casing (m).
     pub clearance: [f64; 2],
-    /// Factor on the casing's shape.
+    /// Factor on the shape of the casing.
     pub shape_factor: f64,
-    /// Orders around the circumference of what acts beside the shape.
+    /// Orders around the circumference of excitations other than the shape.
     pub orders: Vec<usize>,
     /// Causes of motion of tips or casing besides contact, which clearances at rest do not include.
     pub acting: Vec<&'static str>,
-    /// ξ of the rotor.
+    /// Damping ratio ξ of the rotor.
     pub damping_ratio: f64,
-    /// µ.
+    /// Friction coefficient µ.
     pub friction: f64,
-    /// Time in which the casing's shape grows (s).
+    /// Time in which the shape of the casing grows (s).
     pub ramp_time: f64,
     /// Largest internal step (s).
     pub longest_step: f64,
@@ -44,10 +44,10 @@ impl Default for MapStart {
 }
 
 impl MapStart {
-    /// Reads the start of a simulation that has its start values.
+    /// Reads the start from a simulation that has its start values.
     ///
     /// # Errors
-    /// A scene whose master cannot turn.
+    /// The master of the scene cannot rotate.
     pub fn of(scene: &Scene, simulation: &Simulation) -> Result<Self> {
         let value = |quantity| values(simulation, quantity).first().copied();
         let or_nothing = |quantity| value(quantity).unwrap_or(0.0);
@@ -82,7 +82,7 @@ impl MapStart {
         })
     }
 
-    /// `", without load and heat"`, where they act.
+    /// Returns, for example, `", without load and heat"` if these act.
     pub fn without(&self) -> String {
         match self.acting.split_last() {
             None => String::new(),
@@ -92,10 +92,10 @@ impl MapStart {
     }
 }
 
-/// The structure that is master of the first contact, which must be one that can turn.
+/// Returns the structure that is the master of the first contact, which must be able to rotate.
 ///
 /// # Errors
-/// There is none, or it flies freely or stands still.
+/// There is no such structure, or it is a free body or stationary.
 pub fn master(settings: &SceneSettings) -> Result<usize> {
     let what = || format!("scene `{}`", settings.name);
     let name = settings.contacts.first().map(|contact| &contact.master);
@@ -114,14 +114,14 @@ pub fn master(settings: &SceneSettings) -> Result<usize> {
     ))
 }
 
-/// All elements of a real variable; none where the scene does not have it.
+/// Returns all elements of a real variable; empty if the scene does not have it.
 fn values(simulation: &Simulation, quantity: Quantity) -> Vec<f64> {
     let Some(variable) = simulation.table().with_quantity(quantity) else { return Vec::new() };
     let references = (0..variable.len()).zip(variable.reference..);
     references.filter_map(|(_, reference)| simulation.real(reference).ok()).collect()
 }
 
-/// Orders of a load, of a shaft that is not in the middle (1), and of uneven temperatures, which may have any.
+/// Returns the orders of a load, of an eccentric shaft (1), and of uneven temperatures (1, since they may contain any order).
 fn orders(load: Option<usize>, whirls: bool, temperatures: &[f64]) -> Vec<usize> {
     let even = temperatures.windows(2).all(|two| two[0].to_bits() == two[1].to_bits());
     load.into_iter().chain(whirls.then_some(1)).chain((!even).then_some(1)).collect()

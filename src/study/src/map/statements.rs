@@ -1,4 +1,4 @@
-//! Whether the map shows what it should.
+//! Expectations of the map, and whether the results fulfil them.
 
 use super::{
     Map, SpeedResponse,
@@ -7,13 +7,13 @@ use super::{
 };
 use crate::Statement;
 
-/// Change of the effective displacement within the window that counts as none.
+/// Change of the effective displacement within the window that still counts as steady.
 const STEADY: f64 = 0.02;
-/// Largest plausible ratio of the response to what follows the casing's whole depth slowly.
+/// Largest plausible ratio of the response to the quasi-static response to the whole depth of the casing.
 const MOST_DYNAMIC: f64 = 10.0;
-/// Share of the squared amplitudes that lies on engine orders where nearly all of the response does.
+/// Fraction of the squared amplitudes on engine orders that counts as nearly all of the response.
 const NEARLY_ALL: f64 = 0.99;
-/// Largest residual of a ledger that closes, relative to the energy exchanged.
+/// Largest residual of a closed ledger, relative to the exchanged energy.
 const LEDGER: f64 = 1e-9;
 
 /// Returns the expectations of the map, and whether it fulfils them.
@@ -73,7 +73,7 @@ fn contact(map: &Map) -> Vec<Statement> {
         "largest value at any internal step of any window: {depth:.2e} m, {:.1e} of the clearance",
         depth / gap
     );
-    // Gaps count from the surface as it was before anything wore off.
+    // Gaps are measured from the original surface, before wear.
     let penetration = if contact.coating.is_some() {
         Statement::remark("Largest depth of a node below the unworn surface of the coating", found)
     } else {
@@ -150,7 +150,7 @@ fn at_coincidence(map: &Map) -> Option<Statement> {
     Some(Statement::tested(format!("{expected} (within {:.0} %)", 100.0 * NEAR), distance(&nearest) <= NEAR, found))
 }
 
-/// A branch that leans out of the range of speeds has its largest response elsewhere.
+/// Returns a statement if the largest response of a resonance lies outside the range of speeds.
 fn room(map: &Map) -> Option<Statement> {
     let peak = map.peaks.iter().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
     let [first, last] = [map.answered().next()?, map.answered().last()?].map(|end| end.0);
@@ -161,14 +161,14 @@ fn room(map: &Map) -> Option<Statement> {
     ))
 }
 
-/// One-sided contact can only stiffen: resonance should lie above the free one.
+/// Returns the statement that one-sided contact can only stiffen: its resonance lies above the linear one.
 fn stiffening(map: &Map) -> Option<Statement> {
     let spacing = (map.runs[map.runs.len() - 1].speed - map.runs[0].speed) / (map.runs.len().max(2) - 1) as f64;
     stiffens(&map.coincidences, spacing)
 }
 
-/// The same of resonances found at speeds `spacing` (rad/s) apart. Where a crossing responds more at an end of the range than
-/// any resonance found, or the strongest lies within a spacing of its prediction, it is undecided.
+/// Returns that statement for resonances at speeds `spacing` (rad/s) apart. It is undecided if a crossing responds more at an end of the range than
+/// at any resonance, or if the strongest resonance lies within one spacing of its prediction.
 pub fn stiffens(coincidences: &[Coincidence], spacing: f64) -> Option<Statement> {
     let amplitude = |place: Option<(f64, f64)>| place.map_or(0.0, |place| place.1);
     let most = |place: fn(&Coincidence) -> Option<(f64, f64)>| {
@@ -199,7 +199,7 @@ pub fn stiffens(coincidences: &[Coincidence], spacing: f64) -> Option<Statement>
     })
 }
 
-/// Where the response of a crossing is largest; none where it is nowhere.
+/// Describes where the response of a crossing is largest; `None` if there is no response.
 fn place_found(one: &Coincidence) -> Option<String> {
     let Crossing { order, mode, speed: predicted, .. } = one.crossing;
     let end =

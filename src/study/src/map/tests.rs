@@ -3,13 +3,13 @@ use tiprub_core::{Scene, rom::Spin};
 use super::prediction::tests::scene;
 use super::*;
 
-/// First mode of the test blade (Hz), and where engine order 4 meets it (rad/s).
+/// First mode of the test blade (Hz), and the speed at which engine order 4 meets it (rad/s).
 const FIRST: f64 = 100.0;
 const CROSSING: f64 = FIRST * std::f64::consts::TAU / 4.0;
-/// Distance by which the bumps of the scene reach beyond the tips (m).
+/// Distance by which the bumps of the scene extend beyond the tips (m).
 const BUMP: f64 = 0.2 * 3.56e-4;
 
-/// Damped enough for the free vibration to die out soon, without friction, and only `intrusion` (m) of the bumps.
+/// Requests a map without friction and with bumps of height `intrusion` (m); the damping makes the free vibration decay soon.
 fn request(intrusion: f64, speeds: Speeds) -> MapRequest {
     let settings = [
         ("damping_ratio", 0.02),
@@ -34,7 +34,7 @@ fn run(scene: Scene, request: &MapRequest, threads: usize) -> Study {
     of_scene(scene, request, threads, |_, _, _| {}).unwrap().0
 }
 
-/// One blade of rotor 37, damped enough for the free vibration to die out soon, without friction.
+/// Returns one blade of rotor 37 without friction; the damping makes the free vibration decay soon.
 fn blade37() -> Scene {
     let (options, console) = (tiprub_model::Rotor37Options::paper(), Console::new(true, false));
     let mut rom = tiprub_gallery::reduction::rotor37(&options, &console).unwrap().rom;
@@ -49,7 +49,7 @@ fn meeting(scene: &Scene) -> f64 {
     FrequencyPrediction::new(scene, &MapStart::default(), 0.0).unwrap().meeting(4, 0).unwrap()
 }
 
-/// A casing as soft as nothing pushes without holding: the response is linear, and resonance where linear theory has it.
+/// A very soft casing only pushes and does not hold the blade: the response is linear, with resonance at the speed of linear theory.
 #[test]
 fn soft_contact_has_the_linear_resonance() {
     let mut scene = blade37();
@@ -76,7 +76,7 @@ fn soft_contact_has_the_linear_resonance() {
     );
     let unworn = study.statements.iter().find(|one| one.expected.contains("unworn surface")).unwrap();
     assert_eq!(unworn.holds, None);
-    // A tenth of the half-power width, a fifth of the distance of the speeds.
+    // A tenth of the half-power width, and a fifth of the spacing of the speeds.
     assert!(one["relative_shift"].as_f64().unwrap().abs() < 1e-3, "{one}");
     let value = |peak: &serde_json::Value, name: &str| peak[name].as_f64().unwrap();
     let peaks = study.results["peaks"].as_array().unwrap();
@@ -86,7 +86,7 @@ fn soft_contact_has_the_linear_resonance() {
     assert!((value(largest, "speed") / crossing - 1.0).abs() < 1e-9, "{largest}");
 }
 
-/// The same casing rigid, and with hardly any intrusion, holds the blade back: the large response lies above the crossing.
+/// The same casing, rigid and with hardly any intrusion, constrains the blade: the large response lies above the crossing.
 #[test]
 fn rigid_contact_moves_the_response_above_the_crossing() {
     let scene = blade37();
@@ -103,7 +103,7 @@ fn rigid_contact_moves_the_response_above_the_crossing() {
     assert!(rows.iter().all(|row| row[6].abs() < 1.0), "{rows:?}");
 }
 
-/// Runs in which only one engine order moves, by `amplitude` (m) at a speed.
+/// Creates runs in which only one engine order moves, with the amplitude `amplitude` (m) at a speed.
 fn runs_of_order(order: usize, speeds: &[f64], amplitude: impl Fn(f64) -> f64) -> Vec<SpeedRun> {
     let response = |speed: f64| {
         let mut spectrum = vec![0.0; order + 2];
@@ -128,12 +128,12 @@ fn runs_of_order(order: usize, speeds: &[f64], amplitude: impl Fn(f64) -> f64) -
     speeds.iter().map(|&speed| SpeedRun { speed, outcome: Ok(response(speed)) }).collect()
 }
 
-/// A bell of this height around a speed.
+/// Returns a bell curve of this height around a speed.
 fn bell(speed: f64, middle: f64, height: f64) -> f64 {
     height / (1.0 + (40.0 * (speed / middle - 1.0)).powi(2))
 }
 
-/// A branch that leans to +18 %, with a small maximum on the way, and another beyond the range.
+/// The branch extends to +18 %, with a small maximum on the way, and another beyond the range.
 #[test]
 fn follows_a_leaning_resonance_branch_to_its_end() {
     let prediction = FrequencyPrediction::new(&scene(FIRST, 4), &MapStart::default(), 0.0).unwrap();
@@ -145,7 +145,7 @@ fn follows_a_leaning_resonance_branch_to_its_end() {
     let one = found.iter().find(|one| one.crossing.order == 4).unwrap();
     assert!((one.shift().unwrap() - 0.18).abs() < 1e-3, "{one:?}");
     assert_eq!((one.window, one.beyond), ([low, high], None));
-    // The second mode, ten times as high, meets the order far above.
+    // The second mode, of ten times the frequency, meets the order far above.
     let more = |speed: f64| lean(speed) + bell(speed, 1.6 * CROSSING, 1.0);
     let found = findings::coincidences(&runs_of_order(4, &speeds, more), &prediction, &crossings, 1);
     let one = found.iter().find(|one| one.crossing.order == 4).unwrap();
@@ -154,7 +154,7 @@ fn follows_a_leaning_resonance_branch_to_its_end() {
     assert!(end.to_bits() == high.to_bits() && amplitude > one.response.unwrap().1, "{one:?}");
 }
 
-/// Two modes a tenth apart, the lower one responding more: each crossing keeps its own maximum.
+/// Two modes are a tenth apart, and the lower one responds more: each crossing keeps its own maximum.
 #[test]
 fn distinguishes_neighbouring_resonances() {
     let mut scene = scene(FIRST, 4);
@@ -163,7 +163,7 @@ fn distinguishes_neighbouring_resonances() {
     let prediction = FrequencyPrediction::new(&scene, &MapStart::default(), 0.0).unwrap();
     let speeds = around(CROSSING, 0.3, 121).values();
     let crossings = prediction.crossings([speeds[0], speeds[120]], 1.5 * FIRST);
-    // Half a percent below its own crossing the second one is still that of it.
+    // Half a percent below its crossing, the response still belongs to the second mode.
     for second in [1.095, 1.13] {
         let two = |speed: f64| bell(speed, 1.03 * CROSSING, 2e-3) + bell(speed, second * CROSSING, 1e-3);
         let found = findings::coincidences(&runs_of_order(4, &speeds, two), &prediction, &crossings, 1);
@@ -174,7 +174,7 @@ fn distinguishes_neighbouring_resonances() {
     }
 }
 
-/// Whatever the scene: a fifth above the resonance sought, there is room for a branch that leans by another fifth.
+/// For any scene, there is room a fifth above the resonance for a branch that extends by another fifth.
 #[test]
 fn default_speeds_extend_above_the_resonance() {
     let mut scene = scene(FIRST, 4);
@@ -189,7 +189,7 @@ fn default_speeds_extend_above_the_resonance() {
         assert!(speeds[0] <= 0.8 + 1e-9 && *speeds.last().unwrap() >= 1.2 * 1.2, "{speeds:?}");
         assert!(speeds.windows(2).all(|two| (two[1] - two[0] - distance).abs() < 1e-9), "{speeds:?}");
     }
-    // A model that holds up to some speed is not asked beyond it.
+    // A model that is valid up to some speed is not run beyond it.
     let rom = &mut scene.roms[0];
     rom.extras.spin = Some(Spin {
         stiffness_speed2: rom.mass.clone() * 0.1,
@@ -236,7 +236,7 @@ fn numbers_do_not_depend_on_threads() {
     let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(BUMP, around(CROSSING, 0.1, 5)) };
     let [one, three] = [1, 3].map(|threads| run(scene(FIRST, 4), &request, threads));
     assert_eq!(one.figures.len(), 5);
-    // One unit on each axis.
+    // Each axis has one unit.
     for (name, unit) in [("contact", "fraction of time in contact (%)"), ("normal-force", "mean normal force (N)")] {
         assert_eq!(one.figure(name).unwrap().picture.svg.matches(unit).count(), 1, "{name}");
     }
@@ -288,7 +288,7 @@ fn rejects_too_coarse_steps_and_a_speed_override() {
     assert!(of_scene(scene(FIRST, 2), &request, 1, |_, _, _| {}).unwrap_err().usage);
 }
 
-/// With friction the sense matters; a blade mirrored about its middle, turning the other way, is the same in a mirror.
+/// With friction, the sense of rotation matters; a blade mirrored about its middle that rotates in the opposite sense gives the mirrored result.
 #[test]
 fn rotor_keeps_the_sense_of_rotation_of_the_scene() {
     let speeds = around(CROSSING, 0.1, 2);
@@ -327,14 +327,14 @@ fn rejects_excessive_requests_before_running() {
         let request = MapRequest { revolutions: Some(revolutions), ..request(BUMP, around(CROSSING, 0.1, 5)) };
         let failure = refused(&request);
         assert!(failure.usage && failure.what.contains(&format!("--revolutions {revolutions}")), "{failure}");
-        // As many as the remedy names do fit, one more does not.
+        // The number that the remedy names fits, and one more does not.
         let most: usize = failure.remedy.split(' ').find_map(|word| word.parse().ok()).unwrap();
         let with = |revolutions| MapRequest { revolutions: Some(revolutions), ..request.clone() };
         assert!(Map::prepare(scene(FIRST, 36), &with(most)).is_ok(), "{failure}");
         assert!(refused(&with(most + 1)).usage, "{failure}");
         assert!(most > 1000, "{failure}");
     }
-    // Spectra of many runs are what does not fit.
+    // Here, the spectra of many runs do not fit.
     let many = |count| MapRequest { revolutions: Some(2000), ..request(BUMP, around(CROSSING, 0.1, count)) };
     assert!(Map::prepare(scene(FIRST, 36), &many(5)).is_ok());
     assert!(refused(&many(1000)).what.contains("--revolutions 2000"));
@@ -390,7 +390,7 @@ fn start_values_affect_orders_and_facts() {
     assert_eq!((whirling.prediction.base_order, whirling.start.without()), (1, ", without whirl".into()));
 }
 
-/// Where nothing touches nothing is said about the response.
+/// Without contact, no statement is made about the response.
 #[test]
 fn gives_no_response_verdict_without_contact() {
     let request = MapRequest { revolutions: Some(4), transient: Some(3), ..request(-1e-4, around(CROSSING, 0.1, 2)) };
@@ -419,7 +419,7 @@ fn stiffening_verdict_requires_a_visible_effect() {
         let (holds, found) = verdict(&[one(4, Some((100.0 + shift, 3e-3)), None)]).unwrap();
         assert!(holds.is_none() && found.contains("smaller than the spacing of the speeds"), "{found}");
     }
-    // Another crossing runs out of the range: smaller there it does not matter, larger it may be the strongest.
+    // Another crossing extends beyond the range: a smaller response there does not matter, a larger one may be the strongest.
     assert_eq!(verdict(&[above, one(6, Some((104.0, 1e-3)), Some((150.0, 2e-3)))]).unwrap().0, Some(true));
     for response in [None, Some((104.0, 1e-3))] {
         let (holds, found) = verdict(&[above, one(6, response, Some((150.0, 4e-3)))]).unwrap();
@@ -427,7 +427,7 @@ fn stiffening_verdict_requires_a_visible_effect() {
     }
 }
 
-/// Two runs beside a border of the window: the parabola's top lies beyond it.
+/// Two runs lie beside a border of the window, and the vertex of the parabola lies beyond it.
 #[test]
 fn interpolated_maximum_stays_in_its_window() {
     let mut scene = scene(FIRST, 4);
@@ -436,7 +436,7 @@ fn interpolated_maximum_stays_in_its_window() {
     let prediction = FrequencyPrediction::new(&scene, &MapStart::default(), 0.0).unwrap();
     let speeds = [0.9, 1.0, 1.1, 1.2, 1.3].map(|share| share * CROSSING);
     let crossings = prediction.crossings([speeds[0], speeds[4]], 1.5 * FIRST);
-    // The second mode's window begins at 1.1875 times the crossing of the first one, the top of the parabola is at 1.15.
+    // The window of the second mode begins at 1.1875 times the crossing of the first one; the vertex of the parabola is at 1.15.
     let two = |speed: f64| {
         if speed < 1.15 * CROSSING && speed > 1.05 * CROSSING { 0.999e-3 } else { bell(speed, 1.2 * CROSSING, 1e-3) }
     };

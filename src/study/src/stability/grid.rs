@@ -1,29 +1,29 @@
-//! Which friction coefficients, speeds and internal steps are asked about.
+//! Friction coefficients, speeds and internal steps of the stability study.
 
 use tiprub_shell::{Failure, Result};
 
 use super::scene::{OperatingPoint, SceneStart};
 use crate::arguments::{NumberRange, StabilityArguments};
 
-/// Friction coefficients go at least this far where none are asked for.
+/// Smallest upper end of the default range of friction coefficients.
 const FRICTION: f64 = 1.0;
-/// Speeds, times the scene's own.
+/// Speeds relative to the scene's.
 const SPEEDS: [f64; 4] = [-1.0, 0.5, 1.0, 1.5];
 const QUICK_SPEEDS: [f64; 2] = [-1.0, 1.0];
-/// Internal steps, times the scene's own.
+/// Internal steps relative to the scene's.
 const STEPS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 const QUICK_STEPS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
-/// The same for coupled sectors, of which every answer takes long.
+/// Internal steps for coupled sectors, relative to the scene's; there, every answer takes long.
 const COUPLED_STEPS: [f64; 3] = [0.5, 1.0, 2.0];
 
-/// Requested values; values that the scene has no variable for are `None`, and alone.
+/// Requested values; if the scene has no variable for a value, its list is a single `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StabilityGrid {
-    /// Ascending.
+    /// Friction coefficients, ascending.
     pub frictions: Vec<Option<f64>>,
-    /// Ascending (rad/s).
+    /// Speeds, ascending (rad/s).
     pub speeds: Vec<Option<f64>>,
-    /// Ascending (s).
+    /// Internal steps, ascending (s).
     pub steps: Vec<f64>,
 }
 
@@ -32,7 +32,7 @@ impl StabilityGrid {
     /// to half of it.
     ///
     /// # Errors
-    /// A range of what the scene has no variable for.
+    /// A range was given for a value for which the scene has no variable.
     pub fn new(arguments: &StabilityArguments, own: &SceneStart, coupled: bool, usable: Option<f64>) -> Result<Self> {
         let quick = arguments.common.quick;
         let refuse = |option: &str, what: &str| {
@@ -81,7 +81,7 @@ impl StabilityGrid {
         Ok(Self { frictions, speeds, steps })
     }
 
-    /// All pairs of friction and speed: speed by speed.
+    /// Returns all pairs of friction and speed, speed by speed.
     pub fn places(&self) -> Vec<OperatingPoint> {
         let at = |speed: Option<f64>| {
             self.frictions.iter().map(move |friction| OperatingPoint { friction: *friction, speed })
@@ -90,7 +90,7 @@ impl StabilityGrid {
     }
 }
 
-/// Ascending, with the scene's own value; what differs by rounding is one.
+/// Returns the values in ascending order together with the scene's own value; values that differ by rounding are merged.
 fn with(mut values: Vec<f64>, own: f64) -> Vec<Option<f64>> {
     let same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
     values.retain(|value| !same(*value, own));

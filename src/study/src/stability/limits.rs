@@ -1,5 +1,4 @@
-//! The largest internal step of every scheme and solver at the scene's own friction and speed, up to which all that were tried are
-//! accepted.
+//! Largest internal step of every scheme and solver at the scene's own friction and speed, such that all shorter steps that were tried are accepted.
 
 use tiprub_core::{
     dynamics::{cyclic::CyclicModel, modal::ModalModel},
@@ -12,7 +11,7 @@ use super::{
     seek::{Sought, TRIED, seek},
 };
 
-/// Answers that are asked for, about: doublings from end to end of the range and halvings, of every scheme, and two of each further solver.
+/// Approximate number of answers that are needed: for every scheme doublings over the whole range and halvings, and two for each further solver.
 pub const ANSWERS: usize = 72;
 
 /// Largest steps of a scheme with a solver.
@@ -20,12 +19,12 @@ pub const ANSWERS: usize = 72;
 pub struct Usable {
     /// Scheme and solver.
     pub method: Method,
-    /// The largest step (s), and why a longer one is refused; or why none is accepted.
+    /// Largest step (s) with the reason why a longer one is rejected, or the reason why none is accepted.
     pub sought: Sought<String>,
 }
 
 impl Usable {
-    /// The largest step (s) that was accepted.
+    /// Returns the largest step (s) that was accepted.
     pub fn step(&self) -> Option<f64> {
         match self.sought {
             Sought::All(step) | Sought::Below(step, _) => Some(step),
@@ -33,7 +32,7 @@ impl Usable {
         }
     }
 
-    /// For people.
+    /// Formats the result for the terminal.
     pub fn to_text(&self) -> String {
         match &self.sought {
             Sought::All(step) => format!("none rejected up to {step:.1e} s"),
@@ -42,7 +41,7 @@ impl Usable {
         }
     }
 
-    /// Why a longer step is refused.
+    /// Returns the reason why a longer step is rejected.
     pub fn why(&self) -> &str {
         match &self.sought {
             Sought::All(_) => "",
@@ -51,7 +50,7 @@ impl Usable {
     }
 }
 
-/// Highest angular frequency of all structures (rad/s).
+/// Returns the highest angular frequency of all structures (rad/s).
 fn highest(asked: &StabilityScene) -> f64 {
     let of = |rom: &tiprub_core::Rom| {
         if rom.is_cyclic() {
@@ -63,11 +62,11 @@ fn highest(asked: &StabilityScene) -> f64 {
     asked.scene.roms.iter().filter_map(|rom| of(rom).ok()).fold(0.0, f64::max)
 }
 
-/// Limits of all: scheme by scheme at the same time. What a solver changes is asked at the limit of the scheme's first, and sought
-/// anew where the answers differ.
+/// Determines all limits, the schemes in parallel. Further solvers are tried at the limit of the scheme's first solver, and are searched anew only
+/// if the answers differ.
 ///
 /// # Errors
-/// A thread that is lost.
+/// A thread fails.
 pub fn of(
     asked: &StabilityScene,
     own: &SceneStart,
@@ -78,7 +77,7 @@ pub fn of(
     let place = [OperatingPoint { friction: own.friction, speed: own.speed }];
     let highest = highest(asked);
     let range = TRIED.map(|product| product / highest);
-    // Quickly: from the scene's own step or the resolved one, whichever is longer; below it nothing is looked at.
+    // A quick study searches from the scene's own step or the resolved one, whichever is longer.
     let range = if quick { [range[0].max(own.step).min(range[1]), range[1]] } else { range };
     let of_scheme = |scheme: &Scheme| {
         let ask =
@@ -91,7 +90,7 @@ pub fn of(
             let sought = match like {
                 Some(other) => other.sought.clone(),
                 None => match sought(solver, range) {
-                    // Refused at the scene's own step already: the limit lies below.
+                    // The scene's own step is already rejected: the limit lies below.
                     Sought::None(_) if quick => sought(solver, TRIED.map(|product| product / highest)),
                     found => found,
                 },
@@ -105,14 +104,14 @@ pub fn of(
     Ok(sweep::sweep(&Scheme::RECURRENCES, threads, of_scheme, progress)?.concat())
 }
 
-/// Whether another solver answers the same just below and just above a limit, and in the same words.
+/// Returns whether another solver gives the same answers just below and just above a limit, with the same reason.
 fn alike(other: &Usable, ask: &dyn Fn(f64) -> ScreeningResult) -> bool {
     let Sought::Below(step, why) = &other.sought else { return false };
     // Twice the width of the last interval.
     ask(step * (1.0 - 1e-6)).is_ok() && ask(step * 1.02).is_err_and(|refusal| same_reason(&refusal, why))
 }
 
-/// Refusals that differ in their numbers only.
+/// Returns whether two rejections differ only in their numbers.
 pub fn same_reason(a: &str, b: &str) -> bool {
     let words = |text: &str| {
         text.split_whitespace()

@@ -1,8 +1,8 @@
-//! What a scene allows: right, warned or refused over friction, speed and internal step, growth of sliding contact, and the largest
+//! Stability study of a scene: accepted, warned or rejected over friction, speed and internal step, growth of sliding contact, and the largest
 //! accepted step of every scheme and solver.
 //!
-//! The answers are those of the core, asked as a run asks it ([`scene`]). [`structure`] holds growth rates and limits of one structure
-//! by itself, [`grid`] what is asked, [`limits`] the largest steps, [`page`] pictures and tables.
+//! The answers are those of the core, obtained in the same way as by a run ([`scene`]). [`structure`] has growth rates and limits of one structure
+//! by itself, [`grid`] the values to try, [`limits`] the largest steps, [`page`] pictures and tables.
 
 pub mod grid;
 pub mod limits;
@@ -29,10 +29,10 @@ use tiprub_shell::{
 use super::{Study, master};
 use crate::{arguments::StabilityArguments, error::user_scene::refuse_compared, one_rotor_and_friction};
 
-/// Friction that makes the coefficient a parameter of a scene; every answer sets it.
+/// Friction that makes the coefficient a parameter of a scene; every answer replaces it.
 const SOME_FRICTION: f64 = 0.1;
 
-/// The answer at one place and step.
+/// Answer at one operating point and step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StabilityPoint {
     /// Friction and speed.
@@ -45,21 +45,21 @@ pub struct StabilityPoint {
     pub rates: Option<Rates>,
 }
 
-/// Kinds of answers, the better first.
+/// Kinds of answers, best first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AnswerKind {
-    /// Accepted without a word.
+    /// Accepted without warnings.
     Right,
     /// Accepted with warnings.
     Warned,
-    /// Accepted with warnings, and sliding contact flutters by itself.
+    /// Accepted with warnings, and sliding contact flutters.
     Flutter,
-    /// Refused.
+    /// Rejected.
     Refused,
 }
 
 impl StabilityPoint {
-    /// The kind of the answer.
+    /// Returns the kind of the answer.
     pub fn verdict(&self) -> AnswerKind {
         let flutters = self.rates.as_ref().is_some_and(structure::Rates::is_flutter);
         match &self.answer {
@@ -70,7 +70,7 @@ impl StabilityPoint {
         }
     }
 
-    /// Refusal or warnings; empty where all is right.
+    /// Returns the reason of the rejection or the warnings; empty if there are none.
     pub fn reason(&self) -> String {
         match &self.answer {
             Ok(warnings) => warnings.join("; "),
@@ -79,29 +79,29 @@ impl StabilityPoint {
     }
 }
 
-/// Everything that was found of a scene.
+/// Results of the stability study of a scene.
 #[derive(Debug)]
 pub struct StabilityResult {
     /// The scene.
     pub scene: Scene,
     /// Name on the command line.
     pub name: String,
-    /// With what it starts.
+    /// Start values of the scene.
     pub own: SceneStart,
     /// Requested values.
     pub grid: StabilityGrid,
-    /// All answers: step by step, in each speed by speed, in each by friction.
+    /// All answers: step by step, then speed by speed, then friction by friction.
     pub points: Vec<StabilityPoint>,
     /// Largest accepted steps.
     pub limits: Vec<limits::Usable>,
-    /// Why growth rates cannot be told, where they cannot.
+    /// Reason why growth rates cannot be determined, if they cannot.
     pub no_rates: Option<&'static str>,
 }
 
-/// The study of a scene.
+/// Runs the study of a scene.
 ///
 /// # Errors
-/// The scene cannot be read, is refused whatever is asked, or start values are wrong.
+/// The scene cannot be read, is rejected for all values, or start values are wrong.
 pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study> {
     refuse_compared(&arguments.set)?;
     let scene = arguments.common.options.load(&arguments.scene, &arguments.common.cache.cache(), console)?;
@@ -113,7 +113,7 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
         own.friction = Some(0.0);
     }
     let coupled = scene.roms[master(&scene)].is_cyclic();
-    // Ranges that are wrong are refused before the work.
+    // Wrong ranges are rejected before the work.
     let first = StabilityGrid::new(arguments, &own, coupled, None)?;
     let threads = arguments.threads.map_or_else(sweep::processors, std::num::NonZero::get);
     let mut ledger = WorkPlan::new(seconds_per_answer(&asked, &own) / threads as f64);
@@ -133,18 +133,18 @@ pub fn study(arguments: &StabilityArguments, console: &Console) -> Result<Study>
     page::study(&found)
 }
 
-/// Kinds of work, for a forecast.
+/// Kinds of work in a forecast.
 pub(super) const LIMITS: usize = 0;
 const GRID: usize = 1;
 
-/// Time of the answer to the scene as it stands (s).
+/// Measures the time of the answer for the unchanged scene (s).
 fn seconds_per_answer(asked: &StabilityScene, own: &SceneStart) -> f64 {
     let clock = std::time::Instant::now();
     asked.at(own.method, own.step, &[OperatingPoint { friction: own.friction, speed: own.speed }]);
     clock.elapsed().as_secs_f64()
 }
 
-/// Where a scene has no friction, the same with the parameter, so that more than none can be asked about; and whether it had none.
+/// Adds friction to a scene without friction, so that the coefficient is a parameter; also returns whether it had none.
 fn with_friction(scene: Scene) -> (Scene, bool) {
     let mut other = scene.clone();
     let contacts = other.settings.contacts.iter_mut().filter(|contact| contact.friction == 0.0);
@@ -156,7 +156,7 @@ fn with_friction(scene: Scene) -> (Scene, bool) {
     }
 }
 
-/// The master at every speed of the grid; or why its growth cannot be told.
+/// Returns the master at every speed of the grid, or the reason why its growth cannot be determined.
 fn structures<'a>(
     scene: &'a Scene,
     own: &SceneStart,
@@ -177,13 +177,13 @@ fn structures<'a>(
         let structure = SingleStructure::new(rom, damping, speed).map(|structure| structure.stiffened(factor));
         structure.map(|structure| if radial { structure.radial() } else { structure })
     };
-    // A speed that the structure does not take is refused by the core, place by place.
+    // The core rejects a speed that the structure does not support, point by point.
     let found: Vec<SingleStructure> =
         grid.speeds.iter().map(at).collect::<tiprub_core::Result<_>>().unwrap_or_default();
     Ok(if found.is_empty() { Err("the modes of the master cannot be computed at every speed") } else { Ok(found) })
 }
 
-/// All answers.
+/// Computes all answers.
 fn points(
     asked: &StabilityScene,
     own: &SceneStart,

@@ -1,4 +1,4 @@
-//! The answers as pictures, tables and files.
+//! Presents the answers as pictures, tables and files.
 
 use serde_json::{Value, json};
 use tiprub_core::shown;
@@ -39,7 +39,7 @@ impl AnswerKind {
     }
 }
 
-/// The study from everything that was found.
+/// Builds the study from its results.
 ///
 /// # Errors
 /// A plot cannot be drawn.
@@ -73,7 +73,7 @@ fn or_none(value: Option<f64>) -> String {
     value.map_or_else(|| "not in this scene".into(), shown)
 }
 
-/// Numbers for a cell or a label.
+/// Formats numbers for a cell or a label.
 fn short(value: f64) -> String {
     format!("{:.4}", value).trim_end_matches('0').trim_end_matches('.').to_owned()
 }
@@ -110,7 +110,7 @@ fn facts(found: &StabilityResult) -> Vec<(String, String)> {
     facts
 }
 
-/// The point of the scene as it stands.
+/// Returns the point of the unchanged scene.
 fn own_point(found: &StabilityResult) -> Option<&StabilityPoint> {
     let own = &found.own;
     let is = |point: &&StabilityPoint| {
@@ -165,7 +165,7 @@ fn title(speed: Option<f64>) -> String {
     speed.map_or_else(String::new, |speed| format!("{} rad/s", short(speed)))
 }
 
-/// The map, with the tables below it.
+/// Returns the map, with the tables below it.
 fn answers(found: &StabilityResult) -> StudyFigure {
     let (grid, count) = (&found.grid, found.grid.frictions.len());
     let of = |speed: usize, step: usize| {
@@ -220,7 +220,7 @@ const COLUMNS: [&str; 7] = [
     "flutter frequency (Hz)",
 ];
 
-/// NaN where the scene has no such value, or a rate cannot be told.
+/// Returns all points as a sheet; NaN if the scene has no such value, or if a rate cannot be determined.
 fn sheet(found: &StabilityResult) -> Sheet {
     let mut sheet = Sheet::new(COLUMNS);
     let known = |value: Option<f64>| value.unwrap_or(f64::NAN);
@@ -239,7 +239,7 @@ fn sheet(found: &StabilityResult) -> Sheet {
     sheet
 }
 
-/// Cells of the tables for one point.
+/// Returns the table cells of one point.
 fn row(point: &StabilityPoint) -> Vec<String> {
     let growth = point.rates.as_ref().map(|rates| rates.growth);
     let rate = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.3e}"));
@@ -272,7 +272,7 @@ fn points_table(found: &StabilityResult) -> Table {
     Table { rows: found.points.iter().map(row).collect(), ..Table::new(caption, HEADINGS) }
 }
 
-/// A cell of a CSV file of text.
+/// Quotes text for a cell of a CSV file.
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
@@ -308,7 +308,7 @@ fn limits_table(found: &StabilityResult) -> Table {
     table
 }
 
-/// Growth rates over friction at the scene's speed: of the equations, and of the steps.
+/// Plots growth rates over friction at the scene's speed: of the equations, and of the steps.
 fn growth(found: &StabilityResult) -> Result<Option<StudyFigure>> {
     let here: Vec<&StabilityPoint> = found.points.iter().filter(|point| point.place.speed == found.own.speed).collect();
     let rate = |point: &StabilityPoint, value: &dyn Fn(&super::Rates) -> f64| {

@@ -1,4 +1,4 @@
-//! What the core answers to a scene with another friction, speed, internal step, scheme or solver: its refusal or its warnings.
+//! Answers of the core to a scene with another friction, speed, internal step, scheme or solver: its rejection or its warnings.
 
 use tiprub_core::{
     Scene, Simulation,
@@ -12,34 +12,34 @@ use crate::error::scene::SceneRun;
 /// Scheme and solver.
 pub type Method = (Scheme, Solver);
 
-/// Friction coefficient and speed; `None` leaves what the scene has, or has not.
+/// Friction coefficient and speed; `None` keeps the value of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatingPoint {
-    /// µ.
+    /// Friction coefficient µ.
     pub friction: Option<f64>,
-    /// rad/s.
+    /// Speed (rad/s).
     pub speed: Option<f64>,
 }
 
-/// Warnings, or the refusal.
+/// Warnings, or the reason of a rejection.
 pub type ScreeningResult = Result<Vec<String>, String>;
 
-/// Values with which a scene starts, after those that were set.
+/// Start values of a scene after replacements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneStart {
-    /// µ, where the scene has it.
+    /// Friction coefficient µ, if the scene has it.
     pub friction: Option<f64>,
-    /// Speed (rad/s), where the master turns.
+    /// Speed (rad/s), if the master rotates.
     pub speed: Option<f64>,
-    /// Damping ratio of the master, where the scene has it.
+    /// Damping ratio of the master, if the scene has it.
     pub damping_ratio: Option<f64>,
-    /// Internal step (s): what the communication step is divided into.
+    /// Internal step (s) that divides the communication step.
     pub step: f64,
     /// Scheme and solver.
     pub method: Method,
 }
 
-/// A scene that can be asked.
+/// Scene that is tried with other values.
 #[derive(Debug, Clone, Copy)]
 pub struct StabilityScene<'a> {
     /// The scene.
@@ -58,17 +58,17 @@ fn set(simulation: &mut Simulation, quantity: Quantity, value: Option<f64>) -> t
     reference.zip(value).map_or(Ok(()), |(reference, value)| simulation.set_real(reference, value))
 }
 
-/// The step (s) that a communication step of this length is divided into; the largest allowed where that divides it.
+/// Returns the step (s) that divides a communication step of this length; exactly `largest` if that divides it.
 pub fn divided(length: f64, largest: f64) -> f64 {
     let step = length / (length / largest * (1.0 - 1e-9)).ceil().max(1.0);
     if (step / largest - 1.0).abs() < 1e-9 { largest } else { step }
 }
 
 impl StabilityScene<'_> {
-    /// With what it starts.
+    /// Returns the start values of the scene.
     ///
     /// # Errors
-    /// A scene that is refused whatever is asked, and start values that are none.
+    /// The scene is rejected for all values, or start values are wrong.
     pub fn start_values(&self) -> Result<SceneStart> {
         let settings = &self.scene.settings;
         let in_scene = |error| Failure::from_core(format!("scene `{}`", settings.name), error);
@@ -87,8 +87,8 @@ impl StabilityScene<'_> {
         })
     }
 
-    /// The answers at one internal step (s), place by place. The communication step is the internal one, so that the step asked
-    /// for is the step taken.
+    /// Returns the answers at one internal step (s), point by point. The communication step equals the internal step, so that exactly the requested
+    /// step is used.
     pub fn at(&self, method: Method, step: f64, places: &[OperatingPoint]) -> Vec<ScreeningResult> {
         let mut scene = SceneRun::changed(self.scene, method, step, 0.0);
         scene.settings.experiment.communication_step = step;

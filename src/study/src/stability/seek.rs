@@ -1,23 +1,23 @@
-//! The largest step up to which all that are tried are accepted.
+//! Searches for the largest step up to which all tried steps are accepted.
 
-/// Steps tried, times the highest angular frequency: from where every mode is resolved well to far beyond.
+/// Range of tried steps, times the highest angular frequency: from steps that resolve every mode well to far beyond.
 pub const TRIED: [f64; 2] = [0.1, 1e3];
-/// Halvings of the interval between a step that is accepted and one that is not.
+/// Number of halvings of the interval between an accepted and a rejected step.
 const HALVINGS: u32 = 7;
 
 /// Result of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Sought<E> {
-    /// All are accepted, the largest tried.
+    /// All steps are accepted, up to the largest tried (s).
     All(f64),
-    /// Shorter steps are accepted, and why a longer one is not.
+    /// Steps up to this one (s) are accepted; the reason why a longer one is not.
     Below(f64, E),
-    /// None is: why.
+    /// No step is accepted, with the reason.
     None(E),
 }
 
-/// From the smallest step on by doubling, then by halving between the last that is accepted and the first that is not. `known` is
-/// where the limit is if nothing else stands in the way.
+/// Doubles the step from the smallest on, then halves the interval between the last accepted and the first rejected step. `known` is the limit if no
+/// other reason applies.
 pub fn seek<E>([low, high]: [f64; 2], known: Option<f64>, mut accepts: impl FnMut(f64) -> Result<(), E>) -> Sought<E> {
     let (mut good, mut bad) = (0.0, low);
     let mut why = loop {
@@ -56,7 +56,7 @@ mod tests {
         assert!(step < 3.1e-4 && step > 0.99 * 3.1e-4 && why >= 3.1e-4, "{step} {why}");
         let Sought::Below(step, _) = seek([1e-6, 1e-2], Some(3.1e-4), below(3.1e-4)) else { panic!("not found") };
         assert_eq!(step.to_bits(), 3.1e-4_f64.to_bits());
-        // What is known does not hold where something else refuses before.
+        // The known limit does not apply if another reason rejects shorter steps.
         let Sought::Below(step, _) = seek([1e-6, 1e-2], Some(3.1e-4), below(3e-4)) else { panic!("not found") };
         assert!(step < 3e-4);
     }

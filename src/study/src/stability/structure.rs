@@ -1,6 +1,5 @@
-//! One structure with contact closed and sliding on a round casing: growth rates, what can be solved, and the internal step of each
-//! scheme below which all are accepted, sought with the very checks of the core. Longer ones may be accepted too: growth by friction
-//! comes in bands.
+//! One structure with closed sliding contact on a round casing: growth rates, solvability, and the internal step of each scheme below which all
+//! steps are accepted, found with the same checks as in the core. Longer steps may be accepted too, because friction causes growth in bands.
 
 use tiprub_core::{
     Result, Rom,
@@ -8,14 +7,14 @@ use tiprub_core::{
     rom::DisplacementFrame,
     settings::Scheme,
     shown,
-    stability::{self, ContactDirections, Fastest, GrowthRates, lock_up, judged::SetGrowth, massless::MasslessCheck},
+    stability::{self, ContactDirections, Fastest, GrowthRates, judged::SetGrowth, lock_up, massless::MasslessCheck},
 };
 
 use super::seek::{Sought, TRIED, seek};
 
-/// Contact nodes up to this number are closed in every combination; of more, each alone, neighbours, and all.
+/// Contact nodes up to this number are closed in every combination; with more nodes, each alone, pairs of neighbours, and all.
 const ALL_COMBINATIONS_UP_TO: usize = 3;
-/// Friction coefficients for which solvability is tried, ascending.
+/// Number of friction coefficients for which solvability is checked, ascending.
 const FRICTION_STEPS: u32 = 40;
 const FRICTION_STEPS_PER_UNIT: f64 = 20.0;
 
@@ -24,12 +23,12 @@ const FRICTION_STEPS_PER_UNIT: f64 = 20.0;
 pub struct KnownContact {
     /// Friction coefficient µ.
     pub friction: f64,
-    /// Speed at the start (rad/s), whose sign is the sense of slip; both senses where it is 0.
+    /// Speed at the start (rad/s), whose sign is the sense of slip; 0 stands for both senses.
     pub speed: f64,
 }
 
 impl KnownContact {
-    /// Senses of slip: 0 along +θ, 1 along −θ.
+    /// Returns the senses of slip: 0 along +θ, 1 along −θ.
     fn senses(&self) -> impl Iterator<Item = usize> + use<> {
         let slides = [self.speed >= 0.0, self.speed <= 0.0];
         (0..2).filter(move |sense| slides[*sense])
@@ -41,9 +40,9 @@ impl KnownContact {
 pub enum SchemeLimit {
     /// Steps below this (s) are accepted.
     Below(f64),
-    /// Nothing is refused, tried up to this step (s).
+    /// No step is rejected, up to this tried step (s).
     Tried(f64),
-    /// The scheme is refused at any step.
+    /// The scheme is rejected at any step.
     Refused(String),
 }
 
@@ -57,7 +56,7 @@ pub struct StepLimit {
 }
 
 impl StepLimit {
-    /// For people.
+    /// Formats the limit for the terminal.
     pub fn to_text(&self) -> String {
         match &self.limit {
             SchemeLimit::Below(step) => format!("{step:.4e} s"),
@@ -66,7 +65,7 @@ impl StepLimit {
         }
     }
 
-    /// The limit (s), where there is one.
+    /// Returns the limit (s), if there is one.
     pub fn below(&self) -> Option<f64> {
         match self.limit {
             SchemeLimit::Below(step) => Some(step),
@@ -75,57 +74,57 @@ impl StepLimit {
     }
 }
 
-/// Growth of closed sliding contact: that of the set of closed nodes that grows most.
+/// Growth of closed sliding contact, for the set of closed nodes with the largest growth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rates {
     /// Growth of the model and of the scheme's steps.
     pub growth: GrowthRates,
     /// Fastest growth of the differential equations, without the mass of the contact nodes if the model permits it.
     pub physical: Fastest,
-    /// Names of the closed nodes, of coupled sectors with the nodal diameter.
+    /// Names of the closed nodes; for coupled sectors with the nodal diameter.
     pub closed: String,
 }
 
 impl Rates {
-    /// The equations themselves are unstable.
+    /// Returns whether the differential equations themselves are unstable.
     pub fn is_flutter(&self) -> bool {
         self.physical.rate > self.growth.noise
     }
 
-    /// Frequency of what grows by itself (Hz); where nothing does, none.
+    /// Returns the frequency of the self-excited vibration (Hz), if there is one.
     pub fn frequency(&self) -> Option<f64> {
         self.is_flutter().then_some(self.physical.frequency / std::f64::consts::TAU)
     }
 }
 
-/// Where a tip digs in.
+/// Lock-up of a tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LockUp {
-    /// Friction coefficient µ* beyond which no force holds closed contact that slides.
+    /// Lock-up friction µ*: above it, no force balances closed sliding contact.
     pub friction: f64,
-    /// Names of the closed nodes, of coupled sectors with the nodal diameter.
+    /// Names of the closed nodes; for coupled sectors with the nodal diameter.
     pub closed: String,
     /// Sense of slip: 0 along +θ, 1 along −θ.
     pub sense: usize,
 }
 
-/// A structure by itself.
+/// One structure by itself.
 #[derive(Debug)]
 pub struct SingleStructure<'a> {
     rom: &'a Rom,
-    /// The sector, or all nodal diameters of coupled sectors.
+    /// Model of the sector, or of all nodal diameters of coupled sectors.
     pub models: Vec<ModalModel>,
-    /// Natural angular frequencies (rad/s) of every nodal diameter of coupled sectors, from 0; else of the sector.
+    /// Natural angular frequencies (rad/s) of the sector, or of every nodal diameter of coupled sectors, from 0.
     pub frequencies: Vec<Vec<f64>>,
     /// Normal and slip direction of all contact nodes for slip in +θ and −θ.
     closed: [ContactDirections; 2],
 }
 
 impl<'a> SingleStructure<'a> {
-    /// The structure with a damping ratio, its modes at a speed (rad/s) that stiffens it, 0 where it does not.
+    /// Creates the structure with a damping ratio and its modes at a speed (rad/s) that stiffens it, 0 without stiffening.
     ///
     /// # Errors
-    /// A ROM whose eigenproblem cannot be solved.
+    /// The eigenproblem of the ROM cannot be solved.
     pub fn new(rom: &'a Rom, damping_ratio: f64, speed: f64) -> Result<Self> {
         let closed = [1.0, -1.0].map(|sign| closed_contacts(rom, sign));
         if rom.is_cyclic() {
@@ -142,26 +141,26 @@ impl<'a> SingleStructure<'a> {
         Ok(Self { rom, frequencies: vec![model.frequencies.clone()], models: vec![model], closed })
     }
 
-    /// Returns the blade with the highest frequencies of mistuned blades: all times `factor`.
+    /// Returns the blade with the highest frequencies among mistuned blades: all frequencies times `factor`.
     pub fn stiffened(mut self, factor: f64) -> Self {
         let models = self.models.iter_mut().flat_map(|model| &mut model.frequencies);
         models.chain(self.frequencies.iter_mut().flatten()).for_each(|frequency| *frequency *= factor);
         self
     }
 
-    /// Normals straight inwards, whatever the slope of the contour.
+    /// Returns the structure with radial normals, independent of the slope of the contour.
     pub fn radial(mut self) -> Self {
         self.closed.iter_mut().flatten().for_each(|(normal, _)| *normal = [-1.0, 0.0, 0.0]);
         self
     }
 
-    /// Highest angular frequency (rad/s).
+    /// Returns the highest angular frequency (rad/s).
     pub fn highest(&self) -> f64 {
         self.models.iter().map(ModalModel::largest_frequency).fold(0.0, f64::max)
     }
 
-    /// Growth of sliding contact: of all sets of closed nodes and senses that of the largest rate of the steps. `None` without
-    /// friction, and where it cannot be told.
+    /// Returns the growth of sliding contact, for the set of closed nodes and the sense with the largest growth rate of the steps. `None` without
+    /// friction, and if the growth cannot be determined.
     pub fn rates(&self, scheme: Scheme, step: f64, sliding: KnownContact) -> Option<Rates> {
         let mut most: Option<GrowthRates> = None;
         let mut physical: Option<(Fastest, String)> = None;
@@ -186,8 +185,9 @@ impl<'a> SingleStructure<'a> {
         Some(Rates { growth, physical, closed })
     }
 
-    /// The least friction with which closed contact that slides digs in, of all sets of closed nodes and of the senses of a speed (rad/s), both
-    /// where it is 0. `None` where no friction does, of what flies freely, and of a ROM that does not say where the other body is.
+    /// Returns the smallest friction at which closed sliding contact locks up, over all sets of closed nodes and over the senses of a speed (rad/s),
+    /// both senses if it is 0. `None` if no friction causes lock-up, for free bodies, and for a ROM that does not define the position of the other
+    /// body.
     pub fn lock_up(&self, speed: f64) -> Option<LockUp> {
         if self.rom.frame == DisplacementFrame::Cartesian {
             return None;
@@ -207,7 +207,7 @@ impl<'a> SingleStructure<'a> {
         least
     }
 
-    /// Growth without the mass of the contact nodes where the model allows.
+    /// Returns the growth without the mass of the contact nodes if the model permits it.
     fn physical(
         &self,
         seen: &ModalModel,
@@ -222,7 +222,7 @@ impl<'a> SingleStructure<'a> {
         if scheme.acts_later() { own } else { without().unwrap_or(own) }
     }
 
-    /// Closed nodes by their names, of coupled sectors with the nodal diameter.
+    /// Returns the names of the closed nodes; for coupled sectors with the nodal diameter.
     fn named(&self, nodes: &[usize], model: usize) -> String {
         let names: Vec<&str> = nodes.iter().map(|node| self.rom.contact_nodes[*node].name.as_str()).collect();
         let diameter = if self.rom.is_cyclic() { format!(", nodal diameter {model}") } else { String::new() };
@@ -232,7 +232,7 @@ impl<'a> SingleStructure<'a> {
         }
     }
 
-    /// One model and the directions of nodes closed on it: of both parts of a nodal diameter.
+    /// Returns one model and the directions of the nodes closed on it, of both parts of a nodal diameter.
     fn seen(&self, model: usize, nodes: &[usize], sense: usize) -> (ModalModel, ContactDirections) {
         let (model, own) = (&self.models[model], self.rom.contact_nodes.len());
         let copies = model.contact_modes.nrows() / (3 * own);
@@ -241,8 +241,8 @@ impl<'a> SingleStructure<'a> {
         (model.with_nodes(&places), directions)
     }
 
-    /// Sets of contact nodes that are closed: all of a few; of many every one alone, neighbours, and all; of coupled sectors every
-    /// one alone and all.
+    /// Returns the sets of contact nodes that are closed: all combinations of a few nodes; for many nodes each alone, pairs of neighbours, and all;
+    /// for coupled sectors each alone, and all.
     fn combinations(&self) -> Vec<Vec<usize>> {
         let nodes = self.rom.contact_nodes.len();
         let alone = (0..nodes).map(|node| vec![node]);
@@ -256,11 +256,11 @@ impl<'a> SingleStructure<'a> {
         alone.chain((1..nodes).map(|node| vec![node - 1, node])).chain([(0..nodes).collect()]).collect()
     }
 
-    /// Limits of every scheme; `sliding` is the contact where it is known. With coupled sectors, growth by friction is left to the
+    /// Returns the limits of every scheme; `sliding` is the contact if it is known. For coupled sectors, growth by friction is checked with the
     /// scene.
     pub fn step_limits(&self, sliding: Option<KnownContact>) -> Vec<StepLimit> {
         let sliding = sliding.unwrap_or(KnownContact { friction: 0.0, speed: 0.0 });
-        // A Cartesian ROM flies freely or stands still, where massless-boundary is not made or not asked for.
+        // A Cartesian ROM belongs to a free or stationary body, for which massless-boundary is not supported or not needed.
         let massless = self.rom.frame != DisplacementFrame::Cartesian;
         let schemes = Scheme::RECURRENCES.into_iter().filter(|scheme| massless || *scheme != Scheme::MasslessBoundary);
         schemes.map(|scheme| StepLimit { scheme: scheme.name(), limit: self.limit(scheme, sliding) }).collect()
@@ -273,7 +273,7 @@ impl<'a> SingleStructure<'a> {
             Err(why) => return SchemeLimit::Refused(why),
         };
         let accepted = |step: f64| step < usable && self.accepts(scheme, step, sliding);
-        // Where nothing else stands in the way the limit is known.
+        // The limit is known unless another check rejects shorter steps.
         let exact = if scheme == Scheme::CentralDifference { 2.0 / self.highest() } else { usable };
         match seek([low, high], Some(exact), |step| if accepted(step) { Ok(()) } else { Err(()) }) {
             Sought::All(step) => SchemeLimit::Tried(step),
@@ -285,7 +285,7 @@ impl<'a> SingleStructure<'a> {
         }
     }
 
-    /// Steps of modal-exact below which it does not pass over what contact acts on (s); infinite for other schemes.
+    /// Returns the steps of modal-exact (s) that resolve all modes on which contact acts; infinite for other schemes.
     fn resolved(&self, scheme: Scheme) -> f64 {
         if scheme != Scheme::ModalExact {
             return f64::INFINITY;
@@ -299,7 +299,7 @@ impl<'a> SingleStructure<'a> {
         self.models.iter().map(limit).fold(f64::INFINITY, f64::min)
     }
 
-    /// Usable step of massless-boundary (s); infinite for other schemes.
+    /// Returns the usable step of massless-boundary (s); infinite for other schemes.
     fn massless(&self, scheme: Scheme, largest: f64) -> Result<f64, String> {
         if scheme != Scheme::MasslessBoundary {
             return Ok(f64::INFINITY);
@@ -326,7 +326,7 @@ impl<'a> SingleStructure<'a> {
         if sliding.friction == 0.0 || self.rom.is_cyclic() {
             return true;
         }
-        // However long contact stays closed.
+        // Independent of the duration of contact.
         let grows = |nodes: &Vec<usize>, sense: usize| {
             let (seen, directions) = self.seen(0, nodes, sense);
             let found = stability::growth(&seen, scheme, step, sliding.friction, &directions);
@@ -335,16 +335,16 @@ impl<'a> SingleStructure<'a> {
         self.combinations().iter().all(|nodes| !sliding.senses().any(|sense| grows(nodes, sense)))
     }
 
-    /// Largest friction coefficient (in steps of 0.05, up to 2) for which the contact problem with all nodes of one sector closed
-    /// has a unique solution at h = 1/ω_max, for slip in both directions; `None` if not even for 0.
+    /// Returns the largest friction coefficient (in steps of 0.05, up to 2) for which the contact problem with all nodes of one sector closed has a
+    /// unique solution at h = 1/ω_max, for slip in both directions; `None` if there is none even for 0.
     ///
-    /// A Cartesian ROM does not say where the other body is: what can be solved is checked with the scene.
+    /// A Cartesian ROM does not define the position of the other body, so that solvability is checked with the scene.
     pub fn solvable_friction(&self) -> Option<f64> {
         if self.rom.frame == DisplacementFrame::Cartesian {
             return None;
         }
         let step = 1.0 / self.highest();
-        // Real and imaginary parts of a nodal diameter are contacts of their own.
+        // Real and imaginary parts of a nodal diameter count as separate contacts.
         let copies = |model: &ModalModel| model.contact_modes.nrows() / (3 * self.rom.contact_nodes.len());
         let of = |model: &ModalModel| self.closed.iter().map(|sense| sense.repeat(copies(model))).collect();
         let together: Vec<Vec<ContactDirections>> = self.models.iter().map(of).collect();
@@ -360,8 +360,7 @@ impl<'a> SingleStructure<'a> {
     }
 }
 
-/// Normal and slip direction of every contact node against a round casing: inwards along the contour's normal, and
-/// along ±θ.
+/// Returns normal and slip direction of every contact node against a round casing: inwards along the normal of the contour, and along ±θ.
 fn closed_contacts(rom: &Rom, slip_sign: f64) -> ContactDirections {
     let directions = rom.contact_nodes.iter().map(|node| {
         let length = node.meridional_slope.hypot(1.0);
@@ -384,7 +383,7 @@ mod tests {
 
     use super::*;
 
-    /// The limits of the structure alone are those of which the start of a run warns; with less friction there is no warning.
+    /// The limits of the structure alone agree with the warnings at the start of a run; with less friction there is no warning.
     #[test]
     fn lock_up_friction_matches_the_warning_of_a_run() {
         let options = StageOptions {

@@ -1,4 +1,4 @@
-//! What depends on step size, scheme, damping and speed, and the state carried from one of them to the next.
+//! Coefficients that depend on step size, scheme, damping and speed, and the conversion of the state when one of them changes.
 
 use super::{BankCoefficients, ModalBank};
 use crate::dynamics::modal::fill_ratios;
@@ -6,7 +6,7 @@ use crate::schemes::{Velocity, resample};
 use crate::settings::Scheme;
 
 impl ModalBank {
-    /// New step size: coefficients and flexibility. The state is not touched (see [`ModalBank::resample`]).
+    /// Sets a new step size: coefficients and flexibility. The state is unchanged (see [`ModalBank::resample`]).
     pub fn set_step(&mut self, scheme: Scheme, step: f64) {
         (self.scheme, self.step) = (scheme, step);
         let modes = self.modes();
@@ -72,7 +72,7 @@ impl ModalBank {
         }
     }
 
-    /// Add the modal forces of spin on one sector, at its present velocity, to the others in `modal_force`.
+    /// Adds the modal forces of spin on one sector, at its current velocity, to `modal_force`.
     fn add_coupling_force(&mut self, sector: usize) {
         let Some(coupling) = self.coupling.take() else { return };
         for mode in 0..self.modes() {
@@ -80,7 +80,7 @@ impl ModalBank {
         }
         let set = self.set_of(sector);
         coupling.force(set, &self.gathered[0], &self.gathered[1], &mut self.correction);
-        // q̇ = d/h + ½hq̈: the velocity of the middle of the step would leave an error that adds up.
+        // q̇ = d/h + ½hq̈: the velocity in the middle of the step would cause an error that accumulates.
         for mode in 0..self.modes() {
             let square = self.frequency(mode, sector) * self.frequency(mode, sector);
             let force = self.modal_force[mode] + self.correction[mode] - square * self.gathered[0][mode];
@@ -91,8 +91,8 @@ impl ModalBank {
         self.coupling = Some(coupling);
     }
 
-    /// Follow the speed of the rotor (rad/s) and its temperature (K) where modes are coupled by them; only between steps. Returns
-    /// the change of energy (J), which is work of the shaft and of heat.
+    /// Sets the rotor speed (rad/s) and temperature (K) if they couple the modes; only between steps. Returns the change of
+    /// energy (J), which is work of the shaft and of heat.
     pub fn set_speed(&mut self, speed: f64, temperature: f64) -> f64 {
         let Some(coupling) = &self.coupling else { return 0.0 };
         let same = |one: f64, other: f64| one.to_bits() == other.to_bits();
@@ -108,13 +108,13 @@ impl ModalBank {
         (now.1 - before.1) + (now.0 - before.0)
     }
 
-    /// Modal damping ratio of all modes but the first, which have their `own` (takes effect with the next [`ModalBank::set_step`]).
+    /// Sets the modal damping ratio of all modes; the first modes have their `own` (takes effect with the next [`ModalBank::set_step`]).
     pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
         fill_ratios(&mut self.model.damping_ratios, damping_ratio, own, 1);
     }
 
-    /// Modal forces on one sector that last over the step: of contact (`forces[row · lanes + sector]`, N; none for an empty
-    /// slice), of the modal loads, of spin.
+    /// Collects the modal forces on one sector that persist over the step: contact forces (`forces[row · lanes + sector]`, N;
+    /// none for an empty slice), modal loads and spin.
     pub(super) fn gather_forces(&mut self, sector: usize, forces: &[f64]) {
         let lanes = self.lanes();
         let of_row = |row: usize| forces.get(row * lanes + sector).copied().unwrap_or(0.0);
@@ -133,13 +133,13 @@ impl ModalBank {
         }
         self.add_coupling_force(sector);
         if let Some(coupling) = self.coupling.as_ref().filter(|coupling| coupling.softens()) {
-            // As forces on the cold mode, whose motion is the same.
+            // Converted to forces on the cold mode, which cause the same motion.
             self.modal_force.iter_mut().enumerate().for_each(|(mode, force)| *force /= coupling.share(mode));
         }
     }
 
-    /// Carry the state from the step size in use to `new_step`, each sector under its last contact force
-    /// (`forces[row · lanes + sector]`, N; none for an empty slice) and the modal loads, then use the new coefficients.
+    /// Converts the state from the current step size to `new_step`, each sector under its last contact force
+    /// (`forces[row · lanes + sector]`, N; none for an empty slice) and the modal loads, then uses the new coefficients.
     pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
         let dynamic = self.model.dynamic_modes(self.scheme);
         if scheme == Scheme::Galerkin {

@@ -1,18 +1,18 @@
-//! Forces that act on some sectors after the prediction: contact, forces of the step before, modal loads.
+//! Forces that act on some sectors after the prediction: contact forces, delayed forces, modal loads.
 
 use super::ModalBank;
 use super::predict::{Accumulate, ModalForce};
 use crate::schemes::ModeCoefficients;
 
 impl ModalBank {
-    /// Add `correction` to the modes of one sector.
+    /// Adds `correction` to the modes of one sector.
     pub(super) fn move_modes(&mut self, sector: usize, with_loss: bool) {
         let correction = std::mem::take(&mut self.correction);
         self.move_each(sector, with_loss, correction.iter(), |_, correction| *correction);
         self.correction = correction;
     }
 
-    /// Add c φᵀf to the modes of one sector.
+    /// Adds c φᵀf to the modes of one sector.
     fn respond_and_move(&mut self, sector: usize, with_loss: bool) {
         let modal_force = std::mem::take(&mut self.modal_force);
         self.move_each(sector, with_loss, modal_force.iter(), |k, force| k.compliance * force);
@@ -48,7 +48,7 @@ impl ModalBank {
         self.state.loss[sector] += loss;
     }
 
-    /// Add the displacement of the contact rows by `correction`.
+    /// Adds the displacement of the contact rows by `correction`.
     pub(super) fn move_rows(&mut self, sector: usize) {
         let lanes = self.lanes();
         if lanes == 1 {
@@ -63,13 +63,13 @@ impl ModalBank {
         }
     }
 
-    /// φᵀf of one sector, for the force on its rows (N), into the scratch `modal_force`.
+    /// Writes φᵀf of one sector, for the force on its rows (N), to the scratch array `modal_force`.
     fn project(&mut self, force: &[f64]) {
         let (modal_force, contact_rows) = (&mut self.modal_force, &self.contact_rows);
         self.instruction_set.run(ModalForce { modal_force, contact_rows, force });
     }
 
-    /// Correct one sector for the contact `force` on its rows (N), eq. 11 of the paper.
+    /// Corrects one sector for the contact `force` on its rows (N), eq. 11 of the paper.
     pub fn correct(&mut self, sector: usize, force: &[f64], with_loss: bool) {
         self.project(force);
         if self.coupling.is_some() {
@@ -91,7 +91,7 @@ impl ModalBank {
         }
     }
 
-    /// Displacement of the contact rows of a single structure by contact forces given as modal forces (m).
+    /// Finds the displacement of the contact rows of a single structure by contact forces given as modal forces (m).
     pub fn response_to_modal(&mut self, modal_force: &[f64], displacement: &mut [f64]) {
         self.modal_force.copy_from_slice(modal_force);
         self.respond(0);
@@ -100,7 +100,7 @@ impl ModalBank {
         self.instruction_set.run(Accumulate { sums: displacement, matrix, values });
     }
 
-    /// Correct a single structure for contact forces given as modal forces, with the response of its rows to them.
+    /// Corrects a single structure for contact forces given as modal forces, using the response of its rows to them.
     pub fn correct_modal(&mut self, modal_force: &[f64], response: &[f64], with_loss: bool) {
         self.modal_force.copy_from_slice(modal_force);
         self.respond(0);
@@ -122,8 +122,7 @@ impl ModalBank {
         }
     }
 
-    /// Let contact forces found in the step before (`forces[row · lanes + sector]`, N) act after the prediction
-    /// (massless-boundary).
+    /// Applies contact forces of the previous step (`forces[row · lanes + sector]`, N) after the prediction (massless-boundary).
     pub fn act_delayed(&mut self, forces: &[f64], with_loss: bool) {
         let (lanes, mut force) = (self.lanes(), std::mem::take(&mut self.moved));
         for sector in 0..self.sectors {
@@ -138,7 +137,7 @@ impl ModalBank {
         self.moved = force;
     }
 
-    /// The same for modal forces.
+    /// Applies modal forces of the previous step to one sector after the prediction.
     pub fn act_delayed_modal(&mut self, sector: usize, modal_force: &[f64], with_loss: bool) {
         self.modal_force.copy_from_slice(modal_force);
         self.act_delayed_modal_force(sector, with_loss);
@@ -154,8 +153,8 @@ impl ModalBank {
         self.move_rows(sector);
     }
 
-    /// Work of the modal loads over the step just done (J), once contact has corrected it. A quasi-static mode
-    /// follows the load of its own instant, so that over this step the load before did the work.
+    /// Returns the work of the modal loads over the last step (J), after the contact correction. A quasi-static mode follows its
+    /// current load, so over this step the previous load did the work.
     pub fn finish_loads(&mut self) -> f64 {
         if !self.options.loads {
             return 0.0;

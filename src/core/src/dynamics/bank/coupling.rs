@@ -1,4 +1,4 @@
-//! Modes coupled by spin and heat: Coriolis force, and the stiffness of a speed and a temperature other than those of the modes.
+//! Coupling of modes by spin and heat: Coriolis force, and the change of stiffness with speed and temperature.
 //!
 //! With G the Coriolis matrix and ΔK = (Ω² − Ω₀²)K₁ + (Ω⁴ − Ω₀⁴)K₂ − s(T − T₀)K in modal coordinates, the step
 //!
@@ -6,8 +6,9 @@
 //! m̃(q⁺ − 2q + q⁻)/h² + (d̃ + 2ΩG)(q⁺ − q⁻)/2h + (ω² + ΔK) q = f
 //! ```
 //!
-//! is d⁺ = T (p − c((Ω/h) G d + ΔK q) + c f) with the uncoupled prediction p = βd − κq and T = (I + c(Ω/h)G)⁻¹. Multiplied
-//! with (q⁺ − q⁻)/2 the Coriolis term vanishes and ΔK adds ½ qᵀΔK q⁻ to the strain energy: the ledger closes as before.
+//! is d⁺ = T (p − c((Ω/h) G d + ΔK q) + c f) with the uncoupled prediction p = βd − κq and T = (I + c(Ω/h)G)⁻¹. When the step is
+//! multiplied by (q⁺ − q⁻)/2, the Coriolis term vanishes and ΔK adds ½ qᵀΔK q⁻ to the strain energy: the energy balance still
+//! closes.
 
 use crate::dynamics::modal::ModalSpin;
 use crate::schemes::ModeCoefficients;
@@ -26,18 +27,18 @@ pub struct Coupling {
     gyroscopic: Vec<f64>,
     /// T of every set of coefficients, row by row.
     transforms: Vec<Vec<f64>>,
-    /// Square of the frequency factor of every set: ΔK of a mistuned sector is so many times that of the others.
+    /// Square of the frequency factor of every set; it multiplies ΔK of a mistuned sector.
     squares: Vec<f64>,
     /// Number of modes, from the lowest, that ΔK couples.
     coupled: usize,
-    /// Stiffness of each mode as a share of that at the reference, where it softens without being coupled; else 1.
+    /// Stiffness of each mode as a fraction of the reference stiffness if it softens without being coupled, otherwise 1.
     shares: Vec<f64>,
     work: Vec<f64>,
     result: Vec<f64>,
 }
 
 impl Coupling {
-    /// For sectors with these factors on their frequencies; one set of coefficients where there are none.
+    /// Coupling for sectors with these frequency factors; one set of coefficients if `factors` is empty.
     pub fn new(spin: ModalSpin, stiffening: bool, coriolis: bool, factors: &[f64]) -> Self {
         let squares = if factors.is_empty() { vec![1.0] } else { factors.iter().map(|one| one * one).collect() };
         let modes = spin.coriolis.nrows();
@@ -59,17 +60,17 @@ impl Coupling {
         }
     }
 
-    /// Speed in use (rad/s).
+    /// Current speed (rad/s).
     pub fn speed(&self) -> f64 {
         self.speed
     }
 
-    /// Temperature in use (K).
+    /// Current temperature (K).
     pub fn temperature(&self) -> f64 {
         self.temperature
     }
 
-    /// Whether anything couples the modes at the speed in use.
+    /// Returns whether anything couples the modes at the current speed.
     pub fn is_active(&self) -> bool {
         (self.coriolis && self.speed != 0.0) || self.is_stiffened()
     }
@@ -79,7 +80,7 @@ impl Coupling {
             && (self.speed.abs().to_bits() != self.spin.reference_speed.abs().to_bits() || self.heated() != 0.0)
     }
 
-    /// Whether heat softens the modes.
+    /// Returns whether heat softens the modes.
     pub fn softens(&self) -> bool {
         self.spin.softening.is_some()
     }
@@ -89,24 +90,24 @@ impl Coupling {
         self.coupled
     }
 
-    /// Stiffness of a mode that ΔK does not couple, as a share of that at the reference; else 1.
+    /// Stiffness of a mode that ΔK does not couple, as a fraction of the reference stiffness; 1 for coupled modes.
     pub fn share(&self, mode: usize) -> f64 {
         self.shares[mode]
     }
 
-    /// Kelvin above the temperature of the modes, where these soften.
+    /// Temperature above the reference temperature of the modes (K), 0 without softening.
     fn heated(&self) -> f64 {
         if self.spin.softening.is_some() { self.temperature - self.spin.reference_temperature } else { 0.0 }
     }
 
-    /// Use the speed Ω (rad/s) and the temperature (K) with a step size h (s) for modes of these `frequencies` at the reference (rad/s),
-    /// the first `dynamic` of which have inertia.
+    /// Updates speed Ω (rad/s) and temperature (K) for step size h (s) and modes with these reference `frequencies` (rad/s), the
+    /// first `dynamic` of which have inertia.
     pub fn refresh(&mut self, [speed, temperature]: [f64; 2], step: f64, dynamic: usize, frequencies: &[f64]) {
         let modes = self.result.len();
         (self.speed, self.temperature) = (speed, temperature);
         let heated = self.heated();
-        // Modes without inertia, and those that the step does not resolve, keep the stiffness of the reference speed: ΔK
-        // is explicit, and at ωh ≈ π the least of it would make them grow. With heat they soften by `shares`.
+        // Modes without inertia, and those that the step does not resolve, keep the stiffness of the reference speed: ΔK is
+        // explicit, and at ωh ≈ π even a small ΔK would make them grow. With heat they soften by `shares`.
         self.coupled = dynamic.min(self.resolved(step, frequencies));
         let dynamic = self.coupled;
         if self.stiffening {
@@ -140,7 +141,7 @@ impl Coupling {
         }
     }
 
-    /// T of every set, from its coefficients of the step in use.
+    /// Computes T of every set from its coefficients for the current step.
     pub fn invert_all(&mut self, coefficients: &[ModeCoefficients]) {
         if self.coriolis {
             for (set, coefficients) in coefficients.chunks_exact(self.shares.len()).enumerate() {
@@ -149,8 +150,8 @@ impl Coupling {
         }
     }
 
-    /// Add ΔK of a sector without a factor times modal coordinates to forces; forces of modes that soften by themselves become those of
-    /// their shares.
+    /// Adds ΔK of a sector without a factor, times modal coordinates, to forces. Forces of modes that soften without coupling are
+    /// multiplied by their stiffness fraction.
     pub fn add_stiffness(&self, position: &[f64], forces: &mut [f64]) {
         if !self.is_stiffened() {
             return;
@@ -200,8 +201,8 @@ impl Coupling {
         values.copy_from_slice(&self.result);
     }
 
-    /// Turns the uncoupled prediction p into the difference d⁺ − p of the coupled one, in place. `position` is q and
-    /// `increment` is d of the step before.
+    /// Replaces the uncoupled prediction p by the difference d⁺ − p of the coupled prediction. `position` is q and `increment` is
+    /// d of the previous step.
     pub fn couple(
         &mut self,
         set: usize,
@@ -237,7 +238,7 @@ impl Coupling {
         }
     }
 
-    /// −ΔKq − 2ΩGq̇ with q̇ = d/h: what constant spin adds to the modal forces of a motion.
+    /// Adds the modal forces of constant spin, −ΔKq − 2ΩGq̇ with q̇ = d/h.
     pub fn force(&self, set: usize, position: &[f64], increment: &[f64], forces: &mut [f64]) {
         let modes = self.result.len();
         forces.fill(0.0);
@@ -254,7 +255,7 @@ impl Coupling {
         }
     }
 
-    /// ½ qᵀΔK(q − d): part of the strain energy (J).
+    /// Returns ½ qᵀΔK(q − d), a part of the strain energy (J).
     pub fn strain(&self, set: usize, position: impl Fn(usize) -> f64, before: impl Fn(usize) -> f64) -> f64 {
         if !self.is_stiffened() {
             return 0.0;

@@ -1,25 +1,25 @@
-//! What an excitation, and a motion at the start, do to the modes of each sector.
+//! Effects of an excitation and of an initial motion on the modes of each sector.
 
 use super::ModalBank;
 use crate::schemes::free_increment;
 use crate::settings::Scheme;
 
 impl ModalBank {
-    /// Engine order of the excitation, where there is one.
+    /// Sets the engine order of the excitation, if any.
     pub fn set_excitation_order(&mut self, order: u32) {
         if let Some(loads) = &mut self.excitation {
             loads.set_order(order);
         }
     }
 
-    /// Excitation of the next step, to be set before [`ModalBank::predict`]: amplitude (N) and phase ψ (rad).
+    /// Sets the excitation of the next step, before [`ModalBank::predict`]: amplitude (N) and phase ψ (rad).
     pub fn excite(&mut self, amplitude: f64, phase: f64) {
         if let Some(loads) = &mut self.excitation {
             loads.set(amplitude, phase);
         }
     }
 
-    /// Add what it does to the step predicted.
+    /// Adds the effect of the excitation to the predicted step.
     pub(super) fn act_excited(&mut self, with_loss: bool) {
         let Some(loads) = self.excitation.take() else { return };
         for (sector, force) in loads.now.iter().enumerate().filter(|(_, force)| **force != 0.0) {
@@ -28,7 +28,7 @@ impl ModalBank {
         self.excitation = Some(loads);
     }
 
-    /// Add what `factor` times modal loads that are known beforehand do to the step predicted of one sector.
+    /// Adds the effect of `factor` times prescribed modal loads to the predicted step of one sector.
     pub(super) fn act_on_modes(&mut self, sector: usize, loads: &[f64], factor: f64, with_loss: bool) {
         let (modes, set) = (self.modes(), self.set_of(sector));
         let coefficients = &self.coefficients[set * modes..][..modes];
@@ -42,8 +42,8 @@ impl ModalBank {
         self.move_rows(sector);
     }
 
-    /// Work of the excitation over the step just done (J), once contact has corrected it; of quasi-static modes as that of the
-    /// modal loads ([`ModalBank::finish_loads`]).
+    /// Returns the work of the excitation over the last step (J), after the contact correction; for quasi-static modes see
+    /// [`ModalBank::finish_loads`].
     pub fn finish_excitation(&mut self) -> f64 {
         let Some(mut loads) = self.excitation.take() else { return 0.0 };
         let (mut work, dynamic) = (0.0, self.model.dynamic_modes(self.scheme));
@@ -59,7 +59,7 @@ impl ModalBank {
         work
     }
 
-    /// Add a free motion to that of a mode with inertia, at the start.
+    /// Adds a free motion to that of a mode with inertia, at the start.
     pub fn add_modal_state(&mut self, mode: usize, sector: usize, position: f64, velocity: f64) {
         let (frequency, ratio, step) = (self.frequency(mode, sector), self.model.damping_ratios[mode], self.step);
         let index = self.index(mode, sector);

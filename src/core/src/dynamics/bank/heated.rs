@@ -1,26 +1,26 @@
-//! Heat: blades that want to be where their free expansion is, and modes that soften without being coupled.
+//! Heat: free thermal expansion of blades, and modes that soften without being coupled.
 //!
-//! A temperature T loads the modes with T K̂ e, where e is the free expansion per kelvin in modal coordinates and K̂ the stiffness that the
-//! step works with. So every sector rests at T e whatever its stiffness is: softened, stiffened by the speed, or that of a mistuned blade,
-//! whose K̂ is that of the others times the square of its factor.
+//! A temperature T loads the modes with T K̂ e, where e is the free expansion per kelvin in modal coordinates and K̂ is the
+//! stiffness in the step. Every sector therefore rests at T e whatever its stiffness is: softened, stiffened by the speed, or
+//! mistuned (K̂ of a mistuned blade is that of the others times the square of its factor).
 
 use super::ModalBank;
 
-/// Loads of heat.
+/// Thermal loads.
 #[derive(Debug, Clone)]
 pub(super) struct HeatLoads {
-    /// e, per mode (√kg m/K).
+    /// Free expansion e of each mode (√kg m/K).
     expansion: Vec<f64>,
     /// K̂ e of a sector without a factor.
     load: Vec<f64>,
-    /// Square of the factor of each sector less 1; empty where all are equal.
+    /// Square of the factor of each sector minus 1; empty if all sectors are equal.
     excess: Vec<f64>,
-    /// T K̂ e in the step under way; empty where all sectors are equal.
+    /// T K̂ e in the current step; empty if all sectors are equal.
     now: Vec<f64>,
 }
 
 impl HeatLoads {
-    /// `None` without an expansion.
+    /// Returns `None` without an expansion.
     pub(super) fn new(expansion: &[f64], factors: &[f64]) -> Option<Self> {
         let modes = expansion.len();
         (modes > 0).then(|| Self {
@@ -31,7 +31,7 @@ impl HeatLoads {
         })
     }
 
-    /// Modes whose load of the step before has to be remembered.
+    /// Number of modes whose load of the previous step is stored.
     pub(super) fn remembered(&self) -> usize {
         self.now.len()
     }
@@ -42,7 +42,7 @@ impl HeatLoads {
 }
 
 impl ModalBank {
-    /// K̂ e of the stiffness in use.
+    /// Computes K̂ e for the current stiffness.
     pub(super) fn fill_heat(&mut self) {
         let Some(heat) = &mut self.heat else { return };
         for (mode, (load, expansion)) in heat.load.iter_mut().zip(&heat.expansion).enumerate() {
@@ -54,7 +54,7 @@ impl ModalBank {
         }
     }
 
-    /// Add the load of a temperature (K) to the modal loads of the next step.
+    /// Adds the load of a temperature (K) to the modal loads of the next step.
     pub fn expand(&mut self, temperature: f64) {
         let Some(heat) = &mut self.heat else { return };
         for (load, heat) in self.modal_load.iter_mut().zip(&heat.load) {
@@ -63,7 +63,7 @@ impl ModalBank {
         heat.now.iter_mut().zip(&heat.load).for_each(|(now, heat)| *now = temperature * heat);
     }
 
-    /// Move all sectors that are at rest by the free expansion of a temperature (K), which loads them from now on.
+    /// Moves all sectors, which are at rest, by the free expansion of a temperature (K), which loads them from now on.
     pub fn settle_expansion(&mut self, temperature: f64) {
         let Some(heat) = self.heat.take() else { return };
         for (mode, (expansion, load)) in heat.expansion.iter().zip(&heat.load).enumerate() {
@@ -79,7 +79,7 @@ impl ModalBank {
         self.recover();
     }
 
-    /// Add what mistuned sectors feel beyond the loads of all to the step predicted.
+    /// Adds the additional thermal loads of mistuned sectors to the predicted step.
     pub(super) fn act_expanded(&mut self, with_loss: bool) {
         let Some(heat) = self.heat.take() else { return };
         for (sector, excess) in heat.excess.iter().enumerate().filter(|(_, excess)| **excess != 0.0) {
@@ -88,13 +88,13 @@ impl ModalBank {
         self.heat = Some(heat);
     }
 
-    /// Load of heat on a mode of a sector in the step before, beyond that of all sectors.
+    /// Additional thermal load on a mode of a mistuned sector in the previous step.
     pub(super) fn heat_before(&self, mode: usize, sector: usize) -> f64 {
         let excess = self.heat.as_ref().and_then(|heat| heat.excess.get(sector)).copied().unwrap_or(0.0);
         if excess == 0.0 { 0.0 } else { excess * self.state.heat_before[mode] }
     }
 
-    /// Work of these loads over the step just done (J), see [`ModalBank::finish_loads`].
+    /// Returns the work of the additional loads over the last step (J), see [`ModalBank::finish_loads`].
     pub(super) fn finish_heat(&mut self) -> f64 {
         let Some(heat) = &self.heat else { return 0.0 };
         let (mut work, dynamic) = (0.0, self.model.dynamic_modes(self.scheme));
@@ -108,8 +108,8 @@ impl ModalBank {
         work
     }
 
-    /// Let modes that ΔK does not couple follow the temperature by themselves: their stiffness, inertia and damping change in one
-    /// proportion, so that they keep their recurrence, and rest under a force where the softened structure does.
+    /// Softens the modes that ΔK does not couple: stiffness, inertia and damping are multiplied by one factor, so that the modes
+    /// keep their recurrence and have the static displacement of the softened structure.
     pub(super) fn relax(&mut self) {
         let Some(coupling) = self.coupling.as_ref().filter(|coupling| coupling.softens()) else { return };
         let (modes, first) = (self.model.len(), coupling.coupled_modes());
@@ -125,7 +125,7 @@ impl ModalBank {
         }
     }
 
-    /// Add `sign` times the shares of their cold stiffness that quasi-static modes have to what they gain before the next step.
+    /// Adds `sign` times the stiffness fractions of the quasi-static modes to the change of stiffness before the next step.
     pub(super) fn count_stiffness(&mut self, sign: f64) {
         let Some(coupling) = self.coupling.as_ref().filter(|coupling| coupling.softens()) else { return };
         let first = self.model.dynamic_modes(self.scheme);
@@ -137,8 +137,8 @@ impl ModalBank {
             .for_each(|(index, gained)| *gained += sign * coupling.share(first + index));
     }
 
-    /// Work of heat on quasi-static modes over the step just done (J), beyond the change of energy at its beginning: they follow the force
-    /// of the step at once, and a stiffness that changes acts on the way there too.
+    /// Returns the work of heat on quasi-static modes over the last step (J), in addition to the change of energy at its
+    /// beginning: these modes follow the force of the step immediately, and the change of stiffness also acts during that motion.
     pub fn finish_stiffening(&mut self) -> f64 {
         let (mut work, first) = (0.0, self.modes() - self.state.stiffened.len());
         for mode in first..self.modes() {

@@ -1,9 +1,9 @@
 //! State of all modes of all sectors, and the fused pass of one step.
 //!
 //! Layout: sectors are SIMD lanes in chunks of [`LANES`]; within a chunk the modes follow each other,
-//! `state[(chunk · modes + mode) · width + lane]`. The pass predicts (eq. 9 of the paper without contact), recovers
-//! the displacements of the contact rows and adds up the damping loss while a chunk is in registers; no horizontal
-//! sum occurs. Contact forces are then applied to the few sectors that touch.
+//! `state[(chunk · modes + mode) · width + lane]`. The pass predicts (eq. 9 of the paper without contact), recovers the
+//! displacements of the contact rows and sums the damping loss while a chunk is in registers; there is no horizontal sum. Contact
+//! forces are then applied to the few sectors in contact.
 
 mod coefficients;
 mod correction;
@@ -28,10 +28,10 @@ use predict::Predict;
 /// Lanes of one chunk: one 512-bit register of f64.
 pub const LANES: usize = 8;
 
-/// Amplitudes below this are flushed to zero now and then: idle damped modes would decay into denormals.
+/// Amplitudes below this are periodically set to zero: damped modes without load would decay into denormals.
 pub(super) const FLUSH_BELOW: f64 = 1e-150;
 
-/// Lanes of a displacement row for this many sectors: rounded up to whole chunks, except for a single structure.
+/// Number of lanes of a displacement row for this many sectors: rounded up to whole chunks, except for a single structure.
 pub fn lanes(sectors: usize) -> usize {
     if sectors == 1 { 1 } else { sectors.div_ceil(LANES) * LANES }
 }
@@ -39,17 +39,17 @@ pub fn lanes(sectors: usize) -> usize {
 /// Optional features of a bank; a feature that is off takes neither time nor memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BankOptions {
-    /// Factor on the frequencies of every sector (mistuning); empty = all tuned.
+    /// Factor on the frequencies of every sector (mistuning); empty if all sectors are tuned.
     pub frequency_factors: Vec<f64>,
-    /// Modal loads beside contact: centrifugal growth, heat, nodal-diameter loads.
+    /// True if there are modal loads in addition to contact forces: centrifugal growth, heat, nodal-diameter loads.
     pub loads: bool,
     /// Free expansion per kelvin in modal coordinates; empty without heat.
     pub expansion: Vec<f64>,
-    /// Spin in modal coordinates, with what of it couples the modes: (stiffening, coriolis).
+    /// Spin in modal coordinates, and which effects couple the modes: (stiffening, coriolis).
     pub coupling: Option<(ModalSpin, bool, bool)>,
     /// Loads of an engine order.
     pub excitation: Option<Excitation>,
-    /// Keep G = Φ diag(c) Φᵀ; a slave with many contact rows goes through its modes instead.
+    /// True if G = Φ diag(c) Φᵀ is stored; a slave with many contact rows uses its modes instead.
     pub flexibility: bool,
 }
 
@@ -66,7 +66,7 @@ impl Default for BankOptions {
     }
 }
 
-/// Everything that moves.
+/// All state variables.
 #[derive(Debug, Clone, PartialEq)]
 struct BankState {
     /// q at the current step.
@@ -75,17 +75,17 @@ struct BankState {
     increment: Vec<f64>,
     /// Displacements of the contact rows at the current step, `[row][lane]`.
     displacement: Vec<f64>,
-    /// The same one step earlier.
+    /// Displacements of the contact rows one step earlier, `[row][lane]`.
     displacement_before: Vec<f64>,
     /// Damping loss per lane since the last collection (J).
     loss: Vec<f64>,
-    /// Modal loads of the step before; empty without loads.
+    /// Modal loads of the previous step; empty without loads.
     modal_load_before: Vec<f64>,
     /// Speed of the coupling (rad/s).
     speed: f64,
     /// Temperature of the structure (K).
     temperature: f64,
-    /// Loads of heat of the step before, of a sector without a factor; empty where all are equal.
+    /// Thermal loads of the previous step, for a sector without a factor; empty if all sectors are equal.
     heat_before: Vec<f64>,
     /// Change of the stiffness of quasi-static modes since the last step, relative to their stiffness; empty without softening.
     stiffened: Vec<f64>,
@@ -128,9 +128,9 @@ pub struct ModalBank {
     contact_modes: Vec<f64>,
     /// `[row][mode]`.
     contact_rows: Vec<f64>,
-    /// `[set][mode]`: one set for all sectors, or one each where they are mistuned.
+    /// `[set][mode]`: one set for all sectors, or one per sector with mistuning.
     coefficients: Vec<ModeCoefficients>,
-    /// Velocities, the same; quasi-static modes have none.
+    /// Velocity coefficients, `[set][mode]`; quasi-static modes have none.
     velocities: Vec<Velocity>,
     lane_coefficients: Vec<BankCoefficients>,
     /// G per set: displacement of the contact rows per unit force held for one step (m/N), rows × rows.
@@ -141,13 +141,13 @@ pub struct ModalBank {
     scheme: Scheme,
     step: f64,
     state: BankState,
-    /// Modal loads of the step under way.
+    /// Modal loads of the current step.
     modal_load: Vec<f64>,
-    /// Scratch: increments of the step before.
+    /// Scratch: increments of the previous step.
     increment_before: Vec<f64>,
-    /// Scratch: φᵀf of the sector being corrected.
+    /// Scratch: φᵀf of the current sector.
     modal_force: Vec<f64>,
-    /// Scratch: change of the modal coordinates of the sector being corrected.
+    /// Scratch: change of the modal coordinates of the current sector.
     correction: Vec<f64>,
     /// Scratch: displacements of the rows of one sector.
     moved: Vec<f64>,
@@ -156,12 +156,12 @@ pub struct ModalBank {
 }
 
 impl ModalBank {
-    /// All sectors at rest, nothing optional; [`ModalBank::set_step`] must be called before stepping.
+    /// Creates a bank with all sectors at rest and without options; call [`ModalBank::set_step`] before stepping.
     pub fn new(model: &ModalModel, sectors: usize) -> Self {
         Self::with_options(model, sectors, BankOptions::default())
     }
 
-    /// The same with options.
+    /// Creates a bank with options, all sectors at rest.
     pub fn with_options(model: &ModalModel, sectors: usize, options: BankOptions) -> Self {
         let width = if sectors == 1 { 1 } else { LANES };
         let chunks = sectors.div_ceil(width);
@@ -220,7 +220,7 @@ impl ModalBank {
         self.sectors
     }
 
-    /// Lanes of a displacement row: sectors rounded up to whole chunks.
+    /// Number of lanes of a displacement row: sectors rounded up to whole chunks.
     pub fn lanes(&self) -> usize {
         self.chunks * self.width
     }
@@ -235,12 +235,12 @@ impl ModalBank {
         self.model.len()
     }
 
-    /// The modes.
+    /// Modes of one sector.
     pub fn model(&self) -> &ModalModel {
         &self.model
     }
 
-    /// Step size of the coefficients in use (s).
+    /// Step size of the current coefficients (s).
     pub fn step(&self) -> f64 {
         self.step
     }
@@ -254,7 +254,7 @@ impl ModalBank {
         &self.coefficients[self.set_of(sector) * self.modes()..][..self.modes()]
     }
 
-    /// Flexibility of the contact rows of one sector over one step (m/N), rows × rows; not symmetric with Coriolis force.
+    /// Flexibility of the contact rows of one sector over one step (m/N), rows × rows; not symmetric with Coriolis forces.
     pub fn flexibility(&self, sector: usize) -> &DMatrix<f64> {
         &self.flexibility[self.set_of(sector)]
     }
@@ -279,7 +279,7 @@ impl ModalBank {
         self.state.displacement[row * self.lanes() + sector]
     }
 
-    /// The same one step earlier (m).
+    /// Displacement of one contact row of one sector one step earlier (m).
     pub fn row_before(&self, row: usize, sector: usize) -> f64 {
         self.state.displacement_before[row * self.lanes() + sector]
     }
@@ -298,8 +298,8 @@ impl ModalBank {
         self.model.frequencies[mode] * self.options.frequency_factors.get(sector).copied().unwrap_or(1.0)
     }
 
-    /// Set a sector's modal position q and velocity q̇; the increment is that of free motion under no force. A
-    /// quasi-static mode carries neither and stays 0.
+    /// Sets modal position q and velocity q̇ of a sector; the increment is that of free motion without force. A quasi-static mode
+    /// has neither and stays 0.
     pub fn set_modal_state(&mut self, mode: usize, sector: usize, position: f64, velocity: f64) {
         if mode >= self.model.dynamic_modes(self.scheme) {
             return;
@@ -313,7 +313,7 @@ impl ModalBank {
         };
     }
 
-    /// Static equilibrium under the modal loads `modal_load` for every sector: q = L/ω², rigid modes at 0.
+    /// Sets the static equilibrium under the modal loads `modal_load` for every sector: q = L/ω², rigid-body modes at 0.
     pub fn settle(&mut self, modal_load: &[f64]) {
         self.rest();
         self.state.modal_load_before.copy_from_slice(modal_load);
@@ -326,7 +326,7 @@ impl ModalBank {
         self.recover();
     }
 
-    /// Recompute the contact displacements from the modal state (after setting it).
+    /// Recomputes the contact displacements from the modal state (after setting it).
     pub fn recover(&mut self) {
         let lanes = self.lanes();
         self.state.displacement.fill(0.0);
@@ -343,7 +343,7 @@ impl ModalBank {
         }
     }
 
-    /// Everything at rest and undeformed.
+    /// Sets the state to rest, undeformed.
     pub fn rest(&mut self) {
         for values in [
             &mut self.state.position,
@@ -375,7 +375,7 @@ impl ModalBank {
         &mut self.modal_load
     }
 
-    /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements.
+    /// Predicts one step without contact (eq. 9 of the paper) and recovers the contact displacements.
     pub fn predict(&mut self, with_loss: bool) {
         std::mem::swap(&mut self.state.increment, &mut self.increment_before);
         std::mem::swap(&mut self.state.displacement, &mut self.state.displacement_before);
@@ -421,10 +421,10 @@ impl ModalBank {
         self.coupling = Some(coupling);
     }
 
-    /// Kinetic and strain energy of all sectors (J), in the quantity the scheme conserves (see [`crate::schemes`]).
+    /// Kinetic and strain energy of all sectors (J), in the form that the scheme conserves (see [`crate::schemes`]).
     pub fn energies(&self) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
-        // Of an instant, or between two.
+        // The strain energy belongs to one time, or to two.
         let lag = if self.scheme == Scheme::Galerkin { 0.0 } else { 1.0 };
         for sector in 0..self.sectors {
             for (mode, k) in self.coefficients(sector).iter().enumerate() {
@@ -441,8 +441,8 @@ impl ModalBank {
         (kinetic, strain)
     }
 
-    /// Kinetic and strain energy of all sectors at this instant (J), ½q̇² and ½ω²q² of every mode, each sector under the
-    /// contact forces that last (`forces[row · lanes + sector]`, N) and the modal loads.
+    /// Instantaneous kinetic and strain energy of all sectors (J), ½q̇² and ½ω²q² of every mode, each sector under the persistent
+    /// contact forces (`forces[row · lanes + sector]`, N) and the modal loads.
     pub fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
         for sector in 0..self.sectors {
@@ -470,7 +470,7 @@ impl ModalBank {
         loss
     }
 
-    /// Set amplitudes that have decayed to nothing to exactly zero, so that no denormals arise.
+    /// Sets amplitudes that have decayed almost to zero to exactly zero, so that no denormals arise.
     pub fn flush(&mut self) {
         for values in [&mut self.state.position, &mut self.state.increment] {
             for value in values.iter_mut().filter(|value| value.abs() < FLUSH_BELOW) {
@@ -479,12 +479,12 @@ impl ModalBank {
         }
     }
 
-    /// True when every modal coordinate is finite.
+    /// Returns whether every modal coordinate is finite.
     pub fn is_finite(&self) -> bool {
         self.state.position.iter().chain(&self.state.increment).all(|value| value.is_finite())
     }
 
-    /// Save the state (not the step size).
+    /// Saves the state (not the step size).
     pub fn save(&self, writer: &mut StateWriter) {
         self.state.save(writer);
         if let Some(loads) = &self.excitation {
@@ -492,7 +492,7 @@ impl ModalBank {
         }
     }
 
-    /// Pass over a saved state and refuse what is none.
+    /// Reads over a saved state and rejects invalid values.
     pub fn check(&self, reader: &mut StateReader) {
         self.state.check(reader);
         if let Some(loads) = &self.excitation {
@@ -500,7 +500,7 @@ impl ModalBank {
         }
     }
 
-    /// Restore a saved state, after [`ModalBank::set_step`].
+    /// Restores a saved state, after [`ModalBank::set_step`].
     pub fn restore(&mut self, reader: &mut StateReader) {
         self.state.restore(reader);
         if let Some(loads) = &mut self.excitation {
@@ -516,8 +516,8 @@ impl ModalBank {
 mod tests {
     use super::*;
 
-    /// Free motion keeps ½q̇² + ½ω²q² exactly, far beyond where the scheme's own energy is half of it; rest under load has none
-    /// of the first, with the load as with a contact force that lasts.
+    /// Free motion conserves ½q̇² + ½ω²q² exactly, even where the energy of the scheme is half of it. A state at rest under load
+    /// has no kinetic energy, for a load as well as for a persistent contact force.
     #[test]
     fn instantaneous_energy_matches_the_motion() {
         let frequencies = vec![0.0, 1e3, 4e4, 1.2e5];
@@ -558,7 +558,7 @@ mod tests {
         let (kinetic, strain) = bank.energies_now(&[]);
         assert!(kinetic < 1e-20 * at_rest && (strain - at_rest).abs() < 1e-12 * at_rest, "{kinetic:e}, {strain:e}");
 
-        // A contact force on the rows that holds the vibrating modes where they are.
+        // A contact force on the rows that holds the vibration modes in place.
         let held = ModalModel {
             frequencies: vec![1.2e5; 3],
             damping_ratios: vec![0.01; 3],
@@ -578,7 +578,7 @@ mod tests {
         assert!(kinetic < 1e-20 * strain && strain > 0.0, "{kinetic:e}, {strain:e}");
     }
 
-    /// Three modes with inertia, one quasi-static under massless-boundary.
+    /// Three modes with inertia and one mode that is quasi-static under massless-boundary.
     fn small(damping: f64) -> ModalModel {
         ModalModel {
             frequencies: vec![0.0, 1e3, 4e3, 2e4],
@@ -621,11 +621,11 @@ mod tests {
             bank.set_step(scheme, 2e-5);
             assert_eq!((bank.energies_now(&[]), bank.energies(), bank.collect_loss()), ((0.0, 0.0), (0.0, 0.0), 0.0));
             assert!(bank.displacement().iter().chain(bank.displacement_before()).all(|value| *value == 0.0));
-            // Neither a step of another length nor a load moves what is not loaded.
+            // Neither another step length nor a load moves an unloaded structure.
             bank.resample(scheme, 7e-6, &[]);
             bank.predict(true);
             assert_eq!((bank.finish_loads(), bank.energies_now(&[])), (0.0, (0.0, 0.0)), "{scheme:?}");
-            // As stiff as at the reference speed again: a mode of 1000 rad/s.
+            // The stiffness is again that of the reference speed: a mode of 1000 rad/s.
             bank.set_modal_state(1, 0, 1.0, 0.0);
             assert_eq!(bank.energies_now(&[]).1.to_bits(), 5e5_f64.to_bits());
         }
@@ -643,13 +643,13 @@ mod tests {
         }
         let sum = |(kinetic, strain): (f64, f64)| kinetic + strain;
         assert!((sum(bank.energies_now(&[])) / expected - 1.0).abs() < 1e-12, "{expected} J");
-        // What the undamped scheme keeps it keeps from the start on.
+        // The energy that the undamped scheme conserves is constant from the start.
         let at_first = sum(bank.energies());
         bank.predict(true);
         assert!((sum(bank.energies()) / at_first - 1.0).abs() < 1e-12);
     }
 
-    /// The widest set against the baseline; a processor without wider registers compares the baseline with itself.
+    /// Compares the widest instruction set with the baseline; without wider registers the baseline is compared with itself.
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
         let modes = 11;

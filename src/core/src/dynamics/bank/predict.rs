@@ -1,4 +1,4 @@
-//! The loops over all modes and sectors.
+//! Loops over all modes and sectors.
 
 use super::{BankCoefficients, ModalBank, ModeCoefficients};
 use crate::dynamics::dispatch::Kernel;
@@ -22,8 +22,8 @@ impl Kernel for ModalForce<'_> {
     }
 }
 
-/// The fused pass over all chunks. `increment_before` holds d, `state.increment` receives d⁺. `LOSS`: add up the damping
-/// loss. `SPECIAL`: coefficients per lane (mistuning) and modal loads.
+/// The fused pass over all chunks. `increment_before` holds d, `state.increment` receives d⁺. `LOSS`: sum the damping loss.
+/// `SPECIAL`: coefficients per lane (mistuning) and modal loads.
 pub(super) struct Predict<'a, const WIDTH: usize, const LOSS: bool, const SPECIAL: bool>(pub &'a mut ModalBank);
 
 impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predict<'_, WIDTH, LOSS, SPECIAL> {
@@ -53,7 +53,7 @@ impl<const WIDTH: usize, const LOSS: bool, const SPECIAL: bool> Kernel for Predi
                 modes.recover_wide(position, &mut displacement[..rows]);
                 continue;
             }
-            // Nine rows (three contact nodes) fit the registers of the widest set; more go in further passes.
+            // Nine rows (three contact nodes) fit the registers of the widest set; further rows need further passes.
             let mut row = match rows {
                 9.. => modes.advance::<WIDTH, 9, LOSS, SPECIAL>(position, before, increment, loss, displacement),
                 6.. => modes.advance::<WIDTH, 6, LOSS, SPECIAL>(position, before, increment, loss, displacement),
@@ -77,9 +77,9 @@ const WIDE: usize = 18;
 /// Data that the passes over one chunk share.
 struct ChunkModes<'a> {
     coefficients: &'a [ModeCoefficients],
-    /// `[mode · WIDTH + lane]` where the pass is special.
+    /// `[mode · WIDTH + lane]` if the pass is special.
     lane_coefficients: &'a [BankCoefficients],
-    /// Modal loads where the pass is special.
+    /// Modal loads if the pass is special.
     modal_load: &'a [f64],
     shapes: &'a [f64],
     rows: usize,
@@ -87,8 +87,8 @@ struct ChunkModes<'a> {
 }
 
 impl ChunkModes<'_> {
-    /// d⁺ = β d − κ q, q⁺ = q + d⁺ for all modes of one chunk, with the displacements of the first `ROWS` contact rows
-    /// (`displacement[row · lanes + lane]`). Whole arrays at a time stay in registers. Returns `ROWS`.
+    /// Computes d⁺ = β d − κ q, q⁺ = q + d⁺ for all modes of one chunk, with the displacements of the first `ROWS` contact rows
+    /// (`displacement[row · lanes + lane]`). Whole arrays stay in registers. Returns `ROWS`.
     #[inline(always)]
     fn advance<const WIDTH: usize, const ROWS: usize, const LOSS: bool, const SPECIAL: bool>(
         &self,
@@ -142,7 +142,7 @@ impl ChunkModes<'_> {
         self.store(&sums, displacement)
     }
 
-    /// Displacements of `ROWS` further contact rows from `first` on. Returns `ROWS`.
+    /// Recovers the displacements of `ROWS` further contact rows from `first` on. Returns `ROWS`.
     #[inline(always)]
     fn recover<const WIDTH: usize, const ROWS: usize>(
         &self,
@@ -158,7 +158,7 @@ impl ChunkModes<'_> {
         self.store(&sums, displacement)
     }
 
-    /// Displacements of all contact rows of a single structure: rows are the vector direction.
+    /// Recovers the displacements of all contact rows of a single structure, with rows as the vector direction.
     #[inline(always)]
     fn recover_wide(&self, position: &[f64], displacement: &mut [f64]) {
         displacement.fill(0.0);
@@ -199,7 +199,7 @@ impl Kernel for Accumulate<'_> {
     #[inline(always)]
     fn run(self) {
         let rows = self.sums.len().max(1);
-        // Four modes at once: the sums are read and written once for them.
+        // Four modes per iteration, so that the sums are read and written once for all four.
         let (fours, rest) = self.values.as_chunks::<4>();
         let (head, tail) = self.matrix.split_at(4 * fours.len() * rows);
         for (values, shapes) in fours.iter().zip(head.chunks_exact(4 * rows)) {

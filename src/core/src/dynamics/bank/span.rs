@@ -1,9 +1,9 @@
-//! State of single sectors, for a scheme that marches them one by one over a span of time.
+//! State of single sectors, for a scheme that integrates them one by one over a span.
 
 use super::ModalBank;
 
 impl ModalBank {
-    /// Sets of coefficients: one, or one per sector where they are mistuned.
+    /// Number of sets of coefficients: one, or one per sector with mistuning.
     pub fn sets(&self) -> usize {
         if self.options.frequency_factors.is_empty() { 1 } else { self.sectors }
     }
@@ -18,12 +18,12 @@ impl ModalBank {
         self.frequency(mode, sector)
     }
 
-    /// Displacements of now become those before.
+    /// Makes the current displacements the previous ones.
     pub fn begin_span(&mut self) {
         self.state.displacement_before.copy_from_slice(&self.state.displacement);
     }
 
-    /// Read q and q̇ of the modes with inertia of a sector.
+    /// Reads q and q̇ of the modes with inertia of a sector.
     pub fn read_sector(&self, sector: usize, position: &mut [f64], velocity: &mut [f64]) {
         for (mode, (q, v)) in position.iter_mut().zip(velocity).enumerate() {
             let (now, increment) = self.modal_state(mode, sector);
@@ -31,7 +31,7 @@ impl ModalBank {
         }
     }
 
-    /// Write them, with the quasi-static modes under the forces `forces` on the rows (N) and the displacements of these (m).
+    /// Writes q and q̇ of a sector, its quasi-static modes under the forces `forces` on the rows (N), and the displacements of the rows (m).
     pub fn write_sector(&mut self, sector: usize, position: &[f64], velocity: &[f64], forces: &[f64], rows: &[f64]) {
         for (mode, (q, v)) in position.iter().zip(velocity).enumerate() {
             let index = self.index(mode, sector);
@@ -49,7 +49,7 @@ impl ModalBank {
         }
     }
 
-    /// Write q and q̇ of all modes of a single structure, those without inertia included, and displacements of the rows (m).
+    /// Writes q and q̇ of all modes of a single structure, including those without inertia, and the displacements of the rows (m).
     pub fn write_all(&mut self, position: &[f64], velocity: &[f64], rows: &[f64]) {
         for (mode, (q, v)) in position.iter().zip(velocity).enumerate() {
             let index = self.index(mode, 0);
@@ -59,12 +59,12 @@ impl ModalBank {
         rows.iter().enumerate().for_each(|(row, moved)| self.state.displacement[row * lanes] = *moved);
     }
 
-    /// Whether there are modal loads beside contact.
+    /// Returns whether there are modal loads in addition to contact forces.
     pub fn is_loaded(&self) -> bool {
         self.options.loads
     }
 
-    /// Modal loads of now are those at the start of a span.
+    /// Makes the current modal loads those at the start of a span.
     pub fn begin_loads(&mut self) {
         if self.options.loads {
             self.state.modal_load_before.copy_from_slice(&self.modal_load);
@@ -79,7 +79,7 @@ impl ModalBank {
         }
     }
 
-    /// Add to the damping loss of a sector (J).
+    /// Adds to the damping loss of a sector (J).
     pub fn lose(&mut self, sector: usize, loss: f64) {
         self.state.loss[sector] += loss;
     }

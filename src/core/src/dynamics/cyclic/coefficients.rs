@@ -1,4 +1,4 @@
-//! What depends on step size, scheme and damping, and the state carried from one step size to the next.
+//! Coefficients that depend on step size, scheme and damping, and the conversion of the state to another step size.
 
 use super::fourier::Synthesis;
 use super::pass::{Gather, modal_force};
@@ -7,7 +7,7 @@ use crate::schemes::{Velocity, resample};
 use crate::settings::Scheme;
 
 impl CyclicBank {
-    /// New step size: coefficients and flexibility. The state is not touched (see [`CyclicBank::resample`]).
+    /// Sets a new step size: coefficients and flexibility. The state is unchanged (see [`CyclicBank::resample`]).
     pub fn set_step(&mut self, scheme: Scheme, step: f64) {
         // The contact forces of the last step act with the coefficients they were found with.
         self.finish();
@@ -48,7 +48,7 @@ impl CyclicBank {
         }
     }
 
-    /// G of every difference of sectors: the columns of Ĝ are spectra.
+    /// Computes G of every difference of sectors: the columns of Ĝ are spectra.
     fn fill_flexibility(&mut self) {
         let (rows, lanes) = (self.rows, self.lanes);
         let nodes = rows / 3;
@@ -67,14 +67,14 @@ impl CyclicBank {
         }
     }
 
-    /// Modal damping ratio of all modes but the first of each nodal diameter, which have their `own` (takes effect with the next
-    /// [`CyclicBank::set_step`]).
+    /// Sets the modal damping ratio of all modes; the first modes of each nodal diameter have their `own` (takes effect with the
+    /// next [`CyclicBank::set_step`]).
     pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
         self.model.set_damping_ratio(damping_ratio, own);
     }
 
-    /// Carry the state from the step size in use to `new_step` under the last contact forces (`forces[row · lanes +
-    /// sector]`, N) and the modal loads, then use the new coefficients.
+    /// Converts the state from the current step size to `new_step` under the last contact forces (`forces[row · lanes + sector]`,
+    /// N) and the modal loads, then uses the new coefficients.
     pub fn resample(&mut self, scheme: Scheme, new_step: f64, forces: &[f64]) {
         if scheme == Scheme::Galerkin {
             let ratio = new_step / self.step;
@@ -91,7 +91,8 @@ impl CyclicBank {
         self.recover();
     }
 
-    /// Spectrum of the contact forces that last (`forces[row · lanes + sector]`, N), once those of the last step have acted.
+    /// Computes the spectrum of the persistent contact forces (`forces[row · lanes + sector]`, N), after those of the last step
+    /// have been applied.
     pub(super) fn gather_forces(&mut self, forces: &[f64]) {
         self.finish();
         self.asked.clear();
@@ -107,7 +108,7 @@ impl CyclicBank {
         self.asked_nodes.fill(true);
     }
 
-    /// Modal force of what was gathered, and of the loads, on a mode (re, im).
+    /// Modal force (re, im) on a mode from the collected contact forces and the loads.
     pub(super) fn gathered_force(&self, nodal_diameter: usize, mode: usize) -> [f64; 2] {
         let (index, lane) = self.index(nodal_diameter, mode);
         let force = &self.asked_force[nodal_diameter / LANES * self.rows..][..self.rows];

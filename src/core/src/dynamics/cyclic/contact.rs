@@ -1,20 +1,19 @@
-//! What contact forces on any of the sectors do.
+//! Effects of contact forces on any of the sectors.
 
 use super::fourier::Synthesis;
 use super::pass::{Gather, SpectralResponse, modal_force};
 use super::{CyclicBank, LANES};
 
 impl CyclicBank {
-    /// Displacement at the contact node `row` of a sector per unit force at the contact node `column` of the sector that
-    /// lies `difference` sectors before it (m/N), component of the force by component of the displacement.
+    /// Displacement at the contact node `row` of a sector per unit force at the contact node `column` of the sector that lies
+    /// `difference` sectors before it (m/N): force components by displacement components.
     #[inline(always)]
     pub fn flexibility(&self, difference: usize, column: usize, row: usize) -> &[[f64; 4]; 3] {
         let nodes = self.rows / 3;
         &self.flexibility[(difference * nodes + column) * nodes + row]
     }
 
-    /// Ask what contact forces (sector, node, force in N) on the step predicted would do; [`CyclicBank::moved`] has the
-    /// answer.
+    /// Computes the effect of contact forces (sector, node, force in N) on the predicted step; [`CyclicBank::moved`] returns the result.
     pub fn ask(&mut self, forces: impl Iterator<Item = (usize, usize, [f64; 3])>) {
         self.asked.clear();
         self.asked.extend(forces.filter(|(.., force)| force.iter().any(|component| *component != 0.0)));
@@ -30,13 +29,13 @@ impl CyclicBank {
         self.instruction_set.run(Synthesis { fourier, spectrum, rows, lanes, values });
     }
 
-    /// Displacements that the forces asked for would cause (m), `[row][lane of sector]`.
+    /// Displacements that the requested forces would cause (m), `[row][lane of sector]`.
     pub fn moved(&self) -> &[f64] {
         &self.moved
     }
 
-    /// Correct the step predicted for the forces asked for, eq. 11 of the paper: contact displacements now, the modes
-    /// with the next pass over them.
+    /// Applies the requested forces to the predicted step, eq. 11 of the paper: to contact displacements immediately, to the
+    /// modes in the next pass over them.
     pub fn act(&mut self) {
         for (displacement, moved) in self.state.displacement.iter_mut().zip(&self.moved) {
             *displacement += moved;
@@ -53,8 +52,8 @@ impl CyclicBank {
         modal_force(&self.state.touched, &self.shapes[index * self.rows..][..self.rows], force).map(|part| part[lane])
     }
 
-    /// Work of the modal loads over the step just done (J), once contact has corrected it. A quasi-static mode
-    /// follows the load of its own instant, so that over this step the load before did the work.
+    /// Returns the work of the modal loads over the last step (J), after the contact correction. A quasi-static mode follows its
+    /// current load, so over this step the previous load did the work.
     pub fn finish_loads(&mut self) -> f64 {
         if !self.loads {
             return 0.0;

@@ -1,10 +1,10 @@
-//! Energies of the modes, and what damping takes of them.
+//! Energies of the modes, and their damping losses.
 
 use super::CyclicBank;
 use crate::settings::Scheme;
 
 impl CyclicBank {
-    /// Kinetic and strain energy of the disk (J), in the quantity the scheme conserves (see [`crate::schemes`]).
+    /// Kinetic and strain energy of the disk (J), in the form that the scheme conserves (see [`crate::schemes`]).
     pub fn energies(&self) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
         for nodal_diameter in 0..self.model.diameters.len() {
@@ -15,8 +15,8 @@ impl CyclicBank {
         (kinetic, strain)
     }
 
-    /// Kinetic and strain energy of the disk at this instant (J), ½q̇² and ½ω²q² of every mode, under the contact forces
-    /// that last (`forces[row · lanes + sector]`, N) and the modal loads.
+    /// Instantaneous kinetic and strain energy of the disk (J), ½q̇² and ½ω²q² of every mode, under the persistent contact forces
+    /// (`forces[row · lanes + sector]`, N) and the modal loads.
     pub fn energies_now(&mut self, forces: &[f64]) -> (f64, f64) {
         self.gather_forces(forces);
         let (mut kinetic, mut strain) = (0.0, 0.0);
@@ -38,7 +38,7 @@ impl CyclicBank {
     /// Kinetic and strain energy of the modes of one nodal diameter (J).
     pub fn diameter_energies(&self, nodal_diameter: usize) -> (f64, f64) {
         let (mut kinetic, mut strain) = (0.0, 0.0);
-        // Of an instant, or between two.
+        // The strain energy belongs to one time, or to two.
         let lag = if self.scheme == Scheme::Galerkin { 0.0 } else { 1.0 };
         for mode in 0..self.model.diameters[nodal_diameter].len() {
             let k = &self.coefficients[nodal_diameter * self.modes + mode];

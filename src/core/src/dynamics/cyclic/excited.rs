@@ -1,4 +1,4 @@
-//! What an excitation, and a motion at the start, do to the modes of nodal diameters.
+//! Effects of an excitation and of an initial motion on the modes of nodal diameters.
 
 use super::{CyclicBank, LANES};
 use crate::dynamics::excitation::{DiskLoads, Excitation};
@@ -6,21 +6,21 @@ use crate::schemes::free_increment;
 use crate::settings::Scheme;
 
 impl CyclicBank {
-    /// With an excitation.
+    /// Adds an excitation.
     #[must_use]
     pub fn excited(mut self, excitation: Option<Excitation>) -> Self {
         self.excitation = excitation.map(|excitation| DiskLoads::new(excitation, &self.model));
         self
     }
 
-    /// Engine order of the excitation, where there is one.
+    /// Sets the engine order of the excitation, if any.
     pub fn set_excitation_order(&mut self, order: u32) {
         if let Some(loads) = &mut self.excitation {
             loads.set_order(order, &self.model);
         }
     }
 
-    /// Excitation of the next step, to be set before [`CyclicBank::predict`]: amplitude (N) and phase ψ (rad).
+    /// Sets the excitation of the next step, before [`CyclicBank::predict`]: amplitude (N) and phase ψ (rad).
     pub fn excite(&mut self, amplitude: f64, phase: f64) {
         if let Some(loads) = &mut self.excitation {
             let is_real = self.model.is_real(loads.diameter);
@@ -28,7 +28,7 @@ impl CyclicBank {
         }
     }
 
-    /// Add what it does to the step that the pass has predicted, and to the spectrum of its displacements.
+    /// Adds the effect of the excitation to the predicted step and to the spectrum of its displacements.
     pub(super) fn act_excited(&mut self) {
         let Some(loads) = &self.excitation else { return };
         let (n, rows) = (loads.diameter, self.rows);
@@ -50,8 +50,8 @@ impl CyclicBank {
         }
     }
 
-    /// Work of the excitation over the step just done (J), once contact has corrected it; of quasi-static modes as that of the
-    /// modal loads ([`CyclicBank::finish_loads`]).
+    /// Returns the work of the excitation over the last step (J), after the contact correction; for quasi-static modes see
+    /// [`CyclicBank::finish_loads`].
     pub fn finish_excitation(&mut self) -> f64 {
         let Some(loads) = &self.excitation else { return 0.0 };
         let (n, mut work) = (loads.diameter, 0.0);
@@ -71,7 +71,7 @@ impl CyclicBank {
         work
     }
 
-    /// Add a free motion to that of a mode with inertia (re, im), at the start; the imaginary part of a real mode stays 0.
+    /// Adds a free motion to that of a mode with inertia (re, im), at the start; the imaginary part of a real mode stays 0.
     pub fn add_modal_state(&mut self, nodal_diameter: usize, mode: usize, position: [f64; 2], velocity: [f64; 2]) {
         let diameter = &self.model.diameters[nodal_diameter];
         let (frequency, ratio) = (diameter.frequencies[mode], diameter.damping_ratios[mode]);

@@ -1,9 +1,9 @@
-//! From nodal diameters to sectors and back: the small Fourier transforms between spectra and the N sectors.
+//! Fourier transforms between the spectra of nodal diameters and the N sectors.
 //!
-//! A spectrum holds complex values per row and nodal diameter, `[block][row][re, im][lane]` with the nodal diameters as
-//! lanes of blocks of [`LANES`]; values of the sectors are `[row][sector]`. With E = Σ Re U_n cos(2πns/N) and
-//! O = Σ Im U_n sin(2πns/N) sector s moves by E − O and sector N − s by E + O, so that half the sectors need sums; for
-//! even N the sums over even and over odd n give sectors N/2 ± s as well, and a quarter is enough.
+//! A spectrum holds complex values per row and nodal diameter, `[block][row][re, im][lane]` with the nodal diameters as lanes of
+//! blocks of [`LANES`]; values of the sectors are `[row][sector]`. With E = Σ Re U_n cos(2πns/N) and O = Σ Im U_n sin(2πns/N),
+//! sector s moves by E − O and sector N − s by E + O, so that only half of the sectors need sums. For even N, the sums over even
+//! and over odd n also give sectors N/2 ± s, and a quarter is enough.
 
 use crate::dynamics::bank::LANES;
 use crate::dynamics::dispatch::Kernel;
@@ -17,7 +17,7 @@ pub struct Fourier {
     sectors: usize,
     /// Nodal diameters 0 ..= N/2.
     diameters: usize,
-    /// Sectors that the sums are made for: 0 .. summed.
+    /// Number of sectors for which sums are computed: 0 .. summed.
     summed: usize,
     /// (cos, sin)(2πns/N) of the summed sectors, `[n][chunk][cos, sin][lane]`.
     synthesis: Vec<[[f64; LANES]; 2]>,
@@ -26,7 +26,7 @@ pub struct Fourier {
 }
 
 impl Fourier {
-    /// Tables for `sectors` sectors.
+    /// Creates tables for `sectors` sectors.
     pub fn new(sectors: usize) -> Self {
         let diameters = sectors / 2 + 1;
         let summed = if sectors.is_multiple_of(2) { sectors / 4 + 1 } else { diameters };
@@ -50,13 +50,12 @@ impl Fourier {
         Self { sectors, diameters, summed, synthesis, analysis }
     }
 
-    /// Blocks of a spectrum.
+    /// Number of blocks of a spectrum.
     pub fn blocks(&self) -> usize {
         self.diameters.div_ceil(LANES)
     }
 
-    /// Add three components of a force on one sector to the spectrum Σ_s f_s e^(−2πins/N), rows `first` to `first + 2`
-    /// of `rows`.
+    /// Adds the three components of a force on one sector to the spectrum Σ_s f_s e^(−2πins/N), rows `first` to `first + 2` of `rows`.
     #[inline(always)]
     pub fn add(&self, sector: usize, first: usize, rows: usize, force: [f64; 3], spectrum: &mut [[[f64; LANES]; 2]]) {
         let blocks = self.blocks();
@@ -72,7 +71,7 @@ impl Fourier {
     }
 }
 
-/// Values of all sectors from a spectrum of `rows` rows: u_s = Σ_n Re(U_n e^(2πins/N)), `[row · lanes + s]`.
+/// Computes the values of all sectors from a spectrum of `rows` rows: u_s = Σ_n Re(U_n e^(2πins/N)), `[row · lanes + s]`.
 pub struct Synthesis<'a> {
     pub fourier: &'a Fourier,
     pub spectrum: &'a [[[f64; LANES]; 2]],
@@ -131,7 +130,7 @@ impl Fourier {
         sums
     }
 
-    /// Sectors s, N − s, and for even N also N/2 + s and N/2 − s, from the sums of even and odd n.
+    /// Computes sectors s, N − s, and for even N also N/2 + s and N/2 − s, from the sums over even and odd n.
     #[inline(always)]
     fn unfold(&self, chunk: usize, sums: (&[[f64; LANES]; 2], &[[f64; LANES]; 2]), values: &mut [f64]) {
         let first = chunk * LANES;
@@ -160,7 +159,7 @@ impl Fourier {
     }
 }
 
-/// Sine and cosine of 2π·index/count, with the symmetries of the circle to the last bit.
+/// Sine and cosine of 2π·index/count; the symmetries of the circle hold exactly.
 pub fn sine_cosine(index: usize, count: usize) -> (f64, f64) {
     let (quarter, rest) = (4 * (index % count) / count, 4 * (index % count) % count);
     let angle = |part: usize| {
@@ -203,7 +202,7 @@ mod tests {
         assert_eq!(sine_cosine(28, 56), (0.0, -1.0));
     }
 
-    /// Every number of sectors against the sum written out, and there and back.
+    /// Compares every number of sectors with the explicit sum, in both directions.
     #[test]
     fn synthesis_is_the_sum_over_the_nodal_diameters() {
         for sectors in 2..=61_usize {

@@ -1,10 +1,10 @@
 //! A disk of coupled sectors in modal coordinates, stepped together.
 //!
 //! Nodal diameters are SIMD lanes in blocks of [`LANES`], complex amplitudes are pairs of real and imaginary parts:
-//! `state[block · modes + mode][re, im][lane]`. A nodal diameter with fewer modes than others, and the padding of the last
-//! block, has modes of coefficients 0. Contact displacements go to the sectors, and forces on sectors to the nodal
-//! diameters, by the transforms of `fourier`; what a force does to any sector within a step is the block-circulant
-//! flexibility G(s − s') = Σ_n Re(Ĝ_n e^(2πin(s − s')/N)), Ĝ_n = Ψ_n diag(c) Ψ_nᴴ.
+//! `state[block · modes + mode][re, im][lane]`. If a nodal diameter has fewer modes than others, or is padding of the last block,
+//! the coefficients of the additional modes are 0. The transforms of `fourier` convert contact displacements to sectors and
+//! forces on sectors to nodal diameters. The effect of a force on any sector within a step is the block-circulant flexibility G(s
+//! − s') = Σ_n Re(Ĝ_n e^(2πin(s − s')/N)), Ĝ_n = Ψ_n diag(c) Ψ_nᴴ.
 
 mod coefficients;
 mod contact;
@@ -29,32 +29,32 @@ use pass::{Complexes, CyclicCoefficients, Pass, Recover};
 
 const NOTHING: Complexes = [[0.0; LANES]; 2];
 
-/// Everything that moves.
+/// All state variables.
 #[derive(Debug, Clone, PartialEq)]
 struct CyclicState {
-    /// q at the current step, without the contact forces that have not been applied yet.
+    /// q at the current step, without contact forces that have not been applied yet.
     position: Vec<Complexes>,
-    /// d = q − q⁻, likewise.
+    /// d = q − q⁻, without contact forces that have not been applied yet.
     increment: Vec<Complexes>,
-    /// d of the step before, for the damping loss.
+    /// d of the previous step, for the damping loss.
     older: Vec<Complexes>,
-    /// Displacements of the contact rows at the current step, `[row][lane of sector]`, contact included.
+    /// Displacements of the contact rows at the current step, `[row][lane of sector]`, including contact.
     displacement: Vec<f64>,
-    /// The same one step earlier.
+    /// Displacements of the contact rows one step earlier, `[row][lane of sector]`.
     displacement_before: Vec<f64>,
     /// Damping loss per nodal diameter since the last collection (J).
     loss: Vec<f64>,
-    /// Modal loads of the step before; empty without loads.
+    /// Modal loads of the previous step; empty without loads.
     modal_load_before: Vec<f64>,
     /// Spectrum of the contact forces of the last step (N).
     force: Vec<Complexes>,
-    /// Contact nodes, of any sector, that carry one.
+    /// True for contact nodes with a force on any sector.
     touched: Vec<bool>,
-    /// They have not acted on the modes of their own step.
+    /// True if the contact forces have not been applied to the modes of their step.
     unapplied: bool,
-    /// There are such forces.
+    /// True if there are such forces.
     acting: bool,
-    /// The damping loss of the last step has not been added.
+    /// True if the damping loss of the last step has not been added.
     loss_due: bool,
 }
 
@@ -87,9 +87,9 @@ pub struct CyclicBank {
     shapes: Vec<Complexes>,
     /// `[block][mode]`.
     lane_coefficients: Vec<CyclicCoefficients>,
-    /// `[n · modes + mode]`; the default where there is no such mode.
+    /// `[n · modes + mode]`; the default if there is no such mode.
     coefficients: Vec<ModeCoefficients>,
-    /// Velocities, the same; quasi-static modes have none.
+    /// Velocity coefficients, `[n · modes + mode]`; quasi-static modes have none.
     velocities: Vec<Velocity>,
     /// Ĝ, `[block][column][row]`.
     spectral_flexibility: Vec<Complexes>,
@@ -101,24 +101,24 @@ pub struct CyclicBank {
     loads: bool,
     excitation: Option<DiskLoads>,
     state: CyclicState,
-    /// Modal loads of nodal diameter 0 for the step under way.
+    /// Modal loads of nodal diameter 0 for the current step.
     modal_load: Vec<f64>,
     /// Displacements caused by `modal_load`, per mode.
     load_response: Vec<f64>,
     /// Scratch: spectrum of displacements.
     spectrum: Vec<Complexes>,
-    /// Forces that an answer was asked for: (sector, node, force).
+    /// Requested forces: (sector, node, force).
     asked: Vec<(usize, usize, [f64; 3])>,
-    /// Their spectrum and contact nodes.
+    /// Spectrum and contact nodes of the requested forces.
     asked_force: Vec<Complexes>,
     asked_nodes: Vec<bool>,
-    /// Displacements that they cause (m), `[row][lane of sector]`.
+    /// Displacements caused by the requested forces (m), `[row][lane of sector]`.
     moved: Vec<f64>,
 }
 
 impl CyclicBank {
-    /// All sectors at rest; [`CyclicBank::set_step`] must be called before stepping. With `loads` there are modal loads of
-    /// nodal diameter 0 beside contact.
+    /// Creates a disk with all sectors at rest; call [`CyclicBank::set_step`] before stepping. If `loads`, there are modal loads
+    /// of nodal diameter 0 in addition to contact forces.
     pub fn new(model: &CyclicModel, loads: bool) -> Self {
         let (sectors, rows, modes) = (model.sectors, model.rows(), model.most_modes());
         let (fourier, lanes) = (Fourier::new(sectors), lanes(sectors));
@@ -180,7 +180,7 @@ impl CyclicBank {
         self.model.sectors
     }
 
-    /// Lanes of a displacement row: sectors rounded up to whole registers.
+    /// Number of lanes of a displacement row: sectors rounded up to whole registers.
     pub fn lanes(&self) -> usize {
         self.lanes
     }
@@ -195,12 +195,12 @@ impl CyclicBank {
         self.instruction_set
     }
 
-    /// The modes.
+    /// Modes of the disk.
     pub fn model(&self) -> &CyclicModel {
         &self.model
     }
 
-    /// Step size of the coefficients in use (s).
+    /// Step size of the current coefficients (s).
     pub fn step(&self) -> f64 {
         self.step
     }
@@ -234,8 +234,8 @@ impl CyclicBank {
         (position, increment)
     }
 
-    /// Set amplitude and velocity (re, im) of a mode of a nodal diameter; the increment is that of free motion under no
-    /// force. A quasi-static mode carries neither and stays 0, and so does the imaginary part of a real mode.
+    /// Sets amplitude and velocity (re, im) of a mode of a nodal diameter; the increment is that of free motion without force. A
+    /// quasi-static mode has neither and stays 0, and so does the imaginary part of a real mode.
     pub fn set_modal_state(&mut self, nodal_diameter: usize, mode: usize, position: [f64; 2], velocity: [f64; 2]) {
         let diameter = &self.model.diameters[nodal_diameter];
         if mode >= diameter.dynamic_modes(self.scheme) {
@@ -254,7 +254,7 @@ impl CyclicBank {
         }
     }
 
-    /// Static equilibrium under the modal loads `modal_load` of nodal diameter 0: q = L/ω², rigid modes at 0.
+    /// Sets the static equilibrium under the modal loads `modal_load` of nodal diameter 0: q = L/ω², rigid-body modes at 0.
     pub fn settle(&mut self, modal_load: &[f64]) {
         self.rest();
         self.state.modal_load_before.copy_from_slice(modal_load);
@@ -266,7 +266,7 @@ impl CyclicBank {
         self.recover();
     }
 
-    /// Everything at rest and undeformed.
+    /// Sets the state to rest, undeformed.
     pub fn rest(&mut self) {
         let state = &mut self.state;
         for values in [&mut state.position, &mut state.increment, &mut state.older, &mut state.force] {
@@ -293,8 +293,8 @@ impl CyclicBank {
         &mut self.modal_load
     }
 
-    /// Predict one step without contact (eq. 9 of the paper) and recover the contact displacements of all sectors. Contact
-    /// forces of the step before act first where they have not yet.
+    /// Predicts one step without contact (eq. 9 of the paper) and recovers the contact displacements of all sectors. Contact
+    /// forces of the previous step that have not been applied yet are applied first.
     pub fn predict(&mut self, with_loss: bool) {
         for (mode, (load_response, modal_load)) in self.load_response.iter_mut().zip(&self.modal_load).enumerate() {
             *load_response = self.coefficients[mode].load_compliance() * modal_load;
@@ -319,8 +319,8 @@ impl CyclicBank {
         self.instruction_set.run(Synthesis { fourier, spectrum, rows, lanes, values });
     }
 
-    /// Let the contact forces of the last step act on its modes, and add its damping loss. The numbers are those that the
-    /// next [`CyclicBank::predict`] would make.
+    /// Applies the contact forces of the last step to its modes and adds its damping loss. The result is the same as that of the
+    /// next [`CyclicBank::predict`].
     pub fn finish(&mut self) {
         match (self.state.unapplied, self.state.loss_due) {
             (false, false) => {}
@@ -349,7 +349,7 @@ impl CyclicBank {
         });
     }
 
-    /// Recompute the contact displacements from the modal state (after setting it). Losses not added yet are dropped.
+    /// Recomputes the contact displacements from the modal state (after setting it). Losses that have not been added yet are dropped.
     pub fn recover(&mut self) {
         self.finish();
         let state = &mut self.state;
@@ -370,7 +370,7 @@ impl CyclicBank {
         }
     }
 
-    /// Set amplitudes that have decayed to nothing to exactly zero, so that no denormals arise.
+    /// Sets amplitudes that have decayed almost to zero to exactly zero, so that no denormals arise.
     pub fn flush(&mut self) {
         for values in [&mut self.state.position, &mut self.state.increment, &mut self.state.older] {
             for value in values.iter_mut().flatten().flatten().filter(|value| value.abs() < FLUSH_BELOW) {
@@ -379,14 +379,14 @@ impl CyclicBank {
         }
     }
 
-    /// True when every modal coordinate is finite.
+    /// Returns whether every modal coordinate is finite.
     pub fn is_finite(&self) -> bool {
         let state = &self.state;
         let all = state.position.iter().chain(&state.increment).chain(&state.force);
         all.flatten().flatten().all(|value| value.is_finite())
     }
 
-    /// Save the state (not the step size).
+    /// Saves the state (not the step size).
     pub fn save(&self, writer: &mut StateWriter) {
         self.state.save(writer);
         if let Some(loads) = &self.excitation {
@@ -394,7 +394,7 @@ impl CyclicBank {
         }
     }
 
-    /// Pass over a saved state and refuse what is none.
+    /// Reads over a saved state and rejects invalid values.
     pub fn check(&self, reader: &mut StateReader) {
         self.state.check(reader);
         if let Some(loads) = &self.excitation {
@@ -402,7 +402,7 @@ impl CyclicBank {
         }
     }
 
-    /// Restore a saved state, after [`CyclicBank::set_step`].
+    /// Restores a saved state, after [`CyclicBank::set_step`].
     pub fn restore(&mut self, reader: &mut StateReader) {
         self.state.restore(reader);
         if let Some(loads) = &mut self.excitation {

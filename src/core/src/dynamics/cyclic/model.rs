@@ -3,8 +3,8 @@
 //! Every nodal diameter n has its Hermitian pencil K_n φ = ω² M_n φ (see [`Harmonic`]). With the mass-normalised modes,
 //! z_n = Φ_n q_n, the equations are q̈ + 2ξω q̇ + ω² q = p for each complex amplitude q, and the displacement of sector s is
 //! u_s = Σ_n Re(Ψ_n q_n e^(2πi n s/N)) with the weighted contact modes Ψ_n = w_n C_n Φ_n. Virtual work gives the modal
-//! force p_n = Ψ_nᴴ Σ_s f_s e^(−2πi n s/N) of forces f_s on the sectors; its imaginary part is left out for n = 0 and
-//! 2n = N, whose modes are real.
+//! force p_n = Ψ_nᴴ Σ_s f_s e^(−2πi n s/N) of forces f_s on the sectors; its imaginary part is omitted for n = 0 and 2n = N,
+//! whose modes are real.
 
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 
@@ -17,9 +17,9 @@ use crate::{Error, Result, Rom, shown};
 /// Entries of a mode shape this close to the largest count as equally large when the phase is chosen.
 const SAME_SIZE: f64 = 1e-6;
 
-/// Frequencies of one mode, once computed by the reduction and once from its matrices, agree to this fraction.
+/// Frequencies of one mode, computed by the reduction and from the matrices of the ROM, agree to this fraction.
 const SAME_FREQUENCY: f64 = 1e-3;
-/// Rigid modes agree to this fraction of the highest frequency.
+/// Frequencies of rigid-body modes agree to this fraction of the highest frequency.
 const RIGID_FREQUENCY: f64 = 1e-5;
 
 /// Modes of one nodal diameter, mass-normalised, in the order of their frequencies.
@@ -27,7 +27,7 @@ const RIGID_FREQUENCY: f64 = 1e-5;
 pub struct DiameterModes {
     /// Nodal diameter n.
     pub nodal_diameter: usize,
-    /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid modes.
+    /// Undamped angular frequencies ω (rad/s), ascending; exactly 0 for rigid-body modes.
     pub frequencies: Vec<f64>,
     /// Damping ratios ξ (-), one per mode.
     pub damping_ratios: Vec<f64>,
@@ -45,7 +45,7 @@ impl DiameterModes {
         self.frequencies.len()
     }
 
-    /// True when there is no mode at all.
+    /// Returns whether there are no modes.
     pub fn is_empty(&self) -> bool {
         self.frequencies.is_empty()
     }
@@ -89,10 +89,10 @@ pub struct CyclicModel {
 }
 
 impl CyclicModel {
-    /// Solve the eigenproblem of every nodal diameter and attach one damping ratio to all modes.
+    /// Solves the eigenproblem of every nodal diameter and assigns one damping ratio to all modes.
     ///
     /// # Errors
-    /// Invalid ROM, or a stiffness that is not positive semidefinite; the message names the array.
+    /// The ROM is invalid, or a stiffness is not positive semidefinite; the message names the array.
     pub fn from_rom(rom: &Rom, damping_ratio: f64) -> Result<Self> {
         let zero = ModalModel::from_rom(rom, damping_ratio)?;
         let (sectors, complex) = (rom.sectors, |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0)));
@@ -100,7 +100,7 @@ impl CyclicModel {
         let map = complex(&rom.contact_map);
         let mut first =
             DiameterModes::new(0, damping_ratio, weight(0, sectors), &map, (squares, complex(&zero.shapes)));
-        // Not by way of the squares, which would cost a rounding.
+        // The frequencies are not computed from their squares, which would add a rounding error.
         first.frequencies = zero.frequencies;
         let mut diameters = vec![first];
         for (index, harmonic) in rom.extras.harmonics.iter().enumerate() {
@@ -121,8 +121,8 @@ impl CyclicModel {
         Ok(model)
     }
 
-    /// The harmonics must have the frequencies that the ROM says they have: exchanged ones do not. (A harmonic in place of
-    /// its complex conjugate has the same; its waves travel the other way.)
+    /// Checks that the harmonics have the frequencies that the ROM states, which detects exchanged harmonics. (The complex
+    /// conjugate of a harmonic has the same frequencies; its waves travel in the other direction.)
     fn check_frequencies(&self, rom: &Rom) -> Result<()> {
         let checks = &rom.checks;
         if checks.nodal_diameters.len() != checks.reduced_frequencies.len() {
@@ -162,12 +162,12 @@ impl CyclicModel {
         self.diameters.iter().map(DiameterModes::len).max().unwrap_or(0)
     }
 
-    /// Whether the modes of a nodal diameter are real: nothing can travel.
+    /// Returns whether the modes of a nodal diameter are real, so that no wave can travel.
     pub fn is_real(&self, nodal_diameter: usize) -> bool {
         nodal_diameter == 0 || 2 * nodal_diameter == self.sectors
     }
 
-    /// Give all modes one damping ratio, but the first of each nodal diameter their `own`.
+    /// Sets one damping ratio for all modes; the first modes of each nodal diameter have their `own`.
     pub fn set_damping_ratio(&mut self, damping_ratio: f64, own: &[f64]) {
         for diameter in &mut self.diameters {
             fill_ratios(&mut diameter.damping_ratios, damping_ratio, own, 1);
@@ -185,9 +185,9 @@ impl CyclicModel {
         weight(nodal_diameter, self.sectors)
     }
 
-    /// One nodal diameter as a real structure: real and imaginary parts of the amplitudes are modes, those of the
-    /// displacement pattern are contact nodes (first all real, then all imaginary ones). Contact that is closed on all
-    /// sectors decouples into these. A nodal diameter with real modes has the real parts only.
+    /// Returns one nodal diameter as a real structure: real and imaginary parts of the amplitudes are modes, those of the
+    /// displacement pattern are contact nodes (first all real, then all imaginary parts). Contact that is closed on all sectors
+    /// decouples into these structures. A nodal diameter with real modes has only real parts.
     pub fn paired(&self, nodal_diameter: usize) -> ModalModel {
         let diameter = &self.diameters[nodal_diameter];
         let (rows, modes) = diameter.contact_modes.shape();
@@ -219,7 +219,7 @@ fn weight(nodal_diameter: usize, sectors: usize) -> f64 {
     libm::sqrt(share / count)
 }
 
-/// Eigenvalues ω² (ascending, rigid ones exactly 0) and mass-normalised modes of a Hermitian pencil.
+/// Eigenvalues ω² (ascending, exactly 0 for rigid-body modes) and mass-normalised modes of a Hermitian pencil.
 fn hermitian_modes(harmonic: &Harmonic, suffix: &str) -> Result<(Vec<f64>, DMatrix<Complex<f64>>)> {
     let Harmonic { mass, stiffness, .. } = harmonic;
     if let Some(modes) = modal_already(mass, stiffness) {
@@ -247,7 +247,7 @@ fn hermitian_modes(harmonic: &Harmonic, suffix: &str) -> Result<(Vec<f64>, DMatr
     Ok((values, shapes))
 }
 
-/// Matrices given in modal coordinates (M = I, K diagonal and ascending) need no eigenproblem.
+/// Returns modes without solving the eigenproblem if the matrices are in modal coordinates (M = I, K diagonal and ascending).
 fn modal_already(
     mass: &DMatrix<Complex<f64>>,
     stiffness: &DMatrix<Complex<f64>>,
@@ -269,7 +269,7 @@ fn modal_already(
         .then(|| (diagonal, DMatrix::identity(order, order)))
 }
 
-/// φᴴKφ, exactly 0 for a rigid mode, as for real modes.
+/// Returns φᴴKφ, exactly 0 for a rigid-body mode, as for real modes.
 fn unresolved_eigenvalue(stiffness: &DMatrix<Complex<f64>>, shapes: &DMatrix<Complex<f64>>, mode: usize) -> f64 {
     let (mut quotient, mut magnitude) = (0.0, 0.0);
     for column in 0..stiffness.ncols() {
@@ -284,7 +284,7 @@ fn unresolved_eigenvalue(stiffness: &DMatrix<Complex<f64>>, shapes: &DMatrix<Com
     if quotient > rounding { quotient } else { 0.0 }
 }
 
-/// An eigenvector's phase is arbitrary; make its largest entry real and positive so that numbers are comparable.
+/// Makes the largest entry of each eigenvector real and positive, because its phase is arbitrary and numbers should be comparable.
 fn fix_phases(shapes: &mut DMatrix<Complex<f64>>) {
     let size = |value: &Complex<f64>| libm::hypot(value.re, value.im);
     for mut column in shapes.column_iter_mut() {
@@ -349,7 +349,7 @@ mod tests {
         assert!(off < 1e-15, "{off:e}");
     }
 
-    /// u = Ψq and p = Ψᴴf, whatever the amplitudes and the forces.
+    /// u = Ψq and p = Ψᴴf for arbitrary amplitudes and forces.
     #[test]
     fn paired_nodal_diameter_equals_the_complex_one() {
         let (sectors, modes) = (5, 4);
@@ -363,7 +363,7 @@ mod tests {
         let mut seed = 10;
         let mut random =
             |count: usize| DMatrix::from_fn(count, 1, |_, _| Complex::new(number(&mut seed), number(&mut seed)));
-        // Amplitudes in pairs; of patterns first all real parts.
+        // Amplitudes as pairs; patterns with all real parts first.
         let in_pairs = |z: &DMatrix<Complex<f64>>| z.iter().flat_map(|z| [z.re, z.im]).collect::<Vec<_>>();
         let in_parts =
             |z: &DMatrix<Complex<f64>>| z.iter().map(|z| z.re).chain(z.iter().map(|z| z.im)).collect::<Vec<_>>();
@@ -385,7 +385,7 @@ mod tests {
 
     #[test]
     fn a_rigid_rotation_of_a_free_pair_is_exactly_rigid() {
-        // Two masses tied by a spring of complex direction: rank one, so one mode is rigid.
+        // Two masses connected by a spring of complex direction: the stiffness has rank one, so one mode is rigid.
         let direction = [Complex::new(1.0, 0.0), Complex::new(-0.6, 0.8)];
         let stiffness = DMatrix::from_fn(2, 2, |i, j| direction[i] * direction[j].conj() * Complex::new(3e7, 0.0));
         let mass =

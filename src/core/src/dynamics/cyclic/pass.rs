@@ -1,8 +1,8 @@
-//! The fused pass over all modes: forces of the step before, damping loss, prediction and recovery at once.
+//! The fused pass over all modes: forces of the previous step, damping loss, prediction and recovery.
 //!
-//! Contact forces of a step act on the modes when the next pass loads the contact modes anyway; until then they are
-//! kept as a spectrum (see [`CyclicBank::finish`](super::CyclicBank::finish)). Accumulators stay in registers, sums run
-//! mode by mode for every lane: wider registers change no bit.
+//! Contact forces of a step are applied to the modes in the next pass, which loads the contact modes anyway; until then they are
+//! stored as a spectrum (see [`CyclicBank::finish`](super::CyclicBank::finish)). Accumulators stay in registers and sums run mode
+//! by mode for every lane, so that wider registers do not change the result.
 
 use super::fourier::Fourier;
 use crate::dynamics::bank::LANES;
@@ -36,24 +36,24 @@ impl CyclicCoefficients {
 
 /// Data of one pass. Arrays of modes are `[block][mode]`, spectra `[block][row]`.
 ///
-/// `APPLY`: the contact forces of the step before act with their compliance first. `DELAYED`: they also act on the
-/// step predicted (massless-boundary). `LOSS`: add the damping loss of the step before. `ADVANCE`: predict and recover.
+/// `APPLY`: the contact forces of the previous step act with their compliance first. `DELAYED`: they also act on the predicted
+/// step (massless-boundary). `LOSS`: add the damping loss of the previous step. `ADVANCE`: predict and recover.
 pub struct Pass<'a, const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bool> {
     pub modes: usize,
     pub rows: usize,
-    /// Contact nodes that the forces act on.
+    /// Contact nodes on which the forces act.
     pub touched: &'a [bool],
     pub coefficients: &'a [CyclicCoefficients],
     /// Ψ, `[block][mode][row]`.
     pub shapes: &'a [Complexes],
-    /// Contact forces of the step before.
+    /// Contact forces of the previous step.
     pub force: &'a [Complexes],
-    /// Modal loads of nodal diameter 0 on the step predicted; may be empty.
+    /// Modal loads of nodal diameter 0 on the predicted step; may be empty.
     pub modal_load: &'a [f64],
     pub position: &'a mut [Complexes],
-    /// d of the step before; with `ADVANCE` only brought up to date for the loss, not stored.
+    /// d of the previous step; with `ADVANCE` it is updated only for the loss and not stored.
     pub increment: &'a mut [Complexes],
-    /// d of the step before that one; receives the new one with `ADVANCE`.
+    /// d of the step before the previous one; receives the new d with `ADVANCE`.
     pub older: &'a mut [Complexes],
     pub loss: &'a mut [f64],
     pub spectrum: &'a mut [Complexes],
@@ -81,7 +81,7 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
     fn block<const ROWS: usize>(&mut self, block: usize) {
         let (modes, rows) = (self.modes, self.rows);
         let force = &self.force[block * rows..][..rows];
-        // Loads turn with the disk: nodal diameter 0 alone.
+        // Loads rotate with the disk, so they act on nodal diameter 0 only.
         let loaded = block == 0 && !self.modal_load.is_empty();
         let mut lost = [0.0; LANES];
         let mut sums = [[[0.0; LANES]; 2]; ROWS];
@@ -149,7 +149,7 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
         }
     }
 
-    /// Rows from `row` on, which the fused pass has no registers for.
+    /// Recovers the rows from `row` on, for which the fused pass has no registers.
     #[inline(always)]
     fn recover(&mut self, block: usize, mut row: usize) {
         let (modes, rows) = (self.modes, self.rows);
@@ -166,7 +166,7 @@ impl<const APPLY: bool, const DELAYED: bool, const LOSS: bool, const ADVANCE: bo
     }
 }
 
-/// U = Σ Ψ q of `ROWS` rows from `first` on, for one block. Returns `ROWS`.
+/// Recovers U = Σ Ψ q of `ROWS` rows from `first` on, for one block. Returns `ROWS`.
 #[inline(always)]
 fn recover<const ROWS: usize>(
     shapes: &[Complexes],
@@ -183,7 +183,7 @@ fn recover<const ROWS: usize>(
     ROWS
 }
 
-/// Σ Ψ q for all rows: the recovery by itself.
+/// Recovers Σ Ψ q for all rows, without prediction.
 pub struct Recover<'a> {
     pub modes: usize,
     pub rows: usize,
@@ -217,14 +217,14 @@ fn add_rows<const ROWS: usize>(sums: &mut [Complexes; ROWS], shapes: &[Complexes
     }
 }
 
-/// p = Ψᴴ F over the contact nodes that carry force.
+/// Returns p = Ψᴴ F over the contact nodes with forces.
 #[inline(always)]
 pub fn modal_force(touched: &[bool], shapes: &[Complexes], force: &[Complexes]) -> Complexes {
     let mut sums = [[0.0; LANES]; 2];
     let (shapes, force) = (shapes.as_chunks::<3>().0, force.as_chunks::<3>().0);
     for ((touched, shapes), force) in touched.iter().zip(shapes).zip(force) {
         if *touched {
-            // Node by node, so that the additions do not wait for each other.
+            // Separate sums for each node, so that the additions do not depend on each other.
             let mut node = [[0.0; LANES]; 2];
             for ([real, imaginary], [across, along]) in shapes.iter().zip(force) {
                 for lane in 0..LANES {

@@ -1,5 +1,5 @@
-//! The state of the disk as plain arrays, for a scheme that marches it over a span of time: coordinates in the order of the lanes,
-//! `[block · modes + mode][re, im][lane]`, of which those without a mode stay 0.
+//! State of the disk as plain arrays, for a scheme that integrates it over a span: coordinates in the order of the lanes,
+//! `[block · modes + mode][re, im][lane]`; entries without a mode stay 0.
 
 use super::fourier::Synthesis;
 use super::pass::{Complexes, Gather, Recover, modal_force};
@@ -8,7 +8,7 @@ use crate::galerkin::shared_body::Coordinates;
 use crate::settings::Scheme;
 use nalgebra::DMatrix;
 
-/// Arrays of lanes as what they are made of.
+/// Converts a flat array to complex lanes.
 fn complexes(values: &[f64]) -> &[Complexes] {
     values.as_chunks::<LANES>().0.as_chunks::<2>().0
 }
@@ -19,13 +19,14 @@ impl CyclicBank {
         self.state.position.len() * 2 * LANES
     }
 
-    /// Place of the real or imaginary part of a mode.
+    /// Index of the real or imaginary part of a mode.
     fn place(&self, nodal_diameter: usize, mode: usize, part: usize) -> usize {
         let (index, lane) = self.index(nodal_diameter, mode);
         (2 * index + part) * LANES + lane
     }
 
-    /// Returns the coordinates with quasi-static highest modes, and the motion of the contact rows of sector 0 per coordinate (rows × coordinates).
+    /// Returns the coordinates, whose highest modes are quasi-static, and the displacement of the contact rows of sector 0 per
+    /// coordinate (rows × coordinates).
     pub fn coordinates_of(&self) -> (Coordinates, DMatrix<f64>) {
         let count = self.coordinates();
         let nothing = || vec![0.0; count];
@@ -52,12 +53,12 @@ impl CyclicBank {
         (found, shapes)
     }
 
-    /// Displacements of now become those before.
+    /// Makes the current displacements the previous ones.
     pub fn begin_span(&mut self) {
         self.state.displacement_before.copy_from_slice(&self.state.displacement);
     }
 
-    /// Read q and q̇; those of modes without inertia are not 0.
+    /// Reads q and q̇; those of modes without inertia are not 0.
     pub fn read_all(&self, [position, velocity]: [&mut [f64]; 2]) {
         position.copy_from_slice(self.state.position.as_flattened().as_flattened());
         for (to, increment) in velocity.iter_mut().zip(self.state.increment.as_flattened().as_flattened()) {
@@ -65,7 +66,7 @@ impl CyclicBank {
         }
     }
 
-    /// Write them, and the contact displacements with them.
+    /// Writes q and q̇, and the resulting contact displacements.
     pub fn write_all(&mut self, position: &[f64], velocity: &[f64]) {
         self.state.position.as_flattened_mut().as_flattened_mut().copy_from_slice(position);
         let increments = self.state.increment.as_flattened_mut().as_flattened_mut();
@@ -75,7 +76,7 @@ impl CyclicBank {
         self.state.displacement = displacement;
     }
 
-    /// Displacements of the contact rows of all sectors, `[row][lane of sector]`, at other coordinates, or velocities there.
+    /// Computes displacements or velocities of the contact rows of all sectors, `[row][lane of sector]`, from given coordinates or their rates.
     pub fn rows_of(&mut self, coordinates: &[f64], values: &mut [f64]) {
         let (modes, rows, shapes, position) = (self.modes, self.rows, &self.shapes[..], complexes(coordinates));
         self.instruction_set.run(Recover { modes, rows, shapes, position, spectrum: &mut self.spectrum });
@@ -83,7 +84,7 @@ impl CyclicBank {
         self.instruction_set.run(Synthesis { fourier, spectrum, rows, lanes, values });
     }
 
-    /// Forces on all coordinates of forces (sector, node, N).
+    /// Computes the forces on all coordinates that contact forces (sector, node, N) cause.
     pub fn modal_forces(&mut self, forces: impl Iterator<Item = (usize, usize, [f64; 3])>, to: &mut [f64]) {
         self.asked.clear();
         self.asked.extend(forces);
@@ -103,7 +104,7 @@ impl CyclicBank {
         }
     }
 
-    /// |Ψ| of all rows by pairs of coordinates (rows × coordinates/2), of the `shapes` of sector 0.
+    /// Returns |Ψ| of all rows for pairs of coordinates (rows × coordinates/2), from the `shapes` of sector 0.
     pub fn sizes(&self, shapes: &DMatrix<f64>) -> Vec<f64> {
         let pairs = (0..self.coordinates() / 2).map(|pair| pair / LANES * 2 * LANES + pair % LANES);
         let sizes = pairs.flat_map(|real| {
@@ -113,7 +114,7 @@ impl CyclicBank {
         sizes.collect()
     }
 
-    /// Adds the largest displacement of each contact row of any sector (m) under coordinates of these amplitudes, with [`CyclicBank::sizes`].
+    /// Finds the largest displacement of each contact row of any sector (m) for coordinates of these amplitudes, with [`CyclicBank::sizes`].
     pub fn reach(&self, amplitudes: &[f64], sizes: &[f64], reach: &mut [f64]) {
         reach.fill(0.0);
         for (pair, sizes) in sizes.chunks_exact(self.rows).enumerate() {
@@ -124,7 +125,7 @@ impl CyclicBank {
         }
     }
 
-    /// Add to the damping loss (J).
+    /// Adds to the damping loss (J).
     pub fn lose(&mut self, loss: f64) {
         self.state.loss[0] += loss;
     }
@@ -135,7 +136,7 @@ mod tests {
     use super::*;
     use crate::dynamics::cyclic::tests::model;
 
-    /// Sectors see coordinates as sector 0 does, turned; forces on coordinates are the transpose of displacements.
+    /// Each sector sees the coordinates as sector 0 does, but rotated; the map of forces is the transpose of the map of displacements.
     #[test]
     fn force_and_displacement_maps_are_transposes() {
         for sectors in [2, 5, 12] {

@@ -1,11 +1,11 @@
-//! Energies, rest, sets of instructions, and displacements against modes.
+//! Energies, states of rest, instruction sets, and displacements compared with modes.
 
 use super::*;
 use nalgebra::{Complex, DMatrix};
 
 pub(super) fn model(sectors: usize, nodes: usize) -> CyclicModel {
     let diameter = |n: usize| {
-        // Fewer modes for some nodal diameters than for others.
+        // Some nodal diameters have fewer modes than others.
         let modes = 3 * nodes + 4 - n % 3;
         let real = n == 0 || 2 * n == sectors;
         let shape = |row: usize, mode: usize| {
@@ -24,7 +24,7 @@ pub(super) fn model(sectors: usize, nodes: usize) -> CyclicModel {
     CyclicModel { sectors, diameters: (0..=sectors / 2).map(diameter).collect() }
 }
 
-/// Free motion keeps ½q̇² + ½ω²q² of every nodal diameter, which the energy that is conserved does not tell.
+/// Free motion conserves ½q̇² + ½ω²q² of every nodal diameter, which differs from the energy that the scheme conserves.
 #[test]
 fn instantaneous_energy_matches_the_motion() {
     let mut undamped = model(11, 2);
@@ -94,7 +94,7 @@ fn quasi_static_modes_start_without_motion() {
     assert!(((kinetic + strain) / expected - 1.0).abs() < 1e-12, "{kinetic} + {strain} of {expected} J");
 }
 
-/// The widest set against the baseline; a processor without wider registers compares the baseline with itself.
+/// Compares the widest instruction set with the baseline; without wider registers the baseline is compared with itself.
 #[test]
 fn every_instruction_set_gives_the_same_bits() {
     for (sectors, nodes) in [(13, 1), (20, 2), (36, 5)] {
@@ -132,7 +132,7 @@ fn every_instruction_set_gives_the_same_bits() {
     }
 }
 
-/// Contact displacements that were corrected at once are those of the modes corrected one by one later.
+/// Contact displacements that were corrected immediately agree with those of the modes, which are corrected later.
 #[test]
 fn displacements_and_modes_agree_after_contact() {
     let mut bank = CyclicBank::new(&model(11, 2), false);

@@ -1,10 +1,10 @@
-//! Sectors that are tried together: they move each other, or a surface that all of them touch.
+//! Trials of sectors that step together because they move each other or touch a common surface.
 
 use super::Trial;
 use crate::galerkin::state::SectorState;
 
 impl Trial {
-    /// Displacements (m) and velocities (m/s) of the rows at the start, which somebody else knows.
+    /// Sets the displacements (m) and velocities (m/s) of the rows at the start from the values of the caller.
     pub fn start_at(&mut self, of_row: impl Fn(usize) -> [f64; 2]) {
         for (row, (moved, velocity)) in self.start.iter_mut().zip(&mut self.velocities).enumerate() {
             [*moved, *velocity] = of_row(row);
@@ -12,7 +12,7 @@ impl Trial {
         self.known = true;
     }
 
-    /// Gaps at the start where nobody has looked; `gap` of a node displaced so (m).
+    /// Finds unknown gaps at the start; `gap` returns the gap of a node with a given displacement (m).
     pub fn find_start_gaps(&mut self, state: &SectorState, mut gap: impl FnMut(usize, [f64; 3]) -> f64) {
         if !state.gaps_known {
             for node in 0..self.nodes() {
@@ -21,7 +21,8 @@ impl Trial {
         }
     }
 
-    /// Somebody else knows displacements under the forces of now (m), of a node at point 1 … s: those of others are what is left.
+    /// Sets the displacements without forces so that the total displacement (m) of a node at point 1 … s equals that of the
+    /// caller, which includes the effect of other sectors.
     pub fn carry(&mut self, of: impl Fn(usize, usize) -> [f64; 3]) {
         for lane in 0..self.lanes.len() {
             let (point, node) = self.lanes.place(lane);
@@ -30,7 +31,7 @@ impl Trial {
         }
     }
 
-    /// Gaps (m) and normals at point 1 … s, of nodes at their displacements of now (m).
+    /// Finds gaps (m) and normals at point 1 … s, for the current displacements of the nodes (m).
     pub fn find_gaps_at(&mut self, point: usize, mut gap: impl FnMut(usize, [f64; 3]) -> (f64, [f64; 3])) {
         for node in 0..self.nodes() {
             let lane = self.lanes.at(point, node);
@@ -40,7 +41,7 @@ impl Trial {
         }
     }
 
-    /// Impulses that the step leaves out on the rows of a node (N·s), once it is judged.
+    /// Impulse error on the rows of a node (N·s); valid after the step has been judged.
     pub fn impulse(&self, node: usize) -> [f64; 3] {
         super::vector3_at(&self.impulses, node)
     }

@@ -1,4 +1,4 @@
-//! How good a step is that has been solved: its error, what switches leave, and what came near between the points.
+//! Judges a solved step: its error, the energy of contacts that open or close, and nodes that came near between the points.
 
 use super::{ForceInterpolation, FreeMotion, Obstacle, Trial, vector3_at};
 use crate::galerkin::basis::{POINTS, TimeBasis};
@@ -6,35 +6,37 @@ use crate::galerkin::kernels::AddProduct;
 use crate::galerkin::level::StepTables;
 use crate::galerkin::rows::ContactRows;
 
-/// Largest change of slope of a force over a step counts by this share of it: what the highest divided difference does not see of a
-/// contact that opens or closes. Measured on 148 random rubs at tolerances from 1e-2 to 1e-5 (`lab scatter`): with 0.05, 0.1 and 0.2 five in
-/// a hundred errors are beyond 1.9, 1.9 and 1.8 times the tolerance, and in 1, 2 and 6 % more trials than without.
+/// Weight of the largest change of slope of a force in the error of a step, because the highest divided difference misses a
+/// contact that opens or closes. Measured on 148 random rubs at tolerances from 1e-2 to 1e-5 (`lab scatter`): with 0.05, 0.1 and
+/// 0.2, 5 % of the errors exceed 1.9, 1.9 and 1.8 times the tolerance, with 1, 2 and 6 % more trials than without this term.
 const KINK: f64 = 0.2;
-/// The same of forces that are linear in time, where contacts may stick. Measured on a block that swings under friction (`core/tests/belt.rs`):
-/// 14 stops leave up to 2.5 times the tolerance. And on a rub where all slides (`core/tests/galerkin/sticking.rs`): 0.2 to 0.8 of it.
+/// Weight of the change of slope of forces that are linear in time, if contacts may stick. Measured on a block that swings under
+/// friction (`core/tests/belt.rs`): 14 stops cause an error of up to 2.5 times the tolerance. On a rub in which all contacts
+/// slide (`core/tests/galerkin/sticking.rs`): 0.2 to 0.8 times.
 const BEND: f64 = 0.5;
-/// The same where a contact opens or closes: what it leaves decides when the next sticks and slips. Measured on a blade of three modes that
-/// sticks and slips thousands of times (`core/tests/galerkin/sticking.rs`): with 0.5, 10 and 30 its errors at tolerances from 1e-2 to 1e-5 are
-/// up to 305, 10 and 2.4 times the tolerance, in 17 and 26 % more trials.
+/// Weight for linear forces of a contact that opens or closes, because its error determines when the next contact sticks and
+/// slips. Measured on a blade of three modes that sticks and slips thousands of times (`core/tests/galerkin/sticking.rs`): with
+/// 0.5, 10 and 30 its errors at tolerances from 1e-2 to 1e-5 are up to 305, 10 and 2.4 times the tolerance, with 17 and 26 % more
+/// trials.
 const OPENING: f64 = 30.0;
-/// Gap of a node between points may be so many times what the polynomial leaves out, or the step is shortened.
+/// A step is shortened if the gap of a node between the points may be below this multiple of the interpolation error.
 pub(super) const NEAR: f64 = 4.0;
 /// Result of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TrialResult {
-    /// The contact problem has been solved.
+    /// True if the contact problem has been solved.
     pub solved: bool,
-    /// Estimate of the error it makes in displacements (m).
+    /// Estimated displacement error of the step (m).
     pub error: f64,
-    /// A contact opens or closes.
+    /// True if a contact opens or closes.
     pub switches: bool,
-    /// Energy that this adds (J): Σ λ_i S_ik g_k of those nodes, and what friction puts in.
+    /// Energy added by switching contacts (J): Σ λ_i S_ik g_k of their nodes plus the energy supplied by friction.
     pub switched: f64,
-    /// A node may have touched between the points.
+    /// True if a node may have touched between the points.
     pub near: bool,
-    /// Depth of open nodes within a surface between the points (m), by the polynomial through their gaps.
+    /// Depth of open nodes within a surface between the points (m), from the polynomial through their gaps.
     pub depth: f64,
-    /// Linear systems factorised.
+    /// Number of factorised linear systems.
     pub factorisations: usize,
 }
 
@@ -44,15 +46,15 @@ impl TrialResult {
         self.error > tolerance || self.depth > tolerance
     }
 
-    /// Returns whether the polynomials of the step describe the motion between its points: its force is a polynomial, and its error is within
-    /// the tolerance (m).
+    /// Returns whether the polynomials of the step describe the motion between its points: its force is a polynomial and its
+    /// error is within the tolerance (m).
     pub fn resolves_motion(&self, kind: ForceInterpolation, tolerance: f64) -> bool {
         kind == ForceInterpolation::Polynomial && !self.misses(tolerance)
     }
 }
 
 impl Trial {
-    /// Error, switches, and near misses of a step that is solved.
+    /// Finds error, switches and near misses of a solved step.
     pub fn judge(
         &mut self,
         (level, rows): (&StepTables, &ContactRows),
@@ -76,7 +78,7 @@ impl Trial {
                 continue;
             }
             pushed = true;
-            // What comes or goes over a free edge is looked at closely.
+            // A contact that passes over a free edge needs short steps.
             verdict.near |= (0..count).any(|point| self.gap(point, node) == f64::INFINITY);
             let mut forces = [[0.0; 3]; POINTS];
             forces[..count].iter_mut().enumerate().for_each(|(point, force)| *force = self.force(point, node));
@@ -86,7 +88,7 @@ impl Trial {
                 self.impulses[3 * node + component] = if self.sticking.is_some() && basis.degree > 1 {
                     left / level.share
                 } else if self.sticking.is_some() {
-                    // What closed contacts leave adds up over all steps of a longest one.
+                    // Errors of closed contacts accumulate over all steps of a span.
                     let bend = if all { BEND / level.share } else { OPENING };
                     bend * level.step * self.bend(node, component)
                 } else if all {
@@ -120,7 +122,7 @@ impl Trial {
         }
     }
 
-    /// The same of a force that is linear in time, against the step before: what sticks and slides turns its force without opening.
+    /// Change of slope of a linear force relative to the previous step; sticking and sliding turn the force without opening the contact.
     fn bend(&self, node: usize, component: usize) -> f64 {
         let row = 3 * node + component;
         let slope = self.force(1, node)[component] - self.start_contacts.forces[row];
@@ -130,21 +132,22 @@ impl Trial {
         if self.multiplier(1, node) == 0.0 && slope.abs() > before.abs() { slope } else { before }
     }
 
-    /// Returns the largest depth of open nodes between the points (m), without those whose surface has jumped at the start of the step:
-    /// the polynomial through their gaps overshoots. Displacements at the start must be known.
+    /// Returns the largest depth of open nodes between the points (m). It excludes nodes whose surface has jumped at the start of
+    /// the step, because the polynomial through their gaps overshoots. Displacements at the start must be known.
     ///
-    /// `gap_at_start` returns the gap of a node at the start (m) displaced by a vector (m); `None` if it is unknown, and the node is left out.
+    /// `gap_at_start` returns the gap (m) at the start of a node displaced by a vector (m), or `None` if it is unknown; the node
+    /// is then excluded.
     pub fn depth_without_jumps(&self, mut gap_at_start: impl FnMut(usize, [f64; 3]) -> Option<f64>) -> f64 {
         let open = (0..self.nodes()).filter(|node| self.depths[*node] > 0.0);
         open.fold(0.0, |deepest, node| {
             let gap = gap_at_start(node, vector3_at(&self.start, node));
-            // Less than 0.15 times a jump lies below the gaps at the points.
+            // The overshoot below the gaps at the points is less than 0.15 times the jump.
             let is_steady = gap.is_some_and(|gap| (gap - self.start_contacts.gaps[node]).abs() < self.depths[node]);
             if is_steady { deepest.max(self.depths[node]) } else { deepest }
         })
     }
 
-    /// Whether the gap of an open node comes near zero between the points, and the depth to which it falls below zero there (m).
+    /// Returns whether the gap of an open node comes near zero between the points, and its depth below zero there (m).
     fn comes_near(&self, level: &StepTables, node: usize, obstacle: &impl Obstacle) -> (bool, f64) {
         let basis = &level.basis;
         let mut gaps = [0.0; POINTS];
@@ -155,10 +158,10 @@ impl Trial {
         }
         if basis.degree == 1 {
             let (lowest, bend) = self.bend_of_gap(level.step, node, [gaps[0], gaps[1]], obstacle);
-            // A parabola with this deviation goes below its ends and its middle by a quarter of it at most.
+            // A parabola with this deviation falls below its ends and its middle by at most a quarter of it.
             return (lowest < 0.25 * NEAR * bend, 0.0);
         }
-        // Between its points a cubic leaves their range by less than half of it, and what it leaves out is less than all of it.
+        // Between its points, a cubic exceeds their range by less than half of it, and its interpolation error is less than the range.
         let extremes = |(low, high): (f64, f64), gap: &f64| (gap.min(low), gap.max(high));
         let (low, high) = gaps.iter().fold((f64::INFINITY, f64::NEG_INFINITY), extremes);
         if low > (0.5 + NEAR) * (high - low) {
@@ -174,8 +177,8 @@ impl Trial {
     /// the straight line between the ends (m). The deviation adds three magnitudes, which may not cancel because they are estimates: the node's
     /// path, a cubic with the velocities at both ends; the motion of the surface; and the amplitudes of modes that the step does not resolve.
     ///
-    /// The velocity at the end is that of free motion. If it is unknown, the path is a parabola. Surfaces that are known at the points only are
-    /// taken to be at rest.
+    /// The velocity at the end is that of free motion. If it is unknown, the path is a parabola. Surfaces that are known only at
+    /// the points count as being at rest.
     fn bend_of_gap(&self, step: f64, node: usize, ends: [f64; 2], obstacle: &impl Obstacle) -> (f64, f64) {
         let (from, to, normal) = (self.displacement(0, node), self.displacement(1, node), self.normal(1, node));
         let velocity = vector3_at(&self.velocities, node);
@@ -194,8 +197,8 @@ impl Trial {
     }
 }
 
-/// Largest change of slope of values at the points, over the step; before and after it what begins or ends with 0 rests there. So a contact
-/// that opens or closes counts even where its values at the points happen to lie on a straight line.
+/// Largest change of slope of values at the points over the step. Values that begin or end with 0 count as resting there before
+/// or after, so that a contact that opens or closes is detected even if its values at the points lie on a straight line.
 fn kink(basis: &TimeBasis, value: impl Fn(usize) -> f64) -> f64 {
     let last = basis.degree;
     let slope = |i: usize| (value(i + 1) - value(i)) / (basis.points[i + 1] - basis.points[i]);
@@ -217,7 +220,7 @@ mod tests {
         for degree in 1..=3 {
             let basis = TimeBasis::new(degree);
             let of = |value: &dyn Fn(f64) -> f64| kink(&basis, |point| value(basis.points[point]));
-            // On a straight line from the start, to the end, and within.
+            // Straight lines from the start and to the end, and a kink within the step.
             assert!((of(&|theta| theta) - 1.0).abs() < 1e-12 && (of(&|theta| 1.0 - theta) - 1.0).abs() < 1e-12);
             assert!(of(&|theta| (theta - 0.5).max(0.0)) > 0.49 && of(&|theta| (0.5 - theta).max(0.0)) > 0.49);
             assert!(of(&|theta| 2.0 + theta) < 1e-12);

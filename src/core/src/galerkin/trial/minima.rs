@@ -1,8 +1,8 @@
-//! Smallest gaps within a step, between its points: of nodes that stay open.
+//! Smallest gaps between the points of a step, for nodes that stay open.
 //!
-//! Gaps at the points make a polynomial, which shows where a node may come closer between them. There its motion is followed exactly: all modes
-//! at the ends of eighths of the step, and cubics with their displacements and velocities in between. Where a contact is closed at a point,
-//! gaps are those at the points.
+//! The polynomial through the gaps at the points shows where a node may come closer between them. There, its motion is followed
+//! exactly: all modes at the ends of eighths of the step, and cubics through their displacements and velocities in between. If a
+//! contact is closed at a point, only the gaps at the points are used.
 
 use super::judgement::NEAR;
 use super::{ForceInterpolation, Obstacle, Trial};
@@ -14,11 +14,11 @@ use crate::galerkin::rows::ContactRows;
 use crate::galerkin::sector::{HALVINGS, Tables};
 use crate::galerkin::state::SectorState;
 
-/// Halvings of a step at whose ends motion is followed.
+/// Number of halvings of a step at whose ends the motion is followed.
 const FINER: usize = 3;
-/// As many parts.
+/// Number of these parts.
 pub const PARTS: usize = 1 << FINER;
-/// Nodes are looked at that may come closer by more than this share of the tolerance.
+/// Nodes are followed if they may come closer by more than this fraction of the tolerance.
 const SHARE: f64 = 0.1;
 
 /// Displacement of a node at the ends of parts of a step (m), and its change per part there.
@@ -27,17 +27,17 @@ type Path = [[[f64; 3]; 2]; PARTS + 1];
 /// Smallest gaps between the points.
 #[derive(Debug, Clone)]
 pub(super) struct Minima {
-    /// Where the polynomial through the gaps of a node is smallest, as a share of the step; NaN where it need not be looked at.
+    /// Fraction of the step at which the polynomial through the gaps of a node is smallest; NaN if the node need not be followed.
     at: Vec<f64>,
-    /// Paths of the nodes, and the number of parts in which they are known; 0 if they were not followed.
+    /// Paths of the nodes, and the number of parts in which they are known; 0 if no paths were followed.
     paths: Vec<Path>,
     parts: usize,
-    /// State on the way.
+    /// State within the step.
     state: SectorState,
 }
 
 impl Minima {
-    /// Room for so many modes and contact nodes.
+    /// Allocates data for `modes` modes and `nodes` contact nodes.
     pub(super) fn new(modes: usize, nodes: usize) -> Self {
         Self {
             at: vec![f64::NAN; nodes],
@@ -49,7 +49,7 @@ impl Minima {
 }
 
 impl Trial {
-    /// Find gaps and displacements at the points of a step without forces.
+    /// Finds gaps and displacements at the points of a step without forces.
     pub fn glide(&mut self, level: &StepTables, rows: &ContactRows, state: &SectorState, obstacle: &mut impl Obstacle) {
         self.begin((level, ForceInterpolation::Polynomial), Some(rows), state);
         self.find_start(rows, state);
@@ -57,7 +57,8 @@ impl Trial {
         self.find_gaps(obstacle);
     }
 
-    /// Find nodes that may come closer between the points of a step than at them by more than a share of `tolerance` (m); whether there are any.
+    /// Finds nodes that may come closer between the points of a step than at them, by more than a fraction of `tolerance` (m).
+    /// Returns whether there are any.
     ///
     /// Finds none if `is_resolved` is false: the polynomials of a step with a constant force, or of a step that misses the tolerance, do not
     /// describe the motion between its points.
@@ -79,7 +80,7 @@ impl Trial {
             let minimum = interior_minimum(&cubic);
             let lowest = gaps[..basis.count()].iter().copied().fold(f64::INFINITY, f64::min);
             let deeper = minimum.map_or(0.0, |theta| lowest - evaluate(&cubic, theta));
-            // Towards its lower end it falls by more in a part than what is left out of the polynomial.
+            // Near its lower end the gap falls within one part by more than the interpolation error.
             let falls = minimum.is_none() && slope.abs() > left * real(PARTS);
             if !falls && deeper + left > SHARE * tolerance {
                 self.minima.at[node] = minimum.unwrap_or(lower);
@@ -89,7 +90,7 @@ impl Trial {
         found
     }
 
-    /// Follow the nodes found over a step of a level, before its state moves on.
+    /// Follows the selected nodes over a step of a level, before its state is advanced.
     pub fn follow(
         &mut self,
         tables: &Tables,
@@ -126,7 +127,8 @@ impl Trial {
         self.minima = minima;
     }
 
-    /// Returns the displacement of a node within the step by the residual flexibility (m), and its slope with respect to the fraction of the step.
+    /// Returns the displacement of a node within the step by the residual flexibility (m), and its derivative with respect to the
+    /// fraction of the step.
     fn bent(&self, basis: &TimeBasis, rows: &ContactRows, node: usize, theta: f64) -> [[f64; 3]; 2] {
         let mut sums = [[0.0; 3]; 2];
         for other in 0..self.nodes() {
@@ -147,24 +149,24 @@ impl Trial {
         sums
     }
 
-    /// Whether a node may come closer between the points of the step, and where (share of the step).
+    /// Returns the fraction of the step at which a node may come closer than at the points, if any.
     pub fn minimum(&self, node: usize) -> Option<f64> {
         let theta = self.minima.at[node];
         (!theta.is_nan()).then_some(theta)
     }
 
-    /// In how many parts the motion of nodes is known; 1 where it is the polynomial of the step.
+    /// Number of parts in which the motion of nodes is known; 1 if it is the polynomial of the step.
     pub fn parts(&self) -> usize {
         self.minima.parts.max(1)
     }
 
-    /// Gap of a node within the step (m), by the polynomial through those at the points.
+    /// Gap of a node within the step (m), from the polynomial through the gaps at the points.
     pub fn gap_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> f64 {
         let weights = basis.weights_at(theta);
         (0..basis.count()).map(|point| weights[point] * self.gap(point, node)).sum()
     }
 
-    /// Displacement of a node within the step (m): followed exactly, or by the polynomial through those at the points.
+    /// Displacement of a node within the step (m): followed exactly, or from the polynomial through the displacements at the points.
     pub fn displacement_within(&self, basis: &TimeBasis, node: usize, theta: f64) -> [f64; 3] {
         let parts = self.minima.parts;
         if parts == 0 {
@@ -186,7 +188,7 @@ impl Trial {
         })
     }
 
-    /// Largest λ of a node within the step (N): of the polynomial through those at the points.
+    /// Largest λ of a node within the step (N), from the polynomial through the values at the points.
     pub fn peak(&self, basis: &TimeBasis, kind: ForceInterpolation, node: usize) -> f64 {
         let at_points = (0..=self.points()).fold(0.0_f64, |peak, point| peak.max(self.multiplier(point, node)));
         if kind == ForceInterpolation::Constant {
@@ -200,7 +202,7 @@ impl Trial {
     }
 }
 
-/// Small numbers as reals.
+/// Converts a small integer to a real number.
 #[expect(clippy::cast_precision_loss, reason = "below 100")]
 fn real(value: usize) -> f64 {
     value as f64

@@ -1,4 +1,4 @@
-//! One step of one sector, tried: contact forces at the points, gaps there, and how good they are.
+//! Trial of one step of one sector: contact forces and gaps at the points, and the quality of the step.
 
 mod coupled;
 mod judgement;
@@ -23,9 +23,9 @@ pub use obstacle::{Obstacle, SlidingState, node_by_node};
 use steady::Steady;
 use sticking::Sticking;
 
-/// Most evaluations of the gaps of one trial.
+/// Largest number of gap evaluations in one trial.
 const PASSES: usize = 6;
-/// Gaps this far below zero, as a share of the largest, are rounding.
+/// Negative gaps within this fraction of the largest gap count as rounding.
 const ROUNDING: f64 = 1e-13;
 
 /// Forces over a step: a polynomial through all points, or a constant force and the end alone.
@@ -33,7 +33,7 @@ const ROUNDING: f64 = 1e-13;
 pub enum ForceInterpolation {
     /// The force is a polynomial of degree s.
     Polynomial,
-    /// The force is what it is at the end: dissipative whatever opens or closes.
+    /// The force has its value at the end of the step throughout, which is dissipative whatever opens or closes.
     Constant,
 }
 
@@ -48,41 +48,41 @@ impl ForceInterpolation {
     }
 }
 
-/// Three values of a node.
+/// The three components of a node.
 pub fn vector3_at(values: &[f64], node: usize) -> [f64; 3] {
     [values[3 * node], values[3 * node + 1], values[3 * node + 2]]
 }
 
-/// Scratch of a trial and what it found, for one number of contact nodes.
+/// Scratch memory and results of a trial, for a fixed number of contact nodes.
 #[derive(Debug, Clone)]
 pub struct Trial {
     lanes: Lanes,
-    /// Displacements of rows and velocities there at the start; whether they are those of the state.
+    /// Displacements and velocities of the rows at the start, and whether they belong to the state.
     start: Vec<f64>,
     velocities: Vec<f64>,
     known: bool,
     now: Sums<2>,
     /// Contacts at the start.
     start_contacts: Contacts,
-    /// Displacements of the lanes without forces after the start (m), what forces add, and the sum.
+    /// Displacements of the lanes without forces after the start (m), those caused by the forces, and their sum.
     free: Vec<f64>,
     pushed: Vec<f64>,
     moved: Vec<f64>,
     gaps: Vec<f64>,
     normals: Vec<f64>,
-    /// Normals for which the forces were found: those of the displacements one pass earlier.
+    /// Normals for which the forces were found, at the displacements of the previous pass.
     solved_normals: Vec<f64>,
-    /// Gaps without the forces, linear from where they are; gaps with them.
+    /// Gaps without the forces, linearised at the current displacements, and gaps with the forces.
     without: Vec<f64>,
     with: Vec<f64>,
     multipliers: Vec<f64>,
-    /// Forces per λ, and forces.
+    /// Directions of the forces (force per λ), and forces.
     directions: Vec<f64>,
     forces: Vec<f64>,
-    /// Displacements and gaps of all lanes per λ of each.
+    /// Displacements and gaps of all lanes per λ of each lane.
     columns: Vec<f64>,
     closing: Vec<f64>,
-    /// Compliance of the obstacle, if it is elastic.
+    /// Compliance of the obstacle, and whether it is elastic.
     carrier_compliance: Vec<f64>,
     carrier_yields: bool,
     solver: ContactSolver,
@@ -90,7 +90,7 @@ pub struct Trial {
     /// Unknowns of the problem: lanes.
     members: Vec<usize>,
     chosen: Vec<bool>,
-    /// Columns taken of a table, and how much of each.
+    /// Selected columns of a table, and their coefficients.
     taken: Vec<usize>,
     amounts: Vec<f64>,
     sums: Sums<MOST>,
@@ -98,20 +98,20 @@ pub struct Trial {
     free_motion: FreeMotion,
     /// Weights of the work of forces at each point.
     work_weights: [[f64; POINTS]; POINTS],
-    /// Displacements at each point without the residual flexibility (m), where they are asked for.
+    /// Displacements at each point without the residual flexibility (m), if they are needed.
     inert: [Vec<f64>; POINTS],
-    /// Forces at one of them, turned round (N).
+    /// Negative forces at one point (N).
     withdrawn: Vec<f64>,
-    /// Impulses left out (N·s), and what the error makes of them (m²/(N·s)).
+    /// Impulse errors (N·s), and their product with the error form (m²/(N·s)).
     impulses: Vec<f64>,
     left: Vec<f64>,
     /// Depth of each node between the points (m), 0 if it touches at a point.
     depths: Vec<f64>,
     minima: Minima,
-    /// Where contacts may stick; and 1/h of the step (1/s), 0 where its force does not follow on that before.
+    /// Data for contacts that may stick; and 1/h of the step (1/s), 0 if its force does not continue that of the previous step.
     sticking: Option<Box<Sticking>>,
     per_step: f64,
-    /// Data of steps of a higher degree; and slopes of the polynomials through the points at the end of the step (1/s).
+    /// Data for steps of a higher degree; and slopes of the polynomials through the points at the end of the step (1/s).
     steady: Option<Box<Steady>>,
     end_slopes: [f64; POINTS],
 }
@@ -123,11 +123,11 @@ struct FreeMotion {
     end_velocities: Sums<1>,
     /// Summed amplitudes of the modes that the step does not resolve (m).
     unresolved_amplitudes: Sums<1>,
-    /// Whether the two belong to the step that is tried.
+    /// True if the two belong to the tried step.
     is_known: bool,
 }
 
-/// Forces, λ, gaps and normals (those for which the forces were found) of the nodes at the start.
+/// Forces, λ, gaps and normals of the nodes at the start; the normals are those for which the forces were found.
 #[derive(Debug, Clone, PartialEq)]
 struct Contacts {
     forces: Vec<f64>,
@@ -139,7 +139,7 @@ struct Contacts {
 }
 
 impl Trial {
-    /// Room for `nodes` contact nodes of a sector with so many modes.
+    /// Creates a trial for a sector with `modes` modes and `nodes` contact nodes.
     pub fn new(modes: usize, nodes: usize) -> Self {
         let lanes = Lanes { points: MOST, nodes };
         let (width, three) = (|| vec![0.0; lanes.width()], || vec![0.0; 3 * lanes.width()]);
@@ -199,7 +199,7 @@ impl Trial {
         }
     }
 
-    /// The same of contacts that may stick. Polynomials are of degree 1.
+    /// Enables contacts that may stick. Polynomials are of degree 1.
     #[must_use]
     pub fn sticking(mut self) -> Self {
         self.sticking = Some(Box::new(Sticking::new(self.lanes.nodes)));
@@ -207,19 +207,19 @@ impl Trial {
         self
     }
 
-    /// The same with steps of a higher degree, while nothing changes.
+    /// Enables steps of a higher degree while no contact changes its status.
     #[must_use]
     pub fn steady(mut self) -> Self {
         self.steady = Some(Box::new(Steady::new(self.lanes.len(), self.lanes.nodes)));
         self
     }
 
-    /// The state is another one than that of the last trial.
+    /// Marks the stored start values as outdated, because the state has changed.
     pub fn forget(&mut self) {
         self.known = false;
     }
 
-    /// Try a step from `state`; `precision`: gaps of contacts that count as closed (m).
+    /// Tries a step from `state`; `precision` is the largest gap of a contact that counts as closed (m).
     pub fn run(
         &mut self,
         (level, kind): (&StepTables, ForceInterpolation),
@@ -238,7 +238,7 @@ impl Trial {
             if lowest.is_nan() {
                 return verdict;
             }
-            // Nothing pushes and nothing is pushed; or what was solved holds on the curved gaps as well.
+            // No contact is active or needed, or the solution also holds for the curved gaps.
             if (rests && lowest >= 0.0) || (pass > 0 && lowest >= -precision && largest <= precision) {
                 verdict.solved = true;
                 break;
@@ -249,7 +249,7 @@ impl Trial {
             }
         }
         if kind == ForceInterpolation::Polynomial {
-            // Two points give a straight line, which cannot show the motion in between.
+            // Two points give a straight line, which cannot represent the motion in between.
             if level.basis.degree == 1 {
                 self.find_start(rows, state);
                 let FreeMotion { end_velocities, unresolved_amplitudes, is_known } = &mut self.free_motion;
@@ -277,7 +277,7 @@ impl Trial {
         }
     }
 
-    /// Gaps at the start where nobody has looked.
+    /// Finds the gaps at the start if they are unknown.
     fn find_gaps_at_start(&mut self, rows: &ContactRows, state: &SectorState, obstacle: &mut impl Obstacle) {
         if !state.gaps_known {
             self.find_start(rows, state);
@@ -287,7 +287,7 @@ impl Trial {
         }
     }
 
-    /// Displacements and velocities of the rows at the start.
+    /// Finds the displacements and velocities of the rows at the start.
     pub fn find_start(&mut self, rows: &ContactRows, state: &SectorState) -> &[f64] {
         if self.known {
             return &self.start;
@@ -316,7 +316,8 @@ impl Trial {
         reach
     }
 
-    /// Where the rows go without forces at points 1 … s, unless somebody else knows (no `rows`), and a guess of these: as at the start.
+    /// Starts a trial: finds the displacements without forces at points 1 … s (unless the caller sets them, then `rows` is
+    /// `None`), and takes the contact state at the start as initial guess.
     pub fn begin(
         &mut self,
         (level, kind): (&StepTables, ForceInterpolation),
@@ -360,7 +361,7 @@ impl Trial {
         }
     }
 
-    /// Displacements of the rows without any force.
+    /// Finds the displacements of the rows without any force.
     fn move_freely(
         &mut self,
         (level, kind): (&StepTables, ForceInterpolation),
@@ -379,14 +380,14 @@ impl Trial {
         }
     }
 
-    /// Sums the `taken` columns of a table, multiplied by `amounts`.
+    /// Sums the selected columns (`taken`) of a table, multiplied by `amounts`.
     fn combine(&mut self, table: &[f64], stride: usize) {
         let Self { taken, amounts, pushed, instructions, .. } = self;
         let sums = [&mut pushed[..stride]];
         instructions.run(Combine { table, stride, columns: taken, coefficients: [amounts], sums });
     }
 
-    /// Displacements under the forces of now, and gaps there: the smallest, and the largest of a contact that pushes.
+    /// Finds displacements and gaps under the current forces. Returns the smallest gap and the largest gap of an active contact.
     pub fn find_gaps(&mut self, obstacle: &mut impl Obstacle) -> (f64, f64) {
         self.move_rows();
         let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
@@ -395,14 +396,14 @@ impl Trial {
         self.extremes()
     }
 
-    /// Displacements under the forces of now.
+    /// Finds the displacements under the current forces.
     pub fn move_rows(&mut self) {
         let stride = 3 * self.lanes.width();
         let Self { free, pushed, moved, .. } = self;
         self.instructions.run(Add { a: &free[..stride], b: &pushed[..stride], to: &mut moved[..stride] });
     }
 
-    /// The smallest gap, and the largest of a contact that pushes.
+    /// Returns the smallest gap and the largest gap of an active contact.
     pub fn extremes(&self) -> (f64, f64) {
         let lanes = self.lanes;
         let (mut lowest, mut largest) = (f64::INFINITY, 0.0_f64);
@@ -415,7 +416,8 @@ impl Trial {
         (lowest, largest)
     }
 
-    /// 0 ≤ λ ⟂ g ≥ 0 at all points and nodes: of those that penetrate or push first, then of those that these make penetrate.
+    /// Solves 0 ≤ λ ⟂ g ≥ 0 at all points and nodes: first for contacts that penetrate or push, then also for those that these
+    /// forces make penetrate.
     pub fn solve(
         &mut self,
         (compliance, residual): (&LaneCompliance, &DMatrix<f64>),
@@ -480,15 +482,15 @@ impl Trial {
         true
     }
 
-    /// Stores the normals for which forces are about to be found.
+    /// Stores the normals for which the next forces are found.
     fn keep_normals(&mut self) {
         let stride = 3 * self.lanes.width();
         self.solved_normals[..stride].copy_from_slice(&self.normals[..stride]);
     }
 
-    /// Finds the displacements at the points by modes with inertia.
+    /// Finds the displacements at the points by the modes with inertia.
     ///
-    /// Not what nodes move by: without mass they go to and fro with the force, much faster than they slide.
+    /// The total displacements are unsuitable: without mass, nodes follow the force back and forth, much faster than they slide.
     fn find_inert(&mut self, residual: &DMatrix<f64>) {
         for point in 0..=self.lanes.points {
             for node in 0..self.lanes.nodes {
@@ -502,7 +504,7 @@ impl Trial {
         }
     }
 
-    /// Returns the sliding distance that a force on a node at a point works on (m).
+    /// Returns the sliding distance over which a force on a node at a point does work (m).
     fn sliding_distance(&self, point: usize, node: usize) -> [f64; 3] {
         let terms = self.work_weights[point].iter().zip(&self.inert);
         terms.fold([0.0; 3], |sliding_distance, (weight, inert)| {
@@ -510,7 +512,7 @@ impl Trial {
         })
     }
 
-    /// A lane becomes an unknown: the direction of its force, and what that moves.
+    /// Makes a lane an unknown, with the direction and the effect of its force.
     fn choose(&mut self, lane: usize, compliance: &LaneCompliance, obstacle: &mut impl Obstacle) {
         let (lanes, width) = (self.lanes, self.lanes.width());
         let (point, node) = lanes.place(lane);
@@ -542,7 +544,7 @@ impl Trial {
         }
     }
 
-    /// The problem of the members.
+    /// Assembles the problem of the members.
     fn pose(&mut self) {
         let width = self.lanes.width();
         self.solver.set_size(self.members.len());
@@ -555,7 +557,7 @@ impl Trial {
         }
     }
 
-    /// Choose lanes that the forces found push into what they may touch.
+    /// Chooses lanes that the current forces push into a surface.
     fn choose_violated(&mut self, compliance: &LaneCompliance, obstacle: &mut impl Obstacle) -> bool {
         let (lanes, width) = (self.lanes, self.lanes.width());
         let scale = self.members.iter().fold(0.0_f64, |most, lane| most.max(self.gaps[*lane].abs()));

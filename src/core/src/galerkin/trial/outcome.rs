@@ -1,4 +1,4 @@
-//! What a trial has found: forces, gaps and displacements of the nodes at the points, and where it leaves the state.
+//! Results of a trial: forces, gaps and displacements of the nodes at the points, and the state at the end.
 
 use super::{ForceInterpolation, Trial, vector3_at};
 use crate::galerkin::basis::{MOST, TimeBasis};
@@ -6,7 +6,7 @@ use crate::galerkin::state::SectorState;
 use nalgebra::DMatrix;
 
 impl Trial {
-    /// Number of points at which forces are sought: s, or 1 where the force is constant.
+    /// Number of points at which forces are unknown: s, or 1 if the force is constant.
     pub fn points(&self) -> usize {
         self.lanes.points
     }
@@ -21,7 +21,7 @@ impl Trial {
         if point == 0 { self.start_contacts.multipliers[node] } else { self.multipliers[self.lanes.at(point, node)] }
     }
 
-    /// Force on it (N).
+    /// Force on a node at point 0 … s (N).
     pub fn force(&self, point: usize, node: usize) -> [f64; 3] {
         if point == 0 { vector3_at(&self.start_contacts.forces, node) } else { self.lane(&self.forces, point, node) }
     }
@@ -31,7 +31,7 @@ impl Trial {
         if point == 0 { self.start_contacts.gaps[node] } else { self.gaps[self.lanes.at(point, node)] }
     }
 
-    /// The same where forces work on it: none where there is nothing to touch, beyond a free edge.
+    /// Gap of a node (m), 0 where there is nothing to touch (beyond a free edge), because no force does work there.
     pub fn finite_gap(&self, point: usize, node: usize) -> f64 {
         let gap = self.gap(point, node);
         if gap == f64::INFINITY { 0.0 } else { gap }
@@ -42,7 +42,7 @@ impl Trial {
         if point == 0 { vector3_at(&self.start_contacts.normals, node) } else { self.lane(&self.normals, point, node) }
     }
 
-    /// The unit normal for which its force was found: force − λ · normal is friction.
+    /// Unit normal for which the force of a node was found: force − λ · normal is friction.
     fn solved_normal(&self, point: usize, node: usize) -> [f64; 3] {
         if point == 0 {
             vector3_at(&self.start_contacts.normals, node)
@@ -51,7 +51,7 @@ impl Trial {
         }
     }
 
-    /// Friction force on it (N).
+    /// Friction force on a node (N).
     pub fn friction_force(&self, point: usize, node: usize) -> [f64; 3] {
         let (force, multiplier) = (self.force(point, node), self.multiplier(point, node));
         let normal = self.solved_normal(point, node);
@@ -67,18 +67,18 @@ impl Trial {
         self.lanes.vector3(values, self.lanes.at(point, node))
     }
 
-    /// A node that had nothing to touch at the start of the step and is inside something now.
+    /// Returns a node that had nothing to touch at the start of the step and now penetrates.
     pub fn entered(&self) -> Option<usize> {
         let inside = |node: &usize| (1..=self.points()).any(|point| self.gap(point, *node) < 0.0);
         (0..self.nodes()).find(|node| self.start_contacts.gaps[*node] == f64::INFINITY && inside(node))
     }
 
-    /// Whether anything pushes.
+    /// Returns whether no contact is active.
     pub fn rests(&self) -> bool {
         self.multipliers[..self.lanes.len()].iter().all(|value| *value == 0.0)
     }
 
-    /// Coefficients of θᵃ of the force on a node (N), projected on degree s − 1; none where nothing pushes.
+    /// Coefficients of θᵃ of the force on a node (N), projected on degree s − 1; `None` without a force.
     pub fn polynomial(&self, basis: &TimeBasis, kind: ForceInterpolation, node: usize) -> Option<[[f64; 3]; MOST]> {
         let mut sums = [[0.0; 3]; MOST];
         if kind == ForceInterpolation::Constant {
@@ -96,7 +96,7 @@ impl Trial {
         pushed.then_some(sums)
     }
 
-    /// ½ΔfᵀGΔf of a constant force against the one before (J), by G of all rows (m/N).
+    /// ½ΔfᵀGΔf, the energy lost by the change to a constant force (J), with G of all rows (m/N).
     pub fn dropped(&self, residual: &DMatrix<f64>, state: &SectorState) -> f64 {
         let change = |row: usize| self.force(1, row / 3)[row % 3] - state.forces[row];
         let rows = 0..residual.nrows();
@@ -112,7 +112,7 @@ impl Trial {
         (0..self.nodes()).filter(|node| self.multiplier(1, *node) > 0.0).map(lost).sum()
     }
 
-    /// The state goes to the end of the step: forces, gaps and normals there.
+    /// Sets forces, gaps and normals of the state to those at the end of the step.
     pub fn leave(&mut self, state: &mut SectorState) {
         let points = self.points();
         for node in 0..self.nodes() {

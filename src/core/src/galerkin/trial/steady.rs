@@ -1,8 +1,8 @@
-//! Steps of a higher degree of contacts that may stick, while nothing changes: what sticks goes with the surface, what slides goes on sliding.
+//! Steps of a higher degree for contacts that may stick, while no contact changes its status.
 //!
-//! Forces at the points are linear then: a node that sticks stays where it is on the surface, one that slides is rubbed against its slip.
-//! Whether that holds is found out afterwards: forces press and are within the cone, sliding has not turned round, open nodes stay open.
-//! Where it does not, a step of degree 1 finds what changes.
+//! The equations for the forces at the points are then linear: a sticking node keeps its place on the surface, and the friction
+//! on a sliding node opposes its slip. The assumption is checked afterwards: forces press and lie within the friction cone,
+//! sliding has not reversed, and open nodes stay open. Otherwise a step of degree 1 finds the change.
 
 use super::{Trial, TrialResult, vector3_at};
 use crate::galerkin::basis::{POINTS, TimeBasis};
@@ -15,11 +15,11 @@ use crate::gaps::dot;
 use crate::laws::de_saxce::Eliminate;
 use crate::laws::tangents;
 
-/// Most evaluations of gaps and slips.
+/// Largest number of evaluations of gaps and slips.
 const PASSES: usize = 8;
-/// A force within the cone by less than this share of µλ slides.
+/// A contact slides if its force is within the cone by less than this fraction of µλ.
 const ON_THE_CONE: f64 = 1e-7;
-/// Directions of sliding are known to this.
+/// Accuracy of sliding directions.
 const TURNED: f64 = 1e-9;
 /// Rounding error of forces, as a fraction of the largest.
 const ROUNDING: f64 = 1e-10;
@@ -29,11 +29,11 @@ const ROUNDING: f64 = 1e-10;
 enum ContactStatus {
     Open,
     Sticks,
-    /// Against this direction, at the start.
+    /// Slides; friction opposes this direction at the start.
     Slides([f64; 3]),
 }
 
-/// Scratch.
+/// Scratch memory.
 #[derive(Debug, Clone)]
 pub(super) struct Steady {
     status: Vec<ContactStatus>,
@@ -44,7 +44,7 @@ pub(super) struct Steady {
 }
 
 impl Steady {
-    /// Room for so many lanes and nodes.
+    /// Allocates data for `lanes` lanes and `nodes` nodes.
     pub(super) fn new(lanes: usize, nodes: usize) -> Self {
         Self {
             status: vec![ContactStatus::Open; nodes],
@@ -56,7 +56,7 @@ impl Steady {
 }
 
 impl Trial {
-    /// Try a step in which no contact changes; not solved where one does.
+    /// Tries a step in which no contact changes its status; it counts as unsolved if one does.
     pub fn run_steady(
         &mut self,
         level: &StepTables,
@@ -77,7 +77,7 @@ impl Trial {
         if verdict.solved {
             self.judge((level, rows), obstacle, &mut verdict);
             self.check_depth(rows, state, obstacle, &mut verdict);
-            // What friction puts in at the start would have to be paid for.
+            // The energy supplied by friction at the start would have to come from the bank.
             verdict.solved = !verdict.switches;
         }
         verdict
@@ -134,12 +134,12 @@ impl Trial {
         false
     }
 
-    /// Motion of a node against what it touches, from the start to a point (m).
+    /// Motion of a node relative to the surface, from the start to a point (m).
     fn relative(&self, point: usize, node: usize, obstacle: &impl Obstacle) -> [f64; 3] {
         if point == 0 { [0.0; 3] } else { self.slip(node, point, obstacle) }
     }
 
-    /// Directions in which nodes slide at all points; by how much they have turned.
+    /// Finds the sliding directions of the nodes at all points, and returns by how much they have turned.
     fn find_directions(&self, own: &mut Steady, basis: &TimeBasis, obstacle: &impl Obstacle) -> f64 {
         let mut turned = 0.0_f64;
         for node in 0..self.lanes.nodes {
@@ -163,7 +163,7 @@ impl Trial {
         turned
     }
 
-    /// Largest slip of a node that sticks (m).
+    /// Largest slip of a sticking node (m).
     fn largest_slip(&self, own: &Steady, obstacle: &impl Obstacle) -> f64 {
         let lanes = self.lanes;
         let slip = |lane: usize| {
@@ -177,7 +177,7 @@ impl Trial {
         sticking.map(slip).fold(0.0, f64::max)
     }
 
-    /// Forces that keep closed nodes closed, sticking ones in place and sliding ones rubbed.
+    /// Finds forces that keep closed nodes closed and sticking nodes in place, with friction on sliding nodes.
     fn solve_steady(&mut self, own: &mut Steady, compliance: &LaneCompliance, obstacle: &impl Obstacle) -> bool {
         let lanes = self.lanes;
         self.keep_normals();
@@ -193,7 +193,7 @@ impl Trial {
             let (moved, free) = (lanes.vector3(&self.moved, *lane), lanes.vector3(&self.free, *lane));
             let relative = self.relative(point, node, obstacle);
             let slides = own.status[node] != ContactStatus::Sticks;
-            // Forces as displacements.
+            // Scales forces to displacements.
             let own_columns = compliance.of_lane(*lane);
             let scale = (0..3).map(|c| lanes.vector3(own_columns[c], *lane)[c]).sum::<f64>() / 3.0;
             for (axis, direction) in [normal, first, second].into_iter().enumerate() {
@@ -241,7 +241,7 @@ impl Trial {
         true
     }
 
-    /// Whether forces press and are within the cone, and sliding has not turned round.
+    /// Returns whether forces press and lie within the cone, and sliding has not reversed.
     fn holds(&mut self, own: &Steady, obstacle: &impl Obstacle) -> bool {
         let lanes = self.lanes;
         let largest = self.multipliers[..lanes.len()].iter().copied().fold(0.0, f64::max);

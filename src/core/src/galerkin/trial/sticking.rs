@@ -1,7 +1,7 @@
-//! Contacts that may stick: forces at the end of a step anywhere within the cone of friction.
+//! Contacts that may stick: forces at the end of a step lie anywhere within the friction cone.
 //!
-//! Polynomials are of degree 1 then, so that the slip of a node is what it moves along the surface over the step. With b the gap and the
-//! slip without its force and W the flexibility along normal and tangents, they are the problem of [`crate::laws::de_saxce`].
+//! Polynomials are of degree 1, so that the slip of a node is its displacement along the surface over the step. With the gap and
+//! the slip without force, b, and the flexibility W along normal and tangents, this is the problem of [`crate::laws::de_saxce`].
 
 use super::{Trial, TrialResult, vector3_at};
 use crate::galerkin::basis::POINTS;
@@ -13,24 +13,24 @@ use crate::laws::de_saxce::CoulombSolver;
 use crate::laws::tangents;
 use nalgebra::DMatrix;
 
-/// Slip is known to this share of what forces move.
+/// Accuracy of the slip, as a fraction of the displacements caused by the forces.
 const ROUNDING: f64 = 1e-11;
 
-/// Unknowns and scratch.
+/// Unknowns and scratch memory.
 #[derive(Debug, Clone)]
 pub(super) struct Sticking {
     solver: CoulombSolver,
     /// Normal and tangents of each node.
     axes: Vec<[[f64; 3]; 3]>,
-    /// Motion of all nodes against what they touch per force along each axis of each: columns of three rows of lanes.
+    /// Motion of all nodes relative to the surface per force along each axis of each node: columns of three rows of lanes.
     columns: Vec<f64>,
-    /// The same of what they touch, and under the forces of now.
+    /// Motion of the surface per force, and under the current forces.
     carrier_compliance: Vec<f64>,
     under: Vec<f64>,
 }
 
 impl Sticking {
-    /// Room for so many nodes.
+    /// Allocates data for `nodes` nodes.
     pub(super) fn new(nodes: usize) -> Self {
         let stride = 3 * Lanes { points: 1, nodes }.width();
         Self {
@@ -44,7 +44,8 @@ impl Sticking {
 }
 
 impl Trial {
-    /// Forces that keep the law at the end of the step: of nodes that penetrate or push first, then of those that these make penetrate.
+    /// Solves the contact law at the end of the step: first for nodes that penetrate or push, then also for those that these
+    /// forces make penetrate.
     pub(super) fn solve_sticking(
         &mut self,
         compliance: &LaneCompliance,
@@ -130,7 +131,7 @@ impl Trial {
         }
     }
 
-    /// A node becomes three unknowns.
+    /// Makes a node three unknowns.
     fn choose_axes(
         &mut self,
         own: &mut Sticking,
@@ -160,7 +161,7 @@ impl Trial {
         }
     }
 
-    /// The problem of the members.
+    /// Assembles the problem of the members.
     fn pose_sticking(&mut self, own: &mut Sticking, obstacle: &impl Obstacle) {
         let (lanes, stride) = (self.lanes, 3 * self.lanes.width());
         for (place, lane) in self.members.iter().enumerate() {
@@ -186,7 +187,7 @@ impl Trial {
         }
     }
 
-    /// Choose nodes that the forces found push into what they may touch.
+    /// Chooses nodes that the current forces push into a surface.
     fn choose_pressed(
         &mut self,
         own: &mut Sticking,
@@ -225,7 +226,8 @@ impl Trial {
         std::array::from_fn(|c| now[c] - before[c] + under[c])
     }
 
-    /// Energy that friction puts in at nodes over a step that is solved (J): the force at its start is not that of the slip to come.
+    /// Energy that friction supplies at the nodes over a solved step (J), because the force at its start does not belong to the
+    /// slip of the step.
     pub fn find_gain(&self, obstacle: &impl Obstacle) -> f64 {
         let mut gain = 0.0;
         let points = self.points();
@@ -248,13 +250,13 @@ impl Trial {
         gain
     }
 
-    /// Whether contacts may stick.
+    /// Returns whether contacts may stick.
     pub fn sticks(&self) -> bool {
         self.sticking.is_some()
     }
 
-    /// Returns the largest distance (m) that nodes may have slid forth and back within a step. Where sliding turns round, nodes stick for a while;
-    /// the result is four times the distance because of the duration of sticking.
+    /// Returns the largest distance (m) that nodes may have slid back and forth within a step. Where sliding reverses, nodes
+    /// stick for a while; the result is four times the distance because of the duration of sticking.
     pub fn find_turn(&mut self, residual: &DMatrix<f64>, step: f64, obstacle: &impl Obstacle) -> f64 {
         self.withdrawn.copy_from_slice(&self.velocities);
         let (matrix, x, y) = (residual, &self.start_contacts.slopes, &mut self.withdrawn);
@@ -268,7 +270,7 @@ impl Trial {
             let across = dot(along, normal);
             let along: [f64; 3] = std::array::from_fn(|c| along[c] - across * normal[c]);
             let speed = dot(along, along).sqrt();
-            // Speed at the end where it changes steadily.
+            // Speed at the end if it changes steadily.
             let last = 2.0 * dot(slip, along) / (step * speed) - speed;
             if last < 0.0 { 2.0 * step * last * last / (speed - last) } else { 0.0 }
         };

@@ -1,4 +1,4 @@
-//! Closest points where the surface kinks: between facets, and at the seam of free ends.
+//! Closest points at kinks of the surface: between facets, and at the seam of free ends.
 //!
 //! Between its creases the surface is a smooth sheet with its own closest point, which may lie on a crease.
 
@@ -7,18 +7,18 @@ use super::{ClosestPoint, Ends, SurfaceSpline};
 use crate::gaps::dot;
 use crate::settings::Interpolation;
 
-/// The eight sheets around one.
+/// The eight neighbouring sheets.
 const NEIGHBOURS: [[i8; 2]; 8] = [[-1, 0], [1, 0], [0, -1], [0, 1], [-1, -1], [1, -1], [-1, 1], [1, 1]];
 
 impl SurfaceSpline {
-    /// The closest of the minima of this sheet and, where a crease is near, of those beside it.
+    /// Returns the closest of the minima of this sheet and, near a crease, of the neighbouring sheets.
     ///
-    /// A sheet across a crease at the distance b along this one can only hold a closer point if b < |r| tan(φ/2) for a
-    /// fold of angle φ: b ≤ 2|r| covers folds up to 126°.
+    /// A sheet across a crease at the distance b along this one can only contain a closer point if b < |r| tan(φ/2) for a fold of angle φ:
+    /// b ≤ 2|r| covers folds up to 126°.
     pub(super) fn search_sheets(&self, x: [f64; 3], start: FootPoint) -> Option<FootPoint> {
         let rounding = self.rounding(x, &start);
         let mut best = start;
-        // Every round lowers f, and a start on the opposite side has half the facets to walk over.
+        // Every round lowers f, and a start on the opposite side has to cross half the facets.
         for _ in 0..self.around + self.along {
             let from = best;
             for sides in NEIGHBOURS {
@@ -35,7 +35,7 @@ impl SurfaceSpline {
         None
     }
 
-    /// The place across the creases on these sides, where they are near.
+    /// Returns the place across the creases on these sides, if they are near.
     fn across(&self, foot: &FootPoint, sides: [i8; 2]) -> Option<ClosestPoint> {
         let (room, [length_s, _, length_t]) = (self.room(foot.place), foot.metric());
         let ClosestPoint { patch: [p, q], s, t } = foot.place;
@@ -70,7 +70,7 @@ impl SurfaceSpline {
         })
     }
 
-    /// On a crease, the sheet whose normal is nearest to the direction of the node.
+    /// Returns, for a point on a crease, the sheet whose normal is nearest to the direction of the node.
     fn face_squarely(&self, x: [f64; 3], foot: FootPoint) -> FootPoint {
         let mut best = foot;
         let squareness = |foot: &FootPoint| dot(foot.residual, foot.normal()).abs();

@@ -5,15 +5,15 @@
 use super::{ClosestPoint, Evaluation, Projection, SurfaceSpline};
 use crate::gaps::dot;
 
-/// Tangents closer to parallel than this (squared sine) are no surface.
+/// The surface is degenerate if its tangents are closer to parallel than this (squared sine).
 pub(super) const DEGENERATE: f64 = 1e-24;
-/// Curvature of f, relative to that for a plane, below which Newton steps are not trusted.
+/// Newton steps are not trusted if the curvature of f, relative to that for a plane, is below this.
 pub(super) const CONVEX: f64 = 1e-3;
 
-/// Gauss-Newton steps below this (in patches) are taken for none where f is not convex: the top of a hill.
+/// Gauss-Newton steps below this (in patches) count as zero if f is not convex, as at the top of a hill.
 const STATIONARY: f64 = 1e-9;
 
-/// Which bound of a sheet a coordinate is held at.
+/// Bound of a sheet at which a coordinate is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeldBound {
     No,
@@ -21,7 +21,7 @@ pub(super) enum HeldBound {
     High,
 }
 
-/// A point of the surface as seen from the node.
+/// A point of the surface relative to the node.
 #[derive(Clone, Copy)]
 pub(super) struct FootPoint {
     pub place: ClosestPoint,
@@ -68,13 +68,13 @@ impl FootPoint {
         (hessian, hessian[0] * hessian[2] - hessian[1] * hessian[1])
     }
 
-    /// Change of f along a step, to first order.
+    /// Derivative of f along a step.
     pub fn slope(&self, step: [f64; 2]) -> f64 {
         let gradient = self.gradient();
         gradient[0] * step[0] + gradient[1] * step[1]
     }
 
-    /// Newton step on the coordinates that are not held; None where the surface is degenerate.
+    /// Returns the Newton step on the coordinates that are not held; `None` if the surface is degenerate.
     #[inline]
     pub fn newton_step(&mut self, room: &Room, metric: [f64; 3]) -> Option<[f64; 2]> {
         let gradient = self.gradient();
@@ -118,7 +118,7 @@ impl FootPoint {
         }
         let step =
             if is_convex { solve(hessian, 1.0 / determinant, gradient) } else { solve(metric, 1.0 / area, gradient) };
-        // The other coordinate may push this one over a bound that it would leave inwards alone.
+        // The other coordinate may push this one over a bound that it would leave inwards by itself.
         let blocked = |axis: usize| {
             (position[axis] <= room[axis][0] && step[axis] < 0.0)
                 || (position[axis] >= room[axis][1] && step[axis] > 0.0)
@@ -152,7 +152,7 @@ pub(super) fn solve([a, b, c]: [f64; 3], per_determinant: f64, gradient: [f64; 2
     [(b * gradient[1] - c * gradient[0]) * per_determinant, (b * gradient[0] - a * gradient[1]) * per_determinant]
 }
 
-/// On top of a maximum or a saddle of f, where the gradient vanishes: half a patch along the lowest curvature.
+/// Returns half a patch along the lowest curvature, for a maximum or a saddle of f, where the gradient vanishes.
 fn escape(gradient: [f64; 2], hessian: [f64; 3], metric: [f64; 3], determinant: f64) -> Option<[f64; 2]> {
     let size = gradient[0] * gradient[0] * metric[2] + gradient[1] * gradient[1] * metric[0];
     let [a, b, c] = hessian;
@@ -175,7 +175,7 @@ pub(super) fn noise(foot: &FootPoint, rounding: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// All signs of the second derivatives, zeros included: where any direction leads down, half a patch along one that does.
+    /// All signs of the second derivatives, zeros included: half a patch along a descending direction, if there is one.
     #[test]
     fn escape_descends_from_maxima_and_saddles_only() {
         let metric = [2.0, 0.3, 0.7];

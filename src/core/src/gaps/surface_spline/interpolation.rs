@@ -1,8 +1,8 @@
 //! The interpolation problem in one direction, and its transpose.
 //!
-//! (Q_{i−1} + 4 Q_i + Q_{i+1})/6 = P_i with cyclic indices, or between free ends: zero second derivative at an end makes
-//! Q_end = P_end, and what is left is tridiagonal. Both matrices are symmetric, so that the transposed problem uses the
-//! same factor. O(n), in place.
+//! (Q_{i−1} + 4 Q_i + Q_{i+1})/6 = P_i with cyclic indices, or between free ends: a zero second derivative at an end means Q_end = P_end,
+//! and the remaining system is tridiagonal. Both matrices are symmetric, so that the transposed problem uses the same factor. O(n), in
+//! place.
 
 use super::SurfaceSpline;
 
@@ -29,12 +29,12 @@ const CORNER: [f64; 2] = [-4.0, 1.0];
 const MIRROR: f64 = -0.25;
 
 impl InterpolationRow {
-    /// No interpolation problem.
+    /// Creates the trivial problem of facets.
     pub fn facets() -> Self {
         Self { kind: RowEnds::Facets, pivots: Vec::new() }
     }
 
-    /// Closed with continuous first and second derivatives.
+    /// Creates the problem of a closed row with continuous first and second derivatives.
     pub fn closed(count: usize) -> Self {
         let mut diagonal = vec![4.0; count];
         diagonal[0] -= CORNER[0];
@@ -48,17 +48,17 @@ impl InterpolationRow {
         line
     }
 
-    /// Free ends at the first and the last point.
+    /// Creates the problem of a row with free ends at the first and the last point.
     pub fn free_ends(count: usize) -> Self {
         Self { kind: RowEnds::Free { last: count - 1 }, pivots: pivots(&vec![4.0; count - 2]) }
     }
 
-    /// Free ends that both lie at the first point.
+    /// Creates the problem of a row whose free ends meet at the first point.
     pub fn free_ends_meeting(count: usize) -> Self {
         Self { kind: RowEnds::Free { last: 0 }, pivots: pivots(&vec![4.0; count - 1]) }
     }
 
-    /// Data points to control points, at `start`, `start + stride`, …
+    /// Converts data points to control points, at `start`, `start + stride`, …
     pub fn interpolate(&self, values: &mut [[f64; 3]], start: usize, stride: usize) {
         match &self.kind {
             RowEnds::Facets => {}
@@ -78,7 +78,7 @@ impl InterpolationRow {
         }
     }
 
-    /// Forces on control points to forces on data points: the transpose of [`InterpolationRow::interpolate`].
+    /// Converts forces on control points to forces on data points: the transpose of [`InterpolationRow::interpolate`].
     pub fn transfer(&self, forces: &mut [[f64; 3]], start: usize, stride: usize) {
         match &self.kind {
             RowEnds::Facets => {}
@@ -108,7 +108,7 @@ impl InterpolationRow {
         }
     }
 
-    /// Thomas algorithm for off-diagonals 1.
+    /// Solves a tridiagonal system with off-diagonals 1 by the Thomas algorithm.
     fn solve_tridiagonal(&self, values: &mut [[f64; 3]], start: usize, stride: usize) {
         let mut before = [0.0; 3];
         for (index, pivot) in self.pivots.iter().enumerate() {
@@ -142,8 +142,8 @@ fn subtract(values: &mut [[f64; 3]], from: usize, what: usize) {
 }
 
 impl SurfaceSpline {
-    /// Solve the interpolation problem in place: data points, or their displacements (the map is linear), become
-    /// control points, or their displacements; around × along of them.
+    /// Solves the interpolation problem in place: around × along data points, or their displacements (the map is linear), become control
+    /// points, or their displacements.
     ///
     /// # Panics
     /// Wrong number of values.
@@ -153,8 +153,8 @@ impl SurfaceSpline {
         (0..self.around).for_each(|column| self.lines[1].interpolate(values, column, self.around));
     }
 
-    /// Forces on the control points become forces on the data points of the same virtual work, in place: the
-    /// transpose of [`SurfaceSpline::interpolate`].
+    /// Converts forces on the control points to forces on the data points with the same virtual work, in place: the transpose of
+    /// [`SurfaceSpline::interpolate`].
     ///
     /// # Panics
     /// Wrong number of values.

@@ -4,22 +4,21 @@
 //!
 //! S(s, t) = (s³, s², s, 1) H Q_pq Hᵀ (t³, t², t, 1)ᵀ,   H = ⅙ [−1 3 −3 1; 3 −6 3 0; −3 0 3 0; 1 4 1 0],
 //!
-//! with the 4 × 4 control points Q_{p−1..p+2, q−1..q+2}. The control points solve the interpolation problem
-//! S(data point) = P. Along the axis both edges are free: S_tt = 0 there. Around, the surface closes with continuous
-//! first and second derivatives ([`Closure::Smooth`], fig. 8b), with free ends that meet in position only
-//! ([`Closure::FreeEnds`], fig. 8a), or not at all: an open surface ([`SurfaceSpline::open`]) has two more free edges,
-//! S_ss = 0 there, and stands anywhere in space. [`Interpolation::Facets`] replaces all of it by bilinear patches.
+//! with the 4 × 4 control points Q_{p−1..p+2, q−1..q+2}. The control points solve the interpolation problem S(data point) = P. Along the
+//! axis both edges are free: S_tt = 0 there. Around, the surface closes with continuous first and second derivatives ([`Closure::Smooth`],
+//! fig. 8b), with free ends that meet in position only ([`Closure::FreeEnds`], fig. 8a), or not at all: an open surface
+//! ([`SurfaceSpline::open`]) has two more free edges, S_ss = 0 there, and any position in space. [`Interpolation::Facets`] replaces all of
+//! this by bilinear patches.
 //!
-//! A free end is the phantom control point Q₋₁ = 2 Q₀ − Q₁, so that phantoms depend on the others and there is exactly
-//! one control point per data point, with the same index. Displacements of the data points become displacements of the
-//! control points by [`SurfaceSpline::interpolate`], and forces at a place become forces on the data points by
-//! [`SurfaceSpline::weights`] and [`SurfaceSpline::transfer`], the transposes of the same two maps: virtual work is
-//! exact.
+//! A free end is the phantom control point Q₋₁ = 2 Q₀ − Q₁, so that phantoms depend on the others and there is exactly one control point
+//! per data point, with the same index. Displacements of the data points become displacements of the control points by
+//! [`SurfaceSpline::interpolate`], and forces at a place become forces on the data points by [`SurfaceSpline::weights`] and
+//! [`SurfaceSpline::transfer`], the transposes of these maps: virtual work is exact.
 //!
-//! A surface around the axis does not end at its first and last ring: it goes on along its tangents,
-//! S(s, t) = S(s, 1) + (t − 1) S_t(s, 1), for [`REACH`] of its axial extent. Since S_tt = 0 at the edge this is as smooth as
-//! the rest, points, derivatives and weights alike. A node that wanders over the last ring and back thus has a distance all
-//! the time. An open surface, which stands alone in space, ends at its edges.
+//! A surface around the axis does not end at its first and last ring: it continues along its tangents, S(s, t) = S(s, 1) + (t − 1) S_t(s,
+//! 1), for [`REACH`] of its axial extent. Since S_tt = 0 at the edge the continuation is as smooth as the rest: points, derivatives and
+//! weights. A node that moves over the last ring and back thus always has a distance. An open surface, which is not around an axis, ends at
+//! its edges.
 
 mod creases;
 mod foot;
@@ -34,16 +33,16 @@ use crate::settings::{Closure, Interpolation};
 use crate::{Error, Result};
 use interpolation::InterpolationRow;
 
-/// Fewest data points around: below them the four control points of a patch would not be different ones.
+/// Smallest number of data points around: with fewer the four control points of a patch would not be distinct.
 pub const FEWEST_AROUND: usize = 4;
-/// Fewest rings of data points along the axis, and of data points in either direction of an open surface.
+/// Smallest number of rings of data points along the axis, and of data points in either direction of an open surface.
 pub const FEWEST_ALONG: usize = 2;
 
 /// Extension of a surface around the axis beyond its first and last ring, as a fraction of its axial extent (counted in rings: exact for equal
 /// distances). It does not depend on the fineness of the grid.
 pub const REACH: f64 = 0.25;
-/// A node this far (in patches) beyond an edge of an open surface is still on it, so that rounding does not decide for nodes
-/// that stand exactly on it.
+/// A node at most this far (in patches) beyond an edge of an open surface is still on it, so that rounding does not decide for nodes
+/// exactly on the edge.
 const EDGE_TOLERANCE: f64 = 1e-9;
 /// Rounding of saved places at the borders of patches (in patches).
 const BORDER: f64 = 1e-6;
@@ -67,14 +66,14 @@ pub struct ClosestPoint {
     pub patch: [usize; 2],
     /// Parameter around, 0 at data point p and 1 at p + 1; beyond that by rounding at the edges of an open surface.
     pub s: f64,
-    /// Parameter along the axis, 0 at ring q and 1 at ring q + 1; beyond that where the surface goes on beyond its first and
-    /// last ring, and by rounding at the edges of an open one.
+    /// Parameter along the axis, 0 at ring q and 1 at ring q + 1; outside this range on the extension beyond the first and last ring, and
+    /// by rounding at the edges of an open surface.
     pub t: f64,
 }
 
-/// A surface through around × along data points, index `along · around + i`. A closed one has rings in order of growing z,
-/// the points of a ring at angles growing by 2π/around about z; an open one is a quadrilateral grid of any shape, whose
-/// "around" and "along" are its two directions. Nothing but construction allocates.
+/// A surface through around × along data points, index `along · around + i`. A closed surface has rings in order of increasing z, with the
+/// points of a ring at angles that increase by 2π/around about z; an open surface is a quadrilateral grid of any shape, with "around" and
+/// "along" as its two directions. Only construction allocates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceSpline {
     around: usize,
@@ -99,11 +98,11 @@ pub struct SurfaceSpline {
 }
 
 impl SurfaceSpline {
-    /// Surface through `data`, Cartesian points (m).
+    /// Creates the surface through `data`, Cartesian points (m).
     ///
     /// # Errors
-    /// Fewer than 4 × 2 points, a wrong number of them, points that are not finite or not at their place of the grid
-    /// (more than a quarter of the spacing 2π/around off in angle; rings that do not lie beyond each other in z).
+    /// Fewer than 4 × 2 points; a wrong number of points; points that are not finite or not at their place in the grid (more than a quarter
+    /// of the spacing 2π/around off in angle; rings that are not in order of z).
     pub fn new(
         data: &[[f64; 3]],
         around: usize,
@@ -118,11 +117,11 @@ impl SurfaceSpline {
         Self::with_ends(data, around, along, ends, interpolation)
     }
 
-    /// An open surface through `data`, Cartesian points (m) of a quadrilateral grid of any shape: free edges on all four
+    /// Creates an open surface through `data`, Cartesian points (m) of a quadrilateral grid of any shape, with free edges on all four
     /// sides. Its normal is S_t × S_s/|S_t × S_s|, with s from point to point of a row and t from row to row.
     ///
     /// # Errors
-    /// Fewer than 2 × 2 points, a wrong number of them, points that are not finite.
+    /// Fewer than 2 × 2 points; a wrong number of points; points that are not finite.
     pub fn open(data: &[[f64; 3]], around: usize, along: usize, interpolation: Interpolation) -> Result<Self> {
         Self::with_ends(data, around, along, Ends::Open, interpolation)
     }
@@ -174,7 +173,7 @@ impl SurfaceSpline {
         Ok(surface)
     }
 
-    /// Replace the data points (m) and what [`SurfaceSpline::locate`] knows of them.
+    /// Replaces the data points (m) and the data of [`SurfaceSpline::locate`].
     ///
     /// # Errors
     /// As [`SurfaceSpline::new`]; the surface is then unchanged.
@@ -231,8 +230,8 @@ impl SurfaceSpline {
         Ok(())
     }
 
-    /// Replace the control points (m), for example by those of the undeformed surface plus a linear combination of
-    /// interpolated mode shapes.
+    /// Replaces the control points (m), for example by those of the undeformed surface plus a linear combination of interpolated mode
+    /// shapes.
     ///
     /// # Panics
     /// Wrong number of points.
@@ -241,17 +240,17 @@ impl SurfaceSpline {
         self.fill_mesh();
     }
 
-    /// Control points (m), index `along · around + i` as the data points.
+    /// Control points (m), with index `along · around + i` like the data points.
     pub fn control_points(&self) -> &[[f64; 3]] {
         &self.control
     }
 
-    /// Data points around the circumference.
+    /// Number of data points around the circumference.
     pub fn around(&self) -> usize {
         self.around
     }
 
-    /// Rings of data points along the axis.
+    /// Number of rings of data points along the axis.
     pub fn along(&self) -> usize {
         self.along
     }
@@ -261,12 +260,12 @@ impl SurfaceSpline {
         std::f64::consts::TAU / real(self.around)
     }
 
-    /// Patches around.
+    /// Number of patches around.
     pub fn columns(&self) -> usize {
         if self.ends == Ends::Open { self.around - 1 } else { self.around }
     }
 
-    /// Whether a place is on a patch that exists.
+    /// Returns whether the patch of a place exists.
     pub fn has_patch(&self, place: ClosestPoint) -> bool {
         place.patch[0] < self.columns() && place.patch[1] < self.along - 1
     }
@@ -277,8 +276,8 @@ impl SurfaceSpline {
         self.has_patch(place) && within(place.s, [0.0, 1.0]) && within(place.t, self.span(place.patch[1]))
     }
 
-    /// ClosestPoint at about the angle and the axial position of a point (m), on the edge for points beyond it, or the nearest
-    /// data point of an open surface: the start for [`SurfaceSpline::project`] when there is none from the last step.
+    /// Returns a place at about the angle and the axial position of a point (m), on the edge for points beyond it, or the nearest data
+    /// point of an open surface: the start for [`SurfaceSpline::project`] without a place from the last step.
     pub fn locate(&self, point: [f64; 3]) -> ClosestPoint {
         if self.ends == Ends::Open {
             return self.nearest_data_point(point);
@@ -299,7 +298,7 @@ impl SurfaceSpline {
         ClosestPoint { patch, s: real(p - patch[0]), t: real(q - patch[1]) }
     }
 
-    /// The place `turns` revolutions about z further, to start from when the rotor has turned; on closed surfaces only.
+    /// Returns the place `turns` revolutions further about z, a start value after the rotor has turned; closed surfaces only.
     pub fn advance(&self, place: ClosestPoint, turns: f64) -> ClosestPoint {
         let whole = real(self.around);
         let s = place.s + turns * whole;
@@ -311,7 +310,7 @@ impl SurfaceSpline {
         ClosestPoint { patch: [p, place.patch[1]], s, t: place.t }
     }
 
-    /// Write phantoms and repetitions around the control points.
+    /// Writes phantoms and repetitions around the control points.
     fn fill_mesh(&mut self) {
         let (around, width) = (self.around, self.around + 3);
         for (ring, points) in self.control.chunks_exact(around).enumerate() {
@@ -349,7 +348,7 @@ fn mean_axial(points: &[[f64; 3]]) -> f64 {
     points.iter().map(|point| point[2]).sum::<f64>() / real(points.len())
 }
 
-/// Whole part below `count` and the rest of a value in [0, count].
+/// Splits a value in [0, count] into a whole part below `count` and the rest.
 fn split(value: f64, count: usize) -> (usize, f64) {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 ≤ value ≤ count")]
     let whole = (value as usize).min(count - 1);

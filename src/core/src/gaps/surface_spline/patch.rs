@@ -20,7 +20,7 @@ pub struct Evaluation {
     pub d_tt: [f64; 3],
 }
 
-/// Control points that act on a place: S = Σ `values[k]` · Q of `indices[k]`, k < `len`, for every Q.
+/// Control points that influence a place: S = Σ `values[k]` · Q of `indices[k]`, k < `len`, for every Q.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weights {
     /// Control points, each at most once.
@@ -32,18 +32,18 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// Pairs of control point and weight.
+    /// Iterates over pairs of control point and weight.
     pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.indices[..self.len].iter().zip(&self.values).map(|(index, value)| (*index as usize, *value))
     }
 }
 
-/// The functions that multiply control points −1..=2 of a direction: values, first and second derivatives.
+/// Basis functions of the control points −1..=2 of a direction: values, first and second derivatives.
 type SplineBasis = [[f64; 4]; 3];
 
 const SIXTH: f64 = 1.0 / 6.0;
 
-/// The columns of (s³, s², s, 1) H and its derivatives.
+/// Evaluates the columns of (s³, s², s, 1) H and their derivatives.
 #[inline(always)]
 fn cubic(s: f64) -> SplineBasis {
     let r = 1.0 - s;
@@ -55,8 +55,8 @@ fn cubic(s: f64) -> SplineBasis {
     ]
 }
 
-/// [`cubic`] along the axis: beyond t = 0 and 1 the tangent goes on, S(s, t) = S(s, 1) + (t − 1) S_t(s, 1). At a free edge,
-/// the only place where a patch ends so, S_tt = 0: the surface stays twice continuously differentiable.
+/// Evaluates [`cubic`] along the axis: beyond t = 0 and 1 the tangent continues, S(s, t) = S(s, 1) + (t − 1) S_t(s, 1). At a free edge, the
+/// only end of a patch of this kind, S_tt = 0: the surface stays twice continuously differentiable.
 #[inline(always)]
 fn cubic_and_beyond(t: f64) -> SplineBasis {
     let edge = t.clamp(0.0, 1.0);
@@ -84,7 +84,7 @@ fn sum_of_three(value: [f64; 4]) -> [f64; 3] {
     [value[0], value[1], value[2]]
 }
 
-/// Independent control points of one direction that a window of four becomes, with their weights.
+/// Independent control points that replace a window of four in one direction, with their weights.
 struct Fold {
     indices: [usize; 4],
     values: [f64; 4],
@@ -104,7 +104,7 @@ impl Fold {
         self.values[slot] += value;
     }
 
-    /// Twice the end less its neighbour, for a phantom.
+    /// Adds a phantom: twice the end minus its neighbour.
     fn add_phantom(&mut self, end: usize, inner: usize, value: f64) {
         self.add(end, 2.0 * value);
         self.add(inner, -value);
@@ -112,10 +112,10 @@ impl Fold {
 }
 
 impl SurfaceSpline {
-    /// Point and derivatives at a place.
+    /// Evaluates point and derivatives at a place.
     ///
     /// # Panics
-    /// A patch that does not exist.
+    /// If the patch does not exist.
     #[inline]
     pub fn evaluate(&self, place: ClosestPoint) -> Evaluation {
         match self.interpolation {
@@ -129,7 +129,7 @@ impl SurfaceSpline {
         assert!(self.has_patch(place), "no such patch");
     }
 
-    /// Without `SECOND` the second derivatives are left zero.
+    /// Evaluates a bicubic patch; without `SECOND` the second derivatives stay zero.
     #[inline(always)]
     pub(super) fn evaluate_bicubic<const SECOND: bool>(&self, place: ClosestPoint) -> Evaluation {
         let ([p, q], width) = (place.patch, self.around + 3);
@@ -173,10 +173,10 @@ impl SurfaceSpline {
         }
     }
 
-    /// Weights of the control points at a place: the derivative of S with respect to Q.
+    /// Returns the weights of the control points at a place: the derivative of S with respect to Q.
     ///
     /// # Panics
-    /// A patch that does not exist.
+    /// If the patch does not exist.
     pub fn weights(&self, place: ClosestPoint) -> Weights {
         self.assert_exists(place);
         let (around, along) = match self.interpolation {

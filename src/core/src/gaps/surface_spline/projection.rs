@@ -1,10 +1,9 @@
 //! Closest point of the surface to a node.
 //!
-//! Newton on f = ½|x − S|², r = x − S: gradient −(S_s·r, S_t·r), Hessian [S_s·S_s − r·S_ss, S_s·S_t − r·S_st; …], and
-//! the first fundamental form in its place where it is not positive definite. Steps are cut until f falls, so iterations
-//! never cycle. Patch borders are crossed freely where the surface is smooth. At free edges, and at creases (borders
-//! of facets, the seam of free ends), the step is projected onto the sheet between them; neighbouring sheets are then
-//! searched for a closer point.
+//! Newton iteration on f = ½|x − S|², r = x − S, with gradient −(S_s·r, S_t·r) and Hessian [S_s·S_s − r·S_ss, S_s·S_t − r·S_st; …], or the
+//! first fundamental form if the Hessian is not positive definite. Steps are cut until f falls, so that iterations never cycle. Patch
+//! borders can be crossed where the surface is smooth. At free edges, and at creases (borders of facets, the seam of free ends), the step
+//! is projected onto the sheet between them; neighbouring sheets are then searched for a closer point.
 
 use super::foot::{CONVEX, DEGENERATE, FootPoint, HeldBound, Room, noise, solve};
 use super::{ClosestPoint, EDGE_TOLERANCE, Ends, SurfaceSpline};
@@ -16,23 +15,22 @@ use crate::settings::Interpolation;
 pub enum Projection {
     /// The closest point lies on the surface.
     Found {
-        /// Where it is; start of the next projection of this node.
+        /// Place of the closest point; start of the next projection of this node.
         place: ClosestPoint,
         /// The closest point S (m).
         point: [f64; 3],
-        /// Unit normal from the casing towards the axis. On a crease it is that of the facet which faces the node
-        /// most squarely.
+        /// Unit normal from the casing towards the axis. On a crease it is that of the facet whose normal is nearest to the direction of
+        /// the node.
         normal: [f64; 3],
         /// (x − S)·n (m), negative outside the casing.
         gap: f64,
     },
-    /// The node has left the surface: in z further than the surface goes on beyond its last ring, or over any of the four
-    /// edges of an open surface.
+    /// The node has left the surface: in z beyond the extension of the last ring, or over any of the four edges of an open surface.
     BeyondEdge {
         /// The closest point of the edge; start of the next projection of this node.
         place: ClosestPoint,
     },
-    /// No closest point: the coordinates are not finite, or the surface is folded beyond use.
+    /// No closest point: the coordinates are not finite, or the surface is folded.
     Lost,
 }
 
@@ -40,19 +38,19 @@ pub enum Projection {
 const STEP_TOLERANCE: f64 = 1e-11;
 /// Rounding of the coordinates of x − S, relative to |x| (and |x − S|).
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
-/// Corrections near a good start; one or two are the rule.
+/// Largest number of corrections near a good start; one or two are usual.
 const MAX_CORRECTIONS: usize = 6;
-/// Far beyond what starts on the opposite side of the casing need (about 30).
+/// Largest number of iterations, far above the need of starts on the opposite side of the casing (about 30).
 const MAX_ITERATIONS: usize = 100;
-/// Halvings of a step before giving up.
+/// Largest number of halvings of a step.
 const MAX_HALVINGS: usize = 40;
 
 impl SurfaceSpline {
-    /// Closest point to `x` (m), found from `guess`: the place of the last step, moved along by
-    /// [`SurfaceSpline::advance`] or not, or [`SurfaceSpline::locate`].
+    /// Finds the closest point to `x` (m) from `guess`: the place of the last step, possibly moved by [`SurfaceSpline::advance`], or the
+    /// result of [`SurfaceSpline::locate`].
     ///
     /// # Panics
-    /// A guess on a patch that does not exist.
+    /// If the patch of the guess does not exist.
     pub fn project(&self, x: [f64; 3], guess: ClosestPoint) -> Projection {
         if let Some(projection) = self.project_nearby(x, guess) {
             return projection;
@@ -78,8 +76,8 @@ impl SurfaceSpline {
         foot.found()
     }
 
-    /// A Newton step that stays in its patch, then corrections with the same Hessian until the next one is within the
-    /// tolerance: nearly every projection of a run. None where anything is out of the ordinary.
+    /// Takes a Newton step that stays in its patch, then corrections with the same Hessian until the next one is within the tolerance:
+    /// sufficient for nearly every projection of a run. Returns `None` in all other cases.
     #[inline]
     fn project_nearby(&self, x: [f64; 3], guess: ClosestPoint) -> Option<Projection> {
         if self.interpolation == Interpolation::Facets {
@@ -112,7 +110,7 @@ impl SurfaceSpline {
         None
     }
 
-    /// Whether the seam of free ends is too far away to hold a closer point on its other side.
+    /// Returns whether the seam of free ends is too far away for a closer point on its other side.
     fn is_far_from_seam(&self, foot: &FootPoint, length_s: f64) -> bool {
         let column = foot.place.patch[0];
         self.ends != Ends::Meeting || (column > 0 && column + 1 < self.around && 8.0 * foot.half_square < length_s)
@@ -133,14 +131,14 @@ impl SurfaceSpline {
             || (self.ends == Ends::Open && over(foot.held[0], column == 0, column + 2 == self.around))
     }
 
-    /// Range of t in the patches of a ring, with what goes on beyond the first and the last one.
+    /// Range of t in the patches of a ring, including the extension beyond the first and the last ring.
     #[inline]
     pub(super) fn span(&self, ring: usize) -> [f64; 2] {
         let low = if ring == 0 { -self.reach } else { 0.0 };
         [low, if ring + 2 == self.along { 1.0 + self.reach } else { 1.0 }]
     }
 
-    /// The sheet around a place: a facet, or everything up to the edges and the seam.
+    /// Returns the sheet around a place: a facet, or everything up to the edges and the seam.
     #[inline]
     pub(super) fn room(&self, place: ClosestPoint) -> Room {
         let [p, q] = place.patch.map(super::real);
@@ -160,7 +158,7 @@ impl SurfaceSpline {
         [around, [-q - self.reach, super::real(self.along - 1) - q + self.reach]]
     }
 
-    /// A place with parameters beyond its patch, expressed in the patch where it lies.
+    /// Expresses a place with parameters beyond its patch in the patch that contains it.
     #[inline]
     fn settle(&self, patch: [usize; 2], s: f64, t: f64) -> ClosestPoint {
         if self.interpolation == Interpolation::Facets || ((0.0..1.0).contains(&s) && (0.0..1.0).contains(&t)) {
@@ -183,9 +181,9 @@ impl SurfaceSpline {
         ClosestPoint { patch, s, t: t - (ring - q) }
     }
 
-    /// Rounding of the coordinates of x − S (m), and of the place of S. A node inside a casing is near the surface and as
-    /// far from the axis. One that faces an open surface may be anywhere, and so may that: rounding of the tangents, which
-    /// is that of the coordinates over a patch, moves the closest point in proportion to the distance.
+    /// Rounding of the coordinates of x − S (m), and of the place of S. A node inside a casing is near the surface and about as far from
+    /// the axis. A node that faces an open surface may be anywhere, and so may the surface: rounding of the tangents, which is that of the
+    /// coordinates over a patch, moves the closest point in proportion to the distance.
     pub(super) fn rounding(&self, x: [f64; 3], foot: &FootPoint) -> f64 {
         let size = dot(x, x).sqrt();
         if self.ends != Ends::Open {
@@ -195,7 +193,7 @@ impl SurfaceSpline {
         ROUNDING * (size + distance) * (1.0 + distance / metric[0].min(metric[2]).sqrt())
     }
 
-    /// Minimum of f on the sheet of `start`.
+    /// Finds the minimum of f on the sheet of `start`.
     pub(super) fn descend(&self, x: [f64; 3], start: ClosestPoint) -> Option<FootPoint> {
         let longest = (0.125 * super::real(self.around)).max(1.0);
         let mut foot = FootPoint::at(self, x, start);
@@ -219,7 +217,7 @@ impl SurfaceSpline {
         None
     }
 
-    /// The first of the halved steps that lowers f enough (Armijo's condition on the projected step).
+    /// Returns the first of the halved steps that lowers f enough (Armijo's condition on the projected step).
     #[inline]
     fn search_line(
         &self,
@@ -252,7 +250,7 @@ mod tests {
     use crate::settings::Closure;
     use tiprub_test_models::SeededRandom;
 
-    /// Nodes of a run start from where they were a step ago: the short way ends there, and where the long one does.
+    /// Nodes of a run start from their places of the previous step: the short search ends at the same place as the long one.
     #[test]
     fn nearly_stationary_nodes_use_the_fast_projection() {
         let ring = |ring: u32| {

@@ -1,15 +1,14 @@
 //! Principal pivoting after R. W. Cottle and G. B. Dantzig (Linear Algebra Appl. 1, 1968), one contact at a time.
 //!
-//! Every contact but the violated ones fulfils its conditions. One violated contact is pressed harder and harder, the
-//! closed contacts following so that they stay closed; a contact whose multiplier falls to zero on the way opens, and one
-//! whose gap falls to zero closes, until the pressed contact itself is closed. No condition is given up again, so
-//! that for every P-matrix the number of violated contacts falls to zero. Needs about as many factorisations as
-//! contacts change, where block exchanges, when they work, need a handful for all.
+//! All contacts except the violated ones fulfil their conditions. The force on one violated contact is increased while the closed contacts
+//! stay closed; a contact whose multiplier falls to zero opens, and one whose gap falls to zero closes, until the driven contact itself is
+//! closed. Fulfilled conditions stay fulfilled, so that for every P-matrix the number of violated contacts falls to zero. The method needs
+//! about as many factorisations as contacts change, whereas block exchanges, when they work, need a handful for all.
 
 use super::{ContactSolver, SolverOutcome, ZERO_FRACTION};
 
 impl ContactSolver {
-    /// Solve from the current active set, with up to `limit` factorisations.
+    /// Solves from the current active set, with up to `limit` factorisations.
     pub(super) fn drive_all(&mut self, gap_scale: f64, limit: usize) -> SolverOutcome {
         let mut factorisations = 0;
         while factorisations < limit {
@@ -31,7 +30,7 @@ impl ContactSolver {
         SolverOutcome::direct(false, factorisations)
     }
 
-    /// Open contacts that pull until none does; multipliers and slacks of that set are the start. Returns the number of
+    /// Opens contacts with tensile forces until there are none; multipliers and slacks of that set are the start. Returns the number of
     /// factorisations.
     fn start_drive(&mut self) -> usize {
         for factorisations in 1.. {
@@ -53,7 +52,7 @@ impl ContactSolver {
         unreachable!("every round opens a contact")
     }
 
-    /// Press one violated contact until it is closed. Not solved when that does not open it, or the limit is reached.
+    /// Drives one violated contact until it is closed. Fails if its force does not open it, or if the limit is reached.
     fn drive(&mut self, driven: usize, gap_scale: f64, limit: usize) -> SolverOutcome {
         for factorisations in 1..=limit {
             self.solve_active(Some(driven));
@@ -78,7 +77,7 @@ impl ContactSolver {
         SolverOutcome::direct(false, limit)
     }
 
-    /// Gap of every node per multiplier of the driven one, the closed contacts following; 0 for those.
+    /// Computes the gap of every node per multiplier of the driven node while closed contacts stay closed; 0 for those.
     fn correct_by(&mut self, driven: usize) {
         let size = self.size;
         self.corrected[..size].copy_from_slice(&self.delassus.as_slice()[driven * self.delassus.nrows()..][..size]);
@@ -93,7 +92,7 @@ impl ContactSolver {
         }
     }
 
-    /// Longest step up to `step` that keeps every fulfilled condition, and the contact that ends it.
+    /// Returns the longest step up to `step` that keeps every fulfilled condition, and the contact that ends it.
     fn blocking(&self, driven: usize, step: f64, gap_scale: f64) -> (f64, usize) {
         let mut shortest = (step, driven);
         for node in (0..self.size).filter(|node| *node != driven) {

@@ -1,7 +1,7 @@
-//! Elimination with diagonal pivoting, whose order of operations on every entry is that of the textbook.
+//! Elimination with diagonal pivoting; every entry undergoes the same operations in the same order as in the textbook algorithm.
 //!
-//! Large systems update the trailing block only after a panel of pivots, so that each pass through it does more work; until
-//! then only the diagonal, which the next pivot is chosen by, and the pivot's own row and column are brought up to date.
+//! Large systems update the trailing block only after a panel of pivots, so that each pass does more work; until then only the diagonal,
+//! from which the next pivot is chosen, and the row and column of the pivot are updated.
 
 use super::{ContactSolver, LARGE, REDUNDANT_PIVOT};
 use crate::dynamics::dispatch::Kernel;
@@ -10,8 +10,8 @@ use crate::dynamics::dispatch::Kernel;
 const PANEL: usize = 8;
 
 impl ContactSolver {
-    /// Eliminate the system of the first `count` entries of `members`; returns its rank. Pivots and right-hand side are
-    /// then reduced, and `members` is in the order of the pivots.
+    /// Eliminates the system of the first `count` entries of `members`; returns its rank. Pivots and right-hand side are then reduced, and
+    /// `members` is in the order of the pivots.
     #[inline]
     pub(super) fn eliminate(&mut self, count: usize) -> usize {
         for row in 0..count {
@@ -40,17 +40,17 @@ impl ContactSolver {
         rank
     }
 
-    /// The node with the largest share of its own flexibility left: nodes may differ by many orders of magnitude.
-    /// None when the others are redundant.
+    /// Returns the node with the largest remaining fraction of its own flexibility, since nodes may differ by many orders of magnitude.
+    /// `None` if the others are redundant.
     #[inline]
     fn next_pivot(&self, rank: usize, count: usize) -> Option<usize> {
         let left = |row: usize| self.remaining[row].abs() / self.diagonal[row];
         let pivot = (rank..count).fold(rank, |best, row| if left(row) > left(best) { row } else { best });
-        // False for a node without any flexibility (0/0), too.
+        // Also false for a node without any flexibility (0/0).
         (left(pivot) > REDUNDANT_PIVOT).then_some(pivot)
     }
 
-    /// One pivot of a small system, at once.
+    /// Applies one pivot of a small system immediately.
     #[inline]
     fn reduce(&mut self, rank: usize, count: usize) {
         let order = self.factor.nrows();
@@ -90,7 +90,7 @@ impl ContactSolver {
         }
     }
 
-    /// Apply the pivots from `start` to the column and the row of pivot `rank`.
+    /// Applies the pivots from `start` to the column and the row of pivot `rank`.
     fn catch_up(&mut self, start: usize, rank: usize, count: usize) {
         for p in start..rank {
             let value = self.factor[(p, rank)];
@@ -106,7 +106,7 @@ impl ContactSolver {
         }
     }
 
-    /// Multipliers of a pivot, and what they do to the right-hand side and to the diagonal.
+    /// Computes the multipliers of a pivot, and updates the right-hand side and the diagonal.
     fn divide(&mut self, rank: usize, count: usize) {
         let (pivot, known) = (self.factor[(rank, rank)], self.right[rank]);
         for row in rank + 1..count {
@@ -125,18 +125,18 @@ impl ContactSolver {
     }
 }
 
-/// `value − ratio · factor`; a zero ratio leaves infinite factors out.
+/// Returns `value − ratio · factor`; a zero ratio ignores infinite factors.
 #[inline(always)]
 fn reduced(value: f64, ratio: f64, factor: f64) -> f64 {
     if ratio == 0.0 { value } else { value - ratio * factor }
 }
 
-/// Apply the pivots `start..rank` to the block behind them, column by column.
+/// Application of the pivots `start..rank` to the trailing block, column by column.
 struct Trailing<'a> {
     order: usize,
     /// Columns of the pivots.
     multipliers: &'a [f64],
-    /// Columns behind them.
+    /// Trailing columns.
     trailing: &'a mut [f64],
     start: usize,
     rank: usize,

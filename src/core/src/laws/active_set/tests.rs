@@ -1,11 +1,11 @@
-//! Pivoting against brute force, and the limits of its cases.
+//! Pivoting against brute force, and its limits.
 
 use super::*;
 use proptest::prelude::*;
 
 mod semidefinite;
 
-/// The solution by trying every active set: independent of pivoting rules.
+/// Finds the solution by trying every active set, independently of pivoting rules.
 fn brute_force(w: &DMatrix<f64>, g: &[f64]) -> Vec<f64> {
     let n = g.len();
     for set in 0..1_usize << n {
@@ -100,7 +100,7 @@ fn stiff_nodes_beside_soft_ones_are_not_redundant() {
 
 #[test]
 fn film_ignores_penetration_caused_by_other_contacts() {
-    // Pushing node 1 out pulls node 2 in: FILM does not notice, complementarity does.
+    // Pushing node 1 out pulls node 2 in, which complementarity detects and FILM does not.
     let mut solver = ContactSolver::new(2);
     solver.delassus.copy_from_slice(&[1.0, -0.9, -0.9, 1.0]);
     solver.gaps.copy_from_slice(&[-1.0, 0.1]);
@@ -111,7 +111,7 @@ fn film_ignores_penetration_caused_by_other_contacts() {
     assert!(exact.gaps.iter().all(|gap| *gap >= 0.0) && exact.multipliers.iter().all(|value| *value > 0.0));
 }
 
-/// Random P-matrices of the sizes of whole casings, some of them far from symmetric.
+/// Random P-matrices of the size of whole casings, some of them far from symmetric.
 #[test]
 fn large_problems_fulfil_complementarity() {
     let mut seed = 1_u64;

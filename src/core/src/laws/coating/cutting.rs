@@ -1,10 +1,10 @@
-//! Cutting: a blade shears the coating off along its way. Per width b of a row and depth of cut a the force against the way
-//! is u·b·a, u being the specific cutting energy, and κ times that away from the casing. What is removed per way is b·a, so
-//! that the work along the way is u times the volume.
+//! Cutting: a blade shears the coating off along its path. For a row of width b and a depth of cut a, the force against the motion is
+//! u·b·a, with the specific cutting energy u, and κ times that away from the casing. The volume removed per sliding distance is b·a, so
+//! that the work along the path is u times the volume.
 //!
-//! A blade cuts what lay in front of it as it came into a cell: the depth of a cell as a whole grows while it is passed, the
-//! depth of its part ahead does not. The way of one step may lie in two cells, each with the share of the way in it. So forces
-//! do not know how wide cells are.
+//! A blade cuts the material that was in front of it when it entered a cell: the depth of the whole cell grows while the blade passes, the
+//! depth of the part ahead does not. The path of one step may lie in two cells, each with its fraction of the path. Forces therefore do not
+//! depend on the width of cells.
 
 use super::{Branch, CellContact, CellRow, CoatedProblem, Coating, RodMaterial, place};
 use crate::persist::{Persist, StateReader, StateWriter};
@@ -13,51 +13,51 @@ use crate::settings::CuttingSettings;
 /// Edge of one row of a blade that cuts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Edge {
-    /// Number of the cell, from 1; 0: it cuts nothing.
+    /// Number of the cell, from 1; 0 without cutting.
     cell: u64,
-    /// Depth of that cell ahead of the blade, as a share of the thickness.
+    /// Depth of that cell ahead of the blade, as a fraction of the thickness.
     ahead: f64,
-    /// Sense of the way around: 1, −1, or 0 at rest.
+    /// Direction of motion around: 1, −1, or 0 at rest.
     sense: f64,
 }
 
 crate::persist::persist_fields!(Edge { cell, ahead, sense });
 
-/// Material that is removed from a cell in a step.
+/// Material removed from a cell in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Chip {
     cell: usize,
     row: usize,
     blade: usize,
-    /// Force against the way (N).
+    /// Force against the motion (N).
     force: f64,
 }
 
 /// Motion of a blade along the coating.
 #[derive(Debug, Clone, Copy)]
 pub struct BladePassage<'a> {
-    /// Which blade.
+    /// Index of the blade.
     pub blade: usize,
-    /// Angles at which its contact nodes face the casing (rad).
+    /// Angles of its contact nodes on the casing (rad).
     pub angles: &'a [f64],
-    /// Way of each over the step (m), positive towards growing angles.
+    /// Sliding distance of each node over the step (m), positive towards increasing angles.
     pub slid: &'a [f64],
 }
 
-/// The cutting of a coating.
+/// State of cutting of a coating.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CoatingCut {
     /// Specific cutting energy (J/m³).
     energy: f64,
-    /// Tangential per normal force.
+    /// Ratio of tangential to normal force.
     tangential: f64,
-    /// `[blade · rows + row]`.
+    /// Edges, `[blade · rows + row]`.
     edges: Vec<Edge>,
-    /// The same after the step under way: a row that is not pressed in any more starts anew.
+    /// Edges after the current step: a row that is no longer pressed in starts anew.
     next: Vec<Edge>,
     /// Chips of the current step; none between steps.
     chips: Vec<Chip>,
-    /// Way against the force of each contact node (m), `[blade · nodes + node]`; of the step under way.
+    /// Sliding distance of each contact node against the force (m) in the current step, `[blade · nodes + node]`.
     ways: Vec<f64>,
 }
 
@@ -73,7 +73,7 @@ impl CoatingCut {
         }
     }
 
-    /// The normal force κ·u·b·a as that of a rod: of the area b·h₀ it has the modulus κ·u, and it never yields.
+    /// Returns the normal force κ·u·b·a as that of a rod: with the area b·h₀ it has the modulus κ·u, and it never yields.
     pub(super) fn rod(settings: CuttingSettings) -> RodMaterial {
         let modulus = settings.normal_ratio * settings.specific_energy;
         RodMaterial { modulus, yield_stress: f64::INFINITY, hardening: 0.0 }
@@ -114,17 +114,17 @@ impl CoatingCut {
 }
 
 impl Coating {
-    /// Whether it is cut instead of pressed in.
+    /// Returns whether the coating is cut instead of pressed in.
     pub fn is_cut(&self) -> bool {
         self.cutting.is_some()
     }
 
-    /// Tangential per normal force of what is cut (-); 0 where the coating is pressed in.
+    /// Ratio of tangential to normal force of a cut (-); 0 if the coating is pressed in.
     pub fn tangential_ratio(&self) -> f64 {
         self.cutting.as_ref().map_or(0.0, |cutting| cutting.tangential)
     }
 
-    /// As [`Coating::locate`], of a blade that cuts: the one or two cells of each row in which its way of the step lies.
+    /// Like [`Coating::locate`], for a blade that cuts: the one or two cells of each row that contain its path of the step.
     pub fn locate_cut(&self, problem: &mut CoatedProblem, way: BladePassage) {
         let Some(cutting) = &self.cutting else { return };
         let first = problem.append_nodes(self.nodes);
@@ -157,7 +157,8 @@ impl Coating {
         }
     }
 
-    /// Share of the way (m, on a radius) that lies behind the border of the cell it ends in, so far `within` it (-).
+    /// Fraction of the sliding distance (m, at a radius) that is behind the border of its last cell, in which it ends at the position
+    /// `within` (-).
     fn behind(&self, within: f64, slid: f64, radius: f64) -> f64 {
         let turned = slid / radius;
         if turned == 0.0 {
@@ -167,7 +168,7 @@ impl Coating {
         (1.0 - since * self.width() / turned.abs()).clamp(0.0, 1.0)
     }
 
-    /// Take up what a solved problem cuts, of nodes that have slid so far (m).
+    /// Records the chips of a solved problem, for nodes that have slid by these distances (m).
     pub(in crate::laws) fn take_chips(&mut self, problem: &CoatedProblem, slid: &[f64]) {
         let (rows, Some(cutting)) = (self.rows.len(), &mut self.cutting) else { return };
         for contact in &problem.contacts {
@@ -185,7 +186,7 @@ impl Coating {
         }
     }
 
-    /// Way of a contact node against the force on it in the step (m).
+    /// Sets the sliding distance of a contact node against its force in the step (m).
     pub fn slid(&mut self, blade: usize, node: usize, way: f64) {
         let nodes = self.nodes;
         if let Some(cutting) = &mut self.cutting {
@@ -193,7 +194,7 @@ impl Coating {
         }
     }
 
-    /// Remove what the blades have cut on their way; returns the energy this takes (J).
+    /// Removes the material that the blades have cut along their path; returns the energy this consumes (J).
     pub fn cut(&mut self) -> f64 {
         let Some(cutting) = &mut self.cutting else { return 0.0 };
         let mut energy = 0.0;
@@ -210,7 +211,7 @@ impl Coating {
     }
 }
 
-/// 1, −1 or 0.
+/// Returns 1, −1 or 0.
 fn sense(way: f64) -> f64 {
     if way > 0.0 {
         1.0

@@ -1,13 +1,12 @@
 //! One step of a group of coupled nodes on a coating: rods that are free, elastic or yielding, and hard contact.
 //!
-//! g = g_p + W(NᵀF(−Ng) + λ), λ ⟂ g + h₀ ≥ 0. With every rod on one branch (F = f + kδ) and every node open or closed
-//! the equations are linear in the gaps of the open and the λ of the closed nodes. The branches are found by block
-//! exchanges as in [`ContactSolver`](crate::laws::active_set::ContactSolver): every rod and node whose condition is
-//! violated moves on by one branch. When the number of violated conditions stops falling, Katzenelson's method takes
-//! over (J. Katzenelson, Bell Syst. Tech. J. 44, 1965): starting without contact, the prediction is approached on a
-//! straight line, and whenever a rod or node comes to the end of its branch this one alone is exchanged. Gaps are a
-//! continuous, piecewise linear and invertible function of the prediction where the symmetric part of W is positive
-//! definite, so the line meets every combination of branches at most once.
+//! g = g_p + W(NᵀF(−Ng) + λ), λ ⟂ g + h₀ ≥ 0. With every rod on one branch (F = f + kδ) and every node open or closed, the equations are
+//! linear in the gaps of the open and the λ of the closed nodes. The branches are found by block exchanges as in
+//! [`ContactSolver`](crate::laws::active_set::ContactSolver): every rod and node whose condition is violated moves on by one branch. When
+//! the number of violated conditions stops falling, Katzenelson's method takes over (J. Katzenelson, Bell Syst. Tech. J. 44, 1965):
+//! starting without contact, the prediction is approached on a straight line, and whenever a rod or node reaches the end of its branch only
+//! this branch is exchanged. Gaps are a continuous, piecewise linear and invertible function of the prediction if the symmetric part of W
+//! is positive definite, so that the line meets every combination of branches at most once.
 
 mod linear;
 
@@ -19,11 +18,11 @@ use crate::laws::proximal::{ROUNDS, Yielding};
 
 /// Depths and forces within this fraction of their scale count as zero.
 const ZERO_FRACTION: f64 = 1e-12;
-/// Rounding of a depth relative to the depths it is the difference of.
+/// Rounding of a depth relative to the depths whose difference it is.
 const ROUNDING: f64 = 1e-15;
 /// Block exchanges allowed without progress before the path is followed.
 const PATIENCE: usize = 8;
-/// Golden ratio: multiples of it, without their whole part, are spread evenly.
+/// Golden ratio: the fractional parts of its multiples are evenly distributed.
 const GOLDEN: f64 = 1.618_033_988_749_895;
 
 /// One step of the path.
@@ -33,7 +32,7 @@ enum PathStep {
     Node(usize),
 }
 
-/// The contact problem of one group of blades on a coating; allocates only when made.
+/// The contact problem of one group of blades on a coating; allocates only when created.
 ///
 /// Per group: [`clear`](Self::clear), [`Coating::locate`](super::Coating::locate) for each blade, fill `delassus`, `gaps`
 /// and (as a guess) `closed` of the first [`size`](Self::size) nodes, then [`solve`](Self::solve).
@@ -45,7 +44,7 @@ pub struct CoatedProblem {
     /// Normal gap of node i per multiplier of node j (m/N), friction included; capacity × capacity, the leading
     /// `size` × `size` part in use.
     pub delassus: DMatrix<f64>,
-    /// The same per force of a coating that is cut, which pulls differently from friction on the hard casing.
+    /// Normal gap per force of a coating that is cut, whose tangential force differs from friction on the hard casing.
     pub cut: Option<DMatrix<f64>>,
     /// As in [`ContactSolver::monotone`](crate::laws::active_set::ContactSolver::monotone).
     pub monotone: bool,
@@ -65,7 +64,7 @@ pub struct CoatedProblem {
     largest: f64,
     yielding: Yielding,
     pub(super) factorisations: usize,
-    /// Nodes that carry force, and where each is among them.
+    /// Nodes with force, and the index of each among them.
     members: Vec<usize>,
     slot: Vec<usize>,
     factor: DMatrix<f64>,
@@ -100,7 +99,7 @@ impl CoatedProblem {
         }
     }
 
-    /// Start a new group.
+    /// Starts a new group.
     pub fn clear(&mut self) {
         self.size = 0;
         self.contacts.clear();
@@ -111,7 +110,7 @@ impl CoatedProblem {
         self.size
     }
 
-    /// Room for another blade; returns its first node.
+    /// Adds the nodes of another blade; returns its first node.
     pub(super) fn append_nodes(&mut self, nodes: usize) -> usize {
         let first = self.size;
         self.size += nodes;
@@ -136,14 +135,14 @@ impl CoatedProblem {
         loaded.map(|contact| (contact.cell, self.force(contact, &self.gaps).max(0.0)))
     }
 
-    /// Gaps, coating and hard forces of the step.
+    /// Solves for gaps, coating forces and hard forces of the step.
     pub fn solve(&mut self) -> SolverOutcome {
         self.guess();
         let solved = self.exchange_blocks() || self.follow_path() || self.monotone && self.approach();
         SolverOutcome { solved, factorisations: self.factorisations, ..SolverOutcome::default() }
     }
 
-    /// Start from the prediction and from the nodes that the caller says are closed.
+    /// Starts from the prediction and from the nodes that the caller marked as closed.
     pub(super) fn guess(&mut self) {
         for index in 0..self.contacts.len() {
             let contact = self.contacts[index];
@@ -156,7 +155,7 @@ impl CoatedProblem {
         self.factorisations = 0;
     }
 
-    /// From the predicted gaps, whatever the rank of W ([`crate::laws::proximal`]).
+    /// Solves from the predicted gaps, for any rank of W ([`crate::laws::proximal`]).
     fn approach(&mut self) -> bool {
         let size = self.size;
         self.coating[..size].fill(0.0);
@@ -185,7 +184,7 @@ impl CoatedProblem {
         false
     }
 
-    /// From no contact to the prediction, one exchange at a time.
+    /// Follows the path from no contact to the prediction, one exchange at a time.
     pub(super) fn follow_path(&mut self) -> bool {
         for index in 0..self.contacts.len() {
             self.contacts[index].branch = Branch::Free;
@@ -193,7 +192,7 @@ impl CoatedProblem {
         self.closed[..self.size].fill(false);
         self.reached[1][..self.size].fill(0.0);
         for node in 0..self.size {
-            // Different for every node, lest rods close at the same point of the path.
+            // Different for every node, so that rods do not close at the same point of the path.
             let apart = 1.0 + (GOLDEN * number(node + 1)).fract();
             self.reached[0][node] = self.gaps[node].max(0.0) + apart * self.thickness;
         }
@@ -218,8 +217,8 @@ impl CoatedProblem {
         false
     }
 
-    /// Which branch ends first between the point reached and the solution of the present branches, and after which
-    /// share of the way; `None` if all hold at that solution.
+    /// Returns the branch that ends first between the point reached and the solution of the present branches, and the fraction of the path
+    /// up to there; `None` if all hold at that solution.
     fn first_end(&self) -> Option<(f64, PathStep)> {
         let share = |from: f64, to: f64, end: f64| ((end - from) / (to - from)).clamp(0.0, 1.0);
         let rods = (0..self.contacts.len()).filter_map(|index| {
@@ -244,11 +243,11 @@ impl CoatedProblem {
         -(share_a * gaps[a] + share_b * gaps[b]) / self.thickness
     }
 
-    /// On the straight line of its branch, below zero where that branch does not hold.
+    /// Force on the straight line of its branch, negative where that branch does not hold.
     pub(super) fn force(&self, contact: &CellContact, gaps: &[f64]) -> f64 {
         let (offset, tangent) = self.rod.line(contact.branch, contact.plastic);
         let strain = self.strain(contact, gaps);
-        // As a difference the elastic force keeps its digits close to zero.
+        // Computed as a difference, the elastic force is accurate close to zero.
         let stress = if contact.branch == Branch::Elastic {
             tangent * (strain - contact.plastic)
         } else {
@@ -257,8 +256,8 @@ impl CoatedProblem {
         contact.area * stress
     }
 
-    /// Strain by which a condition may be violated: rounding of what it is computed from, or a force that does not
-    /// matter beside the largest.
+    /// Strain by which a condition may be violated: rounding of the terms it is computed from, or a force that is negligible compared with
+    /// the largest.
     fn slack(&self, contact: &CellContact) -> f64 {
         let depth = contact
             .nodes
@@ -301,7 +300,7 @@ impl CoatedProblem {
         }
     }
 
-    /// Remove rounding from a solution. False, and nothing done, where it is none.
+    /// Removes rounding from a solution. Returns false and does nothing if there is no solution.
     fn settle(&mut self) -> bool {
         if self.yielding.is_pinched(self.size, self.scale(), |node| self.hard[node]) {
             return false;
@@ -315,7 +314,8 @@ impl CoatedProblem {
         true
     }
 
-    /// Largest gap, the thickness, or the most that the coating moves a node (m): rods may be stiff beside the blade.
+    /// Largest gap, the thickness, or the largest displacement of a node by the coating (m), since rods may be stiff compared with the
+    /// blade.
     fn scale(&self) -> f64 {
         let of = |node: usize| self.gaps[node].abs().max(self.delassus[(node, node)] * self.coating[node].abs());
         (0..self.size).map(of).fold(self.thickness, f64::max)

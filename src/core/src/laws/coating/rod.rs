@@ -1,11 +1,11 @@
-//! The law of one coating cell: a rod that is loaded in compression only, yields and hardens linearly.
+//! Law of one coating cell: a rod that is loaded in compression only, yields and hardens linearly.
 
 use crate::settings::CoatingSettings;
 
-/// Which piece of the law a rod is on.
+/// Branch of the law of a rod.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Branch {
-    /// Blade and rod do not touch.
+    /// Blade and rod are not in contact.
     #[default]
     Free,
     /// Along the modulus.
@@ -24,13 +24,13 @@ pub struct RodMaterial {
 }
 
 impl RodMaterial {
-    /// Material of a coating.
+    /// Creates the material of a coating.
     pub fn new(settings: &CoatingSettings) -> Self {
         let &CoatingSettings { modulus, yield_stress, hardening, .. } = settings;
         Self { modulus, yield_stress, hardening }
     }
 
-    /// Branch that belongs to a total strain, given the plastic strain so far.
+    /// Returns the branch at a total strain and the current plastic strain.
     pub fn branch(&self, strain: f64, plastic: f64) -> Branch {
         let trial = self.modulus * (strain - plastic);
         if trial <= 0.0 {
@@ -42,8 +42,8 @@ impl RodMaterial {
         }
     }
 
-    /// The straight line of a branch: stress at zero total strain (Pa) and tangent (Pa). The hardening line is the
-    /// same for every plastic strain so far.
+    /// Straight line of a branch: stress at zero total strain (Pa) and tangent (Pa). The hardening line is the same for every current
+    /// plastic strain.
     pub fn line(&self, branch: Branch, plastic: f64) -> (f64, f64) {
         let Self { modulus, yield_stress, hardening } = *self;
         match branch {
@@ -56,12 +56,12 @@ impl RodMaterial {
         }
     }
 
-    /// Plastic strain once a strain on the hardening line is reached: Eε = Y + (E + K)ε_p.
+    /// Plastic strain after a strain on the hardening line: Eε = Y + (E + K)ε_p.
     pub fn worn(&self, strain: f64) -> f64 {
         (self.modulus * strain - self.yield_stress) / (self.modulus + self.hardening)
     }
 
-    /// Stress (Pa) at a total strain, and the plastic strain it leaves.
+    /// Stress (Pa) at a total strain, and the resulting plastic strain.
     pub fn stress(&self, strain: f64, plastic: f64) -> (f64, f64) {
         let branch = self.branch(strain, plastic);
         let (offset, tangent) = self.line(branch, plastic);
@@ -74,7 +74,8 @@ impl RodMaterial {
         (after - before) * (self.yield_stress + 0.5 * self.hardening * (before + after))
     }
 
-    /// Where `branch` goes, one border at a time, if `strain` is beyond it by more than `slack`; `None` if it holds.
+    /// Returns the next branch, one border at a time, if `strain` is beyond the border of `branch` by more than `slack`; `None` if it
+    /// holds.
     pub(super) fn next(&self, branch: Branch, strain: f64, plastic: f64, slack: f64) -> Option<Branch> {
         let beyond = |next: Branch| strain - self.border(branch, next, plastic);
         match branch {

@@ -1,4 +1,4 @@
-//! The coating against the hand-derived law; energy and virtual work balances; geometry, groups and state.
+//! The coating against the hand-derived law; balances of energy and virtual work; geometry, groups and state.
 
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -42,7 +42,7 @@ fn coating(settings: &CoatingSettings, nodes: usize) -> Coating {
     Coating::new(settings, &tip(settings, &axial).with_extent([-0.2, number(nodes) - 0.8]), 1).unwrap()
 }
 
-/// In the middle of a cell: a tip as wide as a cell covers this one alone.
+/// The middle of a cell, where a tip as wide as a cell covers only this cell.
 fn middle(settings: &CoatingSettings) -> f64 {
     0.5 * TAU / number(settings.cells_around)
 }
@@ -52,7 +52,7 @@ fn set_wear(coating: &mut Coating, plastic: &[f64]) {
     coating.restore(&mut StateReader::new(&bytes));
 }
 
-/// The rod with its node moved as prescribed: no flexibility, so the gap stays. Returns the force.
+/// Moves the node of the rod as prescribed, without flexibility, so that the gap stays. Returns the force.
 fn press(coating: &mut Coating, penetration: f64) -> f64 {
     let mut problem = coating.problem(1);
     coating.locate(&mut problem, &[TAU / 16.0]);
@@ -80,11 +80,11 @@ fn load_unload_reload_follows_the_law() {
     check(-1e-3, 0.0);
     check(0.5 * yields, 0.5 * y);
     check(0.999 * yields, 0.999 * y);
-    // Beyond the yield point with the tangent EK/(E + K), whatever the number of steps.
+    // Beyond the yield point with the tangent EK/(E + K), for any number of steps.
     let tangent = e * k / (e + k);
     check(2.0 * yields, y + tangent * yields);
     check(5.0 * yields, y + tangent * 4.0 * yields);
-    // The stress at the top is also Y + Kε_p, from which ε_p follows; unloading along E reaches zero at ε_p.
+    // The maximum stress is also Y + Kε_p, which determines ε_p; unloading along E reaches zero at ε_p.
     let top = y + tangent * 4.0 * yields;
     let plastic = (top - y) / k;
     assert!((plastic - (5.0 * yields - top / e)).abs() < 1e-15, "both ways to ε_p agree");
@@ -105,7 +105,7 @@ fn closed_cycle_work_is_plastic_plus_hardening_energy() {
     let (e, y, k) = (5.0, 0.4, 1.5);
     let mut coating = coating(&material(e, y, k, 8, 1), 1);
     let volume = std::f64::consts::TAU / 8.0 * 0.4 * THICKNESS;
-    // Up to 0.35, back, up to 0.6, back: corners of the law are points of the path, so trapezia are exact.
+    // Up to 0.35, back, up to 0.6, back: corners of the law are points of the path, so that the trapezoidal rule is exact.
     let worn = |strain: f64| (e * strain - y) / (e + k);
     let (first, second) = (worn(0.35), worn(0.6));
     let top = first + (y + k * first) / e;
@@ -186,7 +186,7 @@ fn interpolation_does_the_same_work_on_both_sides() {
     }
     let by_nodes: f64 = on_nodes.iter().zip(displacement).map(|(force, moved)| force * moved).sum();
     assert!((on_cells - by_nodes).abs() < 1e-14);
-    // A penetration that is linear in z is seen exactly, as is its resultant: solve with prescribed gaps.
+    // A penetration that is linear in z is represented exactly, as is its resultant: solve with prescribed gaps.
     let depth = |z: f64| 0.02 + z;
     (0..4).for_each(|node| problem.gaps[node] = -depth(axial[node]));
     assert!(problem.solve().solved);
@@ -220,7 +220,7 @@ fn cells_follow_the_angle_of_the_blade() {
     assert_eq!(cells(-0.5 * cell, -0.5 * cell), [9, 19, 29]);
     assert_eq!(cells(-1e-300, -1e-300), [9, 0, 19, 10, 29, 20], "half of it on each side of the seam");
     assert_eq!(cells(1000.0 * TAU + 3.5 * cell, 3.5 * cell), [3, 13, 23]);
-    // Swept across the seam: the middle row lies between its nodes; the outer ones are beyond the nodes at 0.2 and 0.8.
+    // Swept across the seam: the middle row is between its nodes; the outer rows are beyond the nodes at 0.2 and 0.8.
     assert_eq!(cells(-0.6 * cell, 1.0 * cell + 0.4 * cell), [9, 10, 21]);
     assert_eq!(cells(TAU - 0.6 * cell, 1.4 * cell), [9, 10, 21], "however the angles are wrapped");
     for index in 0..coating.cells() {
@@ -229,7 +229,7 @@ fn cells_follow_the_angle_of_the_blade() {
     }
 }
 
-/// Shares of cells by the overlap of intervals, whatever the angle and the width.
+/// Fractions of cells by the overlap of intervals, for any angle and width.
 #[test]
 fn covered_cell_fractions_sum_to_the_tip_width() {
     let mut random = tiprub_test_models::SeededRandom(3);
@@ -254,7 +254,7 @@ fn covered_cell_fractions_sum_to_the_tip_width() {
     }
 }
 
-/// Pressed alike, an unworn coating returns the same force to a tip on whatever cells, and wherever it stands on them.
+/// At equal penetration an unworn coating returns the same force for any size of the cells and any position of the tip on them.
 #[test]
 fn force_does_not_depend_on_the_width_of_cells() {
     for (cells, angle) in [4, 7, 50, 720, 10_007].into_iter().flat_map(|cells| [0.1, 2.0, -3.3].map(|at| (cells, at))) {
@@ -278,7 +278,7 @@ fn patch_width_is_thickness_over_cosine_of_stagger() {
         let (chord, thickness) = (0.06, 2e-3);
         let node = |index: usize| {
             let (along, share) = (chord * number(index) / 4.0, if index.is_multiple_of(4) { 0.125 } else { 0.25 });
-            // On both sides of the angle where counting starts anew.
+            // On both sides of the angle at which counting restarts.
             let angle = (along * stagger.sin() / radius).rem_euclid(TAU);
             let (area, length) = (share * chord * thickness, share * chord);
             let position = [radius, angle, along * stagger.cos()];
@@ -292,7 +292,7 @@ fn patch_width_is_thickness_over_cosine_of_stagger() {
         }
         let given = CoatingSettings { contact_width: Some(0.7), ..settings };
         assert_eq!(BladeTip::of(&nodes.iter().collect::<Vec<_>>(), &given).widths, [0.7; 5]);
-        // One by itself: its area over the strip that it stands for.
+        // One node alone: its area over the strip that it represents.
         let alone = BladeTip::of(&[&nodes[0]], &settings);
         let [low, high] = alone.extent;
         assert!((alone.widths[0] * (high - low) / nodes[0].area - 1.0).abs() < 1e-12);
@@ -375,7 +375,7 @@ fn coupled_blades_contact_their_own_cells() {
         assert!((forward.coating[node] - backward.coating[other]).abs() < 1e-13);
         assert!((forward.hard[node] - backward.hard[other]).abs() < 1e-13);
     }
-    // The equation itself, coupling included; without the coupling the answer is another.
+    // The equation itself, including the coupling; without the coupling the result differs.
     for i in 0..4 {
         let moved: f64 = (0..4).map(|j| w[(i, j)] * (forward.coating[j] + forward.hard[j])).sum();
         assert!((forward.gaps[i] - gaps[i] - moved).abs() < 1e-13);

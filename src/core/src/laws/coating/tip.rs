@@ -1,11 +1,11 @@
-//! The tip of a blade in front of a coating: where its contact nodes are, and how wide it is around the circumference.
+//! Tip of a blade in front of a coating: positions of its contact nodes, and widths around the circumference.
 
 use std::f64::consts::TAU;
 
 use crate::rom::ContactNode;
 use crate::settings::CoatingSettings;
 
-/// One node stands for a strip along the axis as long as this fraction of its radius.
+/// A single node represents an axial strip whose length is this fraction of its radius.
 const STRIP: f64 = 0.1;
 /// Contact nodes within this fraction of their radius along the axis have no axial extent.
 const FLAT: f64 = 1e-6;
@@ -17,28 +17,29 @@ pub struct BladeTip {
     pub(super) axial: Vec<f64>,
     /// Radii (m).
     pub(super) radii: Vec<f64>,
-    /// Widths around the circumference over which the nodes press the coating (m); not used where it is cut.
+    /// Widths around the circumference over which the nodes press the coating (m); unused if it is cut.
     pub(super) widths: Vec<f64>,
-    /// Axial positions of the first and the last edge of the cells (m). Rows beyond the outermost nodes, and all rows of a single node,
-    /// see the penetration of the nearest node.
+    /// Axial positions of the first and the last edge of the cells (m). Rows beyond the outermost nodes, and all rows of a single node, use
+    /// the penetration of the nearest node.
     pub(super) extent: [f64; 2],
 }
 
 impl BladeTip {
-    /// Nodes at axial positions and radii (m), all as wide as `width` (m), with cells from the first to the last.
+    /// Creates a tip with nodes at axial positions and radii (m), all with the width `width` (m), and cells from the first to the last
+    /// node.
     pub fn new(axial: &[f64], radii: &[f64], width: f64) -> Self {
         let low = axial.iter().copied().fold(f64::INFINITY, f64::min);
         let high = axial.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Self { axial: axial.to_vec(), radii: radii.to_vec(), widths: vec![width; axial.len()], extent: [low, high] }
     }
 
-    /// The same with cells over another extent (m).
+    /// Changes the extent of the cells (m).
     #[must_use]
     pub fn with_extent(self, extent: [f64; 2]) -> Self {
         Self { extent, ..self }
     }
 
-    /// Contact nodes or patches of a ROM: as wide as the scene says, or as their areas and lengths say.
+    /// Creates the tip of contact nodes or patches of a ROM, with widths from the scene or from their areas and lengths.
     pub fn of(nodes: &[&ContactNode], settings: &CoatingSettings) -> Self {
         let [radii, _, axial] = [0, 1, 2].map(|i| nodes.iter().map(|node| node.position[i]).collect::<Vec<f64>>());
         let tip = Self::new(&axial, &radii, settings.contact_width.unwrap_or(0.0));
@@ -56,8 +57,9 @@ impl BladeTip {
     }
 }
 
-/// Widths of patches around the circumference (m): area per length along the axis, which is that along the chord times the cosine of
-/// the chord's angle to the axis at the patch. A patch alone does not know this angle: its area goes over the whole extent (m).
+/// Widths of patches around the circumference (m): area per length along the axis, which is the length along the chord times the cosine of
+/// the angle between chord and axis at the patch. A single patch does not determine this angle: its area is distributed over the whole
+/// extent (m).
 fn widths_of_patches(nodes: &[&ContactNode], extent: [f64; 2]) -> Vec<f64> {
     let [low, high] = extent;
     if let [only] = nodes {

@@ -1,4 +1,4 @@
-//! Dense linear algebra of the Newton steps: columns stored one after the other, work done on whole columns.
+//! Dense linear algebra of the Newton steps: column-major storage, operations on whole columns.
 //!
 //! The loops are compiled per instruction set and contain neither fused multiply-add nor horizontal sums.
 
@@ -28,7 +28,7 @@ impl Kernel for AddColumns<'_> {
     }
 }
 
-/// The same with absolute values of the products: how large the terms were that a sum was made of.
+/// Adds absolute values of the products instead: the magnitude of the terms in a sum.
 pub(super) struct AddMagnitudes<'a>(pub(super) AddColumns<'a>);
 
 impl Kernel for AddMagnitudes<'_> {
@@ -45,8 +45,8 @@ impl Kernel for AddMagnitudes<'_> {
     }
 }
 
-/// Solve `matrix · x = right` in place by elimination with row exchanges; `right` returns x, `matrix` is destroyed.
-/// The matrix is `order` × `order` by columns. False when a pivot vanishes or is not finite.
+/// Solution of `matrix · x = right` in place by elimination with row exchanges; `right` returns x, `matrix` is destroyed. The matrix is
+/// `order` × `order` by columns. The result is false if a pivot vanishes or is not finite.
 pub(crate) struct Eliminate<'a> {
     pub(crate) order: usize,
     pub(crate) matrix: &'a mut [f64],
@@ -85,7 +85,7 @@ impl Kernel for Eliminate<'_> {
     }
 }
 
-/// Eliminate below the diagonal within the panel; row exchanges are noted relative to `start`.
+/// Eliminates below the diagonal within the panel; row exchanges are recorded relative to `start`.
 #[inline(always)]
 fn factorise_panel(order: usize, matrix: &mut [f64], start: usize, width: usize, exchanges: &mut [usize]) -> bool {
     for local in 0..width {
@@ -116,7 +116,7 @@ fn factorise_panel(order: usize, matrix: &mut [f64], start: usize, width: usize,
     true
 }
 
-/// Apply the panel's exchanges and elimination to one column outside it.
+/// Applies the panel's exchanges and elimination to one column outside it.
 #[inline(always)]
 fn update_column(
     order: usize,

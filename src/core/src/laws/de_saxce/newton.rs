@@ -1,31 +1,31 @@
 //! Semismooth Newton method on the function of P. Alart and A. Curnier (Comput. Methods Appl. Mech. Eng. 92, 1991).
 //!
-//! With v = r − ρu (ρ the inverse flexibility of the contact) the law is F(r) = 0, where
-//! F_N = r_N − [v_N]₊ and F_T = r_T − P(v_T), P the projection on the disk of radius µ[v_N]₊. Contacts with v_N ≤ 0 are
-//! open: their step leads to r = 0. The linearised rows of the others, for the next reaction r⁺ = r + d, are
+//! With v = r − ρu (ρ the inverse flexibility of the contact) the law is F(r) = 0, with F_N = r_N − [v_N]₊ and F_T = r_T − P(v_T), where P
+//! is the projection on the disk of radius µ[v_N]₊. Contacts with v_N ≤ 0 are open: their step leads to r = 0. The linearised rows of the
+//! others, for the next reaction r⁺ = r + d, are
 //!
 //! * normal: W_N r⁺ = −b_N;
 //! * sticking (‖v_T‖ ≤ µ v_N): W_T r⁺ = −b_T;
 //! * sliding: (I − M) r⁺_T + ρ M W_T r⁺ − µ t r⁺_N = −ρ M b_T with t = v_T/‖v_T‖, M = µ v_N/‖v_T‖ (I − t tᵀ).
 //!
-//! A proximal term ε(r⁺ − r) in the displacement keeps redundant contacts regular and does not move the solution.
+//! A proximal term ε(r⁺ − r) in the displacement keeps redundant contacts regular and does not change the solution.
 
 use super::linear::Eliminate;
 use super::one_contact::length;
 use super::problem::ScaledProblem;
 
-/// Steps of one attempt.
+/// Largest number of steps of one attempt.
 const STEPS: usize = 20;
-/// Halvings of a step.
+/// Largest number of halvings of a step.
 const HALVINGS: usize = 12;
-/// Full steps taken in spite of a larger merit: ‖F‖ is not smooth, and may have valleys without a way down.
+/// Number of full steps accepted in spite of a larger merit: ‖F‖ is not smooth, and may have local minima.
 const UPHILL: usize = 6;
-/// A step may exceed the last merit as long as it stays below the largest of this many.
+/// A step may exceed the last merit as long as it stays below the largest of this many merits.
 const MEMORY: usize = 4;
-/// Decrease asked for per length of step.
+/// Required decrease per length of step.
 const DECREASE: f64 = 1e-4;
 
-/// Scratch of the method.
+/// Scratch of Newton's method.
 #[derive(Debug, Clone)]
 pub(super) struct Newton {
     matrix: Vec<f64>,
@@ -36,9 +36,9 @@ pub(super) struct Newton {
     start_reaction: Vec<f64>,
     start_relative: Vec<f64>,
     active: Vec<usize>,
-    /// Systems factorised since the start of the solve.
+    /// Number of systems factorised since the start of the solve.
     pub(super) factorisations: usize,
-    /// Factor on the flexibilities 1/ρ: moves no solution, but changes the way to it.
+    /// Factor on the flexibilities 1/ρ, which changes the path of the iteration but not the solution.
     pub(super) stretch: f64,
 }
 
@@ -58,8 +58,8 @@ impl Newton {
         }
     }
 
-    /// Newton steps from the reactions of the problem until the residual is below the tolerance. When it gives up,
-    /// the reactions are those of the last step, projected on the cones.
+    /// Takes Newton steps from the reactions of the problem until the residual is below the tolerance. If it fails, the reactions are those
+    /// of the last step, projected on the cones.
     pub(super) fn attempt(&mut self, problem: &mut ScaledProblem, proximal: f64, tolerance: f64) -> bool {
         let mut memory = [0.0_f64; MEMORY];
         memory[0] = merit(problem, self.stretch);
@@ -85,7 +85,7 @@ impl Newton {
         false
     }
 
-    /// Project a copy on the cones; keep it when it solves the problem.
+    /// Projects a copy on the cones, and keeps it if it solves the problem.
     fn finished(&mut self, problem: &mut ScaledProblem, tolerance: f64) -> bool {
         let order = problem.order();
         self.start_reaction[..order].copy_from_slice(&problem.reaction[..order]);
@@ -106,7 +106,7 @@ impl Newton {
         problem.refresh();
     }
 
-    /// Newton direction at the current reactions. False when the system is singular.
+    /// Computes the Newton direction at the current reactions. Returns false if the system is singular.
     fn direct(&mut self, problem: &ScaledProblem, proximal: f64) -> bool {
         self.active.clear();
         self.active.extend((0..problem.size).filter(|contact| trial(problem, self.stretch, *contact)[0] > 0.0));
@@ -160,7 +160,7 @@ impl Newton {
         }
     }
 
-    /// Turn the sticking rows of a contact into sliding ones.
+    /// Converts the sticking rows of a contact to sliding ones.
     fn slide(&mut self, local: usize, v: [f64; 3], limit: f64, friction: f64, flexibility: f64) {
         let order = 3 * self.active.len();
         let size = length([v[1], v[2]]);
@@ -188,7 +188,7 @@ impl Newton {
         }
     }
 
-    /// Go along the direction as far as the merit allows; returns the merit reached.
+    /// Searches along the direction as far as the merit permits; returns the merit reached.
     fn search(&mut self, problem: &mut ScaledProblem, allowed: f64) -> Option<f64> {
         let order = problem.order();
         self.moved[..order].fill(0.0);
@@ -206,7 +206,7 @@ impl Newton {
         None
     }
 
-    /// Go a part of the direction from the start of the step; returns the merit there.
+    /// Moves a fraction of the direction from the start of the step; returns the merit there.
     fn move_along(&self, problem: &mut ScaledProblem, step: f64) -> f64 {
         for k in 0..problem.order() {
             problem.reaction[k] = self.start_reaction[k] + step * self.direction[k];

@@ -1,21 +1,20 @@
 //! Coulomb's law for one contact, solved exactly.
 //!
-//! With A the 3 × 3 Delassus block (normal, tangent 1, tangent 2) and b the relative displacement without this
-//! contact's reaction: u = A r + b, 0 ≤ u_N ⟂ r_N ≥ 0, ‖r_T‖ ≤ µ r_N, and r_T = −µ r_N u_T/‖u_T‖ where u_T ≠ 0.
-//! The cases are tried in the order take-off, stick, slide. In sliding u_T = −α r_T with α > 0; eliminating r_N by
-//! u_N = 0 leaves (S + αI) r_T = −c with the Schur complement S of A_NN, so that with y = adj(S + αI) c and
-//! D = det(S + αI) the condition ‖r_T‖ = µ r_N becomes
+//! With A the 3 × 3 Delassus block (normal, tangent 1, tangent 2) and b the relative displacement without the reaction of this contact: u =
+//! A r + b, 0 ≤ u_N ⟂ r_N ≥ 0, ‖r_T‖ ≤ µ r_N, and r_T = −µ r_N u_T/‖u_T‖ if u_T ≠ 0. The cases are tried in the order take-off, stick,
+//! slide. In sliding u_T = −α r_T with α > 0; eliminating r_N by u_N = 0 yields (S + αI) r_T = −c with the Schur complement S of A_NN, so
+//! that with y = adj(S + αI) c and D = det(S + αI) the condition ‖r_T‖ = µ r_N becomes
 //!
 //! g(α) = µ (A_NT·y − b_N D)/A_NN − ‖y‖ = 0,
 //!
 //! whose square is the quartic of O. Bonnefon, G. Daviet (INRIA report, 2011, HAL inria-00553859). Outside the stick cone
 //! g(0) < 0, and g grows like α² because b_N < 0: a root is always bracketed, and Newton's method polishes it.
 
-/// Newton and bisection steps of the sliding root; bisection alone would need about 60.
+/// Largest number of Newton and bisection steps for the sliding root; bisection alone would need about 60.
 const ROOT_STEPS: usize = 100;
 
-/// Reaction of one contact: block `a` by rows, displacement `b` without reaction, friction coefficient.
-/// A block without normal flexibility (A_NN ≤ 0) carries nothing.
+/// Reaction of one contact: block `a` by rows, displacement `b` without reaction, friction coefficient. A block without normal flexibility
+/// (A_NN ≤ 0) has no reaction.
 pub(super) fn solve(a: &[[f64; 3]; 3], b: [f64; 3], friction: f64) -> [f64; 3] {
     if b[0] >= 0.0 || a[0][0] <= 0.0 {
         return [0.0; 3];
@@ -89,7 +88,7 @@ impl TangentialProblem {
         )
     }
 
-    /// The root of g: Newton steps kept inside a shrinking bracket.
+    /// Finds the root of g by Newton steps inside a shrinking bracket.
     fn root(&self) -> f64 {
         let far = length(self.right) / (self.friction * self.alone);
         let (mut low, mut high) = (0.0, far.max(self.schur[0][0].abs() + self.schur[1][1].abs()));
@@ -117,7 +116,7 @@ impl TangentialProblem {
         alpha
     }
 
-    /// The reaction of a slide with u_T = −α r_T, on the cone to the last bit but rounding.
+    /// Reaction of sliding with u_T = −α r_T, on the cone up to rounding of the last bit.
     fn reaction(&self, alpha: f64) -> [f64; 3] {
         let (y, determinant) = self.adjugate(alpha);
         let size = length(y);
@@ -147,7 +146,7 @@ mod tests {
         std::array::from_fn(|i| b[i] + a[i][0] * r[0] + a[i][1] * r[1] + a[i][2] * r[2])
     }
 
-    /// Reaction of a slide with force direction θ at u_N = 0, and the moment of u_T about that direction.
+    /// Reaction of sliding with force direction θ at u_N = 0, and the moment of u_T about that direction.
     fn slide(a: &[[f64; 3]; 3], b: [f64; 3], friction: f64, theta: f64) -> ([f64; 3], f64, f64) {
         let (sin, cos) = (libm::sin(theta), libm::cos(theta));
         let normal = -b[0] / (a[0][0] + friction * (a[0][1] * cos + a[0][2] * sin));
@@ -156,7 +155,7 @@ mod tests {
         (r, u[1] * sin - u[2] * cos, u[1] * cos + u[2] * sin)
     }
 
-    /// Every solution, found by trying all three cases and all directions of sliding.
+    /// Finds every solution by trying all three cases and all directions of sliding.
     fn brute_force(a: &[[f64; 3]; 3], b: [f64; 3], friction: f64) -> Vec<[f64; 3]> {
         let mut found = Vec::new();
         if b[0] >= 0.0 {
@@ -170,7 +169,7 @@ mod tests {
         let step = std::f64::consts::TAU / 3600.0;
         for index in 0..3600 {
             let (mut low, mut high) = (step * f64::from(index), step * f64::from(index + 1));
-            // The moment changes its sign at a pole of the normal reaction, too; their product does not.
+            // The moment also changes its sign at a pole of the normal reaction; their product does not.
             let side = |theta: f64| {
                 let (r, moment, _) = slide(a, b, friction, theta);
                 r[0] * moment > 0.0
@@ -212,7 +211,7 @@ mod tests {
             let size = r.iter().fold(1e-300_f64, |most, value| most.max(value.abs()));
             let off = |other: &[f64; 3]| (0..3).map(|i| (r[i] - other[i]).abs()).fold(0.0, f64::max) / size;
             prop_assert!(all.iter().any(|other| off(other) < 1e-6), "{r:?} is none of {all:?}");
-            // The law to the last digits.
+            // The law is fulfilled to the last digits.
             let u = relative(&a, b, r);
             let terms: [f64; 3] = std::array::from_fn(|i| b[i].abs() + (0..3).map(|j| (a[i][j] * r[j]).abs()).sum::<f64>());
             prop_assert!(u[0] >= -1e-13 * terms[0] && (r[0] == 0.0 || u[0] <= 1e-13 * terms[0]), "u {u:?}");
@@ -223,7 +222,7 @@ mod tests {
         }
     }
 
-    /// Nothing yields sideways: the force is µ times the normal one against the slip, however far that goes beside the penetration.
+    /// No tangential flexibility: the force is µ times the normal force against the slip, for any ratio of slip to penetration.
     #[test]
     fn solves_sliding_at_vanishing_contact_pressure() {
         let (a, friction) = ([[1.0, 0.5, 0.0], [0.5, 0.25, 0.0], [0.0, 0.0, 0.0]], 0.6);
@@ -248,7 +247,7 @@ mod tests {
         // A slip a million million times the elastic displacement: pure sliding.
         let r = solve(&a, [-2.0, 3e12, 4e12], 0.5);
         assert!((r[0] - 1.0).abs() < 1e-15 && (r[1] + 0.3).abs() < 1e-12 && (r[2] + 0.4).abs() < 1e-12);
-        // One mode only: the block has rank one (and beyond µ = 1.79, where sliding jams, there is no solution).
+        // One mode only: the block has rank one (and beyond µ = 1.79, where sliding locks up, there is no solution).
         let shape = [1.0, 0.5, -0.25];
         let flat: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| shape[i] * shape[j]));
         for friction in [0.0, 0.1, 1.0, 1.5] {

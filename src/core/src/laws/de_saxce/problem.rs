@@ -1,8 +1,8 @@
-//! The contact problem in each contact's own unit, and its residual.
+//! The contact problem in units scaled for each contact, and its residual.
 //!
-//! Contact i is measured with a unit σ_i, a power of two near the square root of its largest flexibility: r̂ = σ r,
-//! û = u/σ, Ŵ_ij = W_ij/(σ_i σ_j). Normal and tangents share the unit, so Coulomb's law keeps its form and µ; the
-//! diagonal becomes of order one, and scaling commits no rounding.
+//! Contact i is scaled by a unit σ_i, a power of two near the square root of its largest flexibility: r̂ = σ r, û = u/σ, Ŵ_ij = W_ij/(σ_i
+//! σ_j). Normal and tangents share the unit, so that Coulomb's law keeps its form and µ; the diagonal becomes of order one, and scaling
+//! causes no rounding.
 
 use nalgebra::DMatrix;
 
@@ -10,12 +10,12 @@ use super::linear::{AddColumns, AddMagnitudes};
 use super::one_contact::{self, length};
 use crate::dynamics::dispatch::InstructionSet;
 
-/// Share of the unit diagonal by which one contact is softened about its current reaction: fixed points stay, and
-/// blocks without full rank have a unique next reaction.
+/// Fraction of the unit diagonal by which one contact is softened about its current reaction: fixed points are unchanged, and blocks
+/// without full rank have a unique next reaction.
 const LOCAL_PROXIMAL: f64 = 1e-10;
 
-/// Terms of a displacement beyond this many times the prediction excuse no larger residual: forces that cancel each
-/// other, of a node pinched without room to give way, must not pass for a solution because they are large.
+/// Terms of a displacement beyond this multiple of the prediction do not permit a larger residual: forces that cancel each other, of a node
+/// that is pinched and cannot yield, must not count as a solution because they are large.
 const LARGEST_TERMS: f64 = 1e5;
 
 /// A problem of `size` contacts in scaled variables; entries contact by contact (normal, tangent 1, tangent 2).
@@ -31,7 +31,7 @@ pub(super) struct ScaledProblem {
     pub(super) reaction: Vec<f64>,
     /// û = free + Ŵ r̂, kept up to date by the sweeps.
     pub(super) relative: Vec<f64>,
-    /// Sum of the magnitudes û was added up from, at the last refresh, but at most `ceiling`.
+    /// Sum of the magnitudes of the terms of û at the last refresh, but at most `ceiling`.
     magnitude: Vec<f64>,
     ceiling: f64,
     /// Diagonal of Ŵ and predicted displacements while the problem is softened.
@@ -62,7 +62,7 @@ impl ScaledProblem {
         3 * self.size
     }
 
-    /// Take over a problem; the warm start is projected on the cones. False when something is not finite.
+    /// Loads a problem; the warm start is projected on the cones. Returns false if a value is not finite.
     pub(super) fn load(&mut self, delassus: &DMatrix<f64>, free: &[f64], friction: &[f64], warm: &[f64]) -> bool {
         let order = self.order();
         for contact in 0..self.size {
@@ -92,7 +92,7 @@ impl ScaledProblem {
         finite(&self.matrix[..order * order]) && finite(&self.free[..order]) && finite(&self.friction[..self.size])
     }
 
-    /// Largest predicted displacement of the contacts that penetrate, or of all when none does.
+    /// Largest predicted displacement of the contacts that penetrate, or of all if none does.
     fn largest_prediction(&self) -> f64 {
         let contacts = self.free[..self.order()].chunks_exact(3);
         let largest = |most: f64, contact: &[f64]| contact.iter().fold(most, |most, value| most.max(value.abs()));
@@ -100,7 +100,7 @@ impl ScaledProblem {
         if closed > 0.0 { closed } else { contacts.fold(0.0, largest) }
     }
 
-    /// Reactions (N) and relative displacements (m).
+    /// Writes reactions (N) and relative displacements (m).
     pub(super) fn store(&self, reactions: &mut [f64], relative: &mut [f64]) {
         for k in 0..self.order() {
             reactions[k] = self.reaction[k] / self.unit[k / 3];
@@ -108,7 +108,7 @@ impl ScaledProblem {
         }
     }
 
-    /// Replace Ŵ by Ŵ + αI and the prediction such that the current reactions give the same û as before.
+    /// Replaces Ŵ by Ŵ + αI and the prediction such that the current reactions give the same û as before.
     pub(super) fn soften(&mut self, alpha: f64) {
         let order = self.order();
         for k in 0..order {
@@ -118,7 +118,7 @@ impl ScaledProblem {
         }
     }
 
-    /// Undo `soften`, to the last bit.
+    /// Reverts `soften`, to the last bit.
     pub(super) fn harden(&mut self) {
         let order = self.order();
         for k in 0..order {
@@ -143,7 +143,7 @@ impl ScaledProblem {
         (normal, self.entry(k + 1, k + 1).max(self.entry(k + 2, k + 2)).max(f64::EPSILON))
     }
 
-    /// Replace the reaction of a contact by the nearest one of its cone.
+    /// Replaces the reaction of a contact by the nearest one in its cone.
     pub(super) fn project(&mut self, contact: usize) {
         let k = 3 * contact;
         let (friction, normal) = (self.friction[contact], self.reaction[k]);
@@ -162,12 +162,12 @@ impl ScaledProblem {
         self.reaction[3 * contact..3 * contact + 3].iter().any(|value| *value != 0.0)
     }
 
-    /// Contacts with a reaction.
+    /// Returns the number of contacts with a reaction.
     pub(super) fn count_carrying(&self) -> usize {
         (0..self.size).filter(|contact| self.carries(*contact)).count()
     }
 
-    /// û and the magnitudes of its terms from the reactions.
+    /// Recomputes û and the magnitudes of its terms from the reactions.
     pub(super) fn refresh(&mut self) {
         let order = self.order();
         self.relative[..order].copy_from_slice(&self.free[..order]);
@@ -189,7 +189,7 @@ impl ScaledProblem {
         }
     }
 
-    /// `target += Ŵ · direction`.
+    /// Computes `target += Ŵ · direction`.
     pub(super) fn add_product(&self, direction: &[f64], target: &mut [f64]) {
         let order = self.order();
         for contact in 0..self.size {
@@ -201,7 +201,7 @@ impl ScaledProblem {
         }
     }
 
-    /// Solve every contact exactly once, the others held; `relaxation` is the share of the change that is taken.
+    /// Solves every contact exactly once while the others are held; `relaxation` is the fraction of the change that is applied.
     pub(super) fn sweep(&mut self, backward: bool, relaxation: f64) {
         for step in 0..self.size {
             self.visit(if backward { self.size - 1 - step } else { step }, relaxation);
@@ -234,13 +234,13 @@ impl ScaledProblem {
         self.instructions.run(AddColumns { columns, factors, target: &mut self.relative[..order] });
     }
 
-    /// Largest residual of all contacts; infinite when anything is not a number.
+    /// Largest residual of all contacts; infinite if a value is NaN.
     pub(super) fn residual(&self) -> f64 {
         let all = (0..self.size).map(|contact| self.contact_residual(contact));
         all.fold(0.0, |worst: f64, value| if value.is_nan() { f64::INFINITY } else { worst.max(value) })
     }
 
-    /// Residual of Signorini's and Coulomb's law at one contact, as shares of the terms that u and r are made of.
+    /// Residual of Signorini's and Coulomb's law at one contact, as fractions of the terms of u and r.
     fn contact_residual(&self, contact: usize) -> f64 {
         let k = 3 * contact;
         let (normal, tangent) = self.flexibility(contact);
@@ -263,7 +263,7 @@ fn share(value: f64, whole: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value / whole }
 }
 
-/// A power of two near the square root of the flexibility; 1 for a contact without any.
+/// Returns a power of two near the square root of the flexibility; 1 for a contact without flexibility.
 fn unit(flexibility: f64) -> f64 {
     if flexibility.is_finite() && flexibility >= f64::MIN_POSITIVE {
         libm::scalbn(1.0, libm::ilogb(flexibility).div_euclid(2))

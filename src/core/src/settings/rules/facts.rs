@@ -1,11 +1,11 @@
-//! What a scene can have, so that something else is needed or excluded.
+//! Features of a scene to which rules refer.
 
 use super::place::ScenePlace;
 use crate::settings::{BodyMotion, Closure, InputInterpolation, Meridian, Scheme, Shape, Solver};
 
-/// Something a scene can have at a place.
+/// A feature of a scene at a place.
 pub struct Fact {
-    /// Key of the scene file, whose first word says which places there are.
+    /// Key of the scene file, whose first word determines the possible places.
     pub(super) key: &'static str,
     /// Description of the value, if the key alone does not give it.
     pub(super) words: &'static str,
@@ -17,7 +17,7 @@ const fn fact(key: &'static str, words: &'static str, holds: fn(&ScenePlace) -> 
 }
 
 impl Fact {
-    /// As the guide prints it.
+    /// Returns the text in the guide.
     pub(super) fn shown(&self) -> String {
         if self.words.is_empty() { format!("`{}`", self.key) } else { format!("`{}`: {}", self.key, self.words) }
     }

@@ -1,4 +1,4 @@
-//! Where rules are asked for: structures and contacts of a scene, and the scene as a whole.
+//! Places to which rules apply: structures and contacts of a scene, and the scene as a whole.
 
 use crate::Rom;
 use crate::settings::relations::{Relations, structure};
@@ -12,15 +12,15 @@ use crate::settings::{
 pub struct ScenePlace<'a> {
     pub(super) settings: &'a SceneSettings,
     pub(super) relations: &'a Relations,
-    /// As the structures; empty before ROMs are known.
+    /// ROMs of the structures; empty before they are known.
     pub(super) roms: &'a [Rom],
     pub(super) scheme: Scheme,
     pub(super) solver: Solver,
-    /// Structure or contact.
+    /// Index of the structure or contact.
     pub(super) index: usize,
 }
 
-/// The key with the number of its structure, surface or contact.
+/// Returns the key with the number of its structure, surface or contact.
 pub(super) fn path(at: &ScenePlace, key: &str) -> String {
     let (table, rest) = key.split_once('.').unwrap_or((key, ""));
     let number = match table {
@@ -32,7 +32,7 @@ pub(super) fn path(at: &ScenePlace, key: &str) -> String {
 }
 
 impl<'a> ScenePlace<'a> {
-    /// The places of a key: structures, contacts, or the scene.
+    /// Returns the places of a key: structures, contacts, or the scene.
     pub(super) fn all_of(self, key: &str) -> impl Iterator<Item = Self> {
         let count = match key.split('.').next() {
             Some("structure") => self.settings.structures.len(),
@@ -46,7 +46,7 @@ impl<'a> ScenePlace<'a> {
         &self.settings.structures[self.index]
     }
 
-    /// Returns the ROM of a structure; ROMs are known.
+    /// Returns the ROM of a structure, if ROMs are known.
     pub(super) fn rom(&self) -> &'a Rom {
         &self.roms[self.index]
     }
@@ -55,7 +55,7 @@ impl<'a> ScenePlace<'a> {
         &self.settings.contacts[self.index]
     }
 
-    /// Returns the surface of a contact, whose names are checked.
+    /// Returns the surface of a contact, whose names are already checked.
     pub(super) fn surface(&self) -> &'a SurfaceSettings {
         let own = self.relations.surfaces[self.index];
         &self.settings.surfaces[own.unwrap_or_else(|| unreachable!("validated"))]
@@ -69,7 +69,7 @@ impl<'a> ScenePlace<'a> {
         self.all_of("contact")
     }
 
-    /// Whether the master of the contact flies freely.
+    /// Returns whether the master of the contact is a free body.
     pub(super) fn is_free(&self) -> bool {
         self.master().is_some_and(|master| master.motion == BodyMotion::Free)
     }
@@ -82,7 +82,7 @@ impl<'a> ScenePlace<'a> {
         self.contact().coating.is_some_and(|coating| coating.cutting.is_some())
     }
 
-    /// Whether it is given for a coating.
+    /// Returns whether the contact has a coating with this value.
     pub(super) fn plastic(&self, value: fn(&CoatingSettings) -> f64) -> bool {
         self.contact().coating.is_some_and(|coating| value(&coating) != 0.0)
     }
@@ -91,29 +91,29 @@ impl<'a> ScenePlace<'a> {
         structure(self.settings, self.relations.masters[self.index])
     }
 
-    /// The structure under the surface of the contact.
+    /// Returns the structure under the surface of the contact.
     pub(super) fn carrier(&self) -> Option<&'a StructureSettings> {
         structure(self.settings, self.relations.carriers[self.index])
     }
 
-    /// Whether that structure is the master of a contact too.
+    /// Returns whether that structure is also the master of a contact.
     pub(super) fn carrier_touches(&self) -> bool {
         self.relations.carriers[self.index].is_some_and(|carrier| self.relations.touches(carrier))
     }
 
-    /// Whether several contacts have the master of this one.
+    /// Returns whether the master of this contact has several contacts.
     pub(super) fn has_other_contacts(&self) -> bool {
         let Some(master) = self.relations.masters[self.index] else { return false };
         let own = self.relations.contacts[master].iter();
         own.filter(|contact| self.relations.masters[**contact] == Some(master)).count() > 1
     }
 
-    /// Whether the contact is solved together with another pair's.
+    /// Returns whether the contact is solved together with that of another pair.
     pub(super) fn is_coupled(&self) -> bool {
         self.relations.is_coupled(self.settings, self.index)
     }
 
-    /// Whether another pair has its surface on the same flexible structure.
+    /// Returns whether another pair has its surface on the same flexible structure.
     pub(super) fn shares_carrier(&self) -> bool {
         self.relations.shares_carrier(self.settings, self.index)
     }
@@ -123,7 +123,7 @@ impl<'a> ScenePlace<'a> {
         self.relations.masters[self.index].map(|index| &self.roms[index])
     }
 
-    /// ROMs whose stress is recovered, of the masters with a load.
+    /// Returns the ROMs with recovered stress of the masters with a load.
     pub(super) fn stressed(self, is_loaded: fn(&StructureSettings) -> bool) -> impl Iterator<Item = &'a Rom> {
         let masters = self.contacts().filter(move |at| at.settings.master_of(at.contact()).is_some_and(is_loaded));
         masters.filter_map(|at| at.master_rom()).filter(|rom| rom.extras.stress.is_some())
@@ -133,13 +133,13 @@ impl<'a> ScenePlace<'a> {
         self.relations.carriers[self.index].map(|index| &self.roms[index])
     }
 
-    /// Whether the structure takes part in a contact whose master moves like this.
+    /// Returns whether the structure takes part in a contact whose master has such a motion.
     pub(super) fn meets(&self, moves: fn(BodyMotion) -> bool) -> bool {
         let own = self.relations.contacts[self.index].iter();
         own.filter_map(|contact| Self { index: *contact, ..*self }.master()).any(|master| moves(master.motion))
     }
 
-    /// Whether there is room for `coulomb`: a coupled problem of all sectors has it only if the scene says so.
+    /// Returns whether `coulomb` is possible: a coupled problem of all sectors supports it only if the scene selects it.
     pub(super) fn may_stick(&self) -> bool {
         let settings = self.settings;
         let small = self.contacts().all(|at| !at.is_free() && at.carrier().is_none());
@@ -149,7 +149,7 @@ impl<'a> ScenePlace<'a> {
             || (small && uncoupled && rubs && self.contacts().all(|at| !at.is_coated()))
     }
 
-    /// Whether every structure that touches keeps modes with inertia; before ROMs are known it may.
+    /// Returns whether every master has modes with inertia; true before ROMs are known.
     pub(super) fn has_modes_left(&self) -> bool {
         let structures = self.roms.iter().enumerate();
         structures.filter(|(structure, _)| self.relations.touches(*structure)).all(|(_, rom)| {

@@ -27,7 +27,7 @@ fn rom(frame: DisplacementFrame) -> Rom {
     }
 }
 
-/// `master` before a surface of `under`, which stands still.
+/// Scene with `master` and a surface of `under`, which stands still.
 fn scene(motion: BodyMotion, frame: DisplacementFrame) -> Scene {
     let structure = |name: &str, motion| StructureSettings { name: name.into(), motion, ..Default::default() };
     let settings = SceneSettings {
@@ -62,7 +62,7 @@ fn flight() -> Scene {
     scene(BodyMotion::Free, DisplacementFrame::Cartesian)
 }
 
-/// A master whose stress is asked for.
+/// Requests the stress of a master.
 fn stressed(scene: &mut Scene) {
     let points = scene.roms[0].contact_nodes.clone();
     scene.roms[0].extras.stress = Some(WatchedPoints { map: DMatrix::zeros(6, 4), points });
@@ -95,7 +95,7 @@ fn coating() -> Option<CoatingSettings> {
     })
 }
 
-/// A second contact of the same master, on a surface of the same structure.
+/// Adds a second contact of the same master, on a surface of the same structure.
 fn second(settings: &mut SceneSettings) {
     settings.surfaces.push(SurfaceSettings { name: "other".into(), ..settings.surfaces[0].clone() });
     settings.contacts.push(contact("other"));
@@ -123,7 +123,7 @@ fn excitation() -> ExcitationSettings {
 
 type Change = fn(&mut Scene);
 
-/// Changes that break a rule in a scene with a rotor, and the beginning of the message.
+/// Changes that violate a rule in a scene with a rotor, and the beginning of the message.
 const OF_ROTORS: &[(&str, Change)] = &[
     ("structure[2].whirl: needs `motion = \"rotating\"`", |scene| scene.settings.structures[1].whirl = true),
     ("structure[1].load: needs `motion = \"still\"`", |scene| {
@@ -302,7 +302,7 @@ const OF_ROTORS: &[(&str, Change)] = &[
     ("surface[1].structure: a surface around an axis needs a contact grid", |scene| scene.roms[1].extras.grid = None),
 ];
 
-/// The same of a scene with a free master.
+/// Changes that violate a rule in a scene with a free master, and the beginning of the message.
 const OF_FREE_MASTERS: &[(&str, Change)] = &[
     ("structure[1].thermal: excludes `motion = \"free\"`", |scene| scene.settings.structures[0].thermal = true),
     ("surface[1].moving: excludes a free master", |scene| scene.settings.surfaces[0].moving = true),

@@ -1,4 +1,4 @@
-//! Which structures and surfaces take part, and which contacts push each other.
+//! Checks that structures and surfaces take part in contact pairs.
 
 use std::collections::HashSet;
 
@@ -7,18 +7,18 @@ use crate::settings::{BodyMotion, ContactSettings, SceneSettings, StructureSetti
 use crate::{Error, Result};
 
 impl SceneSettings {
-    /// The first free structure whose contact nodes touch something; `None` in scenes of rotors.
+    /// Returns the first free master; `None` in scenes of rotors.
     pub fn free_master(&self) -> Option<&StructureSettings> {
         let free = |structure: &&StructureSettings| structure.motion == BodyMotion::Free;
         self.touching().into_iter().map(|structure| &self.structures[structure]).find(free)
     }
 
-    /// The structure whose contact nodes touch in a pair.
+    /// Returns the master of a pair.
     pub fn master_of(&self, contact: &ContactSettings) -> Option<&StructureSettings> {
         self.structures.iter().find(|structure| structure.name == contact.master)
     }
 
-    /// Every structure and every surface takes part; a surface belongs to one pair.
+    /// Checks that every structure and every surface takes part; a surface belongs to one pair.
     pub(super) fn validate_pairs(&self) -> Result<()> {
         let relations = Relations::of(self);
         let carriers: HashSet<&str> = self.surfaces.iter().filter_map(|surface| surface.structure.as_deref()).collect();
@@ -43,7 +43,7 @@ impl SceneSettings {
 }
 
 impl StructureSettings {
-    /// A structure touches something or carries a surface.
+    /// Checks that a structure is a master or carries a surface.
     fn validate_part(&self, part: [bool; 2], at: String) -> Result<()> {
         let (name, what) = (&self.name, format!("{at}.name"));
         match part {

@@ -1,4 +1,4 @@
-//! A structure that turns at one set of parameters: solvability, growth of sliding contact, and what casings add.
+//! Checks of a rotating structure for one set of parameters: solvability, growth of sliding contact, and effects of casings.
 
 use super::Parameters;
 use crate::dynamics::cyclic::CyclicModel;
@@ -17,21 +17,21 @@ use crate::warning::Topic;
 use crate::{Result, Warning, shown};
 use nalgebra::DMatrix;
 
-/// Contact nodes up to this number are looked at in every combination; beyond, alone, in neighbouring pairs, and all.
+/// Up to this number, contact nodes are checked in every combination; beyond it alone, in neighbouring pairs, and all together.
 const ALL_COMBINATIONS_UP_TO: usize = 3;
 
 /// Growth per step below this is rounding of the eigenvalue solver.
 const GROWTH_NOISE: f64 = 1e-7;
 
-/// Angles at which the flexible slave is looked at.
+/// Angles at which the flexible slave is checked.
 const SLAVE_ANGLES: u32 = 48;
 
 fn slave_angle(place: u32) -> f64 {
     std::f64::consts::TAU * f64::from(place) / f64::from(SLAVE_ANGLES)
 }
 
-/// The slave's modes along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for nodes that do not face
-/// it.
+/// The slave's modes along normals and tangents of `nodes` of a blade at `angle` (rad), nodes × modes; 0 for nodes that do not face the
+/// slave.
 fn slave_at(law: &SplineGap, modes: &ModalModel, nodes: &[usize], angle: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let zeros = || DMatrix::zeros(nodes.len(), modes.len());
     let mut seen = (zeros(), zeros());
@@ -68,7 +68,7 @@ fn lowest_ratio(
     if largest > 0.0 { eigenvalues.min() / largest } else { 0.0 }
 }
 
-/// Casings need not be alike all around: the check at the place where those under a blade yield most.
+/// Checks a casing, which may differ around the circumference, where its nodes under a blade are most compliant.
 fn yielding_most<'a>(
     check: massless::MasslessCheck<'a>,
     places: impl Iterator<Item = Vec<(DMatrix<f64>, &'a ModalModel)>>,
@@ -84,7 +84,7 @@ fn yielding_most<'a>(
     chosen
 }
 
-/// The step to expect was looked at by itself: it bounds a range of its own.
+/// Adds the expected step, which was checked separately, as the bound of a range.
 pub(super) fn with_expected<T>(
     mut ranges: Vec<(f64, Option<T>)>,
     expected: f64,
@@ -96,15 +96,15 @@ pub(super) fn with_expected<T>(
     ranges
 }
 
-/// A structure of a scene with some parameters, about to be checked with all it touches.
+/// A structure of a scene with some parameters, to be checked with all surfaces it touches.
 pub(super) struct Checking<'a> {
     pub(super) compiled: &'a Compiled,
     system: &'a System,
     pub(super) body: usize,
-    /// Contact nodes that meet a surface.
+    /// Contact nodes that can touch a surface.
     pub(super) nodes: Vec<usize>,
-    /// Structures into which the contact problem with all sectors closed decouples: one uncoupled sector, or the nodal diameters as real structures;
-    /// seen at these nodes.
+    /// Structures into which the contact problem with all sectors closed decouples: one uncoupled sector, or the nodal diameters as real
+    /// structures; observed at these nodes.
     pub(super) models: Vec<ModalModel>,
     pub(super) parameters: &'a Parameters,
     /// Largest friction coefficient.
@@ -142,7 +142,7 @@ impl<'a> Checking<'a> {
         self.compiled.bodies[self.body].disk.as_ref()
     }
 
-    /// Surfaces that carriers deform: their gap functions, and the carriers' modes at their control points.
+    /// Returns the surfaces that carriers deform: gap functions, and modes of the carriers at their control points.
     fn carried(&self) -> Vec<(&SplineGap, usize, ModalModel)> {
         let carried = |(index, pair): (usize, &PairPlan)| {
             let (gap, carrier) = (self.system.pairs()[index].gap(), pair.carrier?);
@@ -152,7 +152,7 @@ impl<'a> Checking<'a> {
         self.compiled.plan.pairs_of(self.body).filter_map(carried).collect()
     }
 
-    /// All warnings at the step to expect, whatever the sense of slip; `casing` and `more` come last.
+    /// Returns all warnings at the expected step, for any sense of slip; `casing` and `more` come last.
     pub(super) fn warnings(&self, step: f64, casing: Option<Warning>, more: Vec<Warning>) -> Result<Vec<Warning>> {
         let mut warnings = self.expected(step)?;
         for carrier in self.compiled.carriers_of(self.body) {
@@ -166,7 +166,7 @@ impl<'a> Checking<'a> {
         Ok(warnings)
     }
 
-    /// Everything about the rotor at the step to expect; returns warnings.
+    /// Checks the rotor at the expected step; returns warnings.
     fn expected(&self, step: f64) -> Result<Vec<Warning>> {
         let Parameters { scheme, step: largest, .. } = *self.parameters;
         let mut warnings: Vec<Warning> =
@@ -182,10 +182,10 @@ impl<'a> Checking<'a> {
         Ok(warnings)
     }
 
-    /// That growth is not looked at, with more modes than its eigenproblems are solved for.
+    /// Returns the warning that growth is not checked, if there are more modes than its eigenproblems are solved for.
     pub(super) fn not_looked_at(&self) -> Option<Warning> {
         let modes = self.models.iter().map(ModalModel::len).max().unwrap_or(0);
-        // No step of galerkin adds growth: what there may be is of the equations, and stays whatever the step.
+        // `galerkin` adds no growth at any step: any growth is a property of the equations.
         let remedy = match self.parameters.scheme {
             Scheme::Galerkin => "Check a ROM with fewer modes for flutter and self-locking",
             _ => "Halve the internal step and compare the results",
@@ -200,7 +200,7 @@ impl<'a> Checking<'a> {
         })
     }
 
-    /// Vibration that grows while all contact nodes of a blade cut, sliding in either sense.
+    /// Returns the warning of vibration that grows while all contact nodes of a blade cut, sliding in either sense.
     pub(super) fn cutting(&self) -> Option<Warning> {
         let (pair, _) = self.compiled.plan.pairs_of(self.body).next()?;
         let coating = self.system.coating(pair)?;
@@ -218,7 +218,7 @@ impl<'a> Checking<'a> {
         let both = [1.0, -1.0].into_iter().filter_map(growth);
         let (rate, frequency) = both.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let kilohertz = 1e-3 * frequency / std::f64::consts::TAU;
-        // What grows without turning round within its growth is no vibration.
+        // Growth without oscillation within the growth time is no vibration.
         let motion = if frequency < 1e-3 * rate {
             "deflection in one direction".to_owned()
         } else {
@@ -233,8 +233,8 @@ impl<'a> Checking<'a> {
         Some(Warning::new(Topic::CuttingGrowth, problem, remedy))
     }
 
-    /// Whether the part that the structures under the surfaces have in the contact problem can spoil solvability, at the step to
-    /// expect and at all others.
+    /// Checks whether the compliance of the structures under the surfaces spoils the solvability of the contact problem, at the expected
+    /// step and at all others.
     pub(super) fn casing(&self, expected: f64) -> Vec<(f64, Option<Warning>)> {
         let carried = self.carried();
         if self.friction == 0.0 || carried.is_empty() || self.parameters.solver == Solver::Coulomb {
@@ -274,12 +274,12 @@ impl<'a> Checking<'a> {
         with_expected(ranges, expected, worst_at(expected))
     }
 
-    /// Largest step of massless-boundary, and a warning where many blades in contact at once may lower it.
+    /// Returns the largest step of massless-boundary, and a warning if many blades in contact simultaneously may lower it.
     pub(super) fn massless(&self, step: f64) -> Result<(Vec<Warning>, MasslessLimit)> {
         if self.parameters.scheme != Scheme::MasslessBoundary {
             return Ok((Vec::new(), MasslessLimit::NONE));
         }
-        // Each on a structure of its own: several surfaces of one are refused.
+        // Each surface has its own carrier: several surfaces of one carrier are rejected.
         let carried = self.carried();
         let largest = 1.01 * self.parameters.step.max(step) / massless::USABLE_STIFF;
         let (mut limit, mut worst) = (MasslessLimit::NONE, (0.0, 0.0));
@@ -296,7 +296,7 @@ impl<'a> Checking<'a> {
                 };
                 check = yielding_most(check, (0..SLAVE_ANGLES).map(at), step);
             }
-            // Of several only the tightest counts.
+            // Only the tightest of several limits counts.
             let own = check.limit(largest.min(limit.closed))?;
             limit = MasslessLimit { closed: limit.closed.min(own.closed), usable: limit.usable.min(own.usable) };
             let found = check.eigenvalues(step).unwrap_or(worst);
@@ -321,8 +321,8 @@ impl<'a> Checking<'a> {
         Ok((warnings, limit))
     }
 
-    /// The slave's modes as the real part of a nodal diameter sees them. One blade in contact has an equal share of all
-    /// nodal diameters, so that the softest of them bounds what the slave adds.
+    /// The slave's modes as the real part of a nodal diameter sees them. One blade in contact has an equal share of all nodal diameters, so
+    /// that the softest of them bounds the contribution of the slave.
     fn seen_by(&self, diameter: usize, seen: DMatrix<f64>) -> DMatrix<f64> {
         let Some(disk) = self.disk() else { return seen };
         let rows = self.models[diameter].contact_modes.nrows() / 3;
@@ -334,8 +334,8 @@ impl<'a> Checking<'a> {
         self.models.iter().fold(0.0, |largest, model| f64::max(largest, model.largest_frequency()))
     }
 
-    /// Normals and slip directions of the contact nodes of one of the models on a round casing, as long as friction there is against
-    /// the largest; both parts of a nodal diameter have the same.
+    /// Normals and slip directions of the contact nodes of one of the models on a round casing; slip directions are scaled by the ratio of
+    /// the friction coefficient to the largest one. Both parts of a nodal diameter have the same directions.
     pub(super) fn directions(&self, model: &ModalModel, sense: f64) -> ContactDirections {
         let rom = self.compiled.body(self.body).1;
         let nodes = self.nodes.iter().cycle().take(model.contact_modes.nrows() / 3);
@@ -365,8 +365,8 @@ impl<'a> Checking<'a> {
         self.directions(model, 1.0).into_iter().map(|(normal, _)| normal).collect()
     }
 
-    /// Sets of closed contact nodes: all combinations of a few; of many every one alone, neighbours, and all; of a disk,
-    /// on all sectors, every one alone and all.
+    /// Sets of closed contact nodes: all combinations of a few; for many nodes each alone, neighbours, and all; for a disk, on all sectors,
+    /// each alone and all.
     pub(super) fn combinations(&self) -> Vec<Vec<usize>> {
         let nodes = self.nodes.len();
         if self.disk().is_some() {

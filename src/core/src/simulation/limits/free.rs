@@ -1,10 +1,10 @@
 //! Limits of a scene with a free master.
 //!
-//! Step limits are those of all structures. With sliding friction the contact problem of a step need not have one solution:
-//! the undeformed master is moved along its flight, and the Delassus matrix of the nodes that are inside a surface there,
-//! sliding along the velocity, is looked at. A node that friction alone jams is refused; a symmetric part that is not
-//! positive definite is a warning, since it is sufficient and not necessary. Growth by sliding (flutter) is not looked
-//! at: which contacts are closed, for how long and where is not known beforehand.
+//! The step limits are those of all structures. With sliding friction the contact problem of a step need not have exactly one solution: the
+//! undeformed master is moved along its flight, and the Delassus matrix of the nodes that are inside a surface there, sliding along the
+//! velocity, is checked. A node that friction alone locks is rejected; a symmetric part that is not positive definite causes a warning,
+//! since the condition is sufficient and not necessary. Growth by sliding (flutter) is not checked: which contacts are closed, for how long
+//! and where is unknown beforehand.
 
 use nalgebra::DMatrix;
 
@@ -21,14 +21,14 @@ use crate::system::System;
 use crate::warning::Topic;
 use crate::{Error, Result, Warning, shown};
 
-/// The flight is looked at in this many places, this share of the extent apart.
+/// Number of places at which the flight is checked, and their spacing as a fraction of the extent.
 const PLACES: u32 = 48;
 const SPACING: f64 = 0.125;
-/// And at these parts of the step.
+/// Fractions of the step that are checked.
 const STEPS: [f64; 3] = [1.0, 0.25, 0.0625];
-/// Flexibility below this share of the largest is none.
+/// Flexibility below this fraction of the largest counts as zero.
 const RIGID: f64 = 1e-9;
-/// Eigenvalues above this (of a matrix with unit diagonal) are not negative.
+/// Eigenvalues above this (of a matrix with unit diagonal) count as not negative.
 const ROUNDING: f64 = -1e-10;
 
 /// Nodes that are inside their surface somewhere on the flight.
@@ -41,12 +41,12 @@ struct NodesInside {
 impl Compiled {
     pub(super) fn free_limits(&self, body: usize, parameters: &Parameters, system: &System) -> BodyLimits {
         let (step, model) = (self.expected_step(parameters.step), &self.bodies[body].model);
-        // Contacts of what flies freely may act along any direction.
+        // Contacts of free bodies may act along any direction.
         let own = std::iter::once_with(|| stability::unresolved::limit_along_axes(model));
         let unresolved = self.unresolved(body, own, parameters.scheme);
         let resolved = stability::unresolved::check(step, unresolved, model.largest_frequency());
         let flight = FlightCheck { compiled: self, system, body, parameters };
-        // What a step of galerkin cannot solve it halves.
+        // `galerkin` halves steps that it cannot solve.
         let outcome = match parameters.scheme {
             Scheme::Galerkin => Ok(self.rigid_directions(body, model).into_iter().collect()),
             _ => resolved.and_then(|()| flight.warnings(step)),
@@ -64,8 +64,8 @@ impl Compiled {
 }
 
 impl Compiled {
-    /// Contact nodes without mass need flexibility of their own, or what is pressed together has nowhere to go: a warning where modes that
-    /// follow contact at once leave some directions of them rigid.
+    /// Returns a warning if contact nodes without mass are rigid in some directions because of modes that follow contact immediately. Such
+    /// nodes need flexibility of their own, since they cannot yield when they are pressed together.
     fn rigid_directions(&self, body: usize, model: &ModalModel) -> Option<Warning> {
         let dynamic = model.dynamic_modes(Scheme::Galerkin);
         let mut shapes = model.contact_modes.columns_range(dynamic..).into_owned();
@@ -88,7 +88,7 @@ impl Compiled {
     }
 }
 
-/// A structure about to fly.
+/// Check of a free body before its flight.
 struct FlightCheck<'a> {
     compiled: &'a Compiled,
     system: &'a System,
@@ -144,7 +144,7 @@ impl FlightCheck<'_> {
         Ok(warnings)
     }
 
-    /// Lowest eigenvalue of the symmetric part of the Delassus matrix with unit diagonal.
+    /// Returns the lowest eigenvalue of the symmetric part of the Delassus matrix with unit diagonal.
     fn solvability(
         &self,
         met: &NodesInside,
@@ -182,8 +182,8 @@ impl FlightCheck<'_> {
     }
 }
 
-/// Where the undeformed structure touches on its flight; slip directions are as long as `frictions` of the pairs are against the
-/// largest.
+/// Finds the contacts of the undeformed structure on its flight; slip directions are scaled by the ratio of the `frictions` of the pairs to
+/// the largest.
 fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: f64) -> Vec<NodesInside> {
     let speed = dot(velocity, velocity).sqrt();
     let Some(extent) = laws.first().map(OpenGap::largest).filter(|_| speed != 0.0) else { return Vec::new() };
@@ -199,7 +199,7 @@ fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: 
         }
         let (mut geometry, mut gap) = (Geometry::new(nodes, true), vec![f64::INFINITY; nodes]);
         laws.iter_mut().for_each(|law| law.evaluate(&displacement, &[], None, &mut geometry, &mut gap));
-        // Beyond small displacements the structure does not get there undeformed.
+        // Beyond small displacements the structure does not arrive undeformed.
         let inside: Vec<usize> = (0..nodes).filter(|node| gap[*node] <= 0.0).collect();
         if inside.is_empty() {
             continue;
@@ -216,7 +216,7 @@ fn flight(laws: &mut [OpenGap], velocity: [f64; 3], frictions: &[f64], largest: 
     met
 }
 
-/// The modes of a carrier at the places of the contacts; zero for contacts with other surfaces.
+/// Returns the modes of a carrier at the places of the contacts; zero for contacts with other surfaces.
 fn seen_by(
     carrier: usize,
     met: &NodesInside,

@@ -1,5 +1,5 @@
-//! Growth of closed sliding contact: what the equations make of it is told in one warning, what the step adds is refused where it
-//! matters.
+//! Growth of closed sliding contact: growth by the differential equations is reported in one warning; growth added by the step is rejected
+//! if it matters.
 
 use super::checking::Checking;
 use super::in_range;
@@ -11,15 +11,16 @@ use crate::stability::{self, ContactDirections, Fastest, lock_up};
 use crate::warning::{Severity, Topic};
 use crate::{Error, Result, Warning, shown};
 
-/// Growth by this factor before contact opens takes what does not matter, a thousandth of the clearance, to all of it.
+/// Growth by this factor before contact opens turns an insignificant motion, a thousandth of the clearance, into one as large as the
+/// clearance.
 const MATTERS: f64 = 1e3;
-/// A motion whose frequency (rad/s) is a smaller part of its rate grows without swinging.
+/// A motion whose frequency (rad/s) is below this fraction of its rate grows without oscillation.
 const SWINGS: f64 = 0.1;
-/// Steps looked at per octave, and octaves from where every mode is resolved well: what is longer is far beyond all that modes resolve, and is
-/// judged by the longest of them.
+/// Number of steps checked per octave, and number of octaves from the step at which every mode is resolved well. Longer steps are far
+/// beyond the resolution of all modes and are judged by the longest of these.
 const PER_OCTAVE: i32 = 4;
 const OCTAVES: i32 = 13;
-/// Growth with and without the mass of the contact nodes within this factor is that of both.
+/// Growth rates with and without the mass of the contact nodes that agree within this factor count as equal.
 const ALIKE: f64 = 1.25;
 
 /// Contact that slides in one sense.
@@ -29,13 +30,13 @@ pub struct Sense {
     grows: Vec<Warning>,
     /// Rate of flutter (1/s), 0 without.
     rate: f64,
-    /// Step to expect (s).
+    /// Expected step (s).
     expected: f64,
-    /// Largest step of each range of step sizes (s), descending, and what it adds.
+    /// Largest step of each range of step sizes (s), descending, and the growth it adds.
     ranges: Vec<(f64, Option<Added>)>,
 }
 
-/// A step (s), and of the sets of closed nodes the one to which it adds most.
+/// A step (s), and the set of closed nodes to which it adds most growth.
 type Looked<'a> = (f64, Option<(&'a [usize], SetGrowth)>);
 
 /// Growth that steps of one range, or shorter ones, add.
@@ -49,7 +50,7 @@ struct Added {
 }
 
 impl Sense {
-    /// Refuse a step (s) that adds growth which matters while contact stays closed for a time (s). Allocates only to refuse.
+    /// Rejects a step (s) that adds significant growth while contact stays closed for a time (s). Allocates only to reject.
     ///
     /// # Errors
     /// [`Error::Unstable`] with numbers.
@@ -60,7 +61,7 @@ impl Sense {
         }
     }
 
-    /// Warnings for the step to expect.
+    /// Returns the warnings for the expected step.
     ///
     /// # Errors
     /// As [`Sense::check`].
@@ -85,7 +86,7 @@ impl Sense {
         })
     }
 
-    /// Put the name of the structure before all texts.
+    /// Puts the name of the structure before all texts.
     pub fn name(&mut self, name: &str) {
         let named = |warning: &mut Warning| *warning = warning.clone().named(name);
         self.grows.iter_mut().for_each(named);
@@ -98,8 +99,8 @@ impl Sense {
     }
 }
 
-/// The model that grows most at the step to expect with some nodes closed, and its growth with time continuous, which no step changes.
-/// At other steps only this one is looked at: with all nodal diameters of a disk at all steps the check would take a minute.
+/// The model that grows most at the expected step with some nodes closed, and its growth in continuous time, which does not depend on the
+/// step. At other steps only this model is checked: with all nodal diameters of a disk at all steps the check would take a minute.
 struct FastestGrowth {
     nodes: Vec<usize>,
     model: usize,
@@ -107,13 +108,13 @@ struct FastestGrowth {
     judged: SetGrowth,
 }
 
-/// The motion that grows fastest by the equations.
+/// The motion that grows fastest by the differential equations.
 struct Flutter {
     found: Fastest,
     nodes: Vec<usize>,
-    /// With the mass of the contact nodes, where that was left out.
+    /// Growth with the mass of the contact nodes, if it was neglected.
     with_mass: Option<Fastest>,
-    /// Share of what contact displaces that it moves until contact opens.
+    /// Fraction of the contact displacement that this motion contributes until contact opens.
     share: f64,
 }
 
@@ -121,14 +122,14 @@ struct Flutter {
 #[derive(Default)]
 struct Physics {
     flutter: Option<Flutter>,
-    /// Least friction with which the tip digs in, where it is closed, and the fastest growth without swinging (1/s).
+    /// Smallest friction coefficient at which the tip locks up, the closed nodes, and the fastest growth without oscillation (1/s).
     lock_up: Option<(f64, Vec<usize>)>,
     divergence: f64,
 }
 
 impl Physics {
     fn add(&mut self, own: Flutter) {
-        // Of coupled sectors divergence drifts slowly around the disk, and double roots are apart by rounding.
+        // For coupled sectors divergence drifts slowly around the disk, and double roots differ by rounding.
         if own.found.frequency < SWINGS * own.found.rate {
             self.divergence = self.divergence.max(own.found.rate);
         } else if self.flutter.as_ref().is_none_or(|known| own.found.rate > known.found.rate) {
@@ -144,7 +145,7 @@ impl Physics {
 }
 
 impl Checking<'_> {
-    /// Growth of sliding contact in one sense, at the step to expect (s) and at all others.
+    /// Checks growth of sliding contact in one sense, at the expected step (s) and at all others.
     pub(super) fn sense(&self, sense: usize, expected: f64) -> Sense {
         if self.friction == 0.0 {
             return Sense::default();
@@ -174,10 +175,10 @@ impl Checking<'_> {
         self.growth(&physics, sign, expected)
     }
 
-    /// Everything at the step to expect.
+    /// Checks growth at the expected step.
     fn watched(&self, expected: f64, sign: f64) -> (Vec<FastestGrowth>, Physics) {
         let (mut watched, mut physics) = (Vec::new(), Physics::default());
-        // The equations of galerkin are those of massless-boundary.
+        // `galerkin` has the same equations as `massless-boundary`.
         let scheme = match self.parameters.scheme {
             Scheme::Galerkin => Scheme::MasslessBoundary,
             scheme => scheme,
@@ -223,7 +224,7 @@ impl Checking<'_> {
         Some(SetGrowth::new(&seen, scheme, step, &directions, growth))
     }
 
-    /// One of the models seen at closed nodes (at both parts of a nodal diameter), and their directions.
+    /// Returns one of the models observed at closed nodes (at both parts of a nodal diameter), and their directions.
     fn closed_at(&self, model: usize, nodes: &[usize], sign: f64) -> (ModalModel, ContactDirections) {
         let all = self.directions(&self.models[model], sign);
         let own = self.nodes.len();
@@ -232,8 +233,8 @@ impl Checking<'_> {
         (self.models[model].with_nodes(&places), places.iter().map(|place| all[*place]).collect())
     }
 
-    /// Limits of every range, which goes from a step that was looked at up to the next: what a shorter step is refused or told for, a
-    /// longer one is too. The steps are the same whatever the largest, so that a step is refused in every scene that allows longer ones too.
+    /// Limits of every range, from one checked step to the next: a longer step is rejected or reported whenever a shorter one is. The
+    /// checked steps do not depend on the largest step, so that a step is rejected in every scene that also allows longer ones.
     fn added(&self, ranges: &[Looked<'_>], sign: f64) -> Vec<(f64, Option<Added>)> {
         let mut added: Vec<(f64, Option<Added>)> = Vec::new();
         let (mut allowed, mut quiet) = (f64::INFINITY, f64::INFINITY);
@@ -266,7 +267,7 @@ impl Checking<'_> {
         added
     }
 
-    /// Which contact is meant.
+    /// Describes the contact for messages.
     fn contact(&self, nodes: &[usize], sign: f64) -> String {
         let all = &self.compiled.body(self.body).1.contact_nodes;
         let names: Vec<&str> = nodes.iter().map(|node| all[self.nodes[*node]].name.as_str()).collect();
@@ -360,7 +361,7 @@ impl Checking<'_> {
     }
 }
 
-/// Whether the growth of a motion without the mass of the contact nodes is there with it too.
+/// Describes whether a motion that grows without the mass of the contact nodes also grows with it.
 fn confirmed(found: &Fastest, with_mass: Option<&Fastest>) -> String {
     match with_mass {
         Some(other) if other.rate < ALIKE * found.rate && found.rate < ALIKE * other.rate => {
@@ -374,8 +375,8 @@ fn confirmed(found: &Fastest, with_mass: Option<&Fastest>) -> String {
     }
 }
 
-/// Steps at which growth is looked at, descending (s): quarters of an octave from where every mode is resolved well up to the largest, the
-/// same ones whatever the largest; where that is shorter than all of them, the shortest.
+/// Steps at which growth is checked, descending (s): quarters of an octave from the step that resolves every mode well up to the largest,
+/// independent of the largest; if that is shorter than all of them, the shortest.
 fn looked_at(frequency: f64, largest: f64) -> Vec<f64> {
     let resolved = 0.1 / frequency;
     let top = libm::floor(f64::from(PER_OCTAVE) * libm::log2(largest * (1.0 + SAME_STEP) / resolved));
@@ -384,17 +385,17 @@ fn looked_at(frequency: f64, largest: f64) -> Vec<f64> {
     (0..=top).rev().map(|place| resolved * libm::exp2(f64::from(place) / f64::from(PER_OCTAVE))).collect()
 }
 
-/// The end of the range that begins with a step that was looked at: just below the next (s).
+/// End of the range that begins with a checked step: just below the next (s).
 fn next_step(step: f64) -> f64 {
     step * libm::exp2(1.0 / f64::from(PER_OCTAVE)) * (1.0 - 1e-6)
 }
 
-/// A step to three digits.
+/// Rounds a step to three digits.
 fn rounded(step: f64) -> f64 {
     format!("{step:.2e}").parse().unwrap_or(step)
 }
 
-/// The same, not above it.
+/// Rounds a step down to three digits.
 fn below(step: f64) -> f64 {
     let near = rounded(step);
     if near <= step { near } else { rounded(0.995 * step) }

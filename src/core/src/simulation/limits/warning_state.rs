@@ -1,5 +1,5 @@
-//! Warnings that hold for the step taken: told at the start for the step to expect, and once more where a run takes another
-//! step, turns the other way, or gets too fast for any machine.
+//! Warnings that depend on the step: reported at the start for the expected step, and again if a run takes a longer step, turns the other
+//! way, or becomes implausibly fast.
 
 use super::{BodyLimits, Parameters, in_range, senses_of};
 use crate::plausibility::{self, Slip};
@@ -8,45 +8,45 @@ use crate::simulation::Simulation;
 use crate::stability::{self, massless};
 use crate::warning::{Topic, Warning};
 
-/// A step longer by this factor than the one told about is worth telling again.
+/// A step that is longer by this factor than the reported one is reported again.
 const MATERIAL: f64 = 1.5;
 
-/// Turn of the excitation per internal step (rad) from which central differences make a resonance more than 1 % too large: √0.06.
+/// Turn of the excitation per internal step (rad) above which central differences make a resonance more than 1 % too large: √0.06.
 const RESOLVED_TURN: f64 = 0.245;
 
 /// Number of kinds of warnings that depend on the step: unresolved modes of the master and of carriers, contact of massless-boundary that gains
 /// energy, neglected flexibility, casings that spoil solvability.
 const KINDS: usize = 5;
 
-/// Warnings given since the start.
+/// Warnings reported since the start.
 #[derive(Debug, Clone)]
 pub struct WarningState {
-    /// Longest step told about (s), per kind and structure: kinds of those that touch, and one of those that carry surfaces.
+    /// Longest reported step (s), per kind and structure: four kinds for masters, and one for surface carriers.
     steps: [Vec<f64>; KINDS],
-    /// Senses of slip, + and −, of each structure that touches.
+    /// Reported senses of slip, + and −, of each master.
     senses: Vec<[bool; 2]>,
-    /// Speed beyond which its tips are too fast (rad/s); infinite once that was told.
+    /// Speed above which the tips are implausibly fast (rad/s); infinite once it was reported.
     pub(in crate::simulation) fastest: Vec<f64>,
-    /// Most warnings at once of one friction coefficient, of each structure that touches.
+    /// Largest number of warnings for one friction coefficient, of each master.
     friction: Vec<usize>,
-    /// Whether a displacement was that linear kinematics describes badly, of each structure that touches.
+    /// True if a displacement was too large for linear kinematics, of each master.
     pub(in crate::simulation) curved: Vec<bool>,
-    /// Whether contact nodes are pulled at, of each structure that touches.
+    /// True if `film` pulls at contact nodes, of each master.
     pub(in crate::simulation) pulls: Vec<bool>,
-    /// Turn of the excitation per internal step (rad) that was warned of, of each structure that touches.
+    /// Reported turn of the excitation per internal step (rad), of each master.
     turned: Vec<f64>,
-    /// The same of the loads on structures that carry surfaces.
+    /// Reported turn of the load per internal step (rad), of each surface carrier.
     load_turned: Vec<f64>,
-    /// Depth of contact nodes inside a surface at the last warning, of each structure that touches, as a fraction of the clearance.
+    /// Depth of contact nodes inside a surface at the last warning, of each master, as a fraction of the clearance.
     pub(in crate::simulation) inside: Vec<f64>,
-    /// Whether curvature work was large beside the net work of inputs.
+    /// True if curvature work was large compared with the net work of inputs.
     pub(in crate::simulation) curvature: bool,
-    /// Whether a tolerance was missed.
+    /// True if a tolerance was missed.
     pub(in crate::simulation) missed: bool,
 }
 
 impl WarningState {
-    /// Nothing, of so many structures that touch, and that carry surfaces.
+    /// Creates the state without warnings, for numbers of masters and surface carriers.
     pub(in crate::simulation) fn new(bodies: usize, carriers: usize) -> Self {
         Self {
             steps: [bodies, carriers, bodies, bodies, bodies].map(|count| vec![0.0; count]),
@@ -65,7 +65,7 @@ impl WarningState {
 }
 
 impl Simulation {
-    /// Warnings of the start are told; those of the step to expect among them.
+    /// Marks the warnings of the start as reported, with those for the expected step.
     pub(in crate::simulation) fn begin_telling(&mut self, parameters: &Parameters) {
         let expected = self.compiled.expected_step(parameters.step);
         self.warning_state = WarningState::new(self.rotors.len(), self.compiled.carriers.len());
@@ -95,7 +95,7 @@ impl Simulation {
         self.limits.as_ref().and_then(|limits| limits.bodies[body].warnings(sense).ok()).unwrap_or_default()
     }
 
-    /// Warnings of another friction coefficient, of each structure unless as many of it were told before.
+    /// Reports the warnings for changed friction coefficients, of each structure unless as many were reported before.
     pub(in crate::simulation) fn warn_of_friction(&mut self, parameters: &Parameters) {
         for (body, sense) in parameters.speeds.iter().enumerate() {
             let warnings = self.warnings_of(body, *sense);
@@ -106,8 +106,8 @@ impl Simulation {
         }
     }
 
-    /// Tell what holds for an internal step (s) and for the speeds of a communication step of length `length` (s) that were not
-    /// told about. Allocates only to tell.
+    /// Reports unreported warnings for an internal step (s) and for the speeds of a communication step of length `length` (s). Allocates
+    /// only to report.
     pub(in crate::simulation) fn warn_of_step_and_speeds(&mut self, step: f64, length: f64) {
         for kind in 0..KINDS {
             for of in 0..self.warning_state.steps[kind].len() {
@@ -130,7 +130,7 @@ impl Simulation {
         }
     }
 
-    /// The same of the load on a casing.
+    /// Warns if the load on a casing turns far in one internal step (rad).
     fn warn_of_load(&mut self, carrier: usize, turn: f64) {
         let coarse = self.system.scheme() == Scheme::CentralDifference
             && turn > MATERIAL * self.warning_state.load_turned[carrier];
@@ -141,7 +141,7 @@ impl Simulation {
         }
     }
 
-    /// Central differences make a resonance too large where the excitation turns far in one internal step (rad).
+    /// Warns that central differences make a resonance too large if the excitation turns far in one internal step (rad).
     fn warn_of_excitation(&mut self, body: usize, turn: f64) {
         if self.system.scheme() != Scheme::CentralDifference || turn <= MATERIAL * self.warning_state.turned[body] {
             return;
@@ -167,7 +167,7 @@ impl Simulation {
         }
     }
 
-    /// A warning of one kind about a structure at a step (s).
+    /// Returns a warning of one kind about a structure at a step (s).
     fn warning_of_step(&self, kind: usize, of: usize, step: f64) -> Option<Warning> {
         let limits = self.limits.as_ref()?;
         let scheme = limits.parameters.scheme;
@@ -189,7 +189,7 @@ impl Simulation {
         }
     }
 
-    /// A warning for who asks next, unless it was given.
+    /// Adds a warning for the next [`Simulation::take_notes`], unless it was reported.
     pub(in crate::simulation) fn note(&mut self, warning: Warning) {
         let silenced = self.compiled.scene.settings.is_silenced(warning.topic());
         if !silenced && !self.warnings.contains(&warning) {
@@ -198,7 +198,7 @@ impl Simulation {
         }
     }
 
-    /// Returns the warnings of sliding contact in the opposite sense of rotation, which the warnings of the start leave out. Empty before
+    /// Returns the warnings of sliding contact in the opposite sense of rotation, which the warnings of the start omit. Empty before
     /// [`Simulation::initialise`], and for coupled sectors, where the search takes as long again.
     ///
     /// # Examples

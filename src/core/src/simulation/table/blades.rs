@@ -1,4 +1,4 @@
-//! Rows of what acts on blades beside contact: excitation, heat, motion at the start; and of damping by modes.
+//! Rows of effects on blades other than contact: excitation, heat, initial motion; and of damping by modes.
 
 use super::builder::TableBuilder;
 use super::features::LARGEST_TEMPERATURE;
@@ -8,7 +8,7 @@ use crate::settings::StructureSettings;
 use crate::simulation::units::{ANGLE, FORCE, LENGTH, LINEAR_SPEED, TEMPERATURE};
 use crate::variables::{DataType, Quantity, StartValue};
 
-/// Excitation and temperature.
+/// Adds excitation and temperature.
 pub fn inputs(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     if let Some(excitation) = &body.structure.excitation {
         let text = "Amplitude of the engine-order excitation of each blade";
@@ -32,7 +32,7 @@ pub fn inputs(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     }
 }
 
-/// Engine order, and motion at the start.
+/// Adds engine order and initial motion.
 pub fn parameters(table: &mut TableBuilder, body: &BodyFacts) {
     if let Some(excitation) = &body.structure.excitation {
         let text = "Engine order of the excitation of the blades";
@@ -58,7 +58,7 @@ pub fn parameters(table: &mut TableBuilder, body: &BodyFacts) {
     (row.min, row.max) = (Some(-ranges::VELOCITY), Some(ranges::VELOCITY));
 }
 
-/// Damping ratios of the first modes.
+/// Adds the damping ratios of the first modes.
 pub fn mode_damping(
     table: &mut TableBuilder,
     quantity: Quantity,

@@ -1,4 +1,4 @@
-//! Rows of the variable table, and those that every scene has.
+//! Rows of the variable table, and the rows that every scene has.
 
 use crate::laws::SOLVERS;
 use crate::ranges::{DAMPING, FRICTION, LONGEST_STEP, SHORTEST_STEP, TURNED};
@@ -13,15 +13,15 @@ use crate::{Result, ranges};
 
 /// Description of inputs that would cause an impact if they jumped.
 pub const RAMPED: &str = "; reached at the end of the communication step (see input_interpolation)";
-/// The same of angles.
+/// Description of angle inputs that would cause an impact if they jumped.
 const RAMPED_ANGLE: &str =
     "; reached at the end of the communication step (see input_interpolation), so do not wrap it to one turn";
 
-/// Collects rows and hands out references.
+/// Collects rows and assigns references.
 #[derive(Default)]
 pub struct TableBuilder {
     variables: Vec<Variable>,
-    /// Readers of the outputs, in their order.
+    /// Readers of the outputs, in the order of the outputs.
     readers: Vec<OutputReader>,
     next: u32,
     /// Index of the structure or pair of the next rows, and the prefix of their names.
@@ -30,12 +30,12 @@ pub struct TableBuilder {
 }
 
 impl TableBuilder {
-    /// Rows from here on belong to structure or pair `of`, and their names start with `prefix`.
+    /// Assigns the following rows to structure or pair `of`, with names that start with `prefix`.
     pub fn belongs(&mut self, of: usize, prefix: String) {
         (self.of, self.prefix) = (of, prefix);
     }
 
-    /// Rows from here on belong to the scene as a whole.
+    /// Assigns the following rows to the whole scene.
     pub fn belongs_to_all(&mut self) {
         self.belongs(0, String::new());
     }
@@ -68,7 +68,7 @@ impl TableBuilder {
         self.variables.last_mut().unwrap_or_else(|| unreachable!("just pushed"))
     }
 
-    /// Account for the references of the last row, whose dimension is known by now.
+    /// Counts the references of the last row, whose dimension is now known.
     fn close(&mut self) {
         self.next = self
             .variables
@@ -94,7 +94,7 @@ impl TableBuilder {
         variable
     }
 
-    /// An input that moves or loads something, and has no jumps therefore.
+    /// Adds an input that moves or loads a structure and therefore never jumps.
     pub fn moving_input(
         &mut self,
         quantity: Quantity,
@@ -128,7 +128,7 @@ impl TableBuilder {
         variable.start = Some(StartValue::Integer(start));
     }
 
-    /// An output with what fills it.
+    /// Adds an output with its reader.
     pub fn output(
         &mut self,
         name: impl Into<String>,
@@ -147,20 +147,20 @@ impl TableBuilder {
         variable
     }
 
-    /// Friction coefficient, which may change between communication steps.
+    /// Adds a friction coefficient, which may change between communication steps.
     pub fn friction(&mut self, contact: &ContactSettings, text: &str) {
         let row = self.parameter(Quantity::Friction, "friction_coefficient", None, contact.friction, text);
         (row.min, row.max, row.variability) = (Some(0.0), Some(FRICTION), Variability::Tunable);
     }
 
-    /// A modal damping ratio.
+    /// Adds a modal damping ratio.
     pub fn damping(&mut self, quantity: Quantity, name: &str, start: f64, text: &str) -> &mut Variable {
         let row = self.parameter(quantity, name, None, start, text);
         (row.min, row.max) = (Some(0.0), Some(DAMPING));
         row
     }
 
-    /// Internal step, how many there may be, scheme and solver.
+    /// Adds internal step, largest number of steps, scheme and solver.
     pub fn methods(&mut self, settings: &SceneSettings) {
         let step = self.parameter(
             Quantity::StepMax,
@@ -188,7 +188,7 @@ impl TableBuilder {
         self.choice(Quantity::SolverChoice, "solver", &SOLVERS, solver, "Contact solver");
     }
 
-    /// Most internal steps, which may change between communication steps.
+    /// Adds the largest number of internal steps, which may change between communication steps.
     fn max_internal_steps(&mut self, settings: &SceneSettings) {
         let text = "Maximum number of internal steps in one communication step, including rejected trials (0: no \
                     limit); a communication step that needs more is discarded";
@@ -207,31 +207,31 @@ impl TableBuilder {
         self.choice(Quantity::InputInterpolation, "input_interpolation", &INPUT_INTERPOLATIONS, start, text);
     }
 
-    /// Whether derivatives over communication steps can be asked for.
+    /// Adds the choice of derivatives over communication steps.
     pub fn step_derivatives(&mut self) {
         let text = "Whether directional derivatives of the outputs at the end of the last communication step with \
                     respect to the inputs over it are available; if on, the state at the start of each step is stored";
         self.choice(Quantity::StepDerivatives, "step_derivatives", &STEP_DERIVATIVES, 1, text);
     }
 
-    /// Name of the scene.
+    /// Adds the name of the scene.
     pub fn scene_name(&mut self, settings: &SceneSettings) {
         let name = self.push(Quantity::SceneName, "scene", "Name of the scene from which this FMU was generated");
         (name.kind, name.causality, name.variability) = (DataType::String, Causality::Local, Variability::Constant);
         name.start = Some(StartValue::String(settings.name.clone()));
     }
 
-    /// Time, the independent variable.
+    /// Adds the time, the independent variable.
     pub fn time(&mut self) {
         let time = self.push(Quantity::Time, "time", "Simulated time");
         time.causality = Causality::Independent;
         time.unit = Some(&TIME);
     }
 
-    /// The table of all rows, and what fills its outputs, in their order.
+    /// Returns the table of all rows, and the readers of its outputs, in their order.
     ///
     /// # Errors
-    /// Names given twice.
+    /// Duplicate names.
     pub fn finish(self) -> Result<(VariableTable, Vec<OutputReader>)> {
         Ok((VariableTable::new(self.variables)?, self.readers))
     }

@@ -13,7 +13,7 @@ pub fn smallest_clearance(table: &mut TableBuilder, unit: Option<(&'static Varia
     table.output("clearance_minimum", Span::Window, unit, text, read).display = Some(1);
 }
 
-/// Forces and contacts as a whole.
+/// Adds total forces and contact counts.
 pub fn totals(table: &mut TableBuilder, friction: bool) {
     let peak = table.output(
         "normal_force_peak",
@@ -59,10 +59,10 @@ pub fn totals(table: &mut TableBuilder, friction: bool) {
     (touching.kind, touching.variability) = (DataType::Boolean, Variability::Discrete);
 }
 
-/// Name, span, quantity where other code looks for it, text, and the term of the ledger or of the instant.
+/// Name, span, quantity if other code looks it up, text, and the term of the ledger or the instantaneous energy.
 type Energy = (&'static str, Span, Quantity, &'static str, fn(&OutputView) -> f64);
 
-/// All rows of the ledger; what has no text is told in other words of rotors and of free bodies.
+/// All rows of the ledger; rows without text have different texts for rotors and for free bodies.
 const ENERGIES: [Energy; 19] = [
     ("kinetic_energy", Span::Point, Quantity::KineticEnergy, "", |view| view.energies.0),
     ("strain_energy", Span::Point, Quantity::StrainEnergy, "", |view| view.energies.1),
@@ -171,7 +171,7 @@ const ENERGIES: [Energy; 19] = [
     }),
 ];
 
-/// The ledger's rows that exist.
+/// Adds the rows of the ledger that the scene needs.
 pub fn energies(table: &mut TableBuilder, parts: &TableFacts) {
     let mut words = energy_descriptions(parts).into_iter();
     for (name, span, quantity, text, read) in ENERGIES.into_iter().filter(|row| exists(parts, row.0)) {
@@ -189,7 +189,7 @@ pub fn energies(table: &mut TableBuilder, parts: &TableFacts) {
     relative.quantity = Quantity::EnergyResidualRelative;
 }
 
-/// Stiffening where heat softens too.
+/// Description of stiffening if heat also softens.
 const SOFTENED: &str =
     "Strain energy added since the start by stiffening and softening when speed and temperature change";
 
@@ -222,7 +222,7 @@ fn exists(parts: &TableFacts, name: &str) -> bool {
         "cutting_work" => parts.is_cut(),
         "load_work" => features::is_loaded(parts),
         "excitation_work" => bodies.iter().any(|body| body.structure.excitation.is_some()),
-        // What flies freely has no inputs that could work.
+        // Free bodies have no inputs that could do work.
         "external_work" => bodies.iter().any(|body| !body.free),
         "shaft_work" => bodies.iter().any(turns),
         "stiffening_work" => bodies.iter().any(|body| body.structure.spin.stiffening) || softens(parts),
@@ -255,7 +255,7 @@ const EFFORTS: [Count; 3] = [
     ),
 ];
 
-/// Internal step in use and number of steps; with a tolerance, what it takes.
+/// Adds the current internal step and the number of steps; with a tolerance, also the effort.
 pub fn internal_steps(table: &mut TableBuilder, settings: &SceneSettings) {
     let with_tolerance = settings.takes_a_tolerance();
     let internal = table.output(

@@ -1,4 +1,4 @@
-//! Rows of what only some scenes ask for.
+//! Rows that only some scenes have.
 
 use super::blades;
 use super::builder::TableBuilder;
@@ -10,17 +10,17 @@ use crate::simulation::outputs::{array_reader, each, scalar};
 use crate::simulation::units::{ANGLE, ENERGY, FORCE, LENGTH, LINE_LOAD, POWER, TEMPERATURE, TORQUE, VOLUME};
 use crate::variables::{DataType, Quantity, Span, StartValue, Variability};
 
-/// Temperatures beyond this are not what a linear expansion describes (K).
+/// A linear expansion does not describe temperatures beyond this (K).
 pub const LARGEST_TEMPERATURE: f64 = 3000.0;
 
-/// Whether centrifugal, thermal or nodal-diameter loads act.
+/// Returns whether centrifugal, thermal or nodal-diameter loads act.
 pub fn is_loaded(parts: &TableFacts) -> bool {
     let loaded = |carrier: &CarrierFacts| carrier.structure.thermal || carrier.structure.load.is_some();
     let heated = |body: &BodyFacts| body.structure.spin.growth || body.structure.thermal;
     parts.bodies().iter().any(heated) || parts.carriers().iter().any(loaded)
 }
 
-/// Whether inputs move or load something; growth and stiffening follow the speed as such an input.
+/// Returns whether inputs move or load a structure; growth and stiffening follow the speed like such an input.
 pub fn has_moving_inputs(parts: &TableFacts) -> bool {
     let moves = |body: &BodyFacts| {
         let StructureSettings { whirl, axial_shift, spin, excitation, .. } = body.structure;
@@ -29,7 +29,7 @@ pub fn has_moving_inputs(parts: &TableFacts) -> bool {
     parts.pairs().iter().any(|pair| pair.surface.moving) || parts.bodies().iter().any(moves) || is_loaded(parts)
 }
 
-/// Whirl, axial shift, excitation, temperatures, nodal-diameter load.
+/// Adds whirl, axial shift, excitation, temperatures, nodal-diameter load.
 pub fn inputs(table: &mut TableBuilder, parts: &TableFacts) {
     for body in &parts.bodies() {
         table.belongs(body.index, parts.of_body(body));
@@ -85,7 +85,7 @@ fn loads(table: &mut TableBuilder, CarrierFacts { structure, rom, .. }: &Carrier
     }
 }
 
-/// Damping of a structure that carries surfaces.
+/// Adds the damping of a surface carrier.
 pub fn damping(table: &mut TableBuilder, carrier: &CarrierFacts, prefix: String, name: &str) {
     table.belongs(carrier.index, prefix);
     let ratio = carrier.structure.damping_ratio.unwrap_or(carrier.rom.damping_ratio);
@@ -94,7 +94,7 @@ pub fn damping(table: &mut TableBuilder, carrier: &CarrierFacts, prefix: String,
     blades::mode_damping(table, Quantity::CarrierModeDamping, &format!("{row}s"), carrier.structure, name);
 }
 
-/// Damping of casings, share of the friction heat.
+/// Adds damping of casings and the fraction of the friction heat.
 pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
     let carriers = parts.carriers();
     for carrier in carriers.iter().filter(|carrier| !carrier.open) {
@@ -120,7 +120,7 @@ pub fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
     }
 }
 
-/// Heat, wear, casing displacement.
+/// Adds heat, wear and casing displacement.
 pub fn outputs(table: &mut TableBuilder, parts: &TableFacts) {
     let pairs = parts.pairs();
     for pair in pairs.iter().filter(|_| parts.has_friction()) {
@@ -155,7 +155,7 @@ pub fn outputs(table: &mut TableBuilder, parts: &TableFacts) {
     }
 }
 
-/// Force and moment on a surface: opposite to those on the rotor, at the same points.
+/// Adds force and moment on a surface: opposite to those on the rotor, at the same points.
 fn casing_forces(table: &mut TableBuilder, pair: &PairFacts) {
     let index = pair.index;
     for (axis, letter) in AXES.into_iter().enumerate() {
@@ -174,7 +174,7 @@ fn casing_forces(table: &mut TableBuilder, pair: &PairFacts) {
     }
 }
 
-/// Force and moment of the support on a casing.
+/// Adds force and moment of the support on a casing.
 fn support(table: &mut TableBuilder, carrier: &CarrierFacts) {
     let index = carrier.index;
     for (row, (axis, letter)) in (0..2).flat_map(|_| AXES.into_iter().enumerate()).enumerate() {
@@ -218,7 +218,7 @@ fn wear(table: &mut TableBuilder, parts: &TableFacts, pair: &PairFacts, coating:
     table.output("wear_depth_maximum", Span::Total, depth, text, read).display = Some(1);
     let read = scalar(move |view| view.coating(index, Coating::worn_volume));
     table.output("worn_volume", Span::Total, Some((&VOLUME, 1e-9)), "Worn volume of the coating", read);
-    // Of all coatings together.
+    // Total over all coatings.
     if parts.settings.contacts[..index].iter().all(|contact| contact.coating.is_none()) {
         table.belongs_to_all();
         let text = "Energy consumed by wear of the coating since the start; supplied by the shaft if the coating is \

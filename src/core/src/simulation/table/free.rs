@@ -1,4 +1,4 @@
-//! Rows of structures that fly freely.
+//! Rows of free bodies.
 
 use super::builder::TableBuilder;
 use super::parts::{AXES, BodyFacts, TableFacts};
@@ -9,7 +9,7 @@ use crate::simulation::outputs::{each, scalar};
 use crate::simulation::units::{FORCE, LENGTH, LINEAR_SPEED};
 use crate::variables::{Quantity, Span, VariableUnit};
 
-/// Velocity at the start.
+/// Adds the initial velocity.
 pub fn velocity(table: &mut TableBuilder, body: &BodyFacts) {
     for (axis, name) in AXES.into_iter().enumerate() {
         let velocity = table.parameter(
@@ -24,7 +24,7 @@ pub fn velocity(table: &mut TableBuilder, body: &BodyFacts) {
     }
 }
 
-/// Rigid motion and contact nodes.
+/// Adds rigid motion and contact nodes.
 pub fn bodies(table: &mut TableBuilder, parts: &TableFacts) {
     for body in parts.bodies().iter().filter(|body| body.free) {
         table.belongs(body.index, format!("{}.", body.structure.name));
@@ -51,7 +51,7 @@ fn motion(table: &mut TableBuilder, body: &BodyFacts) {
     }
 }
 
-/// Arrays over the contact nodes.
+/// Adds arrays over the contact nodes.
 fn nodes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let (list, count, index) = (node_list(body.rom), body.rom.contact_nodes.len(), body.index);
     let units: [Option<(&'static VariableUnit, f64)>; 2] = [Some((&LENGTH, 1e-3)), Some((&FORCE, 100.0))];
@@ -77,7 +77,7 @@ fn nodes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     }
 }
 
-/// Names of a few nodes; of many the first and the last.
+/// Lists the names of a few nodes; the first and the last of many.
 fn node_list(rom: &Rom) -> String {
     let names: Vec<&str> = rom.contact_nodes.iter().map(|node| node.name.as_str()).collect();
     match names.as_slice() {

@@ -1,7 +1,7 @@
-//! The variable table of a scene: one row per thing an importer can see. Features that are off have no row.
+//! The variable table of a scene: one row per variable. Features that are off have no row.
 //!
-//! Names of a scene with one rotor are plain. Where several structures touch, what belongs to one starts with its name; of several
-//! pairs, what belongs to one starts with the name of its surface.
+//! Names of a scene with one rotor have no prefix. With several masters, names of their variables start with the name of the master; with
+//! several pairs, names of their variables start with the name of the surface.
 
 mod blades;
 mod builder;
@@ -21,10 +21,10 @@ use crate::{Result, Rom, ranges};
 use builder::{RAMPED, TableBuilder};
 use parts::{AXES, BodyFacts, PairFacts, TableFacts, largest_length};
 
-/// Build the table of a validated scene, and what fills its outputs, in their order.
+/// Builds the table of a validated scene, and the readers of its outputs, in their order.
 ///
 /// # Errors
-/// A watched sector or nodal diameter that no ROM has; pairs that do not fit the ROMs.
+/// Watched sector or nodal diameter that no ROM has; pairs that do not fit the ROMs.
 pub fn build(scene: &Scene) -> Result<(VariableTable, Vec<OutputReader>)> {
     let parts = &TableFacts { scene, settings: &scene.settings, plan: SteppingOrder::new(scene)? };
     let mut table = TableBuilder::default();
@@ -131,7 +131,7 @@ fn parameters(table: &mut TableBuilder, parts: &TableFacts) {
     table.scene_name(settings);
 }
 
-/// One coefficient where all pairs have the same, else one each.
+/// Adds one friction coefficient if all pairs have the same, otherwise one each.
 fn friction(table: &mut TableBuilder, parts: &TableFacts) {
     if !parts.has_friction() {
         return;
@@ -155,7 +155,7 @@ fn friction(table: &mut TableBuilder, parts: &TableFacts) {
     }
 }
 
-/// Whether all pairs of a scene have the same friction coefficient.
+/// Returns whether all pairs of a scene have the same friction coefficient.
 pub fn has_one_friction(settings: &SceneSettings) -> bool {
     let first = settings.contacts[0].friction.to_bits();
     settings.contacts.iter().all(|contact| contact.friction.to_bits() == first)
@@ -169,7 +169,7 @@ fn gap_offset(table: &mut TableBuilder, rom: &Rom) {
     (offset.min, offset.max) = (Some(-largest_length(rom)), Some(largest_length(rom)));
 }
 
-/// Angles, clearances, forces and moments of structures and pairs, and what all contacts do together.
+/// Adds angles, clearances, forces and moments of structures and pairs, and totals over all contacts.
 fn totals(table: &mut TableBuilder, parts: &TableFacts) {
     let (bodies, pairs) = (parts.bodies(), parts.pairs());
     let rotors = || bodies.iter().filter(|body| !body.free);
@@ -209,7 +209,7 @@ fn smallest_clearance(table: &mut TableBuilder, parts: &TableFacts) {
     contacts::smallest_clearance(table, Some((&LENGTH, gap)), text);
 }
 
-/// Force on a structure, and its moment: of a rotor about the shaft's centre.
+/// Adds force and moment on a structure: for a rotor about the centre of the shaft.
 fn forces(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     let (index, name) = (body.index, parts.rotor(body));
     for (axis, letter) in AXES.into_iter().enumerate() {
@@ -222,7 +222,7 @@ fn forces(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
         table.output(format!("force_{letter}"), Span::Mean, Some((&FORCE, 100.0)), text, read);
     }
     for axis in 0..3 {
-        // The other two of a rotor are for a model of the shaft, which is what gives whirl.
+        // The other two components of a rotor are for a model of the shaft, which provides the whirl.
         if !body.free && axis < 2 && !body.structure.whirl {
             continue;
         }
@@ -232,7 +232,7 @@ fn forces(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     }
 }
 
-/// Name and text of a moment.
+/// Returns name and text of a moment.
 fn moment(parts: &TableFacts, body: &BodyFacts, axis: usize) -> (String, String) {
     let (name, letter) = (parts.rotor(body), AXES[axis]);
     let row = format!("moment_{letter}");
@@ -261,7 +261,7 @@ fn moment(parts: &TableFacts, body: &BodyFacts, axis: usize) -> (String, String)
     }
 }
 
-/// Force of one surface on what touches it, and its moment.
+/// Adds force and moment of one surface on the master.
 fn pair_forces(table: &mut TableBuilder, pair: &PairFacts) {
     let (index, surface, master) = (pair.index, &pair.surface.name, &pair.body.structure.name);
     let point = if pair.body.free { "the origin" } else { "the shaft's centre" };

@@ -1,4 +1,4 @@
-//! What of a scene the variables depend on: structures that touch, contact pairs, structures that carry surfaces.
+//! Properties of a scene that the variables depend on: masters, contact pairs, surface carriers.
 
 use crate::settings::{ContactSettings, Scene, SceneSettings, StructureSettings, SurfaceSettings};
 use crate::simulation::patches::HeatPatches;
@@ -14,7 +14,7 @@ pub struct TableFacts<'a> {
     pub plan: SteppingOrder,
 }
 
-/// A structure that touches.
+/// A master.
 #[derive(Clone, Copy)]
 pub struct BodyFacts<'a> {
     pub index: usize,
@@ -31,16 +31,16 @@ pub struct PairFacts<'a> {
     pub body: BodyFacts<'a>,
     /// Structure that deforms the surface.
     pub carrier: Option<usize>,
-    /// Patches that friction power is gathered for.
+    /// Number of patches that collect friction power.
     pub patches: usize,
 }
 
-/// A structure that carries surfaces.
+/// A surface carrier.
 pub struct CarrierFacts<'a> {
     pub index: usize,
     pub structure: &'a StructureSettings,
     pub rom: &'a Rom,
-    /// Whether the surfaces are open.
+    /// True if the surfaces are open.
     pub open: bool,
 }
 
@@ -80,18 +80,18 @@ impl<'a> TableFacts<'a> {
         self.plan.carriers.iter().enumerate().map(carrier).collect()
     }
 
-    /// A scene that gives no friction coefficient has no friction variables.
+    /// Returns whether there are friction variables; a scene without a friction coefficient has none.
     pub fn has_friction(&self) -> bool {
         self.settings.contacts.iter().any(|contact| contact.friction > 0.0)
     }
 
-    /// Whether blades cut a coating.
+    /// Returns whether blades cut a coating.
     pub fn is_cut(&self) -> bool {
         let mut coatings = self.settings.contacts.iter().filter_map(|contact| contact.coating);
         coatings.any(|coating| coating.cutting.is_some())
     }
 
-    /// Whether there are forces along the way.
+    /// Returns whether there are tangential forces.
     pub fn has_tangential_forces(&self) -> bool {
         self.has_friction() || self.is_cut()
     }
@@ -108,19 +108,19 @@ impl<'a> TableFacts<'a> {
         prefix(self.plan.carriers.len(), &carrier.structure.name)
     }
 
-    /// The structure that a text speaks of: the rotor, or its name.
+    /// Returns the name of a structure for texts: the rotor, or its name.
     pub fn rotor(&self, body: &BodyFacts) -> String {
         if body.free || self.plan.bodies.len() > 1 { body.structure.name.clone() } else { "the rotor".to_owned() }
     }
 }
 
-/// Lengths beyond this are not small against the radius of the contact nodes (m).
+/// Largest length that is small compared with the radius of the contact nodes (m).
 pub fn largest_length(rom: &Rom) -> f64 {
     let radii = rom.contact_nodes.iter().map(|node| node.position[0]);
     ranges::SMALL * radii.fold(f64::INFINITY, f64::min)
 }
 
-/// Refuse what no structure has.
+/// Rejects indices that no structure has.
 pub fn refuse<T>(field: &str, problem: String, remedy: String) -> Result<T> {
     Err(Error::invalid(format!("outputs.{field}"), problem, remedy))
 }

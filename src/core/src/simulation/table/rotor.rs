@@ -1,4 +1,4 @@
-//! Outputs of a rotor, one row each with what fills it.
+//! Outputs of a rotor, one row each with its reader.
 
 use super::builder::TableBuilder;
 use super::parts::{BodyFacts, TableFacts, refuse};
@@ -16,7 +16,7 @@ pub fn angle(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts) {
     (angle.display, angle.quantity) = (Some(0), Quantity::RotorAngle);
 }
 
-/// Clearance that the outputs of a rotor are as large as (m): that of its first pair.
+/// Clearance for nominal values of a rotor's outputs (m): that of its first pair.
 fn nominal(parts: &TableFacts, body: &BodyFacts) -> Option<(&'static VariableUnit, f64)> {
     let mut pairs = parts.plan.pairs_of(body.index);
     let gap = pairs.next().map_or(0.0, |(pair, _)| parts.settings.contacts[pair].nominal_gap());
@@ -39,7 +39,7 @@ pub fn clearances(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts
     (each_node.dimension, each_node.display) = (Some(body.rom.contact_nodes.len()), Some(1));
 }
 
-/// Describes clearances where there is nothing to touch.
+/// Describes clearances if there is no surface to touch.
 fn untouched(parts: &TableFacts, body: &BodyFacts) -> &'static str {
     let paired: usize = parts.plan.pairs_of(body.index).map(|(_, pair)| pair.nodes.len()).sum();
     if paired < body.rom.contact_nodes.len() { "; 1e9 m at nodes in no contact pair" } else { "" }
@@ -99,7 +99,7 @@ fn watch(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector:
 /// Components of displacements in both frames.
 const COMPONENTS: [[&str; 3]; 2] = [["radial", "tangential", "axial"], ["x", "y", "z"]];
 
-/// Displacements and clearances of the points that a ROM has beside its contact nodes.
+/// Adds displacements and clearances of the watched points of a ROM.
 fn watched_points(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: usize) {
     let Some(watched) = &body.rom.extras.watched else { return };
     let names: Vec<&str> = watched.points.iter().map(|point| point.name.as_str()).collect();
@@ -127,7 +127,7 @@ fn watched_points(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts
     (row.dimension, row.display) = (Some(names.len()), Some(1));
 }
 
-/// Amplitudes of the lowest modes.
+/// Adds amplitudes of the lowest modes.
 fn modes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: usize) {
     let Some(count) = parts.settings.outputs.modal_amplitudes else { return };
     let index = body.index;
@@ -141,7 +141,7 @@ fn modes(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector:
     row.dimension = Some(count);
 }
 
-/// Displacements of the contact nodes.
+/// Adds displacements of the contact nodes.
 fn tips(table: &mut TableBuilder, parts: &TableFacts, body: &BodyFacts, sector: usize) {
     let index = body.index;
     for (axis, name) in COMPONENTS[usize::from(body.rom.frame == DisplacementFrame::Cartesian)].into_iter().enumerate()
@@ -160,7 +160,7 @@ const STRESS_COMPONENTS: [[&str; STRESSES]; 2] = [
     ["x", "y", "z", "xy", "yz", "zx"],
 ];
 
-/// Stress at the places that a ROM recovers it at.
+/// Adds the stress at the places where a ROM recovers it.
 fn stresses(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
     let Some(stress) = &body.rom.extras.stress else { return };
     let (index, places) = (body.index, stress.points.len());
@@ -185,7 +185,7 @@ fn stresses(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
     }
 }
 
-/// A force over what a patch stands for: name, words, unit, nominal value, and the extent of a contact node.
+/// A force over the extent of a patch: name, words, unit, nominal value, and the extent of a contact node.
 type PerExtent = (&'static str, &'static str, &'static VariableUnit, f64, fn(&ContactNode) -> f64);
 
 const PER_EXTENT: [PerExtent; 2] = [
@@ -193,7 +193,7 @@ const PER_EXTENT: [PerExtent; 2] = [
     ("normal_line_force", "force per unit length along the chord", &LINE_LOAD, 1e4, |node| node.length),
 ];
 
-/// Pressure and force per length, of contact patches.
+/// Adds pressure and force per length of contact patches.
 fn patches(table: &mut TableBuilder, body: &BodyFacts, sector: usize) {
     for (name, warning_state, unit, nominal, extent) in PER_EXTENT {
         let extents: Vec<f64> = body.rom.contact_nodes.iter().map(extent).collect();
@@ -218,7 +218,7 @@ pub struct NodeRow {
     span: Span,
     unit: Option<(&'static VariableUnit, f64)>,
     pub text: &'static str,
-    /// Only with friction, and only where instantaneous forces are asked for.
+    /// True if the row needs friction, and if it needs the request of instantaneous forces.
     needs: [bool; 2],
     read: OutputReader,
 }
@@ -240,7 +240,7 @@ impl NodeRow {
     }
 }
 
-/// Outputs over the contact nodes of a sector of a structure (0-based); units of gaps and forces.
+/// Adds outputs over the contact nodes of a sector of a structure (0-based); units of gaps and forces.
 pub fn watched_rows(
     body: usize,
     sector: usize,

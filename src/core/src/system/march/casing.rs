@@ -1,4 +1,4 @@
-//! A structure that carries surfaces, over the steps of the sectors that touch them.
+//! A structure that carries surfaces, during the steps of the sectors that touch them.
 
 use crate::dynamics::bank::ModalBank;
 use crate::dynamics::dispatch::InstructionSet;
@@ -12,41 +12,41 @@ use crate::settings::Scheme;
 use crate::system::carrier::Spot;
 use crate::system::pair::at_place;
 
-/// Tables, state and scratch of such a structure.
+/// Tables, state and scratch memory of a structure that carries surfaces.
 #[derive(Debug, Clone)]
 pub struct CarrierIntegrator {
-    /// Which structure.
+    /// Index of the structure.
     pub structure: usize,
     /// Modes of the structure.
     pub whole: SharedBody,
-    /// `[row][mode]` of the rows that move control points, modes filled up to whole registers.
+    /// `[row][mode]` of the rows that move control points, modes padded to whole registers.
     shapes: Vec<f64>,
-    /// `[mode][row]`, rows filled up to whole registers.
+    /// `[mode][row]`, rows padded to whole registers.
     by_mode: Vec<f64>,
-    /// 0, 1, 2, … of all modes.
+    /// The indices 0, 1, 2, … of all modes.
     all: Vec<usize>,
     instructions: InstructionSet,
     /// Displacements of these rows at the points of the step (m), and velocities at its start (m/s).
     moved: [Vec<f64>; POINTS],
     velocity: Vec<f64>,
-    /// Displacements that forces at each point of the accepted step work on, Σ_k S_ik u_k (m).
+    /// Displacements over which forces at each point of the accepted step do work, Σ_k S_ik u_k (m).
     worked: [Vec<f64>; POINTS],
-    /// Weights of the work of forces at each point of the step that is tried.
+    /// Weights of the work of forces at each point of the tried step.
     pub work_weights: [[f64; POINTS]; POINTS],
     /// δ² per squared impulse on each mode: ½ mean φ²/ω².
     error_form: Vec<f64>,
     impulses: Vec<f64>,
-    /// Modes as each lane sees them in fixed directions, and along its normal; lanes that face this structure, and their directions.
+    /// Modal components of each lane in fixed directions and along its normal; lanes on this structure, and their directions.
     seen: [Vec<f64>; 3],
     along: Vec<f64>,
     obstacle: Vec<bool>,
     frames: Vec<PolarFrame>,
-    /// Modes under a unit of λ of one lane.
+    /// Modal forces per unit of λ of one lane.
     force: Vec<f64>,
 }
 
 impl CarrierIntegrator {
-    /// With polynomials of degree `degree`, seen by sectors of at most so many lanes.
+    /// Creates an integrator with polynomials of degree `degree`, for sectors of at most these lanes.
     pub fn new(structure: usize, bank: &ModalBank, degree: usize, lanes: Lanes) -> Self {
         let coordinates = coordinates(bank);
         let (modes, rows) = (bank.modes(), bank.rows());
@@ -92,7 +92,7 @@ impl CarrierIntegrator {
         &self.moved[point]
     }
 
-    /// The rows at the points 1 … `points` of the step, under the forces set there.
+    /// Computes the rows at the points 1 … `points` of the step, under the forces there.
     pub fn recover(&mut self, points: usize) {
         let Self { by_mode, all, moved: [_, one, two, three], whole, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], one.len(), &all[..]);
@@ -104,7 +104,7 @@ impl CarrierIntegrator {
         }
     }
 
-    /// Displacements and velocities of the rows at the start of a step.
+    /// Finds displacements and velocities of the rows at the start of a step.
     pub fn find_start(&mut self) {
         let Self { by_mode, all, moved: [start, ..], velocity, whole, instructions, .. } = self;
         let (table, stride, columns) = (&by_mode[..], start.len(), &all[..]);
@@ -117,7 +117,7 @@ impl CarrierIntegrator {
         at_place(spot.surface, spot.place, spot.frame, |row| self.velocity[row])
     }
 
-    /// Returns the displacement that a force at point i of the tried step works on at a place (m), in the directions of the node.
+    /// Returns the displacement of a place over which a force at point i of the tried step does work (m), in the directions of the node.
     pub fn sliding_distance_at(&self, spot: Spot, i: usize) -> [f64; 3] {
         let (weights, moved) = (&self.work_weights[i], &self.moved);
         let sliding_distance =
@@ -130,12 +130,12 @@ impl CarrierIntegrator {
         at_place(spot.surface, spot.place, spot.frame, |row| self.moved[point][row])
     }
 
-    /// Returns the displacement that a force at point i of the accepted step works on at a place (m), in the directions of the node.
+    /// Returns the displacement of a place over which a force at point i of the accepted step does work (m), in the directions of the node.
     pub fn worked_at(&self, spot: Spot, i: usize) -> [f64; 3] {
         at_place(spot.surface, spot.place, spot.frame, |row| self.worked[i][row])
     }
 
-    /// Weigh displacements at the points for the work of forces there.
+    /// Computes the weighted displacements for the work of forces at the points.
     pub fn weigh(&mut self, points: usize) {
         let Self { worked, moved, work_weights, .. } = self;
         for (worked, weights) in worked.iter_mut().zip(work_weights).take(points + 1) {
@@ -145,24 +145,24 @@ impl CarrierIntegrator {
         }
     }
 
-    /// The reaction to a force on a node at a place, at point i.
+    /// Adds the reaction to a force on a node at a place, at point i.
     pub fn react(&mut self, spot: Spot, i: usize, force: [f64; 3]) {
         self.find_force(spot, force);
         self.whole.forces_mut(i).iter_mut().zip(&self.force).for_each(|(sum, force)| *sum -= force);
     }
 
-    /// Forget impulses, or add one on a node at a place (N·s).
+    /// Sets the impulses to zero.
     pub fn clear_impulses(&mut self) {
         self.impulses.fill(0.0);
     }
 
-    /// See [`CarrierIntegrator::clear_impulses`].
+    /// Adds an impulse on a node at a place (N·s).
     pub fn add_impulse(&mut self, spot: Spot, impulse: [f64; 3]) {
         self.find_force(spot, impulse);
         self.impulses.iter_mut().zip(&self.force).for_each(|(sum, force)| *sum += force);
     }
 
-    /// Force on the modes by one at a place, in the directions of the node.
+    /// Computes the modal forces of a force at a place, in the directions of the node.
     fn find_force(&mut self, spot: Spot, force: [f64; 3]) {
         let (around, fixed) = (Around::new(spot), spot.frame.fixed(force));
         let rows: [usize; 48] = std::array::from_fn(|i| around.rows[i / 3] + i % 3);
@@ -173,17 +173,17 @@ impl CarrierIntegrator {
         self.instructions.run(Combine { table: &self.shapes, stride, columns, coefficients, sums });
     }
 
-    /// The displacement that these leave (m).
+    /// Displacement error caused by the impulses (m).
     pub fn error(&self) -> f64 {
         self.impulses.iter().zip(&self.error_form).map(|(impulse, form)| impulse * impulse * form).sum::<f64>().sqrt()
     }
 
-    /// No lane faces it yet.
+    /// Removes all lanes from this structure.
     pub fn clear_lanes(&mut self) {
         self.obstacle.fill(false);
     }
 
-    /// A lane of the sector that is solved faces a place, with this normal.
+    /// Assigns a lane of the current sector to a place, with this normal.
     pub fn set_lane(&mut self, lane: usize, spot: Spot, normal: [f64; 3]) {
         let padded = self.force.len();
         (self.obstacle[lane], self.frames[lane]) = (true, spot.frame);
@@ -204,7 +204,8 @@ impl CarrierIntegrator {
         }
     }
 
-    /// By how much it gives way at all lanes (m, along their normals) per λ of one with the force `direction` per λ: added to `carrier_compliance`.
+    /// Adds the displacement at all lanes (m, along their normals) per λ of one lane, whose force per λ is `direction`, to
+    /// `carrier_compliance`.
     pub fn add_normal_compliance(
         &mut self,
         (level, kind): (usize, ForceInterpolation),
@@ -223,7 +224,8 @@ impl CarrierIntegrator {
         }
     }
 
-    /// The same in the directions of each lane, under a `force` on one at the end of the step (N), where that is all there is.
+    /// Adds the displacement in the directions of each lane under a `force` on one lane at the end of the step (N), if the end is
+    /// the only point.
     pub fn add_compliance(
         &mut self,
         at: (usize, ForceInterpolation),
@@ -240,7 +242,7 @@ impl CarrierIntegrator {
         }
     }
 
-    /// Returns the motion of the modes at point i under a force on a lane, in its directions.
+    /// Returns the motion of the modes at point i under a force on a lane, in the directions of the lane.
     fn move_modes(
         &mut self,
         (level, kind): (usize, ForceInterpolation),
@@ -265,7 +267,7 @@ impl CarrierIntegrator {
     }
 }
 
-/// Rows of the control points that make a place, and their weights.
+/// Rows of the control points that define a place, and their weights.
 struct Around {
     rows: [usize; 16],
     weights: [f64; 16],
@@ -284,7 +286,7 @@ impl Around {
     }
 }
 
-/// Scalar product in eight parts.
+/// Scalar product, summed in eight parts.
 fn dot_of(a: &[f64], b: &[f64]) -> f64 {
     let mut parts = [0.0; PADDED];
     for (a, b) in a.as_chunks::<PADDED>().0.iter().zip(b.as_chunks::<PADDED>().0) {

@@ -1,4 +1,4 @@
-//! Sectors that step together: those of one disk, and those that touch a surface which a structure carries.
+//! Sectors that step together: those of one disk, and those that touch a surface carried by a structure.
 
 use super::casing::{CarrierIntegrator, coordinates};
 use super::disk::CoupledDisk;
@@ -19,67 +19,69 @@ use crate::system::obstacle_view::{CarriersInStep, ObstacleView};
 use crate::system::record::SpanRecord;
 use crate::system::{ContactPair, StepFailure, Structure};
 
-/// Most evaluations of the gaps of one trial: others move as well.
+/// Largest number of gap evaluations in one trial; it is larger than for one sector because other sectors move as well.
 const PASSES: usize = 16;
-/// Passes end closer to closed gaps than those of one sector, whose last is exact but for curvature: others have moved since.
+/// Passes end at this fraction of the closed-gap precision, because other sectors have moved since; the last pass of a single
+/// sector is exact except for curvature.
 const CLOSE: f64 = 1e-2;
 
-/// Scratch and tables of a set of structures whose sectors step together; allocates only when made.
+/// Scratch memory and tables of a set of structures whose sectors step together; allocates only on creation.
 #[derive(Debug, Clone)]
 pub struct CoupledSet {
-    /// The set.
+    /// Index of the set.
     pub set: usize,
     pub sectors: Vec<CoupledSector>,
     disks: Vec<CoupledDisk>,
     casings: Vec<CarrierIntegrator>,
-    /// Which of these carries the surface of each pair.
+    /// Index of the casing that carries the surface of each pair.
     casing_of: Vec<Option<usize>>,
-    /// Tables of each touching structure.
+    /// Tables of each structure with contact nodes.
     tables: Vec<Vec<Tables>>,
     pub demand: StepGoal,
     bank: f64,
-    /// Largest energy that this has been compared with (J).
+    /// Largest energy so far, the reference for the energy bank (J).
     largest: f64,
     level: usize,
-    /// Length of the spans that the tables are for (s).
+    /// Length of the spans of the tables (s).
     span: f64,
-    /// No step of the span has been taken.
+    /// True if no step of the span has been accepted.
     fresh: bool,
-    /// The sector that a step has failed for, and whether its gap is no number.
+    /// The sector for which a step has failed, and whether its gap is NaN.
     failed: Option<(usize, bool)>,
 }
 
-/// One sector of a touching structure.
+/// One sector of a structure with contact nodes.
 #[derive(Debug, Clone)]
 pub struct CoupledSector {
     pub structure: usize,
     pub sector: usize,
-    /// Tables of its structure, and which of them are its own.
+    /// Index of the structure's tables, and of the sector's table among them.
     table: [usize; 2],
-    /// Disk of the sector, if its modes are those of a disk.
+    /// Index of the disk, if the modes of the sector belong to a disk.
     disk: Option<usize>,
     trial: Trial,
     state: SectorState,
     advance: Advance,
     pub record: SpanRecord,
-    /// Nothing pushes it, and its gaps are wider than others penetrate: others move it by less in a step.
+    /// True if no force acts on the sector and its gaps are wider than the depth of other sectors' penetration, because other
+    /// sectors move it by less in a step.
     far: bool,
 }
 
-/// Everything that is not scratch.
+/// Parts of the scene that are not scratch memory.
 struct SceneMut<'a> {
     structures: &'a mut [Structure],
     pairs: &'a mut [ContactPair],
 }
 
-/// The set and the scene, as one system with adaptive steps.
+/// The set and the scene, as one system that is integrated with adaptive steps.
 pub struct CoupledStepper<'a> {
     coupled_set: &'a mut CoupledSet,
     world: SceneMut<'a>,
 }
 
 impl CoupledSet {
-    /// Makes the tables of the structures of a set, for spans up to `longest` (s) and errors of `tolerance` (m).
+    /// Creates the tables of the structures of a set, for spans up to `longest` (s) and errors of `tolerance` (m).
     pub fn new(
         set: usize,
         members: &[usize],
@@ -142,7 +144,7 @@ impl CoupledSet {
         }
     }
 
-    /// Tables for spans of length `span` (s).
+    /// Fills the tables for spans of length `span` (s).
     pub fn set_span(&mut self, span: f64) {
         if span.to_bits() == self.span.to_bits() {
             return;
@@ -153,7 +155,7 @@ impl CoupledSet {
         wholes.chain(self.casings.iter_mut().map(|casing| &mut casing.whole)).for_each(|whole| whole.set_span(span));
     }
 
-    /// Why it is not marched to the end.
+    /// Converts the reason why the set was not integrated to the end.
     pub fn failure(&self, stopped: Stopped) -> StepFailure {
         let (index, is_lost) = self.failed.unwrap_or((0, false));
         let Some(CoupledSector { structure, sector, trial, .. }) = self.sectors.get(index) else {
@@ -161,13 +163,13 @@ impl CoupledSet {
         };
         let (structure, sector) = (*structure, *sector);
         match stopped {
-            // The surface is nowhere near.
+            // The node is far from the surface.
             Stopped::Unsolved if is_lost => StepFailure::Implausible { structure, sector },
             _ => failure(stopped, (structure, sector), trial.entered()),
         }
     }
 
-    /// To be marched from where the structures are.
+    /// Starts the integration from the current state of the structures.
     pub fn begin<'a>(
         &'a mut self,
         structures: &'a mut [Structure],
@@ -207,7 +209,7 @@ impl CoupledSet {
     }
 }
 
-/// Modes of the sectors, kind by kind.
+/// Modes of the sectors, one entry per kind of sector.
 fn kinds_of(modes: &Sectors) -> Vec<ContactModes> {
     match modes {
         Sectors::Uncoupled(bank) => {
@@ -222,7 +224,7 @@ fn kinds_of(modes: &Sectors) -> Vec<ContactModes> {
 }
 
 impl CoupledSector {
-    /// It faces its surfaces.
+    /// Returns the sector's view of its surfaces.
     fn obstacle<'a>(
         &'a mut self,
         (structures, pairs): (&'a [Structure], &'a mut [ContactPair]),
@@ -236,7 +238,7 @@ impl CoupledSector {
 }
 
 impl CoupledStepper<'_> {
-    /// All sectors, facing their surfaces and the surfaces' structures at a step; none is far any more.
+    /// Calls `to` for all sectors with their surfaces and surface carriers in a step, after marking all sectors as not far.
     fn each(
         &mut self,
         at: (SpanStep, ForceInterpolation),
@@ -246,7 +248,7 @@ impl CoupledStepper<'_> {
         self.each_of(false, at, to);
     }
 
-    /// The same of sectors that are far, or are not.
+    /// Calls `to` for the sectors that are far or for those that are not.
     fn each_of(
         &mut self,
         far: bool,
@@ -268,7 +270,7 @@ impl CoupledStepper<'_> {
         }
     }
 
-    /// Displacements and velocities of what several sectors see, at the start of a step.
+    /// Finds displacements and velocities of disks and casings at the start of a step.
     fn find_start(&mut self) {
         let CoupledSet { disks, casings, .. } = &mut *self.coupled_set;
         for disk in disks {
@@ -298,7 +300,7 @@ impl CoupledStepper<'_> {
         }
     }
 
-    /// A step begins: prescribed motion at its points, motion without forces, and a guess of these.
+    /// Starts a step: prescribed motion at its points, motion without forces, and an initial guess of the forces.
     fn prepare(&mut self, step: SpanStep, kind: ForceInterpolation) {
         for disk in &mut self.coupled_set.disks {
             disk.whole.begin(step, kind);
@@ -316,12 +318,12 @@ impl CoupledStepper<'_> {
             trial.find_start_gaps(state, |node, moved| obstacle.gap(node, 0, moved).0);
         });
         if self.coupled_set.fresh {
-            // What was handed over before is handed over where nodes are found to be at the start of the span.
+            // Earlier forces are applied at the places of the nodes at the start of the span.
             self.react(0..=0, (step, kind));
         }
     }
 
-    /// Forces at some points of the step are handed to what carries surfaces.
+    /// Applies the forces at some points of the step to the structures that carry surfaces.
     fn react(&mut self, points: std::ops::RangeInclusive<usize>, at: (SpanStep, ForceInterpolation)) {
         for casing in &mut self.coupled_set.casings {
             points.clone().for_each(|point| casing.whole.forces_mut(point).fill(0.0));
@@ -337,7 +339,7 @@ impl CoupledStepper<'_> {
         });
     }
 
-    /// Everything moves under the forces of now.
+    /// Computes the motion of all bodies under the current forces.
     fn push(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) {
         let CoupledSet { disks, sectors, .. } = &mut *self.coupled_set;
         for (number, disk) in disks.iter_mut().enumerate() {
@@ -370,7 +372,8 @@ impl CoupledStepper<'_> {
         }
     }
 
-    /// Gaps at all points, of sectors that are far or are not: the smallest, the largest of a contact that pushes, and whether nothing does.
+    /// Finds the gaps at all points, of sectors that are far or of those that are not. Returns the smallest gap, the largest gap
+    /// of an active contact, and whether no contact is active.
     fn find_gaps(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize, far: bool) -> (f64, f64, bool) {
         if self.coupled_set.casings.is_empty() {
             self.each_of(far, (step, kind), |obstacle, (trial, _), _, _| {
@@ -394,17 +397,17 @@ impl CoupledStepper<'_> {
         found
     }
 
-    /// Tell sectors that are far from those that may touch, where the lowest gap is `lowest` (m).
+    /// Marks the sectors that are far; `lowest` is the lowest gap (m).
     fn separate_far_sectors(&mut self, lowest: f64) {
         for one in &mut self.coupled_set.sectors {
             one.far = one.trial.rests() && one.trial.extremes().0 > -lowest;
         }
     }
 
-    /// Sectors that are far are looked at again. True where one of them touches; it is far no more.
+    /// Rechecks sectors that are far. Returns whether one of them touches; it is then no longer far.
     fn recheck_far_sectors(&mut self, step: SpanStep, kind: ForceInterpolation, points: usize) -> bool {
         let (lowest, ..) = self.find_gaps(step, kind, points, true);
-        // What is no number is found out by the next look at all that are near.
+        // The next evaluation of the near sectors reports NaN gaps.
         let found = lowest.is_nan() || lowest < 0.0;
         for one in self.coupled_set.sectors.iter_mut().filter(|one| one.far) {
             let lowest = one.trial.extremes().0;
@@ -413,7 +416,7 @@ impl CoupledStepper<'_> {
         found
     }
 
-    /// Surfaces that are carried are as at a point of the step.
+    /// Deforms the surfaces as at a point of the step.
     fn bend_surfaces(&mut self, point: usize) {
         let CoupledSet { casings, casing_of, sectors, .. } = &*self.coupled_set;
         for (number, pair) in self.world.pairs.iter_mut().enumerate() {
@@ -423,12 +426,12 @@ impl CoupledStepper<'_> {
         }
     }
 
-    /// The first sector of which this holds is what the step fails for.
+    /// Stores the first sector for which `holds` is true as the cause of the failure.
     fn blame(&mut self, holds: impl Fn(&CoupledSector) -> bool, is_lost: bool) {
         self.coupled_set.failed = self.coupled_set.sectors.iter().position(holds).map(|index| (index, is_lost));
     }
 
-    /// Forces that close what penetrates, sector by sector.
+    /// Finds forces that remove penetration, sector by sector.
     fn solve(&mut self, step: SpanStep, kind: ForceInterpolation, verdict: &mut TrialResult) -> bool {
         let (mut solved, mut failed) = (true, None);
         self.each_of(false, (step, kind), |obstacle, (trial, _), tables, _| {
@@ -445,7 +448,7 @@ impl CoupledStepper<'_> {
         solved
     }
 
-    /// Error, switches and near misses of all.
+    /// Finds error, switches and near misses of all sectors.
     fn judge(&mut self, step: SpanStep, points: usize, verdict: &mut TrialResult) {
         self.coupled_set.casings.iter_mut().for_each(CarrierIntegrator::clear_impulses);
         self.coupled_set.disks.iter_mut().for_each(|disk| disk.error = 0.0);
@@ -453,7 +456,7 @@ impl CoupledStepper<'_> {
             let mut own = TrialResult::default();
             trial.judge((&tables.levels[step.level], &tables.rows), obstacle, &mut own);
             match disk {
-                // What one sector leaves all of them swing by.
+                // The error of one sector makes all sectors of its disk vibrate.
                 Some(disk) => disk.error = disk.error.hypot(own.error),
                 None => verdict.error = verdict.error.max(own.error),
             }
@@ -476,7 +479,7 @@ impl CoupledStepper<'_> {
         verdict.error = errors.fold(verdict.error, f64::max);
     }
 
-    /// The state goes back to the structures. Work of loads on the way (J).
+    /// Writes the state to the structures and returns the work of loads during the span (J).
     pub fn finish(self) -> f64 {
         let mut load_work = 0.0;
         let Self { coupled_set, world: SceneMut { structures, .. } } = self;
@@ -626,14 +629,14 @@ impl AdaptiveStepper for CoupledStepper<'_> {
             });
         });
         self.accept_states(step, kind);
-        // What gaps within the precision of contacts that stay closed give is paid as well.
+        // The energy supplied by gaps within the precision of contacts that stay closed comes from the bank as well.
         let after: f64 = self.coupled_set.sectors.iter().map(|one| one.record.work.closing).sum();
         if kind == ForceInterpolation::Constant { dropped + closed } else { after - before }
     }
 }
 
 impl CoupledStepper<'_> {
-    /// Find gaps within a step of free flight, where a node may come closer there than at its ends.
+    /// Finds gaps within a step of free flight if a node may come closer there than at its ends.
     fn pass(&mut self, step: SpanStep) {
         let mut closer = false;
         self.each((step, ForceInterpolation::Polynomial), |obstacle, _, _, disk| {
@@ -654,7 +657,7 @@ impl CoupledStepper<'_> {
         });
     }
 
-    /// All states go to the end of the step.
+    /// Advances all states to the end of the step.
     fn accept_states(&mut self, step: SpanStep, kind: ForceInterpolation) {
         self.coupled_set.fresh = false;
         for one in &mut self.coupled_set.sectors {

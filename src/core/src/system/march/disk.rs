@@ -1,4 +1,4 @@
-//! A disk of coupled sectors, over the steps that its sectors take together.
+//! A disk of coupled sectors, during the steps that its sectors take together.
 
 use crate::dynamics::cyclic::CyclicBank;
 use crate::dynamics::sectors::Sectors;
@@ -9,7 +9,7 @@ use crate::system::Structure;
 /// A disk of coupled sectors.
 #[derive(Debug, Clone)]
 pub struct CoupledDisk {
-    /// Which structure.
+    /// Index of the structure.
     pub structure: usize,
     /// Modes of the disk.
     pub whole: SharedBody,
@@ -25,7 +25,7 @@ pub struct CoupledDisk {
 }
 
 impl CoupledDisk {
-    /// Makes the tables of a structure, with polynomials of degree `degree`.
+    /// Creates the tables of a structure, with polynomials of degree `degree`.
     pub fn new(structure: usize, bank: &CyclicBank, degree: usize) -> Self {
         let (coordinates, shapes) = bank.coordinates_of();
         let rows = bank.rows() * bank.lanes();
@@ -41,7 +41,7 @@ impl CoupledDisk {
         }
     }
 
-    /// State of the structure, before a span.
+    /// Reads the state of the structure, before a span.
     pub fn read(&mut self, structure: &mut Structure) {
         let (forces, lanes, nodes) = (&structure.history.force.now, structure.lanes(), structure.nodes());
         let Sectors::Coupled(bank) = &mut structure.modes else { return };

@@ -1,4 +1,4 @@
-//! Many spans at once: blades that rest, but for less than the tolerance, and that nothing comes near.
+//! Free flight over many spans: blades whose vibration is below the tolerance and that nothing comes near.
 
 use super::Galerkin;
 use crate::dynamics::sectors::Sectors;
@@ -7,9 +7,9 @@ use crate::gaps::wrench::At;
 use crate::system::{ContactPair, Structure, System};
 
 impl System {
-    /// Fly for `length` (s) to the instant described by `drives`, rotors turned by `turns` against the shapes (rad), both one per pair;
-    /// on the way prescribed motion is linear in time, but for the rotor's. False where something may come near, or where blades swing
-    /// by more than the tolerance: nothing has moved then.
+    /// Advances all sectors in free flight by `length` (s) to the time described by `drives`; rotors turn by `turns` relative to
+    /// the shapes (rad), with one entry of both per pair. During the flight, prescribed motion is linear in time, except that of
+    /// the rotor. Returns false, without any change, if something may come near or if blades vibrate by more than the tolerance.
     pub(crate) fn fly(&mut self, drives: &[PrescribedMotion], turns: &[f64], length: f64) -> bool {
         let Self { structures, pairs, .. } = self;
         for structure in structures.iter_mut() {
@@ -40,8 +40,8 @@ impl System {
 }
 
 impl Structure {
-    /// Whether no sector touches anything, swings by more than the tolerance or meets anything on the way; the smallest gaps are then
-    /// those of the way.
+    /// Returns whether no sector touches anything, vibrates by more than the tolerance or can touch during the flight; `lowest`
+    /// then contains the smallest gaps during the flight.
     fn is_free(
         &self,
         galerkin: &mut Galerkin,
@@ -67,7 +67,7 @@ impl Structure {
         })
     }
 
-    /// Take all sectors along; how many there are.
+    /// Advances all sectors and returns their number.
     fn fly(&mut self, galerkin: &mut Galerkin, length: f64) -> u64 {
         self.begin_span();
         let sectors = self.modes().sectors();

@@ -1,10 +1,10 @@
-//! Contact without friction: W symmetric but for what turning adds, and positive semidefinite of any rank. A solution exists
-//! wherever some motion opens all contacts at once, and is found.
+//! Contact without friction: W is symmetric except for effects of rotation, and positive semidefinite of any rank. A solution exists if
+//! some motion opens all contacts simultaneously, and it is found.
 
 use super::*;
 use proptest::test_runner::TestCaseResult;
 
-/// Numbers from −1 to 1.
+/// Random numbers from −1 to 1.
 struct SignedRandom(u64);
 
 impl SignedRandom {
@@ -15,13 +15,13 @@ impl SignedRandom {
     fn unit(&mut self) -> f64 {
         0.5 * (self.signed() + 1.0)
     }
-    /// Evenly in the logarithm, so many powers of ten to either side of 1.
+    /// Returns a number that is uniformly distributed in its logarithm, this number of decades on either side of 1.
     fn scale(&mut self, decades: f64) -> f64 {
         libm::exp10(decades * self.signed())
     }
 }
 
-/// What makes W hard.
+/// Property of W that makes the problem hard.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum HardMatrix {
     Regular,
@@ -29,15 +29,15 @@ enum HardMatrix {
     /// Own flexibilities over six powers of ten.
     StiffBesideSoft,
     StiffBesideSoftFewModes,
-    /// Half of the contacts nearly as the other half.
+    /// One half of the contacts nearly equal to the other half.
     NearlyTwice,
     Twice,
     /// Modes over sixteen powers of ten.
     StiffModes,
     StiffModesFew,
-    /// Smooth shapes of few waves.
+    /// Smooth shapes with few waves.
     Smooth,
-    /// With the skew part of turning structures.
+    /// With the skew-symmetric part of rotating structures.
     Turning,
 }
 
@@ -91,7 +91,7 @@ impl HardMatrix {
     }
 }
 
-/// Gaps that some forces open, a third of the contacts that carry nothing at exactly zero.
+/// Returns gaps that some forces open; a third of the contacts without force are exactly at zero.
 fn solvable_gaps(w: &DMatrix<f64>, random: &mut SignedRandom) -> Vec<f64> {
     let n = w.nrows();
     let forces: Vec<f64> =
@@ -101,7 +101,7 @@ fn solvable_gaps(w: &DMatrix<f64>, random: &mut SignedRandom) -> Vec<f64> {
     (0..n).map(|node| gap(node) - opened(node)).collect()
 }
 
-/// Signorini's law, up to a share of what the gaps are made of.
+/// Checks Signorini's law, up to a fraction of the terms that the gaps consist of.
 fn check(w: &DMatrix<f64>, gaps: &[f64], solver: &ContactSolver) -> TestCaseResult {
     let scale = gaps.iter().fold(0.0_f64, |most, gap| most.max(gap.abs()));
     for (node, gap) in gaps.iter().enumerate() {
@@ -140,7 +140,7 @@ fn solves_every_solvable_frictionless_problem() {
     }
 }
 
-/// One mode that opens either contact closes the other; and three contacts of which forces 1, 1, 1 move nothing.
+/// One mode that closes one contact when it opens the other; and three contacts on which the forces 1, 1, 1 cause no motion.
 #[test]
 fn contacts_that_cannot_open_together_are_reported_unsolved() {
     let second = [[2.0, -1.0, -1.0], [-1.0, 2.0, -1.0], [-1.0, -1.0, 2.0]].concat();
@@ -158,7 +158,7 @@ fn contacts_that_cannot_open_together_are_reported_unsolved() {
             assert!(!outcome.solved, "{matrix:?}, {gaps:?}: {:?}", solver.multipliers);
         }
     }
-    // As much room as they need.
+    // Exactly the capacity that they need.
     let mut solver = ContactSolver::new(2);
     solver.monotone = true;
     solver.delassus.copy_from_slice(&[1.0, -1.0, -1.0, 1.0]);

@@ -6,7 +6,7 @@ use crate::laws::coating::{Branch, CellContact};
 /// Pivots below this fraction of their column belong to redundant contacts (coincident nodes).
 const REDUNDANT_PIVOT: f64 = 1e-12;
 impl CoatedProblem {
-    /// Gaps and forces for the present branches; redundant contacts are softened first.
+    /// Solves for gaps and forces of the present branches; redundant contacts are softened first.
     pub(super) fn solve_branches(&mut self) -> bool {
         if self.solve_linear() {
             return true;
@@ -32,7 +32,7 @@ impl CoatedProblem {
         regular
     }
 
-    /// Only nodes that carry force need an equation; the others follow.
+    /// Finds the nodes with force; only they need an equation.
     fn find_members(&mut self) {
         self.slot[..self.size].fill(usize::MAX);
         self.members.clear();
@@ -49,7 +49,7 @@ impl CoatedProblem {
         (0..self.size).filter(|node| self.closed[*node]).for_each(&mut add);
     }
 
-    /// g − Wλ = g_p, one unknown per node: the gap where it is open, λ where it is closed and g = −h₀.
+    /// Fills in g − Wλ = g_p, with one unknown per node: the gap if it is open, λ if it is closed and g = −h₀.
     fn fill_nodes(&mut self) {
         for (row, i) in self.members.iter().enumerate() {
             self.right[row] = self.gaps[*i] + if self.closed[*i] { self.thickness } else { 0.0 };
@@ -60,7 +60,7 @@ impl CoatedProblem {
         }
     }
 
-    /// Add − W Nᵀ(f − kNg) of one rod.
+    /// Adds − W Nᵀ(f − kNg) of one rod.
     fn fill_rod(&mut self, index: usize) {
         let CellContact { nodes, weights, area, plastic, branch, .. } = self.contacts[index];
         if branch == Branch::Free {
@@ -82,7 +82,7 @@ impl CoatedProblem {
         }
     }
 
-    /// Gaussian elimination with row exchanges; the solution is left in `right`.
+    /// Solves by Gaussian elimination with row exchanges; `right` contains the solution on return.
     fn eliminate(&mut self) -> bool {
         let count = self.members.len();
         for column in 0..count {
@@ -91,7 +91,7 @@ impl CoatedProblem {
         for rank in 0..count {
             let size = |row: usize| self.factor[(row, rank)].abs();
             let pivot = (rank..count).fold(rank, |best, row| if size(row) > size(best) { row } else { best });
-            // Also false at a node without any flexibility (0) and at values that are not numbers.
+            // Also false at a node without any flexibility (0) and for NaN.
             let regular = size(pivot) > REDUNDANT_PIVOT * self.column_scale[rank];
             if !regular {
                 return false;
@@ -109,7 +109,7 @@ impl CoatedProblem {
         true
     }
 
-    /// Subtract row `rank` from those below it, column by column as they lie in memory.
+    /// Subtracts row `rank` from the rows below it, column by column in storage order.
     fn reduce(&mut self, rank: usize, count: usize) {
         let stride = self.factor.nrows();
         let pivot = self.factor[(rank, rank)];
@@ -137,7 +137,7 @@ impl CoatedProblem {
         }
     }
 
-    /// From the solution of the members to gaps and forces of all nodes.
+    /// Computes gaps and forces of all nodes from the solution of the members.
     fn distribute(&mut self) {
         self.coating[..self.size].fill(0.0);
         self.hard[..self.size].fill(0.0);

@@ -1,10 +1,10 @@
-//! More nodes than modes on a coating: W singular, without friction. What can be solved is.
+//! More nodes than modes on a coating: W is singular, without friction. Solvable problems are solved.
 
 use nalgebra::DMatrix;
 
 use super::*;
 
-/// Numbers from 0 to 1.
+/// Random numbers from 0 to 1.
 struct UnitRandom(u64);
 
 impl UnitRandom {
@@ -77,7 +77,7 @@ fn solves_every_solvable_frictionless_coating_problem() {
     assert!(failures.is_empty(), "{} of 4800:\n{}", failures.len(), failures[..failures.len().min(20)].join("\n"));
 }
 
-/// One mode takes either node out of the hard casing as far as it takes the other in.
+/// One mode moves either node out of the hard casing as far as it moves the other in.
 #[test]
 fn rejects_nodes_stuck_on_the_hard_casing() {
     for monotone in [false, true] {

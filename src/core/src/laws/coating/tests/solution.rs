@@ -68,7 +68,7 @@ proptest! {
         problem.gaps.copy_from_slice(&gaps[..n]);
         problem.closed.copy_from_slice(&guess[..n]);
         let expected = every_combination(&coating, &problem.contacts, &w, &gaps[..n]);
-        // The path alone finds the same as block exchanges.
+        // The path alone finds the same solution as block exchanges.
         let solved = if block { problem.solve().solved } else { problem.guess(); problem.follow_path() };
         prop_assert!(solved);
         for node in 0..n {
@@ -80,7 +80,7 @@ proptest! {
             prop_assert!(problem.gaps[node] >= -THICKNESS && problem.hard[node] >= 0.0);
             prop_assert!(problem.hard[node] == 0.0 || problem.gaps[node] == -THICKNESS);
         }
-        // Once worn, the same prediction ends at the same place on the border of elastic and plastic.
+        // After wear, the same prediction ends at the same place on the border between elastic and plastic.
         coating.commit(&problem);
         let forces = problem.coating.clone();
         problem.clear();
@@ -133,7 +133,7 @@ proptest! {
             prop_assert!(problem.gaps[i] >= -THICKNESS && problem.hard[i] >= 0.0);
             prop_assert!(problem.hard[i] == 0.0 || problem.gaps[i] == -THICKNESS);
         }
-        // The path is another way to the same point.
+        // Following the path leads to the same solution.
         let solution = problem.gaps.clone();
         problem.gaps.copy_from_slice(&gaps[..4 * blades]);
         problem.guess();
@@ -178,7 +178,7 @@ fn every_combination(coating: &Coating, cells: &[CellContact], w: &DMatrix<f64>,
         right.rows_mut(0, n).copy_from_slice(gaps);
         for (row, cell) in cells.iter().enumerate() {
             let RodMaterial { modulus: e, yield_stress: y, hardening: k } = coating.rod;
-            // F = area·(stress at zero strain + tangent·strain), written out anew.
+            // F = area·(stress at zero strain + tangent·strain), implemented independently.
             let (stress, tangent) =
                 [(0.0, 0.0), (-e * cell.plastic, e), (e * y / (e + k), e * k / (e + k))][branches[row]];
             system[(n + row, n + row)] = 1.0;
@@ -203,7 +203,7 @@ fn every_combination(coating: &Coating, cells: &[CellContact], w: &DMatrix<f64>,
     best.1
 }
 
-/// Largest amount by which a solution breaks the conditions of its branches.
+/// Largest violation of the conditions of the branches by a solution.
 fn violation(
     coating: &Coating,
     cells: &[CellContact],
@@ -222,7 +222,7 @@ fn violation(
     rods.chain(nodes).fold(0.0, f64::max)
 }
 
-/// Rods that all reach the ends of their branches together, first unworn, then where wear has just stopped.
+/// Rods that reach the ends of their branches together, first unworn, then when wear has just stopped.
 #[test]
 fn path_handles_simultaneous_transitions_of_equal_rods() {
     let settings = material(50.0, 3.0, 5.0, 8, 20);
@@ -259,7 +259,7 @@ fn stiff_and_soft_limits_are_hard_contact_and_no_contact() {
         assert!(problem.solve().solved);
         problem
     };
-    // Rows at the nodes: the hard contact of each node. Rows beside them: that of the interpolated gaps.
+    // Rows at the nodes: the hard contact of each node. Rows beside the nodes: the hard contact of the interpolated gaps.
     for extent in [[-0.5, 2.5], [-0.2, 2.2]] {
         let rows = solve(1.0, extent).contacts;
         let mut n = DMatrix::zeros(3, 3);
@@ -302,7 +302,7 @@ fn redundant_nodes_share_the_hard_contact() {
     assert!((total - (5.0 - THICKNESS) / 0.5).abs() < 1e-8, "{total}");
 }
 
-/// Lengths across the coating a power of two as long: the same way, to the last bit.
+/// Lengths across the coating multiplied by a power of two: the same path, to the last bit.
 #[test]
 fn path_is_independent_of_the_unit_of_length() {
     let mut random = SeededRandom(12);
@@ -327,7 +327,7 @@ fn path_is_independent_of_the_unit_of_length() {
     }
 }
 
-/// Nodes in a ring, alike and pressed alike, that push one neighbour out and draw the other in: many rods end together, again and again.
+/// Equal nodes in a ring with equal loads, which push one neighbour out and draw the other in: many rods end together, again and again.
 #[test]
 fn path_does_not_cycle_when_rods_move_identically() {
     for (n, modulus, yields, pushes, draws) in [(3, 8.0, 0.25, 1.25, -0.75), (4, 64.0, 0.5, 1.75, -2.25)] {
@@ -353,7 +353,7 @@ fn path_does_not_cycle_when_rods_move_identically() {
     }
 }
 
-/// Rods that load and unload again: more exchanges than they have branches.
+/// Rods that load and unload again: more exchanges than rods have branches.
 #[test]
 fn path_is_followed_through_repeated_unloading() {
     let mut random = SeededRandom(77);
